@@ -1,9 +1,9 @@
-"""Scalars that record what is computed with them, and the back ends that run the record.
+"""Scalars that record the computations done with them.
 
-`graph` holds the record, `functions` what models call; both are here. `noise` draws random numbers. `program` has
-phases under a little control flow over a case's memory; `reference` runs a program over plain floats, `llvm` makes
-machine code of it, `c` writes it as C: those are imported from their own modules, so that checking a deck does not
-load them.
+`graph` holds the record, `functions` the functions that models call; both are exported here. `noise` draws random
+numbers. `program` has phases under a little control flow over a case's memory; `reference` runs a program over plain
+floats, `llvm` makes machine code of it, `c` writes it as C: those are imported from their own modules, so that checking
+a deck does not load them.
 """
 
 from met.trace.functions import (

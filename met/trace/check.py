@@ -1,6 +1,6 @@
-"""Checks of a recording that back ends rely on: made between the passes, in tests and wherever it is wanted.
+"""Checks of a recording that back ends rely on: made between the passes, in tests and on request.
 
-`MET_CHECK_RECORDINGS=1` in the environment turns it on. A pass that leaves a recording that is none is a defect of MET.
+`MET_CHECK_RECORDINGS=1` in the environment turns it on. A pass that leaves an invalid recording is a defect of MET.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from met.trace.recording import Branch, CodeSection, RecordedControl, Recording
 
 # operands that are truths, by operation and position; all others are numbers
 _TRUTH_OPERANDS = {("and", 1), ("and", 2), ("where", 1)}
-# what follows the operands of a node
+# types of the further arguments after the operands of a node
 _REST = {"const": float, "input": str, "cell": str, "bit": int, "flip": int, "gather": tuple, "philox": int}
 
 
 def wanted() -> bool:
-    """True where recordings are to be checked."""
+    """True where recordings should be checked."""
     return os.environ.get("MET_CHECK_RECORDINGS") == "1"
 
 
 def check(recording: Recording) -> None:
-    """Raises ValueError with what is wrong."""
+    """Raise ValueError with the fault of an invalid recording."""
     program = recording.program
     cells = set(recording.cells)
     if len(cells) != len(recording.cells):
@@ -40,7 +40,7 @@ def check(recording: Recording) -> None:
 
 
 def check_nodes(where: str, nodes: Sequence[Node]) -> None:
-    """Raises ValueError where one of these nodes is none, or takes what comes after it, or a truth for a number."""
+    """Raise ValueError where one of these nodes is invalid, takes a later node, or a truth for a number."""
     for i, node in enumerate(nodes):
         op = node[0]
         if op not in OPERANDS:

@@ -1,7 +1,7 @@
 """Counts of a program's loops: the same program with counters in every `WhileAny`.
 
-A loop runs for a whole block of cases as long as one of them asks, so its counters are a block's: all cases of a
-block count alike, and what a case computes is left as it was.
+A loop runs for a whole block of cases as long as one of them needs it, so its counters are a block's: all cases of a
+block count alike, and the results of cases do not change.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from met.trace.program import Control, Every, Phase, Program, RunPhase, Tape, Un
 
 @frozen
 class Loop:
-    """A loop of a program: the cell that it goes by, and the outputs that count it.
+    """A loop of a program: the cell that controls it, and the outputs that count it.
 
     entries   times that it was come to and ran at all
     turns     times that its body ran
@@ -29,7 +29,7 @@ class Loop:
 
 
 def counting(program: Program) -> tuple[Program, tuple[Loop, ...]]:
-    """The program with two more outputs a loop, and its loops in order of control (start, tick, end)."""
+    """The program with two more outputs for each loop, and its loops in order of control (start, tick, end)."""
     loops: list[Loop] = []
 
     def counted(body: tuple[Control, ...], outer: bool) -> tuple[Control, ...]:

@@ -1,10 +1,10 @@
 """Derivatives of recorded numbers by their inputs, or along a direction: forward, node by node, in the graph itself.
 
-They are those of the pieces: of `where` the derivative of what is chosen, so at a kink or a jump that of the side which
-the condition takes there; of `floor`, `rint`, tables and random numbers none. Of sin, cos, exp and their like it is the
-derivative of the polynomial that stands for them, right to some units in the last place of the function's own size.
+They are taken piece by piece: `where` has the derivative of the chosen operand, so at a kink or a jump that of the side
+which the condition takes there; `floor`, `rint`, tables and random numbers have none. The derivative of sin, cos, exp
+and the like is that of their polynomials, right to some units in the last place of the function's own size.
 
-For what is not recorded: record it, and `Formulas.replay` the derivative over floats or arrays.
+For plain functions: record them, and `Formulas.replay` the derivative over floats or arrays.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from met.trace.nodes import OPERANDS, TRUTHS, ZERO, Node, Nodes
 from met.trace.scalar import Scalar
 
 ROUNDS = 2.0**51
-"""A sum with a constant of this size or more is whole, or half of it: so functions round (met/trace/elementary.py)."""
+"""A sum with a constant of at least this size is whole, or half of it, by which functions round
+(met/trace/elementary.py)."""
 
 
 def derivative(x: Scalar, name: str) -> Scalar:
@@ -33,7 +34,7 @@ def slopes(
     straight: Callable[[int], bool] = lambda _: False,
     known: KnownTangents | None = None,
 ) -> dict[int, int]:
-    """References of the derivatives of nodes by position, made in the same graph; a truth's is 0.
+    """References of the derivatives of nodes by position, made in the same graph; that of a truth is 0.
 
     order     positions of the nodes, each after its operands
     leaf      gives the reference of a leaf's own derivative
@@ -79,7 +80,8 @@ STEPS = ("floor", "rint")
 """Operations that give whole numbers: a converter's steps."""
 
 Rule = Callable[[Nodes, list[int], Scalar, list[Scalar], list[Scalar]], Scalar]
-"""(graph, what stands behind the operands, the node, its operands, their derivatives) -> its derivative."""
+"""A function (graph, further arguments of the node, the node, its operands, their derivatives) -> the node's
+derivative."""
 
 
 def _flip(graph: Nodes, sign: Scalar, move: Scalar, bit: int) -> Scalar:
@@ -87,8 +89,8 @@ def _flip(graph: Nodes, sign: Scalar, move: Scalar, bit: int) -> Scalar:
 
 
 def sign_of(graph: Nodes, chosen: Sequence[int]) -> int | None:
-    """The reference of the number of which a `where` of these operands is the sign, 1, -1 or the number itself where it
-    is 0: there it jumps, and else it rests. None: it is no sign."""
+    """The reference of the number whose sign a `where` of these operands is (1, -1, or the number itself where it is
+    0): the sign jumps there, and is constant elsewhere. None: it is not a sign."""
     mask, above, rest = chosen
     condition, inner = graph.nodes[mask >> 1], graph.nodes[rest >> 1]
     if mask & 1 or condition[:2] != ("lt", ZERO) or graph.value(above) is None or inner[0] != "where" or inner[1] & 1:
@@ -116,4 +118,4 @@ _RULES: dict[str, Rule] = {
     "where": lambda g, _, y, x, dx: _choice(g, x, dx),
     "significand": lambda g, _, y, x, dx: dx[0] * (y / x[0]),
 }
-"""Rules of differentiation by operation. Those not here have no derivative, or none but at jumps."""
+"""Rules of differentiation by operation. Operations without a rule have no derivative, or one only between jumps."""

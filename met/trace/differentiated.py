@@ -1,7 +1,7 @@
-"""A recorded program that also computes how its outputs move with some of its inputs: as another recorded program.
+"""Differentiation of a recorded program: another one that also computes tangents of its outputs by some inputs.
 
-An input NAME that moves has a second one, `d:NAME`, its tangent; a cell and an output likewise. A case of the made
-program is a case of the first one and a direction, so directions stand in lanes as cases do, and every back end runs
+An input NAME that moves has a second one, `d:NAME`, its tangent; a cell and an output likewise. A case of the new
+program is a case of the first one with a direction, so directions stand in lanes as cases do, and every back end runs
 them. The numbers of the first program are computed by the same operations, with the same bits: its sums are fused as
 they are there, and those of tangents after them.
 """
@@ -22,8 +22,8 @@ from met.trace.tangents import HEAD, Straight, moved_by, moving_nodes, with_tang
 
 
 def differentiated(recording: Recording, inputs: Collection[str], straight: Straight) -> Recording:
-    """The program with tangents of all that moves with these inputs. Nothing is recorded; an output that moves with
-    nothing has the tangent 0."""
+    """The program with tangents of everything that moves with these inputs. No phase is recorded again; an output that
+    does not move has the tangent 0."""
     program = recording.program
     moving = moving_cells(recording, inputs, straight)
     made = [_section(one, moving, inputs, straight, len(program.outputs)) for one in recording.sections]
@@ -79,8 +79,8 @@ def dependence(recording: Recording, name: str, straight: Straight) -> Dependenc
 
 
 def _closed(recording: Recording, found: set[str], more: Callable[[CodeSection], Iterable[str]]) -> frozenset[str]:
-    """All cells that are found from those found before, section by section; a section is looked at again only where it
-    reads one that is new."""
+    """All cells that follow from those found before, section by section; a section is examined again only where it
+    reads a new one."""
     reads = [{one.nodes[i][1] for i in one.order if one.nodes[i][0] == "cell"} for one in recording.sections]
     waiting = list(range(len(recording.sections)))
     while waiting:
@@ -117,8 +117,8 @@ def _section(
     straight: Straight,
     outputs: int,
 ) -> CodeSection:
-    """A section with tangents as stores and outputs of their own; what is stored and does not move has the tangent 0
-    from then on, where it may have had another."""
+    """A section with tangents as stores and outputs of their own; a cell whose new value does not move gets the tangent
+    0, since it may have had another."""
     found = with_tangents(section, moving, straight, inputs)
     tangents, of_outputs = dict(found.tangents), dict(found.output_tangents)
     stores = (

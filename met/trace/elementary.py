@@ -1,4 +1,4 @@
-"""sin, cos, exp, log, atan2 and their like as recorded primitives: what makes every back end agree to the bit.
+"""sin, cos, exp, log, atan2 and the like as recorded primitives, by which all back ends agree to the bit.
 
 Arguments are reduced with fused multiply-adds, then polynomials. sin and cos of one argument share everything but a
 choice. Errors over the whole range, in units in the last place, are tested against 60 digits and more
@@ -17,12 +17,12 @@ from collections.abc import Sequence
 from met.trace.primitives import exact_sum
 from met.trace.scalar import Mask, Scalar
 
-# pi/2 in three parts, each the double nearest to what is left; the first product with a whole number is then exact
+# pi/2 in three parts, each the double nearest to the remainder; the first product with a whole number is then exact
 _QUARTER = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591698e-33)
 # 1.5 * 2^52: added, a number is rounded to a whole one, whose lowest bits are the sum's
 _ROUND = 6755399441055744.0
 
-# up to here sin, cos and tan are what they claim; a turn is then less than 200 steps of the angle itself
+# up to here sin, cos and tan have the stated accuracy; a turn is then less than 200 steps of the angle itself
 FARTHEST = 2.0**48
 
 _SIN = (
@@ -117,10 +117,10 @@ def _polynomial(coefficients: Sequence[float], z: Scalar) -> Scalar:
 
 
 def _quadrant(x: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """(t, s, c): the number of quarter turns in t's lowest bits, sine and cosine of what is left of x.
+    """(t, s, c): the number of quarter turns in t's lowest bits, and sine and cosine of the remainder of x.
 
-    What is left is right to a unit in its last place up to |x| = FARTHEST. Beyond 2^51 it is anything: a check would
-    cost three operations for every joint that turns, and no angle of an arm gets near.
+    The remainder is right to a unit in its last place up to |x| = FARTHEST. Beyond 2^51 it is meaningless: a check
+    would cost three operations for every joint that turns, and no angle of an arm gets near.
     """
     t = _fma(x, 2.0 / math.pi, _ROUND)
     k = t - _ROUND
@@ -134,13 +134,13 @@ def _quadrant(x: Scalar) -> tuple[Scalar, Scalar, Scalar]:
 
 
 def sin(x: Scalar) -> Scalar:
-    """The sine of x rad, |x| <= 2^48: beyond it is worth less and less, from 2^51 on nothing; of infinity no number."""
+    """The sine of x rad, |x| <= 2^48: accuracy falls beyond, and is lost from 2^51 on; not-a-number for infinity."""
     t, s, c = _quadrant(x)
     return _flip(_where(_bit(t, 0), c, s), t, 1)
 
 
 def cos(x: Scalar) -> Scalar:
-    """The cosine of x rad, |x| <= 2^48: beyond, as for the sine."""
+    """The cosine of x rad, |x| <= 2^48; beyond, as for the sine."""
     t, s, c = _quadrant(x)
     return _flip(_where(_bit(t, 0), s, c), t + 1.0, 1)
 
@@ -148,7 +148,7 @@ def cos(x: Scalar) -> Scalar:
 def tan(x: Scalar) -> Scalar:
     """The tangent of x rad; not a number where |x| > 2^48.
 
-    A quotient shows the errors of both its parts, so what is left of x is carried as a sum here, r + rest.
+    A quotient shows the errors of both its parts, so the remainder of x is carried as a sum here, r + rest.
     """
     t = _fma(x, 2.0 / math.pi, _ROUND)
     k = t - _ROUND
@@ -186,7 +186,7 @@ def exp(x: Scalar) -> Scalar:
 
 
 def log(x: Scalar) -> Scalar:
-    """The natural logarithm: minus infinity at 0, not a number below."""
+    """The natural logarithm: minus infinity at 0, not-a-number below."""
     small = x < 2.0**-1022
     scaled = _where(small, x * 2.0**54, x)
     k = _unary("exponent", scaled) - _where(small, 54.0, 0.0)
@@ -218,10 +218,10 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     a, b = abs(y), abs(x)
     steep = a > b
     less, more = _where(steep, b, a), _where(steep, a, b)
-    # by a power of two: no sum overflows, and the bound of `upper` is no number of few bits
+    # scaled by a power of two: no sum overflows, and the bound of `upper` does not underflow
     scale = _where(more > 2.0**500, 2.0**-64, 2.0**64)
     less, more = less * scale, more * scale
-    # the polynomial holds up to 7/16; above, what is left of the angle beyond atan(1/2), whose numerator is exact
+    # the polynomial holds up to 7/16; above, the rest of the angle beyond atan(1/2), whose numerator is exact
     equal = less == more
     upper = (less > more * 0.4375) | (less == math.inf)
     beyond, around = _where(equal, 1.0, 2.0 * less - more), _where(equal, 3.0, 2.0 * more + less)
@@ -250,5 +250,5 @@ def acos(x: Scalar) -> Scalar:
 
 
 def _other_leg(x: Scalar) -> Scalar:
-    """sqrt(1 - x^2): rounded twice only, so it is as right where x is nearly 1."""
+    """sqrt(1 - x^2): rounded only twice, so it is accurate where x is nearly 1 too."""
     return _unary("sqrt", _fma(-x, x, 1.0))

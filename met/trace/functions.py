@@ -1,10 +1,10 @@
 """The functions that models use, over plain numbers and over recorded ones.
 
 Over floats (and arrays) they give the plain result of IEEE arithmetic and never raise: sin(inf) and sqrt(-1) are not
-numbers, and neither is tan of an angle beyond 2^48 rad. Over scalars they are recorded; sin, cos and
-their like become primitives, so that every back end has the same bits (met/trace/elementary.py). Plain results are
-np.float64, so that what a model does with them does not raise either (1.0 / floor(0.5) is infinite). Not-a-number
-survives `minimum`, `maximum` and `clip`: a limit never hides it.
+numbers, and neither is tan of an angle beyond 2^48 rad. Over scalars they are recorded; sin, cos and their like become
+primitives, so that every back end has the same bits (met/trace/elementary.py). Plain results are np.float64, so that a
+model's further arithmetic does not raise either (1.0 / floor(0.5) is infinite). Not-a-number survives `minimum`,
+`maximum` and `clip`: a limit never hides it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from met.trace.scalar import Mask, Scalar
 
 
 def _graph_of(*values: Any) -> Nodes | None:
-    """The graph that the values are recorded in, None where all are plain."""
+    """The graph in which the values are recorded; None where all are plain."""
     for value in values:
         if value.__class__ is Scalar or value.__class__ is Mask:
             return value.graph
@@ -43,7 +43,7 @@ def _ref(graph: Nodes, value: Any) -> int:
 
 
 def _plain(name: str, *values: Any) -> Any:
-    """A primitive of plain numbers or of arrays."""
+    """The plain form of a primitive, for numbers or arrays."""
     if any(isinstance(value, np.ndarray) for value in values):
         with np.errstate(all="ignore"):
             return ARRAYS[name](*values)
@@ -56,7 +56,7 @@ def _elementary(
     array: Callable[[Any], Any],
     farthest: float = math.inf,
 ) -> Callable[[Real], Real]:
-    """One function of one number in its three forms; not a number beyond `farthest`."""
+    """A function of one number in its three forms; not-a-number beyond `farthest`."""
 
     def function(x: Any) -> Any:
         if x.__class__ is Scalar:
@@ -143,17 +143,17 @@ def where(condition: Any, a: Any, b: Any) -> Any:
 
 
 def minimum(a: Real, b: Real) -> Real:
-    """The lesser of two; not a number where either is."""
+    """The lesser of two; not-a-number where either is."""
     return _extreme(a, b, lambda x, y: x < y)
 
 
 def maximum(a: Real, b: Real) -> Real:
-    """The greater of two; not a number where either is."""
+    """The greater of two; not-a-number where either is."""
     return _extreme(a, b, lambda x, y: x > y)
 
 
 def _extreme(a: Any, b: Any, better: Callable[[Any, Any], Any]) -> Any:
-    """a where it is better or not a number, else b; where one is a constant, one comparison does it."""
+    """a where it is better or not-a-number, else b; where one is a constant, one comparison suffices."""
     if _is_number(a):
         a, b = b, a
     if _is_number(b):
@@ -162,20 +162,20 @@ def _extreme(a: Any, b: Any, better: Callable[[Any, Any], Any]) -> Any:
 
 
 def _is_number(x: Any) -> bool:
-    """True where x is known now, and a number."""
+    """True where x is known already, and is not NaN."""
     if x.__class__ is Scalar:
         x = x.graph.value(x.ref)
     return isinstance(x, (float, int)) and x == x
 
 
 def clip(x: Real, low: Real, high: Real) -> Real:
-    """x held within low and high; not a number where x is. The limits must be numbers, low <= high."""
+    """x limited to the range from low to high; not-a-number where x is. The limits must be numbers, low <= high."""
     x = where(x < low, low, x)
     return where(x > high, high, x)
 
 
 def sign(x: Real) -> Real:
-    """1, -1, or x itself where it is zero or not a number."""
+    """1, -1, or x itself where it is zero or not-a-number."""
     return where(x > 0.0, 1.0, where(x < 0.0, -1.0, x))
 
 
@@ -185,7 +185,7 @@ def is_nan(x: Real) -> Truth:
 
 
 def isfinite(x: Real) -> Truth:
-    """True where x is a number and not infinite."""
+    """True where x is neither NaN nor infinite."""
     size: Any = abs(x)
     return size < math.inf
 
@@ -226,7 +226,7 @@ def any_of(conditions: Iterable[Truth]) -> Truth:
 def gather(table: tuple[float, ...], index: Real) -> Real:
     """Entry number `index` of a table of constants: its whole part, held within the table.
 
-    Not a number where the index is none.
+    Not-a-number where the index is.
     """
     table = tuple(map(float, table))
     if not table:
@@ -239,7 +239,7 @@ def gather(table: tuple[float, ...], index: Real) -> Real:
 
 
 def philox(c0: Real, c1: Real, c2: Real, c3: Real, k0: Real, k1: Real, word: int) -> Real:
-    """Word number `word`, 0 to 3, of what Philox4x32-10 makes of a counter and a key (met/trace/philox.py).
+    """Word number `word`, 0 to 3, of the result of Philox4x32-10 for a counter and a key (met/trace/philox.py).
 
     All are whole numbers in [0, 2^32); not a number where one is not.
     """

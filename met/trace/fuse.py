@@ -1,4 +1,4 @@
-"""Fused multiply-adds: a product that only sums take is fused into them, rounded once instead of twice.
+"""Fused multiply-adds: a product that is used only by sums is fused into them, rounded once instead of twice.
 
 This pass decides every fusion, from the graph alone; no compiler is allowed another. So a case has the same bits
 whatever the width, the instruction set or the level of optimisation.
@@ -35,7 +35,7 @@ def fused(nodes: Sequence[Node], roots: Iterable[int], leading: Iterable[int] | 
 
 
 def fused_from(nodes: Sequence[Node], roots: Iterable[int], first: int) -> list[Node]:
-    """The nodes with products fused into sums among those from position `first` on; what stands before is decided."""
+    """The nodes with products fused into sums from position `first` on; earlier ones are final."""
     result, roots = list(nodes), list(roots)
     order = live(nodes, roots)
     _fuse(nodes, order, roots, [i for i in order if i >= first], result)
@@ -49,7 +49,7 @@ def _fuse(
 
     order  positions of all nodes that the roots need: a product that two of them take is not fused
     """
-    # How often each node is used, by whom last; a product that leaves the section counts as used by others too.
+    # The uses of each node, and its last user; a product that leaves the section counts as used by others too.
     uses = [0] * len(nodes)
     user = [0] * len(nodes)
     for ref in roots:

@@ -30,7 +30,7 @@ class Graph(Nodes):
 
 
 def _spelled(node: Node) -> Node:
-    """A node with its numbers as JSON can hold them: what is not finite as a word."""
+    """A node with its numbers as JSON can hold them: non-finite ones as words."""
     if node[0] == "const" and not math.isfinite(node[1]):
         return ("const", repr(node[1]))
     if node[0] == "gather":
@@ -40,7 +40,7 @@ def _spelled(node: Node) -> Node:
 
 @frozen
 class Formulas:
-    """Formulas as plain data: what a plan stores, what replays over floats, arrays or scalars alike.
+    """Formulas as plain data, which a plan stores, and which are replayed over floats, arrays or scalars.
 
     inputs   names, in order of first use
     nodes    as in a graph, numbered from 0, without dead ones: ("const", number, "inf" or "nan"), ("input", name)
@@ -52,7 +52,7 @@ class Formulas:
     outputs: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
-        """Turn the lists that come from JSON into tuples again."""
+        """Turn lists from JSON into tuples again."""
         object.__setattr__(self, "inputs", tuple(self.inputs))
         object.__setattr__(
             self,
@@ -102,7 +102,7 @@ class Formulas:
 
 
 def _respliced(graph: Nodes, nodes: Sequence[Node], outputs: Sequence[int], values: Mapping[str, Any]) -> list[Any]:
-    """The formulas once more, in another graph."""
+    """The formulas copied into another graph."""
     makers: dict[str, Any] = {
         "add": graph.add,
         "sub": lambda a, b: graph.add(a, b ^ 1),

@@ -1,13 +1,13 @@
-"""Keys that say what a recorded program computes, whatever its cells, sections and inputs are called.
+"""Keys of the computations of a recorded program, independent of the names of its cells, sections and inputs.
 
 A program is written down with its names taken away: live operations by position, cells and sections by number in the
 order in which control comes to them, inputs and outputs by their places. The SHA-256 of that text is the key. So a
 renamed cell, a reworded docstring or another layout of the emitted code leaves it alone, and another constant or
 another order of rounding does not.
 
-The state is what the program's `state_outputs` depend on. It has one key; each of the other results (an output, or
-some columns of a row) has its own, of what it computes beyond the state. Equal keys of the state, and equal inputs,
-give equal bits of the state; equal keys of a result besides give equal bits of it.
+The state is everything that the program's `state_outputs` depend on. It has one key; each of the other results (an
+output, or some columns of a row) has its own, of its computation beyond the state. Equal keys of the state, and equal
+inputs, give equal bits of the state; equal keys of a result besides give equal bits of it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from met.trace.slicing import cells_behind, slice_roots
 
 
 def state_key(recording: Recording) -> str:
-    """The key of what decides the program's state: 64 hexadecimal digits."""
+    """The key of everything that decides the program's state: 64 hexadecimal digits."""
     return _state_writer(recording).key()
 
 
@@ -48,7 +48,7 @@ def _state_writer(recording: Recording) -> _Writer:
 
 
 class _Writer:
-    """Writes down the part of a program that some outputs, or columns of a row, depend on.
+    """Writer of the part of a program on which some outputs, or columns of a row, depend.
 
     outputs, columns  what is asked for, and the place that each is written down under
     state             cells that are known already, by name, with their numbers: what they hold is not gone into
@@ -73,7 +73,7 @@ class _Writer:
         self.needed = cells_behind(recording.sections, body, self.outputs, self.columns, known=frozenset(self.state))
 
     def key(self) -> str:
-        """The SHA-256 of what is written."""
+        """The SHA-256 of the text."""
         program = self.recording.program
         self._put("rate", program.base_hz.hex())
         for part in (self.recording.start, self.recording.tick, self.recording.end):
@@ -84,7 +84,7 @@ class _Writer:
         self.lines.append(" ".join(map(str, words)))
 
     def _control(self, body: Iterable[RecordedControl]) -> list[Any]:
-        """A body of control, without what nothing here needs."""
+        """A body of control, without unneeded parts."""
         kept: list[Any] = []
         for step in body:
             if isinstance(step, Branch):
@@ -103,7 +103,7 @@ class _Writer:
         return [type(condition).__name__.lower(), *([condition.divisor] if hasattr(condition, "divisor") else [])]
 
     def _cell(self, name: str) -> str:
-        """A cell of the state by the state's number for it, any other by ours."""
+        """The name of a cell: for a cell of the state by the state's number, for any other by the writer's."""
         known = self.state.get(name)
         return f"state{known}" if known is not None else f"cell{self.cells.setdefault(name, len(self.cells))}"
 
@@ -138,7 +138,7 @@ class _Writer:
                     self._put(kind, places[number], place[ref >> 1] | ref & 1)
 
     def _written(self, op: str, rest: Any) -> str:
-        """Text of what is no operand of a node: a number, a table, a bit's number, or the name of a cell or input."""
+        """Text of a node's further arguments: a number, a table, a bit's number, or the name of a cell or input."""
         if op == "cell":
             return self._cell(rest)
         if op == "input":

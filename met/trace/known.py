@@ -1,7 +1,7 @@
 """Results of a recorded computation whose derivative is known in closed form, in place of operation by operation.
 
-Whoever records a computation may tell its derivative (`Nodes.known`): how its results move where what it was given
-moves. A plain program is not changed by it, as what only a derivative needs is made where one is asked for.
+A recorded computation may come with its derivative (`Nodes.known`): the tangents of its results from those of its
+arguments. A plain program is not changed by it, since nodes for derivatives are made only on request.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class KnownDerivative:
 
 
 class KnownTangents:
-    """Derivatives that a section's recording tells in closed form, for directions one after the other."""
+    """Derivatives that a section's recording has in closed form, for one direction after the other."""
 
     def __init__(self, graph: Nodes, known: Sequence[KnownDerivative]) -> None:
         self._graph, self._known = graph, known
@@ -40,7 +40,7 @@ class KnownTangents:
 
     def at(self, position: int, tangent: Tangent) -> dict[int, int]:
         """By position, the derivatives of all results of the computation that gives a node; none where they are not
-        known. tangent: of nodes before it."""
+        known. tangent: of nodes before it"""
         number = self._of.get(position)
         if number is None:
             return {}

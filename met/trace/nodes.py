@@ -55,7 +55,7 @@ OPERANDS = {
     "where": 3,
     "philox": 6,
 }
-"""Operations and how many operands each has: they stand at positions 1, 2, 3 of the node."""
+"""Operations with the number of operands of each, which stand at positions 1, 2, 3 of the node."""
 
 LEAVES = frozenset(name for name, count in OPERANDS.items() if count == 0)
 TRUTHS = frozenset({"false", "lt", "le", "eq", "and", "bit"})
@@ -78,7 +78,7 @@ class Nodes:
 
     @classmethod
     def of(cls, nodes: Iterable[Node]) -> Self:
-        """The graph of nodes that were made in another one, at the positions that they have there."""
+        """The graph of nodes that were made in another one, at the same positions."""
         made = cls()
         for i, node in islice(enumerate(nodes), len(made.nodes), None):
             made.nodes.append(node)
@@ -95,7 +95,7 @@ class Nodes:
     # Making nodes
 
     def make(self, *node: Any) -> int:
-        """The reference of a node that is no constant, made unless it is there already."""
+        """The reference of a non-constant node, made unless it exists already."""
         ref = self._made.get(node)
         if ref is None:
             ref = 2 * len(self.nodes)
@@ -104,7 +104,7 @@ class Nodes:
         return ref
 
     def constant(self, value: float) -> int:
-        """The reference of a number that is known now."""
+        """The reference of a number that is known already."""
         value = float(value)
         sign = int(math.copysign(1.0, value) < 0.0)
         value = abs(value)
@@ -120,11 +120,11 @@ class Nodes:
         return ref | sign
 
     def truth(self, value: bool) -> int:
-        """The reference of a truth value that is known now."""
+        """The reference of a truth value that is known already."""
         return TRUE if value else FALSE
 
     def value(self, ref: int) -> float | None:
-        """The number behind a reference, where it is known now."""
+        """The number of a reference, where it is known already."""
         value = self._constants.get(ref >> 1)
         return value if value is None or not ref & 1 else -value
 

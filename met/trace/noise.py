@@ -1,11 +1,11 @@
-"""Noise: numbers that look random and are a function of where they belong, recorded or plain.
+"""Noise: numbers that look random and depend only on their stream and tick, recorded or plain.
 
 A stream is (seed, repeat, channel), a value (stream, tick). Nothing is held between draws, so a value depends neither
-on the order of draws nor on what else is drawn, and cases that differ only in a gain feel the same noise.
+on the order of draws nor on other draws, and cases that differ only in a gain feel the same noise.
 
-The generator is Philox4x32-10 (met/trace/philox.py). Of the tick its counter has the low 32 bits and the rest, then the
-repeat and the channel's number; its key is the low 32 bits of the seed and the rest. One counter gives four words:
-two uniform deviates, or two normal ones.
+The generator is Philox4x32-10 (met/trace/philox.py). Its counter holds the low 32 bits of the tick and the rest, then
+the repeat and the channel's number; its key holds the low 32 bits of the seed and the rest. One counter gives four
+words: two uniform deviates, or two normal ones.
 
 A channel is for one kind of draw: `uniform` and `normal` of the same stream and tick are made of the same words.
 """
@@ -90,6 +90,6 @@ def _halves(x: Real) -> tuple[Real, Real]:
 
 
 def _fraction(high: Real, low: Real) -> Real:
-    """The number in (0, 1) of 53 bits: all of `high` and the upper 21 of `low`; half a step where all are zero."""
+    """The number in (0, 1) from 53 bits: all of `high` and the upper 21 of `low`; half a step where all are zero."""
     whole = fma(high, 2.0**21, floor(low * 2.0**-11))
     return where(whole < 0.5, 0.5, whole) * 2.0**-53

@@ -4,7 +4,7 @@ Ten rounds make four words of 32 bits from a counter of four words and a key of 
 whatever was drawn before. From Salmon, Moraes, Dror and Shaw, *Parallel Random Numbers: As Easy as 1, 2, 3* (SC11).
 
 Words are whole numbers in [0, 2^32), held in doubles; a zero may have either sign. Where an operand is anything else
-the result is not a number, so what is no number never becomes a draw.
+the result is not-a-number, so NaN never becomes a valid draw.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-# what words 0 and 2 of the counter are multiplied by, and what the key's words grow by each round (both of the paper)
+# multipliers of words 0 and 2 of the counter, and increments of the key's words for each round (both of the paper)
 MULTIPLIERS = (0xD2511F53, 0xCD9E8D57)
 GROWTH = (0x9E3779B9, 0xBB67AE85)
 ROUNDS = 10
@@ -43,7 +43,7 @@ def plain(*operands: Any) -> float:
 
 
 def arrays(*operands: Any) -> Any:
-    """The same, each word a number or an array."""
+    """Philox's words as `plain` gives them, over numbers or arrays."""
     *words, n = operands
     values = np.broadcast_arrays(*(np.float64(x) for x in words))
     valid = np.logical_and.reduce([(x >= 0.0) & (x <= LOW) & (x == np.floor(x)) for x in values])

@@ -31,7 +31,7 @@ def of_bits(bits: int) -> float:
 
 
 def divide(a: float, b: float) -> float:
-    """a / b of IEEE: 1/0 is infinite, 0/0 not a number; of arrays too, where floating point errors are ignored."""
+    """a / b of IEEE: 1/0 is infinite, 0/0 is NaN; for arrays too, with floating-point errors ignored."""
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         return a / b
     if b != 0.0:
@@ -42,17 +42,17 @@ def divide(a: float, b: float) -> float:
 
 
 def square_root(x: float) -> float:
-    """The square root; not a number below zero."""
+    """The square root; not-a-number below zero."""
     return math.sqrt(x) if x >= 0.0 else math.nan
 
 
 def floor(x: float) -> float:
-    """The greatest whole number that is not greater."""
+    """The largest whole number that is not greater."""
     return float(np.floor(x))
 
 
 def rint(x: float) -> float:
-    """The nearest whole number, the even one of two."""
+    """The nearest whole number, the even one of two equally near."""
     return float(np.rint(x))
 
 
@@ -62,7 +62,7 @@ def fused(a: float, b: float, c: float) -> float:
         return a * b + c
     if not math.isfinite(c):
         return c
-    from fractions import Fraction  # here, since it takes 2 ms, and most starts of MET compute none of this
+    from fractions import Fraction  # imported here, since it takes 2 ms, and most starts of MET do not need it
 
     exact = Fraction(a) * Fraction(b) + Fraction(c)
     if exact == 0:
@@ -74,7 +74,7 @@ def fused(a: float, b: float, c: float) -> float:
 
 
 def gathered(table: tuple[float, ...], index: float) -> float:
-    """Entry number `index` (its whole part, held within the table); not a number for an index that is none."""
+    """Entry number `index` (its whole part, limited to the table); not-a-number for an index that is."""
     if index != index:
         return math.nan
     return table[int(min(max(index, 0.0), len(table) - 1.0))]
@@ -171,7 +171,7 @@ PLAIN: dict[str, Callable[..., Any]] = {
     "gather": lambda index, table: gathered(table, index),
     "philox": philox.plain,
 }
-"""Each operation over Python floats and bools; parameters that are no operands come last."""
+"""Each operation over Python floats and bools; arguments other than operands come last."""
 
 ARRAYS: dict[str, Callable[..., Any]] = PLAIN | {
     "div": np.divide,
@@ -193,4 +193,4 @@ ARRAYS: dict[str, Callable[..., Any]] = PLAIN | {
     "gather": lambda index, table: _gathered_arrays(table, index),
     "philox": philox.arrays,
 }
-"""Each operation over numpy arrays (and numpy scalars), to be used with floating point errors ignored."""
+"""Each operation over numpy arrays (and numpy scalars), to be called with floating-point errors ignored."""

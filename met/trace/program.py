@@ -20,7 +20,7 @@ from met.trace.graph import Real, Truth
 
 
 class Tape(Protocol):
-    """Memory as a phase's body reads and writes it; the recorder and the reference each have one."""
+    """Memory as the body of a phase reads and writes it; the recorder and the reference each have one."""
 
     @property
     def tick(self) -> Real:
@@ -31,16 +31,17 @@ class Tape(Protocol):
         """k / base_hz, s, by one division."""
 
     def read(self, name: str) -> Real:
-        """A cell: what this phase wrote, else what it held before, 0 at first. That nothing writes it is an error."""
+        """Read a cell: the value that this phase wrote, else the former one, 0 at first. A cell that nothing writes is
+        an error."""
 
     def write(self, name: str, value: Real) -> None:
-        """Sets a cell."""
+        """Set a cell."""
 
     def read_mask(self, name: str) -> Truth:
         """True where a cell is not zero."""
 
     def write_mask(self, name: str, value: Truth) -> None:
-        """Sets a cell to 1 or 0."""
+        """Set a cell to 1 or 0."""
 
     def input(self, name: str) -> Real:
         """One of the program's inputs."""
@@ -52,7 +53,7 @@ class Tape(Protocol):
         """One of the program's outputs; only in `end`."""
 
     def part(self, name: str) -> AbstractContextManager[None]:
-        """A context whose computations belong to the part of this name, for whoever asks what costs how much."""
+        """A context whose computations belong to the part of this name, for profiles."""
 
 
 @frozen
@@ -65,21 +66,21 @@ class Phase:
 
 @frozen
 class RunPhase:
-    """A phase, at this point. Neighbouring `RunPhase`s become one straight piece."""
+    """Runs a phase here. Neighbouring `RunPhase`s become one straight piece."""
 
     phase: Phase
 
 
 @frozen
 class CallPhase:
-    """A phase, at this point, whose code is there once however often it is called: it stays a piece of its own."""
+    """Runs a phase here, as a separate piece whose code exists once however often it is called."""
 
     phase: Phase
 
 
 @frozen
 class Every:
-    """The body at ticks whose number `divisor` divides."""
+    """Runs the body at ticks whose number `divisor` divides."""
 
     divisor: int
     body: tuple[Control, ...]
@@ -87,14 +88,14 @@ class Every:
 
 @frozen
 class Unless0:
-    """The body at all ticks but tick 0."""
+    """Runs the body at all ticks but tick 0."""
 
     body: tuple[Control, ...]
 
 
 @frozen
 class WhileAny:
-    """The body as long as any case of the block has a cell that is not zero, at most `at_most` times.
+    """Runs the body as long as any case of the block has a cell that is not zero, at most `at_most` times.
 
     A body runs for the whole block, so it must leave alone (`where`) each case whose cell is zero: then no case
     sees its neighbours.
@@ -107,7 +108,10 @@ class WhileAny:
 
 @frozen
 class RecordPhase:
-    """A phase that records row k // divisor, at ticks that `divisor` divides; nothing where no record is kept."""
+    """Runs a phase that records row k
+
+    divisor, at ticks that `divisor` divides; nothing where no record is kept.
+    """
 
     phase: Phase
     divisor: int

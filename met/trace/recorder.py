@@ -1,4 +1,4 @@
-"""Recording a program: every phase runs once over numbers that write down what is computed with them."""
+"""Recording of a program: every phase runs once over numbers that record the computations."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class RecordingTape:
 
 
 class SectionRecorder:
-    """The sections of a program, each recorded when it is first asked for.
+    """The sections of a program, each recorded when it is first used.
 
     sections  those that were recorded so far
     """
@@ -146,10 +146,10 @@ class SectionRecorder:
 
 
 def record(program: Program, *, fuse: bool = True) -> Recording:
-    """Runs every phase once over recorded numbers.
+    """Record a program by running every phase once over recorded numbers.
 
-    Stores that no phase and no condition ever reads are dropped with all that only they need; then, unless `fuse` is
-    false, products are fused into sums (`met.trace.fuse`).
+    Stores that no phase and no condition ever reads are dropped, with everything that only they need; then, unless
+    `fuse` is false, products are fused into sums (`met.trace.fuse`).
     """
     made = SectionRecorder(program)
     _refuse_nested_records(program)
@@ -174,7 +174,7 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
 
 
 def _flat(body: tuple[Control, ...]) -> Iterator[Control]:
-    """The body, with what stands in an `Every(1, ...)` in its place."""
+    """The body with the contents of each `Every(1, ...)` in its place."""
     for node in body:
         if isinstance(node, Every) and node.divisor == 1:
             yield from _flat(node.body)
@@ -183,7 +183,8 @@ def _flat(body: tuple[Control, ...]) -> Iterator[Control]:
 
 
 def _refuse_nested_records(program: Program) -> None:
-    """A row has all its columns at every `divisor`th tick, so a `RecordPhase` depends on nothing else."""
+    """Raise where a `RecordPhase` depends on more than its divisor: a row has all its columns at every `divisor`th
+    tick."""
     for node in walk((*program.start, *_flat(program.tick), *program.end)):
         if isinstance(node, (Every, Unless0, WhileAny)) and any(
             isinstance(inner, RecordPhase) for inner in walk(node.body)
@@ -204,7 +205,7 @@ def _check_complete(program: Program, sections: list[CodeSection]) -> None:
 
 
 def _check_written(program: Program, sections: list[CodeSection], asked: set[str]) -> None:
-    """Raises ValueError where a cell is read that nothing writes: a name that is misspelt would be 0 for ever."""
+    """Raise ValueError where a cell is read that nothing writes: a misspelt name would be 0 for ever."""
     written = {cell for one in sections for cell, _ in one.stores}.union(program.counters)
     for one in sections:
         for i in one.order:
@@ -231,7 +232,7 @@ def without_dead_stores(sections: list[CodeSection], asked: set[str]) -> list[Co
 
 
 def _storing(section: CodeSection, read: set[str]) -> CodeSection:
-    """The section with its stores to these cells alone."""
+    """The section with stores to these cells only."""
     stores = tuple(store for store in section.stores if store[0] in read)
     if stores == section.stores:
         return section
@@ -239,7 +240,7 @@ def _storing(section: CodeSection, read: set[str]) -> CodeSection:
 
 
 def _fused(sections: list[CodeSection], program: Program, body: tuple[RecordedControl, ...]) -> list[CodeSection]:
-    """The sections with products fused into sums, those of the state as if nothing but the state were computed."""
+    """The sections with products fused into sums; in those of the state, as if nothing but the state were computed."""
     outputs: frozenset[int] = frozenset()
     cells: frozenset[str] = frozenset()
     if program.state_outputs is not None:

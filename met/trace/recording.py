@@ -1,6 +1,6 @@
 """A recorded program as data: straight sections of operations, and the control that runs them.
 
-`met.trace.recorder.record` makes one of a program; `met.trace.fuse`, `met.trace.slicing` and the back ends take it.
+`met.trace.recorder.record` makes one from a program; `met.trace.fuse`, `met.trace.slicing` and the back ends use it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from met.trace.program import Every, Program, Unless0, WhileAny
 
 @frozen
 class CodeSection:
-    """Consecutive phases as one recorded piece. References are into `nodes`; what is not live is to be ignored.
+    """Consecutive phases as one recorded piece. References are into `nodes`; nodes that are not live are ignored.
 
     stores    (cell, reference), in order of writing; the value a cell has afterwards
     records   (column, reference);  outputs (number of the output, reference)
@@ -33,7 +33,7 @@ class CodeSection:
 
     @property
     def roots(self) -> list[int]:
-        """References of all that the section leaves behind."""
+        """References of all results of the section."""
         return [ref for _, ref in (*self.stores, *self.records, *self.outputs)]
 
     @cached_property
@@ -44,7 +44,7 @@ class CodeSection:
 
 @frozen
 class RunSection:
-    """Control of a recorded program: the section of that number, here."""
+    """Control of a recorded program: runs the section of that number."""
 
     section: int
 

@@ -1,4 +1,4 @@
-"""Refusals of what a model must not do while it is recorded, said at the model's own line (E200)."""
+"""Refusals of operations that a model must not do while it is recorded, reported at the model's own line (E200)."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def place_of_caller() -> tuple[Place, str]:
 
 
 def refuse(what: str, help: str = _CHOOSE, *, truth: bool = False, function: str = "") -> NoReturn:
-    """Raises E200 at the model's line: `what` was asked of a value that only a run knows.
+    """Raise E200 at the model's line: `what` was asked of a value that only a run knows.
 
     truth      a branch was to be decided: the word that asked (`if`, `while`, `min(`, ...) is named
     function   the foreign function that was called, whose counterpart in met.trace is then offered
@@ -87,7 +87,7 @@ def refuse(what: str, help: str = _CHOOSE, *, truth: bool = False, function: str
     call = re.match(r"(?:[A-Za-z_]\w*\.)*([A-Za-z_]\w*)\s*\(", piece)
     name = function or (call.group(1) if call else "")
     foreign = set(re.findall(r"\b(?:math|numpy|np)\.(\w+)\s*\(", piece))
-    if name not in _OURS and not truth and len(foreign) == 1:  # the piece is more than the call
+    if name not in _OURS and not truth and len(foreign) == 1:  # the piece contains more than the call
         name = foreign.pop()
     if truth and name not in _OURS:
         head = re.match(r"\s*(if|elif|while|assert)\b", line) or re.search(r"\b(if|while|and|or|not)\b", line)

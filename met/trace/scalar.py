@@ -2,7 +2,7 @@
 
 Both are small handles: a graph and a reference into it. A reference is twice a node's position, plus one where the
 value is the node's negative (for a mask: its opposite), so that signs cost nothing and sharing sees through them.
-Whatever needs to know the value now (`if`, `float()`, an index) is refused at the model's own line, with E200.
+Operations that need the value at once (`if`, `float()`, an index) are refused at the model's own line, with E200.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Scalar:
         self.ref = ref
 
     def _other(self, other: Any) -> int | None:
-        """The reference of an operand, None where it is no number."""
+        """The reference of an operand; None where it is not a number."""
         if other.__class__ is Scalar:
             if other.graph is not self.graph:
                 raise ValueError("two graphs meet in one operation")
@@ -123,7 +123,7 @@ class Scalar:
     __hash__ = None  # type: ignore[assignment]
 
     def __array_ufunc__(self, ufunc: Any, method: str, *operands: Any, **options: Any) -> Any:
-        """Lets numpy's own numbers stand left of an operator; numpy's functions are refused."""
+        """Let numpy's own numbers stand left of an operator; numpy's functions are refused."""
         name = {
             "add": "__radd__",
             "subtract": "__rsub__",
@@ -235,7 +235,7 @@ class Mask:
     __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = __neg__ = _number
 
     def __array_ufunc__(self, ufunc: Any, method: str, *operands: Any, **options: Any) -> Any:
-        """Lets numpy's own truth values stand left of `&`, `|` and `^`."""
+        """Let numpy's own truth values stand left of `&`, `|` and `^`."""
         name = {"bitwise_and": "__and__", "bitwise_or": "__or__", "bitwise_xor": "__xor__"}.get(ufunc.__name__)
         if name is None or method != "__call__" or len(operands) != 2 or getattr(operands[0], "ndim", 1) != 0:
             refuse(f"numpy's `{ufunc.__name__}` of a recorded condition", "both, either, not_, where")

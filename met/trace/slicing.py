@@ -1,4 +1,4 @@
-"""The part of a recorded program that some of its outputs depend on (a backward slice, Weiser 1981)."""
+"""The part of a recorded program on which some of its outputs depend (a backward slice, Weiser 1981)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def sections_in(body: Iterable[RecordedControl]) -> Iterator[int]:
 
 
 def loops_in(body: Iterable[RecordedControl]) -> Iterator[tuple[str, frozenset[int]]]:
-    """The loops in a body of control, inner ones too: the cell that each goes by, and the sections that it runs."""
+    """The loops in a body of control, inner ones too: the cell that controls each, and the sections that it runs."""
     for step in body:
         if isinstance(step, Branch):
             if isinstance(step.condition, WhileAny):
@@ -30,7 +30,7 @@ def loops_in(body: Iterable[RecordedControl]) -> Iterator[tuple[str, frozenset[i
 def slice_roots(
     section: CodeSection, cells: Collection[str], outputs: Collection[int], columns: Collection[int] = ()
 ) -> list[int]:
-    """References of what a section does for these outputs and columns of a row, which need these cells."""
+    """References of the results of a section that these outputs and columns of a row need, or these cells."""
     return [
         *(ref for cell, ref in section.stores if cell in cells),
         *(ref for number, ref in section.outputs if number in outputs),
@@ -46,8 +46,8 @@ def cells_behind(
     *,
     known: frozenset[str] = frozenset(),
 ) -> frozenset[str]:
-    """The cells that these outputs and columns of a row depend on, at any tick, through other cells and through what
-    loops go by.
+    """The cells that these outputs and columns of a row depend on, at any tick, through other cells and through the
+    cells that control loops.
 
     known  cells that are not gone into, and not among the answer
     """

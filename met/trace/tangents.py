@@ -1,9 +1,9 @@
-"""Sections of a recorded program with tangents: graphs that also compute how all that they leave moves with cells.
+"""Sections of a recorded program with tangents: graphs that also compute the tangents of all their results.
 
 A cell NAME that moves has a second one, `d:NAME`, its tangent: a number for one direction, an array for several at
 once, with which the same operations compute (forward mode, A. Griewank and A. Walther, Evaluating Derivatives, 2008,
-ch. 3). What cannot move has none, so the graph that is made is sparse, and what two tangents need is there once. At a
-comparison whose sides are equal the derivative may be another from the other side; such places are told.
+ch. 3). Values that cannot move have none, so the graph is sparse, and nodes that two tangents share exist once. At a
+comparison whose sides are equal the derivative may differ from the other side; such places are listed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from met.trace.primitives import PLAIN
 from met.trace.recording import CodeSection
 
 HEAD = "d:"
-"""Before the name of a cell: the cell of its tangent."""
+"""Prefix of the name of a cell: the cell of its tangent."""
 
 MOVES = frozenset({"add", "sub", "mul", "div", "fma", "sqrt", "abs", "flip", "where", "significand"})
 """Operations whose result moves with their operands; `met.trace.derivative` has their rules."""
@@ -31,8 +31,8 @@ SIGN = 63
 
 @frozen
 class Kink:
-    """A place in a section where the derivative may be another from the other side, or the number itself, of a sign:
-    where two numbers are equal.
+    """A place in a section where two numbers are equal, and the derivative, or for a sign the number itself, may differ
+    from the other side.
 
     sides   references of the two;  move: of the tangent of their difference
     nodes   positions of what goes by their order, the opposite of which is the other side
@@ -48,7 +48,7 @@ class TangentSection:
     """A section with tangents: `stores`, `records` and `outputs` as `CodeSection` has them, and their tangents by the
     same names.
 
-    A store whose tangent is always 0 stands in `stores` alone; its tangent's cell is to be forgotten.
+    A store whose tangent is always 0 is in `stores` only; its tangent's cell must be deleted.
     """
 
     name: str
@@ -63,7 +63,7 @@ class TangentSection:
 
     @cached_property
     def roots(self) -> list[int]:
-        """References of all that it leaves, and of what its kinks go by."""
+        """References of all results, and of the numbers that its kinks compare."""
         several = (
             self.stores, self.tangents, self.records, self.record_tangents, self.outputs, self.output_tangents,
         )  # fmt: skip
@@ -77,7 +77,7 @@ class TangentSection:
 
     @cached_property
     def last_uses(self) -> Mapping[int, list[int]]:
-        """By position of a live node, the nodes that nothing asks for after it."""
+        """By position of a live node, the nodes that are not used after it."""
         last = {ref >> 1: i for i in self.order for ref in self.nodes[i][1 : 1 + OPERANDS[self.nodes[i][0]]]}
         found: dict[int, list[int]] = {}
         for node in last.keys() - {ref >> 1 for ref in self.roots}:
@@ -86,19 +86,20 @@ class TangentSection:
 
     @cached_property
     def plain_order(self) -> list[int]:
-        """Positions of the nodes that are live where nothing moves, so that no tangent is asked for."""
+        """Positions of the nodes that are live where nothing moves, so that no tangent is needed."""
         return live(self.nodes, [ref for pairs in (self.stores, self.records, self.outputs) for _, ref in pairs])
 
 
 Straight = Callable[[CodeSection, int], bool]
-"""Tells of a `floor` or `rint` of a section, by its position, whether it counts as the straight line through its steps,
-as that of a converter; else it has no derivative."""
+"""A test of a `floor` or `rint` in a section, by its position: True if it counts as the straight line through its
+steps, as in a converter; otherwise it has no derivative."""
 
 
 def moved_by(
     section: CodeSection, moving: Collection[str], inputs: Collection[str] = (), straight: Straight | None = None
 ) -> frozenset[str]:
-    """The cells that a section stores numbers in that move with these cells and inputs. straight: None: steps do."""
+    """The cells to which a section stores numbers that move with these cells and inputs. straight: None: steps count as
+    straight lines."""
     moves = moving_nodes(section, moving, inputs, straight)
     return frozenset(cell for cell, ref in section.stores if moves[ref >> 1])
 
@@ -106,7 +107,7 @@ def moved_by(
 def moving_nodes(
     section: CodeSection, moving: Collection[str], inputs: Collection[str] = (), straight: Straight | None = None
 ) -> bytearray:
-    """By position, 1 for each live node of a section that moves with these cells and inputs, as `moved_by` has it."""
+    """By position, 1 for each live node of a section that moves with these cells and inputs, as for `moved_by`."""
     nodes = section.nodes
     found = bytearray(len(nodes))
     for i in section.order:
@@ -126,8 +127,8 @@ def with_tangents(
     straight: Straight,
     inputs: Collection[str] = (),
 ) -> TangentSection:
-    """The section with the tangents of all that moves with these cells and inputs; an input's tangent is another input,
-    by the name with `HEAD` before it, as a cell's is another cell."""
+    """The section with the tangents of everything that moves with these cells and inputs; tangents of inputs are
+    inputs, and those of cells are cells, with the prefix `HEAD`."""
     graph = Nodes.of(section.nodes)
 
     def leaf(node: Node) -> int:
@@ -151,9 +152,9 @@ def with_tangents(
 
 
 def _kinks(graph: Nodes, order: Iterable[int], found: Mapping[int, int], roots: Iterable[int]) -> tuple[Kink, ...]:
-    """The kinks on which these tangents depend: of comparisons by size, and of the bit that is a sign; and all signs of
-    numbers that move, which jump. Two numbers that are asked for being equal are none: that is how a quotient is kept
-    from 0/0 where it has a limit."""
+    """The kinks on which these tangents depend: comparisons by size, and the bit of a sign; and all signs of moving
+    numbers, which jump. A test of two numbers for equality is not a kink: it keeps a quotient from 0/0 where it has a
+    limit."""
     needed = frozenset(live(graph.nodes, roots))
     kinks, of_sign = [], dict[int, list[int]]()
     for i in order:
@@ -181,13 +182,13 @@ def _kinks(graph: Nodes, order: Iterable[int], found: Mapping[int, int], roots: 
 
 
 PRODUCTS: Mapping[str, Callable[..., Any]] = {**PLAIN, "fma": lambda a, b, c: a * b + c}
-"""The operations over plain numbers, and over plain numbers and arrays of tangents, each rounded by itself."""
+"""The operations over plain numbers and arrays of tangents, with products and sums rounded separately."""
 
 
 def values(
     section: TangentSection, leaf: Callable[[Node], Any], opposite: Collection[int] = (), *, plain: bool = False
 ) -> Callable[[int], Any]:
-    """The worth of each reference of a section: numbers are floats, tangents floats or arrays.
+    """The value of each reference of a section: numbers are floats, tangents floats or arrays.
 
     leaf      gives what a cell, an input, the tick and the time are
     plain     whether numbers alone are asked for, and no tangents
