@@ -1,4 +1,4 @@
-"""The engine: what a plan means, compiled and run. Knows neither text, cluster nor serial line."""
+"""The engine: compiles plans and runs them. It imports no deck language, no cluster and no serial line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why a case failed, in words: the time, the joint, body or sensor, its place in the deck, and what to do."""
+"""Causes of failed cases, in words: the time, the joint, body or sensor, its place in the deck, and a remedy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from met.program.unheld import Unheld, unheld
 
 
 def causes_of(experiment: Experiment, inputs: np.ndarray, outputs: Mapping[str, np.ndarray]) -> list[str]:
-    """Why cases failed, in words. inputs: of their program, [case, input]; outputs: of it, by name, [case]."""
+    """The causes of failed cases, in words. inputs: of their program, [case, input]; outputs: of it, by name,
+    [case]."""
     each = [{name: float(of[case]) for name, of in outputs.items()} for case in range(len(inputs))]
     found = ["" if of["failure"] == UNBALANCED else _cause_of(experiment, of) for of in each]
     unbalanced = np.flatnonzero(outputs["failure"] == UNBALANCED)
@@ -26,7 +27,7 @@ def causes_of(experiment: Experiment, inputs: np.ndarray, outputs: Mapping[str, 
 
 
 def _cause_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
-    """Why a case failed that its servos could begin, in words. outputs: of its program, by name."""
+    """The cause, in words, why a case failed after a balanced start. outputs: of its program, by name."""
     failure, number, tick = (outputs[name] for name in FAILURE)
     moving = experiment.structure.moving
     if failure == TOO_FAST:
@@ -74,7 +75,7 @@ def _cause_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
 
 
 def doubt_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
-    """The doubt about a case that is done, in words: a rate that hardly anything could give."""
+    """The doubt about a finished case, in words: a rate that hardly any arm could reach."""
     name, unit, where = _of_rate(experiment, int(outputs[OF]))
     return (
         f"{_head(experiment, outputs[DOUBTFUL_TICK])}{name}: it moves faster than {DOUBTFUL * outputs[MEASURE]:.3g} "
@@ -87,7 +88,7 @@ def _head(experiment: Experiment, tick: float) -> str:
 
 
 def _of_rate(experiment: Experiment, number: int) -> tuple[str, str, str]:
-    """A joint or body by its number in the outputs: its name, the unit of its rates, and where the deck has it."""
+    """The joint or body with this number in the outputs: its name, the unit of its rates, and its place in the deck."""
     structure = experiment.structure
     joints = structure.moving
     if number < len(joints):
@@ -104,7 +105,7 @@ def _where(place: Place | None) -> str:
 
 
 def _of_steps(experiment: Experiment) -> str:
-    """The usual reason of a rate that is none, and the remedy."""
+    """The usual reason of a rate that is not finite, and the remedy."""
     schedule = experiment.structure.schedule
     return (
         "Nearly always a step is too long for the servo, the arm or what acts on it, and the motion diverges: try a "
@@ -113,7 +114,7 @@ def _of_steps(experiment: Experiment) -> str:
 
 
 def _cause_of_balance(experiment: Experiment, number: int, joints: Sequence[Unheld]) -> str:
-    """Why a case failed whose servos cannot hold their joints where it begins balanced, in words.
+    """The cause of a failed balanced start, in words: servos that cannot hold their joints.
 
     number: of the first of the joints;  joints: what is known of all that are not held
     """
@@ -130,7 +131,8 @@ def _cause_of_balance(experiment: Experiment, number: int, joints: Sequence[Unhe
 
 
 def _of_guide(experiment: Experiment, joint: str) -> str:
-    """In words, where the guide that a joint follows gives it no number; empty where there is no such guide."""
+    """The remark, in words, that the guide which a joint follows gives it no finite number; empty where there is no
+    such guide."""
     for use in experiment.structure.guides:
         undefined = models.find("guide", use.model, use.place).undefined
         if joint in use.joints and undefined:
@@ -140,7 +142,7 @@ def _of_guide(experiment: Experiment, joint: str) -> str:
 
 
 def _cause_of_payload(experiment: Experiment, number: int, tick: float) -> str:
-    """Why a case failed by one of the payloads that fly, in words."""
+    """The cause of a failure by one of the payloads that fly, in words."""
     payload = [each for each in experiment.structure.payloads if each.flies][number]
     where = f" ({payload.place.file}:{payload.place.line})" if payload.place else ""
     return (
@@ -151,7 +153,7 @@ def _cause_of_payload(experiment: Experiment, number: int, tick: float) -> str:
 
 
 def _cause_of_sensor(experiment: Experiment, number: int, tick: float) -> str:
-    """Why a case failed by one of the sensors of links, in words."""
+    """The cause of a failure by one of the sensors of links, in words."""
     sensor = experiment.structure.sensors[number]
     where = f" ({sensor.place.file}:{sensor.place.line})" if sensor.place else ""
     return (
@@ -162,7 +164,7 @@ def _cause_of_sensor(experiment: Experiment, number: int, tick: float) -> str:
 
 
 def _cause_of_base(experiment: Experiment, failure: float, tick: float) -> str:
-    """Why a case failed by its free base, in words."""
+    """The cause of a failure by the free base, in words."""
     base = experiment.structure.base
     head = f"t = {tick / experiment.structure.schedule.base_hz:g} s: the base: "
     where = f" ({base.place.file}:{base.place.line})" if base is not None and base.place else ""

@@ -1,4 +1,4 @@
-"""The command `met`: a group over the table of subcommands that packages offer, and what holds for all of them.
+"""The command `met`: a group over the table of subcommands that packages offer, with their common options.
 
 A subcommand is a click command offered as an entry point in the group `met.commands`; only the one that is asked for
 is imported. It returns None or 0 for yes and 1 for no (a case failed, a requirement was missed); whatever a user got
@@ -28,7 +28,7 @@ YES, NO, BAD_INPUT = 0, 1, 2
 INTERRUPTED, PIPE_CLOSED = 130, 141  # 128 + the signal, as a shell counts
 DEFECT = 70  # EX_SOFTWARE of sysexits.h
 
-# How `met --help` lists the commands: in the order of work. A command that is not named here comes after them.
+# The order of commands in `met --help`: the order of work. A command that is not named here comes after them.
 ORDER = (
     "new",
     "import",
@@ -130,14 +130,14 @@ def met() -> None:
 
 
 def deck_options(face: Face) -> Face:
-    """The options of whatever reads a deck: -D, -I, --set and --vary, given on as `defines`, `include_dirs` and
-    `settings` (of --vary, `vary PATH=VALUES`)."""
+    """The options of commands that read a deck: -D, -I, --set and --vary, passed as `defines`, `include_dirs` and
+    `settings` (for --vary, `vary PATH=VALUES`)."""
     face = click.option(
         "--vary",
         multiple=True,
         metavar="PATH=VALUES",
         expose_value=False,
-        is_eager=True,  # before --set, which takes it in
+        is_eager=True,  # before --set, which includes it
         callback=_keep_varied,
         help="Sweep the run over these values, as `vary` does: 'gearbox.kp=0.01..0.1 by 0.01 V*s/rad'; several are "
         "combined.",
@@ -163,7 +163,7 @@ def deck_options(face: Face) -> Face:
     )(face)
 
 
-_VARIED = "met.varied"  # where the context of a command keeps what --vary says
+_VARIED = "met.varied"  # key under which the context of a command keeps the values of --vary
 
 
 def _keep_varied(context: click.Context, _: click.Parameter, values: tuple[str, ...]) -> None:
@@ -182,7 +182,7 @@ def check_options(
     include_dirs: Sequence[str] = (),
     settings: Sequence[str] = (),
 ) -> None:
-    """Refuse options that clash, or that would do nothing, as click refuses what it cannot read."""
+    """Refuse options that clash or would have no effect, as click refuses a value that it cannot read."""
     if names and everything:
         raise click.UsageError(f"--all and `{names[0]}` exclude each other: name runs and sweeps, or take all")
     for option, given in (("-D", defines), ("-I", include_dirs)):
@@ -207,7 +207,7 @@ PROGRAM_FORMS = ("json", "sarif", "github")
 
 
 def format_option(face: Face) -> Face:
-    """--format: text for people or JSON for programs, diagnostics included; given on as `form`."""
+    """The option --format: text for people or JSON for programs, diagnostics included; passed as `form`."""
     return click.option(
         "--format",
         "form",
@@ -218,7 +218,7 @@ def format_option(face: Face) -> Face:
 
 
 def loudness_options(face: Face) -> Face:
-    """-q and -v, given on as `quiet` and `verbose`."""
+    """The options -q and -v, passed as `quiet` and `verbose`."""
     face = click.option("-v", "--verbose", is_flag=True, help="Print more, and tracebacks.")(face)
     return click.option("-q", "--quiet", is_flag=True, help="Print only errors.")(face)
 
@@ -230,23 +230,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # HDF5 loads a library because a file names its filter, from wherever the environment says; archives have none.
     os.environ.setdefault("HDF5_PLUGIN_PRELOAD", "::")
-    # A start makes many objects and drops few: by default they are looked through some 30 times, 15 ms of a start.
+    # A start makes many objects and drops few: by default the garbage collector runs some 30 times, 15 ms of a start.
     gc.set_threshold(50_000)
     for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by the shell, `met ... >&-`: what is said goes nowhere
+        if getattr(sys, name) is None:  # closed by the shell, `met ... >&-`: output is discarded
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115  # as long as the process lives
     try:
         status = _run(given)
         sys.stdout.flush()
         return status
     except BrokenPipeError:
-        # Whoever read our output has gone (`met cases | head`). What Python still holds for it must go nowhere.
+        # The reader of our output has gone (`met cases | head`). Output that Python still buffers must be discarded.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return PIPE_CLOSED
 
 
 def _form_asked(arguments: Sequence[str]) -> str:
-    """The form in which a mistake of usage is said too: that of --format."""
+    """The form in which a usage error is printed too: that of --format."""
     known = PROGRAM_FORMS if arguments[:1] == ["check"] else ("json",)
     asked = [form for option, form in pairwise(arguments) if option == "--format"]
     asked += [each.removeprefix("--format=") for each in arguments if each.startswith("--format=")]
@@ -258,8 +258,8 @@ def _run(arguments: list[str]) -> int:
     verbose = "-v" in arguments or "--verbose" in arguments
     try:
         if "_MET_COMPLETE" in os.environ:
-            met.main(arguments, prog_name="met")  # a shell asks what may follow; click answers and ends
-        # Not `met.main`, which would print and decide the exit status of much by itself.
+            met.main(arguments, prog_name="met")  # a shell asks for completions; click answers and ends
+        # Not `met.main`, which would print errors and choose many exit statuses itself.
         with met.make_context("met", arguments) as context:
             status = met.invoke(context)
         return status if isinstance(status, int) else YES
@@ -308,7 +308,7 @@ def complain(
     allowed: Sequence[tuple[Diagnostic, str]] | None = None,
     titles: Mapping[str, str] | None = None,
 ) -> None:
-    """Print diagnostics: for people on stderr, for programs on stdout, with what a deck allows and why.
+    """Print diagnostics: for people on stderr, for programs on stdout, with the warnings that a deck allows and why.
 
     form    text, or one of `PROGRAM_FORMS`
     titles  what codes are about, for SARIF
@@ -328,8 +328,8 @@ def complain(
 
 
 def confess(defect: Exception, arguments: Sequence[str], *, verbose: bool) -> str:
-    """Say that MET has a defect, in a paragraph, which is given back; the traceback goes into a file, or with -v to the
-    terminal. To be called while it is handled."""
+    """Report a defect of MET, in a paragraph, which is returned; the traceback goes into a file, or with -v to the
+    terminal. To be called while the exception is handled."""
     import platform
     import shlex
     import tempfile

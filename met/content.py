@@ -1,4 +1,5 @@
-"""What a course in time or a load brings, and so what the instants that sample it must carry."""
+"""The time content of a course or a load: its begin, end, frequency and pulses, which the sampling instants must
+resolve."""
 
 from __future__ import annotations
 
@@ -11,10 +12,10 @@ import numpy as np
 from met.frozen import frozen
 
 SMALL = 0.1
-"""Share of the range of a table's values: what rises and falls again by less is no pulse of it."""
+"""Share of the range of a table's values below which a rise and fall is not counted as a pulse."""
 
 MOST_HUMPS = 500
-"""Humps of one course that are looked at: it bounds the time for a measured one of many rows."""
+"""Largest number of humps of one course that are examined: it bounds the time for a measured course of many rows."""
 
 
 @frozen(kw_only=True)
@@ -37,7 +38,7 @@ class Content:
 
 
 NEVER = Content(begins=math.inf, ends=math.inf)
-"""Of what does not change."""
+"""The content of a course that does not change."""
 
 
 def content_of_points(times: Sequence[float], values: Sequence[float], begin: float = 0.0) -> Content:
@@ -53,7 +54,7 @@ def content_of_points(times: Sequence[float], values: Sequence[float], begin: fl
 @frozen
 class Hump:
     """A part of a course of straight lines that rises and falls again, or dips: its points' times, s, and its heights
-    there above the higher of its feet (of a dip the depths below the lower)."""
+    there above the higher of its feet (or, in a dip, the depths below the lower)."""
 
     times: np.ndarray
     heights: np.ndarray
@@ -64,12 +65,12 @@ class Hump:
         return float(np.trapezoid(self.heights, self.times))
 
     def at(self, instants: np.ndarray) -> np.ndarray:
-        """Its heights at these instants, s."""
+        """The heights at these instants, s."""
         return np.asarray(np.interp(instants, self.times, self.heights, left=0.0, right=0.0))
 
 
 def humps_of_turns(points: Sequence[tuple[float, float]]) -> Iterator[Hump]:
-    """The humps between the points at which a course turns back (`SMALL`); of very many the highest."""
+    """The humps between the points at which a course turns back (`SMALL`); if there are very many, the highest."""
     times, values = (list(each) for each in zip(*points, strict=True))
     every, heights = np.array(times), np.array(values)
     turned = list(_turned(values))
@@ -78,7 +79,7 @@ def humps_of_turns(points: Sequence[tuple[float, float]]) -> Iterator[Hump]:
         turned = [turned[place] for place in sorted(np.argsort(rises, kind="stable")[-MOST_HUMPS:].tolist())]
     for before, at, after in turned:
         sign = math.copysign(1.0, values[at] - values[before])
-        foot = (max if sign > 0.0 else min)(values[before], values[after])  # one of them, without any rounding
+        foot = (max if sign > 0.0 else min)(values[before], values[after])  # one of the two values, without rounding
         first, last = _crossing(times, values, at, -1, foot), _crossing(times, values, at, 1, foot)
         inner = slice(int(np.searchsorted(every, first, "right")), int(np.searchsorted(every, last, "left")))
         yield Hump(
@@ -88,7 +89,7 @@ def humps_of_turns(points: Sequence[tuple[float, float]]) -> Iterator[Hump]:
 
 
 def humps_from_zero(points: Sequence[tuple[float, float]], until: float) -> Iterator[Hump]:
-    """The parts of a course of one sign, from 0 s on until then: what it integrates to between two of its zeros."""
+    """The parts of one sign of a course, from 0 s to `until`, each between two of its zeros."""
     times, values = np.array(points).T
     inner = (times > 0.0) & (times < until)
     ends = np.interp([0.0, until], times, values)
@@ -105,7 +106,8 @@ def humps_from_zero(points: Sequence[tuple[float, float]], until: float) -> Iter
 
 
 def _pulses(times: Sequence[float], values: Sequence[float]) -> list[tuple[float, float]]:
-    """Where the lines turn back: from half of the smaller of the way there and the way back, until half of it."""
+    """The pulses between turns of the lines: each from half of the smaller of rise and fall until the same height
+    again."""
     found = []
     for before, at, after in _turned(values):
         height = min(abs(values[at] - values[before]), abs(values[at] - values[after]))
@@ -134,7 +136,7 @@ def _turns(values: Sequence[float], least: float) -> list[int]:
 
 
 def _crossing(times: Sequence[float], values: Sequence[float], at: int, way: int, half: float) -> float:
-    """When the lines pass this value, going from a point back (way -1) or on (1)."""
+    """The time at which the lines pass this value, searched from a point backwards (way -1) or forwards (1)."""
     above, k = values[at] > half, at
     while (values[k + way] > half) == above and values[k + way] != half:
         k += way

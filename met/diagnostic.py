@@ -1,4 +1,4 @@
-"""Diagnostics: the one type of every message that a user sees, whoever noticed.
+"""Diagnostics: the one type of every message that a user sees, from whichever part of MET.
 
 A diagnostic is a code, a severity, one sentence, the place it is about, other places involved, and the remedy.
 Functions that find a user's mistake raise `Problem` (carrying one or more); the command line catches it, renders
@@ -43,7 +43,7 @@ __all__ = [
 
 
 class Problem(Exception):
-    """Raised for a user's mistake; carries diagnostics, never a traceback's worth of program.
+    """Raised for a user's mistake; carries diagnostics and is shown without a traceback.
 
     sources: file -> text, for those who show the lines that the diagnostics are about; may be empty.
     """
@@ -78,7 +78,7 @@ def error(
     also: Iterable[Label] = (),
     help: Iterable[str] | str = (),
 ) -> Diagnostic:
-    """A `Diagnostic` of severity error, with a bare place allowed for a label and one string for the helps."""
+    """A `Diagnostic` of severity error; `at` may be a bare place instead of a label, and `help` one string."""
     label = Label(at) if isinstance(at, Place) else at
     helps = (help,) if isinstance(help, str) else tuple(help)
     return Diagnostic(code, message, label, tuple(also), helps)

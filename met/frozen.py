@@ -1,8 +1,8 @@
 """Frozen dataclasses that cost a fifth to define: `@frozen` for `@dataclass(frozen=True)`.
 
-`dataclasses` compiles six methods for each frozen class, half a millisecond a class and a sixth of the start of
-`met check`. Here only `__init__` is compiled, when the first instance is made; the other methods are shared and go by
-the fields. What is made is a dataclass: `fields`, `replace` and `asdict` work on it, and type checkers see one.
+`dataclasses` compiles six methods for each frozen class, half a millisecond a class and a sixth of the start of `met
+check`. Here only `__init__` is compiled, when the first instance is made; the other methods are shared and use the list
+of fields. The result is a dataclass: `fields`, `replace` and `asdict` work on it, and type checkers see one.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ T = TypeVar("T")
 def keyed(
     when: Literal["always", "never", "where set"], *, default: Any = dataclasses.MISSING, run_key: Any = None
 ) -> Any:
-    """A field of a plan's dataclass, with when it is in a structure key.
+    """A field of a plan's dataclass, declared with its part in the structure key.
 
     "always"     as a field is that is not declared so
     "never"      what changes no number: places, names and units for the reader
@@ -31,10 +31,10 @@ def keyed(
 
 
 RUN_KEY = "keeps this key of a run"
-"""Under which the metadata of a field has the key of a run that it keeps."""
+"""Key of a field's metadata that holds the key of a run that the field keeps."""
 
 IN_KEY = "in the structure key"
-"""Under which the metadata of a field says when it is in a structure key; always where they say nothing."""
+"""Key of a field's metadata that says when the field is in a structure key; without it, always."""
 
 
 @overload
@@ -43,10 +43,10 @@ def frozen(cls: type[T], /) -> type[T]: ...
 def frozen(*, kw_only: bool = ...) -> Callable[[type[T]], type[T]]: ...
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, keyed))
 def frozen(cls: type[T] | None = None, /, *, kw_only: bool = False) -> type[T] | Callable[[type[T]], type[T]]:
-    """Makes a class a frozen dataclass, compared and hashed by its fields."""
+    """Make a class a frozen dataclass, compared and hashed by its fields."""
 
     def make(cls: type[T]) -> type[T]:
-        cls.__doc__ = cls.__doc__ or ""  # else dataclasses writes one, from a signature that takes long to make
+        cls.__doc__ = cls.__doc__ or ""  # else dataclasses writes one, from a signature that is slow to make
         made = dataclasses.dataclass(init=False, eq=False, repr=False, kw_only=kw_only)(cls)
         _compile_later(made)
         for method in (__setattr__, __delattr__, __eq__, __hash__, __repr__):
@@ -58,14 +58,14 @@ def frozen(cls: type[T] | None = None, /, *, kw_only: bool = False) -> type[T] |
 
 
 def _compile_later(cls: type) -> None:
-    """Gives a class an `__init__` that is compiled when it is first called."""
+    """Give a class an `__init__` that is compiled when it is first called."""
 
     compiled: list[Callable[..., None]] = []
 
     def __init__(self: Any, *positional: Any, **named: Any) -> None:
         if not compiled:
             compiled.append(_compiled_init(cls))
-        if cls.__dict__["__init__"] is __init__:  # a decorator may have put one around it, which stays
+        if cls.__dict__["__init__"] is __init__:  # a decorator may have wrapped it: the wrapper stays
             cls.__init__ = compiled[0]  # type: ignore[misc]
         compiled[0](self, *positional, **named)
 
@@ -74,7 +74,7 @@ def _compile_later(cls: type) -> None:
 
 
 def _compiled_init(cls: type) -> Callable[..., None]:
-    """The `__init__` of a dataclass: its fields as parameters, each put where attributes are kept.
+    """The `__init__` of a dataclass, which stores its parameters as the fields.
 
     Names of its own begin with an underscore and a verb, as `_set_on`, so that a field may have any usual name.
     """
@@ -102,7 +102,7 @@ def _compiled_init(cls: type) -> Callable[..., None]:
 
 
 class _LazySignature:
-    """The signature of a frozen class, for those who ask how it is called: that of the compiled `__init__`."""
+    """The signature of a frozen class for introspection: that of the compiled `__init__`."""
 
     def __get__(self, instance: object, owner: type) -> inspect.Signature:
         import inspect
@@ -112,12 +112,12 @@ class _LazySignature:
 
 
 def _values(self: Any) -> tuple[Any, ...]:
-    """The fields that count, in order."""
+    """The values of the compared fields, in order."""
     return tuple(getattr(self, name) for name, field in self.__dataclass_fields__.items() if field.compare)
 
 
 def __setattr__(self: Any, name: str, value: Any) -> None:
-    """A `__post_init__` may set a field that `__init__` does not; nothing else sets anything."""
+    """Store a field that only a `__post_init__` may set; all other assignments raise."""
     own = self.__dict__
     if name in own or name not in self.__dataclass_fields__:
         raise dataclasses.FrozenInstanceError(f"cannot assign to {name!r} of a {type(self).__name__}")

@@ -1,6 +1,6 @@
-"""Comparison of times: written times are computed and rounded, and so are instants, and both mean round numbers.
+"""Comparison of times to rounding: times in decks and instants are both computed, and both mean round numbers.
 
-`(0.1 + 0.2) s` is 4e-17 s after the instant at 0.3 s, and means it. Without this, what is to happen then would wait for
+`(0.1 + 0.2) s` is 4e-17 s after the instant at 0.3 s, and means it. Without this, an event at that time would wait for
 the next step or tick.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 from met.trace import Real, Truth
 
 ROUNDING = 1e-12
-"""Share of itself by which a time may be late: thousands of roundings, and a millisecond in thirty years."""
+"""Relative amount by which a time may be late: thousands of roundings, and a millisecond in thirty years."""
 
 
 def has_come(now: Real, time: Real) -> Truth:

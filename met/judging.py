@@ -1,4 +1,4 @@
-"""Cases that the program carried to their end, and that have failed all the same: what its watch saw of them."""
+"""Failures found by the program's watch in cases that the program carried to their end."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from met.program.step import FAILURE, TOO_FAST, UNBALANCED
 
 
 def judge(names: Sequence[str], outputs: np.ndarray) -> None:
-    """Writes failures into the outputs [case, output], whose names these are: the first of each case stays."""
+    """Write failures into the outputs [case, output], whose names these are: the first failure of each case stays."""
     column = {name: outputs[:, place] for place, name in enumerate(names)}
     failure, of, tick = (column[name] for name in FAILURE)
 

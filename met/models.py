@@ -34,11 +34,11 @@ HELD = ("memory", "outputs", "integrals", "states", "signals")
 """Fields of declarations that list the numbers which a model holds and shows."""
 
 FAULTS = "faults"
-"""The parameter of a bed that a deck writes as a word: what its presets are called."""
+"""The parameter of a bed that a deck writes as a word: the name of a preset."""
 
 
 class Model(Protocol):
-    """The fields that all declarations have."""
+    """The fields that all declarations share."""
 
     @property
     def name(self) -> str: ...
@@ -157,7 +157,8 @@ def available(kind: Kind) -> dict[str, Any]:
 
 
 def _check_names(kind: Kind, model: Any, found_at: str) -> None:
-    """Raise Problem where names of a model's numbers are the same, or the engine's: each is recorded under its name."""
+    """Raise Problem where two names of a model's numbers are equal, or one is the engine's: each is recorded under its
+    name."""
     if kind in ("bed", "law"):
         taken = [name for name, *_ in _of_engine(kind, model)]
     else:
@@ -172,7 +173,7 @@ def _check_names(kind: Kind, model: Any, found_at: str) -> None:
 
 
 def _of_engine(kind: Kind, model: Any) -> tuple[tuple[str, str, str], ...]:
-    """Name, unit and meaning of what the engine holds of a bed, or of a law, besides its memory."""
+    """Name, unit and meaning of the numbers that the engine holds for a bed, or for a law, besides its own memory."""
     if kind == "bed":
         from met.substitution.bed import of_bed
 
@@ -183,7 +184,8 @@ def _of_engine(kind: Kind, model: Any) -> tuple[tuple[str, str, str], ...]:
 
 
 def distinct_names(parameters: Sequence[Parameter]) -> list[str]:
-    """Names of parameters; of those that are there under different words of the same parameter, once."""
+    """Names of parameters; a name that appears several times, under different words of one parameter, is listed
+    once."""
     names: list[str] = []
     for n, one in enumerate(parameters):
         others = [each for each in parameters[:n] if each.name == one.name]
@@ -196,7 +198,7 @@ def distinct_names(parameters: Sequence[Parameter]) -> list[str]:
 
 
 def _check_units(model: Any, found_at: str) -> None:
-    """Every declared unit can be read."""
+    """Check that every declared unit can be read."""
     words = {word: parse_unit("1") for word in ("joint", "effort", "command", "of")}
     if getattr(model, "measures", None) is not None:
         try:
@@ -214,7 +216,7 @@ def _check_units(model: Any, found_at: str) -> None:
 
 
 def _check_bed(model: Any, found_at: str) -> None:
-    """A bed model declares what laws and wire read of it by name (met/substitution/bed.py)."""
+    """Check that a bed model declares the parameters that laws and the wire read by name (met/substitution/bed.py)."""
     from met.substitution.bed import check
 
     wrong = check(model)
@@ -226,7 +228,7 @@ def _check_bed(model: Any, found_at: str) -> None:
 
 
 def _check_law(model: Any, found_at: str) -> None:
-    """A law declares the parameters that its observer, and a balance with friction, read by name."""
+    """Check that a law declares the parameters that its observer, and a balance with friction, read by name."""
     from met.substitution.law import BAND, OBSERVER
 
     needed = [(each, "with an observer") for each in OBSERVER if model.observer]
@@ -239,7 +241,7 @@ def _check_law(model: Any, found_at: str) -> None:
 
 
 def find(kind: Kind, name: str, place: Place | None = None) -> Any:
-    """The model of this kind and name. Raises Problem D140, placed, with what was probably meant."""
+    """The model of this kind and name. Raises Problem D140, placed, with the name that was probably meant."""
     models = find_own(kind)
     if name in models:
         return models[name]
@@ -252,12 +254,12 @@ def find(kind: Kind, name: str, place: Place | None = None) -> Any:
 
 
 def find_own(kind: Kind) -> dict[str, Any]:
-    """MET's own models of this kind by name: found without loading what other packages offer."""
+    """MET's own models of this kind by name, found without loading other packages."""
     return {model.name: model for model in GROUPS[kind].own()[0]}
 
 
 def written(model: Any) -> tuple[Parameter, ...]:
-    """The parameters as a deck writes them, where they are others than a plan's.
+    """The parameters in the form in which a deck writes them, where it differs from a plan's.
 
     Of a profile from a file its name stands for the rows; a bed's `faults` is a word, one of its presets.
     """
@@ -267,7 +269,7 @@ def written(model: Any) -> tuple[Parameter, ...]:
 
 
 def has_motor(servo: Any) -> bool:
-    """True where a bed may take the place of this servo's motor: it has one, and its computer sets the voltage."""
+    """True where a bed may replace this servo's motor: it has one, and its computer sets the voltage."""
     return servo.motor is not None and any(output.name == "voltage" for output in servo.outputs)
 
 

@@ -1,4 +1,4 @@
-"""Places for a command's output: what is refused as one before any work is done, always in the same words.
+"""Checks of a path for a command's output, made before any work is done and always in the same words.
 
 met.host.files.whole_file then writes the file, whole or not at all.
 """
@@ -47,7 +47,7 @@ def check_overwrite(
     remedy: str = "remove the file",
     option: str = "-o",
 ) -> None:
-    """Refuse to overwrite a file that holds anything, unless it is one that MET may replace unasked.
+    """Refuse to overwrite a file with contents, unless it is one that MET may replace without asking.
 
     is_own   True for such a file
     because  the rest of "`output` exists ...", as "and is no report of MET"
@@ -63,7 +63,7 @@ def check_overwrite(
 def not_overwritten(
     output: Path, *, code: str, because: str, remedy: str = "remove the file", option: str = "-o"
 ) -> Any:
-    """The error that `output` exists and is left as it is, as `check_overwrite` has it."""
+    """The error that `output` exists and is left unchanged, with arguments as in `check_overwrite`."""
     helps = f"give another name with `{option}`, or {remedy}"
     return error(code, f"{output} exists{because}: it is not written over", help=helps)
 
@@ -74,11 +74,11 @@ def cannot_write(output: Path, reason: OSError, *, code: str, help: str | Sequen
 
 
 def refusal_text(reason: OSError) -> str:
-    """A refusal in the system's words, as the end of a message: `no space left on device`."""
+    """The system's reason for a refusal, as the end of a message: `no space left on device`."""
     return (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
 
 
 def quoted(path: Any) -> str:
-    """A path as a word of a command line: for a shell, and not to be taken for an option."""
+    """A path as a word of a shell's command line, which is not taken for an option."""
     text = str(path)
     return shlex.quote(f"./{text}" if text.startswith("-") else text)

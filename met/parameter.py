@@ -1,11 +1,11 @@
-"""Declarations in a model: its parameters, the numbers it holds, the numbers it shows.
+"""Declarations in a model: its parameters, its memory and states, and its signals.
 
 Checking, `met doc`, error messages, plans and archives all read these declarations, so a number's unit, range,
 meaning and source are written once, in the model's own file.
 
-A unit is written as in a deck (`"V*s/rad"`, `"1"` for a pure number). Four names stand for what only the use
-decides: `joint` (rad, or m on a prismatic joint), `effort` (N*m, or N), `command` (the unit of what is commanded)
-and `of` (the unit of the channel that a metric watches, of what a sensor is of).
+A unit is written as in a deck (`"V*s/rad"`, `"1"` for a pure number). Four names stand for units that depend on the
+use: `joint` (rad, or m on a prismatic joint), `effort` (N*m, or N), `command` (the unit of what is commanded) and `of`
+(the unit of the channel that a metric watches, of what a sensor is of).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from met.frozen import frozen
 from met.messages.renamed import old_fields
 
 BASE = "base"
-"""The link that the arm stands on. It has no joint, and matter only where a deck gives it some."""
+"""The link that the arm stands on. It has no joint, and mass only where a deck gives it some."""
 
 WORLD = "world"
 """A word that may stand for a link: the ground, whose frame is the world's."""
@@ -112,7 +112,7 @@ class Memory:
 @old_fields(between="in_transmission")
 @frozen(kw_only=True)
 class State:
-    """A number that nature integrates for a model, with the motion of the arm; recorded under its name.
+    """A number of a model that is integrated with the motion of the arm; recorded under its name.
 
     in_transmission  of a servo: true of a state of what joins motor and joint, such as how far a gear is wound up.
                      Where the servo has let go of the joint it goes back to `start`, by half in each step of modified
@@ -143,7 +143,7 @@ class Signal:
 
 @frozen(kw_only=True)
 class Limit:
-    """A limit of a model that is reached in a run, by the parameter that sets it: `upper`; `limit.x` of a vector's.
+    """A limit of a model that a run may reach, named by the parameter that sets it: `upper`, or `limit.x` of a vector.
 
     reached  of an environment (p, world) -> whether it is reached in a state; of a command profile (p, t) -> whether at
              the time t, s. A truth that may be traced

@@ -1,4 +1,4 @@
-"""Cases stepped from instant to instant, so that their memory can be looked at on the way: the same bits as of a run.
+"""Cases stepped from instant to instant, so that their memory can be examined on the way, with the bits of a run.
 
 A block of the kernel keeps its state from call to call. It is the same code that runs a campaign, so looking changes
 nothing and costs a copy of the state at each instant.
@@ -19,16 +19,16 @@ from met.frozen import frozen
 from met.plan import Schedule
 
 LONGEST = 1 << 16
-"""Ticks of one call into machine code, which cannot be interrupted."""
+"""Largest number of ticks in one call into machine code, which cannot be interrupted."""
 
 
 BESIDE = 8
-"""Steps from an instant to the next: a few, so that what changes soon is seen for as long as it lasts."""
+"""Steps between neighbouring instants: a few, so that fast changes are seen while they last."""
 
 
 @frozen
 class Memories:
-    """The memory of some cases at instants that they pass, filled in as they are run.
+    """The memory of some cases at instants that they pass, collected while they run.
 
     ticks    rising;  cases: rows of the case table
     by_case  row -> [instant, cell], in the order of the recording's cells
@@ -40,8 +40,8 @@ class Memories:
 
 
 def even_ticks(schedule: Schedule, instants: int) -> tuple[int, ...]:
-    """Ticks of so many instants of the dynamics over a run, evenly, each with one that is `BESIDE` steps later; fewer
-    of a short run."""
+    """Ticks of `instants` instants of the dynamics, spread evenly over a run, each with one that is `BESIDE` steps
+    later; fewer in a short run."""
     steps = schedule.ticks // schedule.dynamics
     first = [n * steps // instants for n in range(instants)]
     return tuple(sorted({n * schedule.dynamics for k in first for n in (k, min(k + BESIDE, steps))}))

@@ -1,4 +1,4 @@
-"""One joint's emulated bed by itself, to stand at the wire in the place of a real one: in this process, or as C.
+"""One joint's emulated bed alone, in place of a real one on the wire: in this process, or as C.
 
 Its phases are those of the kernel that has the bed inside, over the same cells, so where the wire's period is the
 servo's the bits are the same: each phase is a section of its own in both, and constants are the same ones. What a sweep
@@ -52,7 +52,7 @@ def plant_program(experiment: Experiment, joint: str, *, case: int = 0, period: 
 
 
 class Plant:
-    """A joint's emulated bed in this process, stepped by hand. Parameters as in `plant_program`.
+    """A joint's emulated bed in this process, stepped tick by tick. Parameters as in `plant_program`.
 
     period  of a tick, s
     """
@@ -65,14 +65,15 @@ class Plant:
         self._tick = 0
 
     def start(self, rate: float, seed: float = 0.0, repeat: float = 0.0) -> float:
-        """A shaft that has turned at rate (rad/s) for long, noise from its beginning: the filtered rate, rad/s."""
+        """Start with a shaft that has turned at rate (rad/s) for long, and noise from its beginning; returns the
+        filtered rate, rad/s."""
         self._inputs[:] = [[0.0], [0.0], [rate], [seed], [repeat]]
         self._tick = 0
         self._block.step(0, 0)
         return float(self._outputs[0, 0])
 
     def tick(self, voltage: float, current: float) -> float:
-        """One tick under what the amplifiers hold, V and A: the filtered rate after it, rad/s."""
+        """Run one tick with the amplifiers' held outputs, V and A; returns the filtered rate after it, rad/s."""
         self._inputs[0] = voltage
         self._inputs[1] = current
         self._tick += 1
@@ -91,7 +92,8 @@ class Plant:
 
 
 def plant_c(experiment: Experiment, joint: str, *, case: int = 0, period: float | None = None) -> str:
-    """The same as C, for a bed's firmware: the text of plant.c, whose functions hw/firmware/plant.h declares.
+    """The program of `plant_program` as C, for a bed's firmware: the text of plant.c, whose functions
+    hw/firmware/plant.h declares.
 
     Parameters as in `plant_program`.
     """
@@ -142,7 +144,7 @@ def bed_values(experiment: Experiment, joint: str, case: int = 0) -> dict[str, f
 
 
 def _beds(experiment: Experiment) -> Substituted:
-    """The experiment's beds; nothing is asked of its arm."""
+    """The experiment's beds, without its arm."""
 
     def no_arm(tape: Tape) -> tuple[list[list[Real]], list[Real]]:
         raise AssertionError("a bed alone asks nothing of an arm")
@@ -203,7 +205,7 @@ def _settled(experiment: Experiment, joint: str, case: int) -> dict[str, float]:
     }
     if not varying:
         return {}
-    # what no phase of the kernel reads is not computed there
+    # numbers that no phase of the kernel reads are not computed there
     plain = experiment.formulas.replay(coordinates)
     settled = {path: float(plain[output]) for path, output in varying.items()}
     recording = record(build(experiment))

@@ -1,4 +1,4 @@
-"""Cases -> results: run the cases of an experiment through its kernel, and say in words how each ended."""
+"""Running cases: an experiment's cases go through its kernel, and the end of each is put in words."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ from met.trace.recorder import record
 from met.trace.recording import Recording
 
 DONE, FAILED, TIMED_OUT, LOST = range(4)
-"""Status of a case: done; failed by its own numbers; cut off for taking too long; lost with its worker each time."""
+"""Status of a case: done; failed by its own numbers; stopped for taking too long; lost, each time with its worker."""
 
 STOPPED = 3.0
-"""The output `failure` of a case that something else than the engine ended; a fate says why."""
+"""The output `failure` of a case that was ended from outside the engine; its fate says why."""
 
 
 @frozen
@@ -102,8 +102,8 @@ class Prepared:
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
-        """The names of all that a case gives: the outputs of its program; then metrics of linear answers, and why there
-        is none, by the name of each answer."""
+        """The names of all outputs of a case: those of its program; then metrics of linear answers, and the reasons why
+        one is missing, by the name of each answer."""
         answers = dict.fromkeys(use.of for use in self.experiment.linear_metrics)
         more = (
             *(METRIC + use.name for use in self.experiment.linear_metrics),
@@ -113,7 +113,7 @@ class Prepared:
 
     @cached_property
     def companions(self) -> dict[str, Any]:
-        """Other programs of this experiment that are kept with it, by whoever makes them (`met.analysis`)."""
+        """Other programs of this experiment, kept with it by the modules that make them (`met.analysis`)."""
         return {}
 
     @cached_property
@@ -122,13 +122,13 @@ class Prepared:
 
     @cached_property
     def code_key(self) -> str:
-        """Key of what decides the state: where it is equal, equal inputs give equal bits of it. The same on any machine
-        (`met.trace.identity`)."""
+        """Key of everything that decides the state: where it is equal, equal inputs give equal bits of it. The same on
+        any machine (`met.trace.identity`)."""
         return _code_key(state_key(self.recording))
 
     @cached_property
     def result_keys(self) -> dict[str, str]:
-        """Keys of what each metric and each recorded signal computes beyond the state, by `metrics.NAME` and
+        """Keys of the computation of each metric and each recorded signal from the state, by `metrics.NAME` and
         `record.NAME`."""
         structure, columns, first = self.experiment.structure, {}, 0
         for recorded in structure.record:
@@ -140,7 +140,7 @@ class Prepared:
 
     @property
     def _linear_keys(self) -> dict[str, str]:
-        """Keys of the metrics of linear answers: of the motion, which they are derived of, and of what is asked."""
+        """Keys of the metrics of linear answers: of the motion from which they are derived, and of the question."""
         asked = {use.name: (use.at, use.inputs, use.outputs, use.opened, use.pose) for use in self.experiment.linear}
         return {
             f"metrics.{use.name}": _code_key(
@@ -151,8 +151,8 @@ class Prepared:
 
     @cached_property
     def work_key(self) -> str:
-        """Key of all that a case gives, in its order: the state, every recorded signal and every metric, and what else
-        is watched."""
+        """Key of all outputs of a case, in order: the state, every recorded signal and every metric, and other watched
+        outputs."""
         known = (*(self.program.state_outputs or ()), *(METRIC + use.name for use in self.experiment.structure.metrics))
         watched = {name: name for name in self.program.outputs if name not in known and not name.startswith(COORDINATE)}
         of_watched = result_keys(self.recording, watched) if watched else {}
@@ -162,14 +162,14 @@ class Prepared:
 
     @cached_property
     def old_code_key(self) -> str:
-        """The key of all that a case gives, as MET made it before keys had a version: of the emitted text, for blocks
-        of 8 cases."""
+        """Key of all outputs of a case as made before keys had a version: of the emitted text, for blocks of 8
+        cases."""
         from met.backends.llvm.emit import emit
 
         return hashlib.sha256(emit(self.recording, 8).encode()).hexdigest()
 
     def of_cases(self, experiment: Experiment) -> Prepared:
-        """The same program, ready to run the cases of an experiment that differs in its case table alone."""
+        """The same program, ready to run the cases of an experiment that differs only in its case table."""
         made = Prepared(experiment, self.lanes, self.wire, self.late)
         ready = (*_OF_ANY_CASES, "kernel", "work_key", "old_code_key")
         made.__dict__.update({name: self.__dict__[name] for name in ready if name in self.__dict__})
@@ -186,11 +186,11 @@ class Prepared:
 
     @cached_property
     def extremes(self) -> tuple[str, ...]:
-        """The required metrics that say at which limit they fell."""
+        """The required metrics that say at which limit they took their extreme."""
         return tuple(extremes(self.experiment))
 
     def with_cases(self, cases: Cases) -> Prepared:
-        """The same program for other values of the same coordinates; what is compiled is shared."""
+        """The same program for other values of the same coordinates; compiled code is shared."""
         made = replace(self, experiment=replace(self.experiment, cases=cases))
         made.__dict__.update({name: getattr(self, name) for name in _OF_PROGRAM})
         return made
@@ -201,20 +201,20 @@ _OF_PROGRAM = (*_OF_ANY_CASES, "kernel", "limits", "extremes")
 """The parts of a `Prepared` that are the same whatever values its cases have."""
 
 LINEAR_VERSION = 3
-"""Raised where linear answers of the same program become other numbers."""
+"""Version of linear answers; raised where the numbers for the same program change."""
 
 
 KEY_VERSION = 2
-"""The version that code keys begin with: it says what they are made of. Keys of before have none."""
+"""Prefix of code keys: the version of their ingredients. Older keys have none."""
 
 
 def _code_key(of: str) -> str:
-    """A key of a recording, with what else decides its bits: how the back end carries it out."""
+    """A key of a recording, with everything else that decides its bits: how the back end runs it."""
     return f"{KEY_VERSION}:{hashlib.sha256(f'{of} {backends.find().version}'.encode()).hexdigest()}"
 
 
 def comparable(key: str | None, other: str | None) -> bool:
-    """True where two code keys are both there, and are made of the same."""
+    """True where both code keys exist, and have the same ingredients."""
     return key is not None and other is not None and key.partition(":")[1] == other.partition(":")[1]
 
 
@@ -252,8 +252,8 @@ def compute(
     progress: Callable[[int], None] | None = None,
     memories: Memories | None = None,
 ) -> tuple[np.ndarray | None, np.ndarray]:
-    """The kernel's answer for these rows, as `results` takes it: histories [case, row, column], where they are kept
-    and there are any, and outputs [case, output], in the order of the program's.
+    """The kernel's answer for these rows, for `results`: histories [case, row, column], if they are kept and exist, and
+    outputs [case, output], in the program's order.
 
     memories  gets the memory of those of these cases that it wants
     """
@@ -279,8 +279,8 @@ def compute(
 
 
 def with_linear(prepared: Prepared, outputs: np.ndarray) -> np.ndarray:
-    """The outputs of a program, [case, output], with columns for metrics of linear answers that nobody has computed
-    yet (`met.analysis.linear.metrics`)."""
+    """The outputs of a program, [case, output], with empty columns for metrics of linear answers
+    (`met.analysis.linear.metrics`)."""
     more = prepared.outputs[len(prepared.program.outputs) :]
     if not more:
         return outputs
@@ -289,7 +289,7 @@ def with_linear(prepared: Prepared, outputs: np.ndarray) -> np.ndarray:
 
 
 def _together(first: np.ndarray, of_first: np.ndarray, of_others: np.ndarray) -> np.ndarray:
-    """Arrays of the cases where `first` is True, and of the others, in the cases' order."""
+    """Arrays of the cases where `first` is True, and of the others, merged in the cases' order."""
     made = np.empty((len(first), *of_first.shape[1:]))
     made[first], made[~first] = of_first, of_others
     return made
@@ -383,7 +383,7 @@ def results(
 
 
 def _grapples(experiment: Experiment, out: Mapping[str, np.ndarray], failed: np.ndarray) -> dict[str, np.ndarray]:
-    """The figures of grapples, as `Run` has them."""
+    """The figures of grapples for `Run`."""
     found = {}
     for payload in grappled_payloads(experiment.structure):
         never = failed | (out[cell_names.GRAPPLED(payload, "near")] == 0.0)
@@ -393,7 +393,7 @@ def _grapples(experiment: Experiment, out: Mapping[str, np.ndarray], failed: np.
 
 
 def _unanswered(experiment: Experiment, out: Mapping[str, np.ndarray], failed: np.ndarray) -> dict[int, str]:
-    """Cases without one of their linear answers, and why, in words."""
+    """The cases that lack one of their linear answers, with the reasons in words."""
     found: dict[int, list[str]] = {}
     for use in experiment.linear:
         why = out.get(WHY_ANSWER + use.name)
@@ -404,7 +404,7 @@ def _unanswered(experiment: Experiment, out: Mapping[str, np.ndarray], failed: n
 
 
 def _misapplied(experiment: Experiment, rows: np.ndarray, out: Mapping[str, np.ndarray]) -> dict[int, str]:
-    """Cases that were run with another value than the case table has for them, which would be a defect: in words."""
+    """The cases that were run with a value other than that of the case table, in words; such a case is a defect."""
     found: dict[int, str] = {}
     for coordinate in experiment.cases.coordinates:
         used, wanted = out[COORDINATE + coordinate.path], coordinate.values[rows]

@@ -1,4 +1,4 @@
-"""Settings from outside of a deck, as a command line writes them: `PATH=VALUE`, and `vary PATH=VALUES` of `--vary`."""
+"""Settings from outside of a deck, in the form of a command line: `PATH=VALUE`, and `vary PATH=VALUES` of `--vary`."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def varies(setting: str) -> bool:
 
 
 def to_set(text: str) -> str:
-    """The setting that `--set` makes of a text, which is none that varies, whatever it begins with."""
+    """The setting that `--set` makes of a text; it never varies a path, whatever the text begins with."""
     return f" {text}" if varies(text) else text
 
 
 def settings_of(settings: Iterable[str]) -> dict[str, Any]:
-    """Settings as the arguments `set` and `vary` of `ic.compile`."""
+    """The settings as the arguments `set` and `vary` of `ic.compile`."""
     found = tuple(settings)
     return {
         "set": tuple(each for each in found if not varies(each)),

@@ -1,4 +1,5 @@
-"""Units as declarations, plans and command lines write them: `V*s/rad`, read by recursive descent."""
+"""Reading and writing of units in the form of declarations, plans and command lines: `V*s/rad`, by recursive
+descent."""
 
 from __future__ import annotations
 
@@ -14,8 +15,8 @@ BIGGEST_EXPONENT = 9
 def parse_unit(written: str, names: Mapping[str, Measure] = MappingProxyType({})) -> Measure:
     """The meaning of a unit as a model's declaration writes it: `V*s/rad`, `N*m/(rad*s)`, `m^2`, `1/s`, `1`.
 
-    names: further words and what they stand for here, such as `joint`. ValueError where it cannot be read: a
-    declaration is a programmer's text (a deck's units are read by ic).
+    names: further words with their meanings here, such as `joint`. ValueError where it cannot be read: a declaration is
+    a programmer's text (a deck's units are read by ic).
     """
     return _UnitReader(written, names).whole()
 
@@ -74,7 +75,7 @@ class _UnitReader:
         elif piece in ALL_UNITS:
             result = ALL_UNITS[piece].measure
         else:
-            from met.messages.other_units import suggest  # for a message alone
+            from met.messages.other_units import suggest  # for a message only
 
             near = suggest(piece)
             raise ValueError(f"unit `{self.written}`: `{piece}` is not a unit" + (f"; `{near}`?" if near else ""))
@@ -88,8 +89,8 @@ class _UnitReader:
 
 
 def written(si: float, unit: str) -> str:
-    """An SI value in a unit, in as few digits as give the same value again: `0.33 V*s/rad`; of a unit that cannot be
-    read, as no MET writes, the number alone."""
+    """An SI value in a unit, in the fewest digits that give the same value again: `0.33 V*s/rad`; the number alone for
+    an unreadable unit, which MET never writes."""
     try:
         measure = parse_unit(unit or "1")
     except ValueError:
@@ -102,7 +103,7 @@ def written(si: float, unit: str) -> str:
 
 def _plain(value: float) -> str:
     """A number's own digits, without an exponent where it reads well without."""
-    from decimal import Decimal  # late: a start needs none
+    from decimal import Decimal  # imported late: a start does not need it
 
     if value and not 1e-4 <= abs(value) < 1e7:
         return repr(value)

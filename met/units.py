@@ -6,7 +6,8 @@ radian counts as one, since N*m/A and V*s/rad are the same thing.
 
 Units exist only until a plan is made; the plan is SI (angles in rad). There are no offsets (no degree Celsius) and no
 prefixes beyond the tables. The names of `UNITS` are units wherever a deck writes values, and name nothing else there.
-Those of `FURTHER_UNITS` came later: they are units only behind a number or a unit, and a deck may call a value so.
+Those of `FURTHER_UNITS` came later: they are units only after a number or a unit, and a deck may give a value such a
+name.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ _PI_BELOW = 10**75
 
 @frozen
 class Measure:
-    """The meaning of a unit: its dimension, and how many SI units one of it is, exactly: over / under * pi^turns.
+    """The meaning of a unit: its dimension, and its exact size in SI units, over / under * pi^turns.
 
     hertz  the exponent of the hertz in it: Hz and 1/s are one dimension, but only Hz says that it counts cycles
     """
@@ -67,12 +68,12 @@ class Measure:
 
     @property
     def scale(self) -> float:
-        """SI units in one of it, as a double. Raises OverflowError where that is too large."""
+        """The unit's size in SI as a double. Raises OverflowError where that is too large."""
         return _divided(self.over, self.under, self.turns)
 
     @property
     def exact(self) -> Fraction:
-        """SI units in one of it, with pi to 75 places."""
+        """The unit's size in SI, with pi to 75 places."""
         return Fraction(self.over, self.under) * Fraction(_PI, _PI_BELOW) ** self.turns
 
     def __mul__(self, other: Measure) -> Measure:
@@ -92,12 +93,12 @@ class Measure:
         return Measure(self.dimension**exponent, over**size, under**size, self.turns * exponent, self.hertz * exponent)
 
     def to_si(self, number: float, decimal: str = "") -> float:
-        """So many of this unit in SI, rounded once: 64.1 km is 64100 m, and 700 ms the float that 0.7 is.
+        """A number of this unit converted to SI, rounded once: 64.1 km is 64100 m, and 700 ms the float that 0.7 is.
 
         decimal  how the number is written, its sign aside. Without it a number that prints with 15 digits or less is
                  the decimal that it prints as, and any other the double that it is.
 
-        A recorded number is divided or multiplied as it is. What is too large is infinite.
+        A recorded number is divided or multiplied directly. A result that is too large is infinite.
         """
         if not isinstance(number, float | int):
             return number * self.scale if self.turns or self.over != 1 else number / self.under
@@ -112,7 +113,7 @@ class Measure:
 
 
 def fraction(decimal: str) -> tuple[int, int]:
-    """The number that a decimal says, such as `-1.5e-3`, over and under the line; neither is made small."""
+    """The exact fraction of a decimal such as `-1.5e-3`, as numerator and denominator, not reduced."""
     digits, _, power = decimal.lower().partition("e")
     whole, _, rest = digits.partition(".")
     exponent = int(power or 0) - len(rest)
@@ -120,7 +121,7 @@ def fraction(decimal: str) -> tuple[int, int]:
 
 
 def _exactly(number: float, decimal: str) -> tuple[int, int]:
-    """The size of a number over and under the line (`Measure.to_si`)."""
+    """The exact size of a number as numerator and denominator (`Measure.to_si`)."""
     shortest = repr(abs(float(number)))
     digits = shortest.partition("e")[0].replace(".", "").strip("0")
     if decimal or len(digits) <= sys.float_info.dig:
@@ -139,7 +140,7 @@ def _divided(over: int, under: int, turns: int) -> float:
 
 @frozen
 class NamedUnit:
-    """A row of the table: the name that decks write, the word that messages say, and the meaning."""
+    """A row of the table: the name in decks, the word in messages, and the meaning."""
 
     name: str
     word: str
@@ -209,7 +210,7 @@ _ROWS: tuple[tuple[str, str, Dimension, int, int], ...] = (
     ("K", "kelvin", Dimension(K=1), 1, 1),
     ("%", "per cent", PURE, 1, 100),
 )
-"""Name, word, dimension, and what one is in SI units: over and under the line. Some angles are that many times pi."""
+"""Name, word, dimension, and size in SI units as numerator and denominator; some angles are that many times pi."""
 
 _FURTHER_ROWS: tuple[tuple[str, str, Dimension, int, int], ...] = (
     ("inch", "inch", _LENGTH, 254, 10_000),
@@ -223,7 +224,8 @@ _FURTHER_ROWS: tuple[tuple[str, str, Dimension, int, int], ...] = (
     ("MPa", "megapascal", _PRESSURE, 1_000_000, 1),
     ("GPa", "gigapascal", _PRESSURE, 10**9, 1),
 )
-"""The same of units that names of a deck come before. Inch and pound are those of 1959, which are exact."""
+"""Rows, like those of `_ROWS`, of units that give way to names of a deck. Inch and pound are those of 1959, which are
+exact."""
 
 _OF_PI = frozenset({"deg", "arcmin", "arcsec", "cycle", "rpm", "rev"})
 _OF_HERTZ = frozenset({"Hz", "kHz", "MHz"})
@@ -242,7 +244,7 @@ UNITS = _named(_ROWS)
 """Units whose names are reserved where values stand."""
 
 FURTHER_UNITS = _named(_FURTHER_ROWS)
-"""Units only behind a number or a unit, where the deck does not use the name otherwise."""
+"""Units that count only after a number or a unit, where the deck does not use the name otherwise."""
 
 ALL_UNITS: Mapping[str, NamedUnit] = MappingProxyType({**UNITS, **FURTHER_UNITS})
 
@@ -269,11 +271,11 @@ _SPOKEN: Mapping[Dimension, str] = MappingProxyType(
         _ENERGY / _ANGLE: "N*m/rad",
     }
 )
-"""How a dimension is said where base units would be hard to read."""
+"""Words for dimensions that would be hard to read in base units."""
 
 
 def is_unit(name: str) -> bool:
-    """True where a deck's word is the name of a unit, and so cannot name a value."""
+    """True where a word is the name of a unit, and so cannot name a value in a deck."""
     return name in UNITS
 
 
@@ -299,7 +301,7 @@ def _product(factors: Iterable[tuple[str, int]], declared: Mapping[str, Measure]
 
 
 def counted(dimension: Dimension) -> Dimension:
-    """The dimension as it is compared: without the angle, unless the rest is a power of time or nothing."""
+    """The dimension for comparisons: without the angle, unless the rest is a power of time or nothing."""
     if dimension.m or dimension.kg or dimension.A or dimension.K:
         return dimension._replace(rad=0)
     return dimension

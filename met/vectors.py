@@ -1,4 +1,4 @@
-"""Three-vectors and rotations as tuples of Reals, for whatever moves in space.
+"""Three-vectors and rotations in space as tuples of Reals.
 
 Plain arithmetic on `Real = float | Scalar`: no arrays, so that a trace sees every zero and one.
 
@@ -91,7 +91,7 @@ def snapped(x: float, scale: float = 1.0) -> float:
 
 
 def snap_rotation(R: Matrix) -> Matrix:
-    """R with its constant entries freed of rounding noise; others stay as they are."""
+    """R with its constant entries freed of rounding noise; others are unchanged."""
     rows = [tuple(snapped(float(x)) if constant(x) else x for x in row) for row in R]
     return (rows[0], rows[1], rows[2])  # type: ignore[return-value]
 
@@ -181,7 +181,7 @@ def rotation_vector(R: Matrix) -> Vector:
     """
     w, x, y, z = quaternion(R)
     size = sqrt(x * x + y * y + z * z)
-    small = size < 1e-150  # whose square is none: the angle is then 2 |v|, as it is to rounding below 1e-8
+    small = size < 1e-150  # its square underflows: the angle is then 2 |v|, as it is to rounding below 1e-8
     ratio = where(small, 2.0, 2.0 * atan2(size, w) / where(small, 1.0, size))
     return scale(ratio, (x, y, z))
 

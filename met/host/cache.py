@@ -1,9 +1,9 @@
-"""Compiled objects on disk, each under the hash of everything that made it.
+"""A cache of compiled objects on disk, each under the hash of all its inputs.
 
-A file is a hash of its name and its object, and the object; what does not agree with its hash is made anew, and so is
-what another user may have written: it would run as us. Files are written under another name and renamed, so that any
-number of processes may share the folder. It is a cache: whatever goes wrong with it, the object is made and the run
-goes on.
+A file holds a hash of its name and object, and the object. Objects that do not match their hash are made anew, and so
+are those that another user may have written, since they would run with our rights. Files are written under another name
+and renamed, so that any number of processes may share the folder. If the cache fails in any way, the object is made and
+the run goes on.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-# bytes above which the files longest unused are removed
+# bytes above which the least recently used files are removed
 LIMIT = 1 << 30
 
 _MARK = b"met object 2\n"
@@ -27,7 +27,7 @@ _MARK = b"met object 2\n"
 
 def folder() -> Path | None:
     """The folder of compiled objects: $MET_CACHE_DIR, else ~/.cache/met (under $XDG_CACHE_HOME where that is set). None
-    for who has no home; HOME counts only where it names one whole."""
+    for a user without a home; HOME counts only as an absolute path."""
     own = os.environ.get("MET_CACHE_DIR")
     if own:
         return Path(own)
@@ -44,8 +44,8 @@ def folder() -> Path | None:
 
 
 def within(*parts: str) -> Path | None:
-    """A folder of the cache, made where it is not there. None where there can be none, or where another user could have
-    put something into it, which is told."""
+    """A folder of the cache, made where it does not exist. None where it cannot be made, or where another user could
+    write into it, which stderr reports."""
     path = folder()
     for part in ("", *parts):
         if path is None:
@@ -62,8 +62,8 @@ def within(*parts: str) -> Path | None:
 
 
 def _is_ours(path: Path, status: os.stat_result) -> bool:
-    """True where nobody but this user, and the machine's administrator, can have written the file of this status. Where
-    it is not, stderr says so."""
+    """True where only this user, and the machine's administrator, can have written the file with this status; otherwise
+    stderr reports it."""
     if status.st_uid != os.geteuid():
         _tell(path, "it is another user's")
         return False
@@ -75,7 +75,7 @@ def _is_ours(path: Path, status: os.stat_result) -> bool:
 
 @functools.cache
 def _tell(path: Path, why: str) -> None:
-    """Say once that something of the cache is not used."""
+    """Report once that a part of the cache is not used."""
     print(
         f"met: {path} of the cache is not used: {why}; what is in it is compiled anew (MET_CACHE_DIR names another "
         "cache)",
@@ -84,12 +84,12 @@ def _tell(path: Path, why: str) -> None:
 
 
 TRIMMED = "0"
-"""Third letters of objects with which it is looked how much all are: some thousands of files are looked at then, which
-takes as long as a small program's compiling."""
+"""Third letters of the names of objects after whose writing the cache's size is checked: that looks at some thousands
+of files, which takes as long as to compile a small program."""
 
 
 def key(*parts: str) -> str:
-    """The name of an object that these texts decide."""
+    """The name of the object that is determined by these texts."""
     digest = hashlib.sha256()
     for part in parts:
         data = part.encode()
@@ -99,7 +99,7 @@ def key(*parts: str) -> str:
 
 
 def kept(name: str, make: Callable[[], bytes]) -> tuple[bytes, bool]:
-    """The object of that name and whether it was there; made, and kept, where it was not."""
+    """The object of that name, made and kept where it was missing; and whether it was there."""
     place = within(name[:2])
     if place is None:
         return make(), False
@@ -118,12 +118,12 @@ def kept(name: str, make: Callable[[], bytes]) -> tuple[bytes, bool]:
 
 
 def digest_of(name: str, data: bytes) -> bytes:
-    """By which an object is known again as what was kept under that name."""
+    """The hash by which an object is recognised as the one kept under that name."""
     return hashlib.sha256(name.encode() + b"\0" + data).digest()
 
 
 def read(path: Path) -> bytes | None:
-    """A file of the cache, where it is there, one of ours."""
+    """The contents of a file of the cache, if it exists and is one of ours."""
     try:
         with open(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
             status = os.fstat(file.fileno())
@@ -155,7 +155,7 @@ def _write(path: Path, code: bytes) -> None:
 
 
 def _trim(root: Path) -> None:
-    """Removes the files longest unused while all are more than `LIMIT` bytes."""
+    """Remove the least recently used files while all together exceed `LIMIT` bytes."""
     files = [(stat.st_mtime, stat.st_size, path) for path in root.glob("*/*.o") if (stat := path.stat())]
     total = sum(size for _, size, _ in files)
     for _, size, path in sorted(files):

@@ -21,14 +21,14 @@ PACKAGE = "met_arm"
 
 @frozen
 class EntryPoint:
-    """A named object of an installed package: `value` is `module:object`, `package` who offers it."""
+    """A named object of an installed package: `value` is `module:object`, `package` the package that offers it."""
 
     name: str
     value: str
     package: str
 
     def load(self) -> Any:
-        """The object; raises whatever its module raises when it is imported."""
+        """Import the object; raises whatever its module raises."""
         module, _, path = self.value.partition(":")
         found: Any = import_module(module.strip())
         for attribute in filter(None, path.strip().split(".")):
@@ -37,7 +37,7 @@ class EntryPoint:
 
 
 def offered(group: str) -> list[EntryPoint]:
-    """All that is offered in this group, MET's own first, in the order written; then others by package."""
+    """All entry points of this group, MET's own first, in the order written; then others by package."""
     own: list[EntryPoint] = []
     others: list[EntryPoint] = []
     seen: set[str] = set()
@@ -61,7 +61,7 @@ def offered(group: str) -> list[EntryPoint]:
 
 def _tables() -> Iterator[tuple[str, str]]:
     """Every installed package's name and the file that may list its entry points, in the order of sys.path. A package
-    that merely lies in the working folder is not installed."""
+    that merely lies in the working folder does not count as installed."""
     for directory in interpreter.looked_in():
         try:
             names = os.listdir(directory)

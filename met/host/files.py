@@ -1,8 +1,8 @@
-"""Files that somebody else may have written: opened only where they are regular files, and JSON read as data.
+"""Safe reading of files that others may have written: only regular files are opened, and JSON is read as plain data.
 
-A named pipe makes whoever opens it wait for ever, and a device may do anything. So what is read goes through here:
-archives, plans, shards, sidecars, transcripts, decks. Whatever is refused is an OSError (the file) or a ValueError
-(what is in it), never a wait and never an error of another kind.
+A named pipe blocks its reader for ever, and a device may do anything. All input is read by these functions: archives,
+plans, shards, sidecars, transcripts, decks. A refusal is an OSError (the file) or a ValueError (its contents), never a
+wait and never an error of another kind.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from io import BufferedReader, BufferedWriter
 from typing import Any
 
 MOST_JSON_BYTES = 64 << 20
-"""A sidecar or a description of a campaign has some kilobytes."""
+"""Largest size of a JSON file, in bytes; a sidecar or a description of a campaign has some kilobytes."""
 
 WHOLE_BITS = 64
-"""Whole numbers of more bits are nothing that MET writes, and overflow where they are computed with."""
+"""Largest number of bits of a whole number: MET writes none with more, and they overflow in computations."""
 
 KINDS = {
     stat.S_IFIFO: "a named pipe",
@@ -37,7 +37,7 @@ def open_regular(path: str | os.PathLike[str]) -> BufferedReader:
     if "\0" in name:
         raise OSError(errno.EINVAL, "its name holds a null character", name)
     _check_regular(os.stat(name), name)
-    # the file may have been exchanged since: then it is not waited for, and closed again
+    # the file may have been replaced since: then it is closed again, without waiting
     file = os.open(name, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
     try:
         _check_regular(os.fstat(file), name)
@@ -48,11 +48,11 @@ def open_regular(path: str | os.PathLike[str]) -> BufferedReader:
 
 
 def read_regular(path: str | os.PathLike[str], most: int | None = None) -> bytes:
-    """All of a regular file. most: bytes that it may have; where it is not given, what memory has room for. Raises
-    OSError."""
+    """The contents of a regular file. most: its largest size in bytes; by default, as much as memory has room for.
+    Raises OSError."""
     limit = memory() if most is None else most
     with open_regular(path) as file:
-        large = os.fstat(file.fileno()).st_size > limit  # a file of holes may be larger than any disk
+        large = os.fstat(file.fileno()).st_size > limit  # a sparse file may be larger than any disk
         data = b"" if large else file.read() if most is None else file.read(most + 1)
     if large or len(data) > limit:
         raise OSError(errno.EFBIG, f"it has more than {limit >> 20} MiB", os.fspath(path))
@@ -60,13 +60,14 @@ def read_regular(path: str | os.PathLike[str], most: int | None = None) -> bytes
 
 
 def memory() -> int:
-    """Bytes of a file that is read as a whole, at most: who reads it takes several times as much of this machine's."""
+    """Largest size, in bytes, of a file that is read as a whole: its reader takes several times as much of this
+    machine's memory."""
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 4
 
 
 def new_file(path: str | os.PathLike[str]) -> BufferedWriter:
-    """A new file of this name, open for writing; what had the name is gone. A link or a pipe that lies in wait there is
-    neither followed nor written into. Raises OSError."""
+    """A new file of this name, open for writing; a former file of the name is removed. A link or a pipe in its place is
+    neither followed nor written to. Raises OSError."""
     with contextlib.suppress(FileNotFoundError):
         os.unlink(path)
     return open(path, "xb")
@@ -74,8 +75,8 @@ def new_file(path: str | os.PathLike[str]) -> BufferedWriter:
 
 @contextlib.contextmanager
 def whole_file(path: str | os.PathLike[str], *, mode: int | None = None) -> Iterator[BufferedWriter]:
-    """A new file, open for writing, that gets its name, in the place of what had it, once the block has ended and all
-    is on the disk. What the block raises leaves nothing behind. Raises OSError.
+    """A new file, open for writing, that replaces the file of this name once the block has ended and all is on the
+    disk. If the block raises, nothing is left behind. Raises OSError.
 
     mode  its permissions; None: as of any new file
     """
@@ -83,7 +84,7 @@ def whole_file(path: str | os.PathLike[str], *, mode: int | None = None) -> Iter
     folder, base = os.path.split(name)
     from socket import gethostname  # late: reading a file, as every start does, needs no network
 
-    # hosts that share the folder have processes of one number
+    # machines that share the folder may have processes of one number
     temporary = os.path.join(folder, f".{base}.{gethostname()}.{os.getpid()}.tmp")
     try:
         with new_file(temporary) as file:
@@ -105,8 +106,8 @@ def read_json(path: str | os.PathLike[str], most: int = MOST_JSON_BYTES) -> Any:
 
 
 def parse_json(text: str | bytes) -> Any:
-    """Data from JSON, all of whose numbers are finite and fit into 64 bits. Raises ValueError for all else, however
-    deep it is nested."""
+    """Data from JSON, all of whose numbers are finite and fit into 64 bits. Raises ValueError for anything else, and
+    for nesting of any depth."""
     try:
         if isinstance(text, bytes):
             text = text.decode("utf-8")

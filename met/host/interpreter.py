@@ -1,8 +1,8 @@
-"""Other Pythons that MET starts: with the packages of this one, and nothing of the working folder.
+"""Other Pythons that MET starts, with the packages of this one and without modules of the working folder.
 
 `python -m` and `python -c` look for every module in the working folder first, so a `json.py` beside a deck would be
-run. A child finds what Python itself finds, what the user named in PYTHONPATH, and MET where this process has it. All
-that starts a Python does so by these functions.
+run. A child finds Python's own modules, those that the user named in PYTHONPATH, and MET where this process has it.
+Every Python is started by these functions.
 """
 
 from __future__ import annotations
@@ -14,21 +14,22 @@ from pathlib import Path
 
 
 def command(module: str, *arguments: str) -> list[str]:
-    """The words that run a module in a Python like this one; `environment` belongs to them."""
+    """The command line that runs a module in a Python like this one; it needs the variables of `environment`."""
     return [sys.executable, "-P", "-m", module, *arguments]
 
 
 def environment() -> dict[str, str]:
-    """The variables of this process for a Python that it starts, and for those that this one starts in turn."""
+    """The environment variables for a Python that this process starts, and for those that it starts in turn."""
     return {**os.environ, **packages()}
 
 
 def packages() -> dict[str, str]:
-    """The variables that decide where a Python finds packages.
+    """The environment variables that decide where a Python finds packages.
 
     Folders of PYTHONPATH are written out: there an empty one, as `PYTHONPATH=$PYTHONPATH:more` leaves it, is the
-    working folder, and one like `lib` is another wherever the child starts. MET's own folder comes first, for a script
-    may have found it by other ways; it is left out where Python looks anyway, and where it would hide its library.
+    working folder, and one like `lib` is another wherever the child starts. MET's own folder comes first, since a
+    script may have found it in another way; it is left out where Python finds it anyway, and where it would hide the
+    standard library.
     """
     named = [os.path.abspath(each) for each in os.environ.get("PYTHONPATH", "").split(os.pathsep) if each]
     home = str(Path(__file__).resolve().parents[2])
@@ -37,8 +38,8 @@ def packages() -> dict[str, str]:
 
 
 def looked_in() -> list[str]:
-    """The folders of `sys.path` but for the one that Python puts first by itself: the script's, or the working folder.
-    What lies there is no package that somebody has installed."""
+    """The folders of `sys.path` without the one that Python puts first: the script's, or the working folder, whose
+    modules do not count as installed packages."""
     found = list(dict.fromkeys(sys.path))
     if not sys.flags.safe_path:
         main = getattr(sys.modules["__main__"], "__file__", None)

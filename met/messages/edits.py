@@ -1,8 +1,8 @@
-"""Edits of a deck's text that do what a message's help says: a file, a stretch of it, and what to write there.
+"""Edits of a deck's text that carry out a message's help: a file, a stretch of it, and the new text.
 
-A help carries a `TextChange`, which knows a place and a word. Here the text itself is looked at, and an edit is given
-only where that word stands there, in a file that is the user's own, and as no part of a macro's body: an edit in a
-macro would change all its uses, and one of the library's decks those of everyone.
+A help carries a `TextChange`, which knows a place and a word. This module checks the text itself, and gives an edit
+only where that word stands there, in one of the user's own files and outside of macro bodies: an edit in a macro would
+change all its uses, and one of the library's decks those of everyone.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from met.messages.message import Diagnostic, Help, Place, TextChange, shown_plac
 
 @frozen
 class Edit:
-    """One stretch of a file and what to write in its place; lines and columns count from 1, the end is behind it."""
+    """One stretch of a file and the text to write in its place; lines and columns count from 1, and the end is
+    exclusive."""
 
     file: str
     line: int
@@ -27,9 +28,9 @@ class Edit:
 
 
 def edits(diagnostic: Diagnostic, sources: Mapping[str, str]) -> Iterator[tuple[int, Edit]]:
-    """The edits of a diagnostic, each with the number of its help; each alone is to mend what the diagnostic says.
+    """The edits of a diagnostic, each with the number of its help; each alone resolves the diagnostic.
 
-    A help has several where it names several things to write, of which one is meant.
+    A help has several edits where it offers several texts to write.
 
     sources  the text of each file by the name that places give it
     """
@@ -42,7 +43,7 @@ def edits(diagnostic: Diagnostic, sources: Mapping[str, str]) -> Iterator[tuple[
 
 
 def apply(edit: Edit, text: str) -> str:
-    """The text of the edit's file as it makes it."""
+    """The text of the edit's file after the edit."""
     starts = _starts(text)
     first = starts[edit.line - 1] + edit.column - 1
     last = starts[edit.end_line - 1] + edit.end_column - 1
@@ -61,10 +62,10 @@ def _edit(change: TextChange, place: Place, sources: Mapping[str, str]) -> Edit 
     first = line_at + place.column - 1
     last = min(first + place.length, line_end)
     found = _stretch(change, text, (line_at, line_end), min(first, line_end), last)
-    if found is None or text[found[0] : found[1]] == found[2]:  # what stands there is what would be written
+    if found is None or text[found[0] : found[1]] == found[2]:  # the new text stands there already
         return None
     if any(turn.macro in _names(text[found[0] : found[1]]) - _names(found[2]) for turn in place.turns):
-        return None  # it would be of this turn alone
+        return None  # it would only concern this turn
     return _between(place.file, starts, *found)
 
 
@@ -75,7 +76,7 @@ def _names(text: str) -> set[str]:
 def _stretch(
     change: TextChange, text: str, line: tuple[int, int], first: int, last: int
 ) -> tuple[int, int, str] | None:
-    """The first offset and the last of what is replaced, and the text that is put there; None where there is no such.
+    """The first and the last offset of the replaced text, and the new text; None where there is no such stretch.
 
     line         where the place's line begins and ends
     first, last  where the place does
@@ -110,7 +111,7 @@ def _between(file: str, starts: list[int], first: int, last: int, new: str) -> E
 
 
 def _words(word: str, line: str, at: int) -> Iterator[tuple[int, int]]:
-    """The stretches of a line where words stand as whole ones, with blanks between them or none."""
+    """The stretches of a line that consist of these whole words, with or without blanks between them."""
     before = r"(?<!\w)" if word[:1].isalnum() or word[:1] == "_" else ""
     behind = r"(?!\w)" if word[-1:].isalnum() or word[-1:] == "_" else ""
     blanks = r"\s*".join(map(re.escape, word.split(" ")))
@@ -126,7 +127,7 @@ _ENDS_A_VALUE = re.compile(r"\s*(?:[;,)\]}<>=!]|//|/\*|\.\.|(?:by|and|or|in|with
 
 
 def _is_whole_value(text: str, first: int, last: int) -> bool:
-    """True where a stretch is not a part of a value that goes on behind it, or began before it in brackets."""
+    """True where a stretch is not part of a longer value, one that goes on after it or began before it in brackets."""
     depth = 0
     for sign in text[first:last]:
         depth += (sign in "([{") - (sign in ")]}")
@@ -135,7 +136,7 @@ def _is_whole_value(text: str, first: int, last: int) -> bool:
     return depth == 0 and _ENDS_A_VALUE.match(text, last) is not None
 
 
-# Entries of blocks. What they are does not matter here: brackets part them, semicolons, and what is no text of theirs.
+# Entries of blocks. Their kind does not matter here: brackets and semicolons part them, outside of texts.
 
 _PIECES = re.compile(
     r"""(?P<skip>\s+|//[^\n]*|/\*.*?\*/|^[ \t]*\#(?:[^\n]*\\\r?\n)*[^\n]*)"""
@@ -145,7 +146,7 @@ _PIECES = re.compile(
 
 
 def _at_its_end(text: str, at: int, new: str) -> tuple[int, int, str] | None:
-    """An entry put in at the end of the next block; None where an entry ends before a block is opened."""
+    """The edit that adds an entry at the end of the next block; None where an entry ends before a block is opened."""
     depth = 0
     for piece in _PIECES.finditer(text, at):
         sign = piece["sign"]
@@ -167,7 +168,7 @@ def _at_its_end(text: str, at: int, new: str) -> tuple[int, int, str] | None:
 def _entry(text: str, at: int) -> tuple[int, int] | None:
     """The innermost entry of a block around an offset, with its `;` or its block; None where brackets do not match."""
     best: tuple[int, int] | None = None
-    begun: list[int | None] = [None]  # where the entry that is open began, in each block that is open
+    begun: list[int | None] = [None]  # start of the unfinished entry in each open block
     rounds = 0
     for piece in _PIECES.finditer(text):
         sign = piece["sign"]
@@ -194,7 +195,7 @@ def _entry(text: str, at: int) -> tuple[int, int] | None:
 
 
 def _with_its_line(text: str, first: int, last: int) -> tuple[int, int]:
-    """The stretch with the blanks behind it, and with its line where nothing else stands on it."""
+    """The stretch with the blanks after it, and with its line where nothing else stands on it."""
     before = text.rfind("\n", 0, first) + 1
     behind = re.compile(r"[ \t]*").match(text, last)
     end = behind.end() if behind else last

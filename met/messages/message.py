@@ -1,4 +1,4 @@
-"""A message to a user as data: what is wrong, at which places, and what to do."""
+"""A message to a user as data: the mistake, its places and the remedies."""
 
 from __future__ import annotations
 
@@ -65,12 +65,12 @@ class Expansion:
     turn: str = ""
 
     def __str__(self) -> str:
-        """A turn as messages have it: `i = 7`."""
+        """The text of a turn of a loop in messages: `i = 7`."""
         return f"{self.macro} = {self.turn}"
 
 
 def macro_count(expansions: tuple[Expansion, ...]) -> int:
-    """The number of steps of macro expansion, behind which the turns of loops stand."""
+    """The number of steps of macro expansion, which come before the turns of loops."""
     count = len(expansions)
     while count and expansions[count - 1].turn:
         count -= 1
@@ -107,8 +107,8 @@ class TextChange:
 
 
 class Help(str):
-    """One line of help, and the changes of the deck's text of which each does what it says; none where it takes a
-    person to write it."""
+    """One line of help, and alternative changes of the deck's text that carry it out; none where a person has to write
+    it."""
 
     __slots__ = ("changes",)
 
@@ -123,25 +123,25 @@ class Help(str):
 def write(
     new: str, text: str = "", *, old: str | None = None, at: Place | None = None, where: Where = "instead"
 ) -> Help:
-    """The help which says to write this, "write `2 m`" or the text given, with its change; see `TextChange`."""
+    """The help that says what to write, "write `2 m`" or the given text, with its change; see `TextChange`."""
     return Help(text or f"write `{new}`", TextChange(new, old, at, where))
 
 
 def write_either(news: Iterable[str], text: str = "", *, old: str | None = None, where: Where = "instead") -> Help:
-    """The help which says to write one of these, "write `30 deg` or `30 rad`", or a text that ends so."""
+    """The help that offers several texts to write, "write `30 deg` or `30 rad`", or a text that ends so."""
     texts = tuple(news)
     said = f"{text}write {' or '.join(f'`{each}`' for each in texts)}"
     return Help(said, *(TextChange(each, old, None, where) for each in texts))
 
 
 def leave_out(text: str, at: Place | None = None) -> Help:
-    """The help which says to leave an entry of a block out, with its change: the entry that the place stands in."""
+    """The help that says to leave out an entry of a block, with its change; the place lies in the entry."""
     return Help(text, TextChange("", None, at, "entry"))
 
 
 @frozen
 class Diagnostic:
-    """One message for a user: what is wrong, where, why, and what to do."""
+    """One message for a user: the mistake, its place, the reason and the remedies."""
 
     code: str
     message: str

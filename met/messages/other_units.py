@@ -1,7 +1,7 @@
-"""Words that are no units of the table, and what to write instead: for messages only.
+"""Words that are not units of the table, and the units to write instead: for messages only.
 
-A unit is proposed in the place of a word only where it is the same thing of the same size. Else the message says what
-the word is, and what to write for the number that stands before it.
+A unit is proposed for a word only where both mean the same quantity of the same size. Otherwise the message explains
+the word, and converts the number before it.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from met.messages.alike import nearest
 from met.messages.message import write
 from met.units import UNITS, is_unit
 
-LONGEST = 16  # of a word that is looked for
-_FUZZY = 4  # letters of a word that may be misspelt
+LONGEST = 16  # longest word that is looked up
+_FUZZY = 4  # fewest letters of a word that may be misspelt
 
 _SAME: Mapping[str, str] = MappingProxyType({
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "msecs": "ms", "usec": "us", "hr": "h",
@@ -88,7 +88,7 @@ _OTHERS: Mapping[str, tuple[str, str, str]] = MappingProxyType({
     "MHZ": ("a megahertz", "1e6", "Hz"), "mhz": ("a megahertz", "1e6", "Hz"),
     "Nms": ("a newton metre second", "1", "N*m*s"), "deg_s": ("a degree a second", "1", "deg/s"),
 })  # fmt: skip
-"""Word: what it is, how many of which unit of the table."""
+"""By word: its meaning, and its size as a number and a unit of the table."""
 
 _NOT_HERE: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -122,13 +122,13 @@ _AS_FORCE: Mapping[str, str] = MappingProxyType(
         "oz": "0.27801385095378125",
     }
 )
-"""Words for a mass that are said of its weight too, in N."""
+"""Words for a mass that are also used for its weight, with their size in N."""
 
-_NEVER_RUN_TOGETHER = ("t", "h", "K", "H", "F")  # `th`, `mHg`: such words are no products
+_NEVER_RUN_TOGETHER = ("t", "h", "K", "H", "F")  # `th`, `mHg`: such words are not products
 
 
 def suggest(name: str) -> str | None:
-    """The same thing of the same size by a unit of the table: `sec` -> `s`, `Nm` -> `N*m`; None where nothing is."""
+    """The unit of the table with the same meaning and size: `sec` -> `s`, `Nm` -> `N*m`; None where there is none."""
     if name in _SAME:
         return _SAME[name]
     if len(name) > LONGEST or name in _OTHERS or name in _NOT_HERE:
@@ -159,7 +159,7 @@ def suggest(name: str) -> str | None:
 
 
 def _one_slip(word: str, unit: str) -> bool:
-    """True where one letter too many, too few or wrong parts the two, or two letters that changed places."""
+    """True where the two differ by one letter too many, too few or wrong, or by two swapped letters."""
     same = next(
         (i for i, pair in enumerate(zip(word, unit, strict=False)) if pair[0] != pair[1]), min(len(word), len(unit))
     )
@@ -168,7 +168,7 @@ def _one_slip(word: str, unit: str) -> bool:
 
 
 def remedy(name: str, number: str = "", *, alone: bool = True) -> tuple[str, ...]:
-    """Lines of help that say what to write for a word that is no unit; none where nothing is known of it.
+    """Lines of help that say what to write for a word that is not a unit; none for an unknown word.
 
     number  what stands before it, as written; "" where none does
     alone   whether the word is the whole of the unit, or its first factor without an exponent
@@ -206,7 +206,7 @@ def remedy(name: str, number: str = "", *, alone: bool = True) -> tuple[str, ...
 
 
 def _with_prefix(name: str) -> tuple[str, int] | None:
-    """A prefix before a unit, as a unit of the table and a power of ten: `MHz` is Hz and 6."""
+    """A prefix with a unit, as a unit of the table and a power of ten: `MHz` is Hz and 6."""
     prefix = "da" if name[:2] == "da" else name[:1].replace("K", "k")
     unit = name[len(prefix) :]
     if prefix not in _SIZES or unit not in _PREFIXED:
@@ -235,7 +235,7 @@ def _splits(name: str) -> list[tuple[str, ...]]:
 
 def _times(number: str, factor: str) -> str:
     """The product of two decimals, exactly, as a deck writes it."""
-    from decimal import Context, Decimal  # only who made a mistake pays for it
+    from decimal import Context, Decimal  # imported only after a mistake
 
     product = Context(prec=40).multiply(Decimal(number), Decimal(factor)).normalize()
     exponent = product.adjusted()

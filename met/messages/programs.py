@@ -1,8 +1,8 @@
-"""Diagnostics as programs read them: JSON, SARIF 2.1.0, and the workflow commands of GitHub Actions.
+"""Diagnostics for programs: JSON, SARIF 2.1.0, and the workflow commands of GitHub Actions.
 
-JSON has all that a diagnostic has. SARIF is what code hosts and editors take from checkers: results of rules, with
-fixes (https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/). A workflow command makes an annotation of a pull
-request. Edits of the deck's text, where a help has one, are in JSON and in SARIF.
+JSON holds the complete diagnostic. SARIF is the format that code hosts and editors read from checkers: results of
+rules, with fixes (https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/). A workflow command makes an annotation
+of a pull request. Edits of the deck's text, where a help has one, are in JSON and in SARIF.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ PROJECT_PAGE = "docs/diagnostics.md"
 LIBRARY_BASE = "METLIBRARY"
 
 Allowed = Iterable[tuple[Diagnostic, str]]
-"""Warnings that a run allows, and why."""
+"""Warnings that a run allows, each with the reason."""
 
 _NONE: Mapping[str, str] = MappingProxyType({})
 
@@ -172,7 +172,7 @@ def _location(place: Place, text: str) -> dict[str, Any]:
 
 
 def _artifact(file: str) -> dict[str, str]:
-    """Where a file is, as a URI: relative to the working folder, or to MET's own decks."""
+    """The URI of a file: relative to the working folder, or to MET's own decks."""
     if file.startswith("<"):
         return {"uri": quote(file[1:-1]), "uriBaseId": LIBRARY_BASE}
     if os.path.isabs(file):
@@ -227,7 +227,8 @@ def _command(diagnostic: Diagnostic) -> str:
 
 
 def _escaped(text: str, also: tuple[str, ...] = ()) -> str:
-    """Text without what ends a value of a workflow command, so that no deck writes commands of its own."""
+    """Text without the characters that end a value of a workflow command, so that no deck can write commands of its
+    own."""
     for sign in ("%", "\r", "\n", *also):
         text = text.replace(sign, f"%{ord(sign):02X}")
     return text

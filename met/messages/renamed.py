@@ -1,4 +1,4 @@
-"""Old names of what plugins import or write: they work for one version more, each use with a DeprecationWarning."""
+"""Old names in the interface for plugins: they work for one more version, each use with a DeprecationWarning."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def old_names(module: str, names: Mapping[str, str], namespace: Mapping[str, Any
 
 
 def old_fields(**names: str) -> Callable[[C], C]:
-    """Decorates a dataclass whose fields were renamed, old name=new name: it is made and read by the old ones too."""
+    """Decorate a dataclass whose fields were renamed, old name=new name: the old names work as arguments and attributes
+    too."""
 
     def decorate(cls: C) -> C:
         make = cls.__init__  # type: ignore[misc]

@@ -1,4 +1,4 @@
-"""Diagnostics as people read them in a terminal; `met.messages.programs` writes them for programs.
+"""Diagnostics as text for people in a terminal; `met.messages.programs` writes them for programs.
 
     error[D031]: servo `shoulder` at 300 Hz does not divide the base rate, 1000 Hz
       --> arm.ic:42:12
@@ -36,7 +36,7 @@ _RESET = "\x1b[0m"
 def render(
     diagnostics: Iterable[Diagnostic], sources: Mapping[str, str] = MappingProxyType({}), *, colour: bool = False
 ) -> str:
-    """The diagnostics as text, with the lines they are about and a count at the end; "" for none.
+    """The diagnostics as text, with the deck's lines and a count at the end; "" for none.
 
     sources: the text of each file by the name that places give it; a file that is not there is named, not shown.
     """
@@ -159,7 +159,7 @@ def _window(line: str, start: int) -> tuple[int, int]:
 
 
 def _spread(text: str, column: int) -> tuple[str, int]:
-    """The text as it is printed from a column on, and the column behind it."""
+    """The text as it is printed from a column on, and the column after it."""
     out = []
     for character in text:
         if character == "\t":
@@ -184,7 +184,7 @@ def _width(character: str) -> int:
 
 
 def _safe(text: str) -> str:
-    """Text without what could steer a terminal."""
+    """Text without control sequences that could steer a terminal."""
     if text.isprintable():
         return text
     import unicodedata

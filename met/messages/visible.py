@@ -1,7 +1,8 @@
-"""Texts from decks, archives and file names, in which what cannot be seen is made visible; and how they are said.
+"""Texts from decks, archives and file names with their invisible characters made visible; and printing of them.
 
-A name may hold what a terminal obeys: sequences that move the cursor, change colours or the window's title, or turn the
-direction of what follows. So nothing that somebody else wrote is printed but through here, on a terminal or not.
+A name may contain sequences that move a terminal's cursor, change colours or the window's title, or reverse the
+direction of the text that follows. So every text that somebody else wrote is printed through this module, on a terminal
+or not.
 """
 
 from __future__ import annotations
@@ -22,12 +23,13 @@ def visible(text: str) -> str:
 
 
 def line(text: str) -> str:
-    """The same of what is to be one line: its line ends and tabs are escapes, too."""
+    """The text made visible as one line: its line ends and tabs are escapes, too."""
     return visible(text).replace("\n", "\\n").replace("\t", "\\t")
 
 
 def say(text: str = "", *, end: str = "\n", err: bool = False, exact: bool = False) -> None:
-    """Print a text, visible. err: on stderr. exact: as it is where no terminal is, for programs and files."""
+    """Print a text, made visible. err: on stderr. exact: unchanged where the output is not a terminal, for programs and
+    files."""
     stream = sys.stderr if err else sys.stdout
     print(text if exact and not stream.isatty() else visible(text), end=end, file=stream, flush=True)
 

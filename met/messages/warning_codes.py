@@ -1,11 +1,11 @@
-"""The codes of warnings: what a run may allow, `allow D105 because "the paper's own rates";`."""
+"""The codes of warnings that a run may allow, as by `allow D105 because "the paper's own rates";`."""
 
 from __future__ import annotations
 
 WHILE_RUNNING: frozenset[str] = frozenset(
     {"D310", "D311", "D312", "D317", "D318", "D319", "D320", "D321", "D322", "D341", "D344", "D345", "D347", "D348"}
 )
-"""Codes of warnings that a run itself may give: the check does not know whether an `allow` of one is of use."""
+"""Codes of warnings that only a run may give: the check cannot know whether an `allow` of one is of use."""
 
 WARNINGS = WHILE_RUNNING | {
     "D003", "D015", "D017", "D036", "D037",
@@ -14,6 +14,5 @@ WARNINGS = WHILE_RUNNING | {
     "D296", "D297", "D298", "D300", "D301", "D305", "D306", "D307",
     "D334", "D335", "D336", "D337", "D338", "D339", "D340", "D341", "D342", "D352", "D366", "D385", "D386", "D392",
 }  # fmt: skip
-"""Every code that a warning of a run or of its deck has, but that of an `allow` that silences nothing. An error may
-have the same.
-tests/met/messages/test_warning_codes.py holds this against the source."""
+"""Every code of a warning about a run or its deck, except that of an `allow` that silences nothing. Some are also codes
+of errors. tests/met/messages/test_warning_codes.py checks the list against the source."""
