@@ -1,1 +1,1 @@
-"""Archives: results as HDF5 files that xarray opens as they are."""
+"""Archives: results as HDF5 files that xarray opens directly."""

@@ -1,8 +1,8 @@
-"""The group of one experiment in memory: as an xarray.Dataset, what `batch.open` gives of an archive of the same cases;
-and as whoever reads archives takes it.
+"""The group of one experiment in memory: as an xarray.Dataset, equal to the one that `batch.open` gives for an archive
+of the same cases; and as a group for code that reads archives.
 
 Making twenty variables anew takes xarray a millisecond. So the Dataset is laid out once for each number of cases, and
-filled by a copy of it that has other values.
+copied with other values.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     import xarray
 
 KEPT_LAYOUTS = 4
-"""Numbers of cases whose layouts are kept, those that were used last."""
+"""Largest number of layouts that are kept, those used last."""
 
 
 @frozen
 class DatasetLayout:
-    """A Dataset without values. moving: its variables that have other ones in each run."""
+    """A Dataset without values. moving: its variables whose values differ from run to run."""
 
     layout: Layout
     template: xarray.Dataset
@@ -40,7 +40,7 @@ class DatasetLayout:
 
 
 class DatasetMaker:
-    """Makes Datasets of runs of one program.
+    """Maker of Datasets for runs of one program.
 
     deck      its name, as an archive's attribute has it
     prepared  the program, with any cases
@@ -52,7 +52,7 @@ class DatasetMaker:
         self._laid_out = lru_cache(KEPT_LAYOUTS)(self._lay_out)
 
     def dataset(self, experiment: Experiment, run: Run, signals: Collection[str] = ()) -> xarray.Dataset:
-        """The Dataset of all cases of an experiment, which were run; with these signals, where there are any.
+        """The Dataset of all cases of an experiment after their run, with these signals.
 
         experiment  that of `prepared`, with these cases
         """
@@ -102,7 +102,7 @@ class DatasetMaker:
 
 
 class GroupInMemory(ArchiveGroup):
-    """A group of an archive that is in no file: what is one value a case, and no histories.
+    """A group of an archive that is in no file: the variables with one value a case, without histories.
 
     values  by the names of the layout's variables along `case`, in the order of the cases
     """
@@ -127,7 +127,7 @@ class GroupInMemory(ArchiveGroup):
     def of_metrics(
         cls, experiment: Experiment, rows: np.ndarray, status: np.ndarray, metrics: Mapping[str, np.ndarray]
     ) -> GroupInMemory:
-        """The group of these rows of the case table, with their status and metrics alone."""
+        """The group of these rows of the case table, with only their status and metrics."""
         names = {each.key: each.name for each in archive_layout.layout(experiment, len(rows), 0).role("metric")}
         values = {names[name]: each for name, each in metrics.items()}
         return cls(experiment, len(rows), {"case": experiment.cases.table[rows], "status": status, **values})
@@ -166,12 +166,13 @@ def _stored(variable: archive_layout.Variable) -> Stored:
 
 
 def _as_read(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    """Attributes as `ArchiveGroup` has them: arrays as lists."""
+    """Attributes as in `ArchiveGroup`: arrays as lists."""
     return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in attributes.items()}
 
 
 def _as_opened(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    """Attributes as xarray gives them of an opened archive: coordinates are none, a list of one item is that item."""
+    """Attributes as xarray gives them for an opened archive: those of coordinates are left out, and a list of one item
+    is that item."""
     found = {name: value for name, value in attributes.items() if name != "coordinates"}
     return {
         name: value[0] if isinstance(value, list | np.ndarray) and len(value) == 1 else value
@@ -180,7 +181,7 @@ def _as_opened(attributes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _plain(values: Any, count: int) -> np.ndarray:
-    """Values as an opened archive has them: strings as arrays of letters; one value of all cases, as often as that."""
+    """Values as in an opened archive: strings as arrays of letters; a value that all cases share, repeated."""
     if isinstance(values, list):
         if not any(values):
             return np.zeros(count, "U1")

@@ -1,4 +1,4 @@
-"""What stands where in an archive: one description, by which files are written and sized.
+"""The layout of an archive, by which files are written and their size is estimated.
 
     /                       attributes: schema, deck, and for a single experiment those of its group
       <variables>           a single experiment lies in the root
@@ -52,13 +52,13 @@ Role = Literal["dimension", "case", "coordinate", "choice", OfMachine, "metric",
 Kind = Literal["float64", "float32", "int64", "int8", "str"]
 
 WIDTHS: Mapping[Kind, int] = {"float64": 8, "float32": 4, "int64": 8, "int8": 1, "str": 48}
-"""Bytes of a value; of a string, with what HDF5 has about it."""
+"""Bytes of a value; of a string, with HDF5's overhead."""
 
 CHUNK_BYTES = 4 << 20
-"""A chunk is one case's signal, cut in time beyond this size."""
+"""Largest size of a chunk: one case's signal, cut in time beyond this size."""
 
 CHUNK_ENTRY, VARIABLE_HEAD, PARAMETER_TEXT = 56, 1500, 300
-"""Bytes about what is stored, measured: a chunk in its index; a variable's head; a parameter in the plan's JSON."""
+"""Measured overhead in bytes: of a chunk in its index; of a variable's head; of a parameter in the plan's JSON."""
 
 FRAME = (
     "joint frame: the parent link's frame moved by `at`, turned by `rpy` (fixed x-y-z); a joint moves about or along "
@@ -75,7 +75,7 @@ EVENTS = {
 
 AT_LIMIT, EXCESS, EXTREME_AT, GRAPPLE = "at_limit.", "excess.", "extreme_at.", "grapple."
 """Prefixes of variables along `case`: the share of a run's time at the limit of this path, the largest excess over it,
-the limit that was reached where the extreme of this metric fell, and a figure of the grapple of this payload."""
+the limit that was reached at the extreme of this metric, and a figure of the grapple of this payload."""
 
 LIMITED = "ticks at which the load motor of a bed was at its limit"
 
@@ -101,7 +101,7 @@ RESERVED = frozenset(
         *(f"friction_{name}" for name in EVENTS),
     }
 )
-"""Names of variables that MET writes into a group. A deck's name that is one of these, or a signal's, gets a word
+"""Names of variables that MET writes into a group. A deck's name that equals one of these, or a signal's, gets a word
 before it: `coordinates.seed`, `metrics.time`, and for an experiment's group `experiments.provenance`."""
 
 
@@ -120,17 +120,17 @@ class Variable:
 
     @property
     def key(self) -> str:
-        """The engine's name of it."""
+        """The engine's name of the variable."""
         return self.source or self.name
 
     @property
     def written_attributes(self) -> dict[str, Any]:
-        """The attributes that it has in an archive, in their order, but for a code key."""
+        """The attributes of the variable in an archive, in their order, without a code key."""
         units = {"units": self.unit} if self.unit else {}
         return {**units, "long_name": self.long_name, "role": self.role, **self.attributes}
 
     def code_key(self, results: Mapping[str, str]) -> dict[str, str]:
-        """The attribute with the key of what a metric or signal computes, among `met.run.Prepared.result_keys`."""
+        """The attribute with the code key of a metric or signal, from `met.run.Prepared.result_keys`."""
         kind = {"metric": "metrics", "signal": "record"}.get(self.role)
         key = results.get(f"{kind}.{self.key}")
         return {} if key is None else {"code_key": key}
@@ -138,7 +138,8 @@ class Variable:
 
 @frozen
 class Layout:
-    """The group of one experiment: sizes of its dimensions, and its variables in the order they are written."""
+    """The group of one experiment: sizes of its dimensions, and its variables in the order in which they are
+    written."""
 
     sizes: Mapping[str, int]
     variables: tuple[Variable, ...]
@@ -159,13 +160,13 @@ class Layout:
 
     @property
     def bytes(self) -> int:
-        """About the size of the group in the file."""
+        """Approximate size of the group in the file."""
         values = sum(int(np.prod(self.shape(v), dtype=np.int64)) * WIDTHS[v.kind] for v in self.variables)
         chunks = sum(self.sizes["recorded_case"] for _ in self.role("signal"))
         return values + CHUNK_ENTRY * chunks + VARIABLE_HEAD * len(self.variables)
 
     def chunks(self, variable: Variable) -> tuple[int, ...] | None:
-        """Chunks of a signal: one case each, cut in time where that is too large."""
+        """Shape of a signal's chunks: one case each, cut in time where that is too large."""
         if variable.role != "signal":
             return None
         _, rows, *width = self.shape(variable)
@@ -174,8 +175,8 @@ class Layout:
 
 
 def layout(experiment: Experiment, cases: int, recorded: int, single: bool = False) -> Layout:
-    """The group of an experiment of which `cases` cases are run, and of `recorded` of them the histories are kept, of
-    which each number has eight bytes, or four: `single`."""
+    """The group of an experiment with `cases` cases run and the histories of `recorded` of them kept, with numbers of
+    eight bytes, or of four where `single`."""
     structure = experiment.structure
     sizes = {"case": cases, "requirement": len(experiment.requirements)}
     variables = [
@@ -195,18 +196,18 @@ def layout(experiment: Experiment, cases: int, recorded: int, single: bool = Fal
 
 
 def joint_dimensions(experiment: Experiment) -> dict[tuple[str, ...], str]:
-    """The dimensions that hold joints, by the names they hold."""
+    """The dimensions of joints, by the joints' names."""
     moving = tuple(joint.name for joint in experiment.structure.moving)
     found = {moving: "joint"}
     for recorded in experiment.structure.record:
         if recorded.joints and recorded.joints not in found:
-            owner = recorded.name.partition(".jacobian.")[0]  # both jacobians of a link have its joints
+            owner = recorded.name.partition(".jacobian.")[0]  # both jacobians of a link have the same joints
             found[recorded.joints] = "joint_of_" + re.sub(r"\W", "_", owner)
     return found
 
 
 def component_dimensions(experiment: Experiment) -> dict[tuple[str, ...], str]:
-    """The dimensions that hold components of recorded vectors, by the components' names."""
+    """The dimensions of recorded vectors' components, by the components' names."""
     recorded = [each.components for each in experiment.structure.record if each.components]
     return {components: DIMENSIONS[components] for components in recorded}
 
@@ -304,7 +305,7 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
 
 
 def _limits(experiment: Experiment) -> list[Variable]:
-    """Shares of time at limits, largest excesses, and limits at extremes, by their own names."""
+    """Variables of shares of time at limits, largest excesses, and limits at extremes, by their own names."""
     limits = limits_of(experiment.structure, experiment.parameters)
     found = [
         Variable(
@@ -334,7 +335,7 @@ def _limits(experiment: Experiment) -> list[Variable]:
 
 
 def _grapples(experiment: Experiment) -> list[Variable]:
-    """Figures of grapples, by their own names."""
+    """Variables of figures of grapples, by their own names."""
     return [
         Variable(
             f"{GRAPPLE}{payload}.{name}", "float64", ("case",), "grapple", f"payload {payload}: {words}", unit,
@@ -346,7 +347,8 @@ def _grapples(experiment: Experiment) -> list[Variable]:
 
 
 def _over_cases(experiment: Experiment) -> dict[str, np.ndarray]:
-    """Share and confidence of each requirement, not-a-number where it has none; nothing where none of them has any."""
+    """Share and confidence of each requirement, not-a-number where it has none; nothing where no requirement has
+    any."""
     found = experiment.requirements
     if all(requirement.share is None for requirement in found):
         return {}
@@ -360,7 +362,7 @@ def _over_cases(experiment: Experiment) -> dict[str, np.ndarray]:
 
 
 def _apart(name: str, word: str, taken: Collection[str], fellows: Collection[str]) -> str:
-    """A name, with a word before it (or several) where it is taken; then it is none of its fellows' names either."""
+    """A name, with one word or several before it where it is taken, so that it equals no name of its fellows either."""
     if name not in taken:
         return name
     while name in taken or name in fellows:
@@ -399,7 +401,7 @@ def _recorded(experiment: Experiment, variables: list[Variable]) -> list[Variabl
 
 
 def _signals(experiment: Experiment, sizes: dict[str, int], kind: Kind, told: Mapping[str, str]) -> list[Variable]:
-    """told: attributes of every signal; empty ones are left out."""
+    """Variables of signals. told: attributes of every signal; empty ones are left out."""
     joint_dims, component_dims = joint_dimensions(experiment), component_dimensions(experiment)
     out = []
     for joints, dim in joint_dims.items():
@@ -422,7 +424,7 @@ def _signals(experiment: Experiment, sizes: dict[str, int], kind: Kind, told: Ma
 
 
 def _signal_unit(recorded: Recorded) -> tuple[str, dict[str, Any]]:
-    """The unit, where all joints share one, and else the attribute that has each joint's."""
+    """The unit, if all joints share one, or else the attribute with each joint's unit."""
     units = recorded.unit if len(recorded.unit) > 1 else recorded.unit * max(1, len(recorded.channels))
     if len(set(units)) > 1:
         return "", {"units_by_joint": list(units[:: max(1, len(recorded.components))])}

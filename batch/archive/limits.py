@@ -1,4 +1,4 @@
-"""The unit in which a metric's requirement is written: whoever wrote `sag > -136 deg` reads the metric in degrees."""
+"""The unit in which a metric's requirement is written: a deck with `sag > -136 deg` shows the metric in degrees."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from met import units
 from met.plan.judged import Requirement
 from met.unit_parser import parse_unit
 
-# what a unit may stand behind: a number, or the end of a sum in parentheses
+# text before a unit: a number, or the end of a sum in parentheses
 _NUMBER = re.compile(r"\d[\d.]*(?:[eE][-+]?\d+)?|\)")
 _OVER_TIME = re.compile(r"(?:\w+: )?\w+\(")
 _OVER_CASES = re.compile(r"\s+(?:in\s.*\sof\s+cases\b.*|with\s.*\sconfidence)$")
@@ -25,8 +25,8 @@ def deck_unit(metric: str, unit: str, requirements: Iterable[Requirement]) -> tu
 
 
 def written_unit(text: str, unit: str) -> tuple[str, float] | None:
-    """The unit at the end of a requirement's text and its size in SI, of one over time that of a comparison in it; None
-    where no unit of this dimension is there."""
+    """The unit at the end of a requirement's text and its size in SI; for one over time, that of a comparison in it.
+    None where no unit of this dimension is there."""
     try:
         wanted = parse_unit(unit).dimension
     except ValueError:

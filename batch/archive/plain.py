@@ -1,9 +1,9 @@
-"""That an archive is one file and leads to no other: looked at before anything that is in it is read.
+"""A check, before anything is read, that an archive is one file that refers to no other.
 
-HDF5 follows what a file says. External storage makes any file of this machine a dataset's values, and so would come out
-of `met export`; external links and virtual datasets open other files, filters load other people's code, and a named
-pipe in the place of one of these is waited for. MET writes none of them, and refuses them all, whoever asks for the
-archive. Nothing is opened by looking: HDF5 follows only when values or sizes are asked for.
+HDF5 follows references in a file. External storage could make any file of this machine a dataset's values, which `met
+export` would then write; external links and virtual datasets open other files, filters load foreign code, and a named
+pipe among these blocks. MET writes none of them, and refuses them all for every reader. The check opens nothing: HDF5
+follows references only when values or sizes are read.
 """
 
 from __future__ import annotations
@@ -20,17 +20,18 @@ from met.diagnostic import Problem, error
 from met.host.files import open_regular
 
 DEEPEST = 64
-"""Groups that one may be in: whoever opens a file of thousands takes minutes."""
+"""Largest depth of nested groups: a file of thousands takes minutes to open."""
 
 MOST_ATTRIBUTES = 1000
-"""Attributes that a thing may have; MET writes some dozens. HDF5 finds each anew: of thousands it takes minutes."""
+"""Largest number of attributes of an object; MET writes some dozens. HDF5 searches for each anew: thousands take
+minutes."""
 
 SCALES = ("DIMENSION_LIST", "REFERENCE_LIST")
-"""Attributes by which HDF5 itself says what a dataset's dimensions are: references to datasets of the same file."""
+"""Attributes by which HDF5 itself records a dataset's dimensions: references to datasets of the same file."""
 
 
 def check(file: Any, path: Path) -> None:
-    """Refuse an open file (h5py.File) that is not all in itself, or holds what no archive does. Raises Problem E308,
+    """Refuse an open file (h5py.File) that refers to others, or holds objects that no archive has. Raises Problem E308,
     Unlike."""
     with open_regular(path) as raw:
         room.check_heaps(raw, os.fstat(raw.fileno()).st_size)
@@ -44,7 +45,7 @@ def check(file: Any, path: Path) -> None:
 
 
 def _wrong(root: Any, raw: BufferedReader) -> Iterator[tuple[str, str]]:
-    """Each object of a file that an archive must not have: its name, and why. raw: the file itself."""
+    """Each object of a file that an archive must not have, with its name and the reason. raw: the file itself"""
     module = h5py()
     size = os.fstat(raw.fileno()).st_size
     seen = set()
@@ -74,7 +75,7 @@ def _wrong(root: Any, raw: BufferedReader) -> Iterator[tuple[str, str]]:
 
 
 def _links(group: Any) -> list[tuple[bytes, int]]:
-    """Names of a group's links, and their kinds."""
+    """The names of a group's links, with their kinds."""
     found: list[tuple[bytes, int]] = []
 
     def take(name: bytes, about: Any) -> None:
@@ -85,8 +86,8 @@ def _links(group: Any) -> list[tuple[bytes, int]]:
 
 
 def _dataset(node: Any) -> str:
-    """Why a dataset is none of an archive's; empty where it may be one. Its values and its size are not asked for
-    before it is known where they are."""
+    """The reason why a dataset cannot be an archive's; empty where it can. Its values and size are not read before it
+    is known where they are."""
     module = h5py()
     made = node.get_create_plist()
     if made.get_layout() == module.h5d.VIRTUAL:
@@ -104,7 +105,7 @@ def _dataset(node: Any) -> str:
 
 
 def _attributes(where: str, node: Any) -> Iterator[tuple[str, str]]:
-    """The attributes of a thing that are neither numbers nor strings, nor what HDF5 itself writes."""
+    """The attributes of an object that are neither numbers nor strings, nor written by HDF5 itself."""
     module = h5py()
     plain = (module.h5t.INTEGER, module.h5t.FLOAT, module.h5t.STRING, module.h5t.ENUM)
     count = module.h5a.get_num_attrs(node)

@@ -1,7 +1,7 @@
-"""Where results come from: what stands inside the archive, and what beside it.
+"""The provenance of results, in the archive and beside it.
 
-Inside is what decides the numbers: deck, plan, versions, git commit of MET and whether it was changed. Beside it, in
-`<archive>.run.json`, is what differs from one making to the next: dates, host, CPU, wall times.
+The archive holds everything that decides the numbers: deck, plan, versions, git commit of MET and whether it was
+changed. The file `<archive>.run.json` beside it holds what differs between runs: dates, host, CPU, wall times.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ class Revision:
         home = Path(__file__).resolve().parents[2]
         if not (home / ".git").exists():
             return
-        # git looks into no folder of another user's, whose settings may name programs: this one's code runs here anyway
+        # git refuses a folder of another user, whose settings may name programs; its code runs here anyway
         trusted = ("-c", f"safe.directory={home}", "-c", "core.fsmonitor=false")
         command = ["git", *trusted, "-C", str(home), "describe", "--always", "--dirty", "--abbrev=40", "--exclude", "*"]
-        quiet = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}  # as a hook sets
+        quiet = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}  # a hook sets
         quiet["GIT_OPTIONAL_LOCKS"] = "0"
         try:
             self._process = subprocess.Popen(
@@ -43,7 +43,7 @@ class Revision:
             self._process = None
 
     def read(self) -> tuple[str, str]:
-        """Commit, and "yes" or "no": whether tracked files differ from it; both "unknown" outside a repository."""
+        """The commit, and "yes" or "no": whether tracked files differ from it; both "unknown" outside a repository."""
         if self._process is None:
             return UNKNOWN, UNKNOWN
         try:
@@ -58,7 +58,7 @@ class Revision:
         return commit, "yes" if dirty else "no"
 
     def close(self) -> None:
-        """Leave no process behind, whether or not it was read."""
+        """End the process, whether or not its answer was read."""
         if self._process is not None:
             self._process.kill()
             self._process.communicate()
@@ -73,7 +73,7 @@ def version(package: str) -> str:
 
 
 def machine() -> dict[str, Any]:
-    """Host, CPU and software that the numbers do not depend on."""
+    """Host, CPU and software on which the numbers do not depend."""
     return {
         "host": platform.node(),
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",

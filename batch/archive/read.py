@@ -1,4 +1,4 @@
-"""Reading an archive without xarray: fast to start, for `met show`, `met plot` and whoever needs single values."""
+"""Reading an archive without xarray: fast to start, for `met show`, `met plot` and readers of single values."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from met.plan.swept import blocks
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """Turn whatever HDF5 and h5py raise over damaged bytes into Problem E302."""
+    """Turn every error of HDF5 and h5py over damaged bytes into Problem E302."""
     try:
         yield
     except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError, ArithmeticError) as reason:
@@ -39,11 +39,11 @@ def reading(path: Path) -> Iterator[None]:
 
 
 FEW = 100
-"""So many values at most are read one by one."""
+"""Largest number of values that are read one by one."""
 
 
 class ArchiveGroup:
-    """One experiment of an archive. Raises Problem E302 where the file does not hold what it should."""
+    """One experiment of an archive. Raises Problem E302 where the file does not match the format."""
 
     def __init__(self, node: Any, path: Path) -> None:
         self._node, self.path = node, path
@@ -54,7 +54,7 @@ class ArchiveGroup:
             self.step_errors = step_errors.read(self)
             self.summary = summarised.read(node, self)
         self.summed: summarised.CaseSummary | None = None
-        """The summary of all cases, once somebody has gone through their rows for it (batch/queries/streamed.py)."""
+        """The summary of all cases, once computed from their rows (batch/queries/streamed.py)."""
         self.name: str = self.attributes["experiment"]
         self.sweep: str = str(self.attributes.get("sweep", ""))
 
@@ -81,7 +81,7 @@ class ArchiveGroup:
         return tuple(self._node[name].shape)
 
     def type(self, name: str) -> str:
-        """A variable's type, as numpy writes it: `<f8`; `|O` of strings."""
+        """A variable's type in numpy's notation: `<f8`; `|O` for strings."""
         return str(self._node[name].dtype.str)
 
     def values(self, name: str) -> np.ndarray:
@@ -93,7 +93,7 @@ class ArchiveGroup:
             return np.asarray(dataset[...])
 
     def at(self, name: str, positions: Sequence[int] | np.ndarray) -> np.ndarray:
-        """A variable in the cases at these positions, in their order; few of many are read by themselves."""
+        """A variable in the cases at these positions, in their order; if they are few of many, each is read alone."""
         if len(positions) > FEW:
             return self.values(name)[positions]
         with reading(self.path):
@@ -103,7 +103,7 @@ class ArchiveGroup:
             return np.array([read[int(position)] for position in positions], dtype=object if words else dataset.dtype)
 
     def stretch(self, name: str, first: int, last: int) -> np.ndarray:
-        """A variable in the cases at positions `first` to `last`, not itself; strings as an array of str."""
+        """A variable in the cases at positions `first` to `last` (exclusive); strings as an array of str."""
         with reading(self.path):
             dataset = self._node[name]
             if h5py().check_string_dtype(dataset.dtype) is not None:
@@ -123,7 +123,8 @@ class ArchiveGroup:
             return numbers.astype(np.uint64)
 
     def signal(self, name: str, position: int) -> np.ndarray:
-        """History of one signal in the case at this position, which has one: (time,), then joints, then components."""
+        """History of one signal in the case at this position, which must have one: (time,), then joints, then
+        components."""
         with reading(self.path):
             return np.asarray(self._node[name][int(np.searchsorted(self.recorded_positions, position))])
 
@@ -138,13 +139,14 @@ class ArchiveGroup:
 
     @cached_property
     def recorded_positions(self) -> np.ndarray:
-        """Positions of the cases whose histories are here, rising."""
+        """Positions of the cases whose histories are in the archive, ascending."""
         if not self.recorded:
             return np.empty(0, np.int64)
         return np.searchsorted(self.values("case"), self.values("recorded_case"))
 
     def recorded_position(self, wanted: str) -> int:
-        """Position of a case as `find_case` has it, which has its history here. Raises Problem E328 for another."""
+        """Position of a case, named as for `find_case`, whose history is in the archive. Raises Problem E328 for
+        another."""
         position = self.find_case(wanted)
         if position not in self.recorded_positions:
             case = self.values("case")[position]
@@ -160,7 +162,7 @@ class ArchiveGroup:
         return self._along(variable.dims[2:3]) if variable.of_joints else ()
 
     def components(self, variable: Stored) -> tuple[str, ...]:
-        """Names of a signal's components; none where it is no vector."""
+        """Names of a signal's components; none for a signal that is not a vector."""
         return self._along(variable.dims[3:4] if variable.of_joints else variable.dims[2:3])
 
     def _along(self, dims: tuple[str, ...]) -> tuple[str, ...]:
@@ -181,7 +183,7 @@ class ArchiveGroup:
         return int(self._node["recorded_case"].shape[0]) if "recorded_case" in self._node else 0
 
     def coordinates_of(self, position: int) -> dict[str, tuple[float, str]]:
-        """The varied parameters of the case at this position as the deck writes them: path -> (value, unit)."""
+        """The varied parameters of the case at this position in the deck's units: path -> (value, unit)."""
         out = {}
         for variable in self.role("coordinate"):
             scale = float(variable.attributes.get("deck_scale", 1.0))
@@ -190,12 +192,12 @@ class ArchiveGroup:
         return out
 
     def position_of(self, case: int) -> int:
-        """The position here of a case by its position in the case table; it is here."""
+        """The position in this group of a case, by its position in the case table; the case must be there."""
         with reading(self.path):
             return bisect_left(range(self.count), case, key=lambda place: int(self._node["case"][place]))
 
     def find_case(self, wanted: str) -> int:
-        """Position in this group of a case: `#7`, its row in the case table, or the beginning of its case_id."""
+        """The position in this group of a case: `#7`, its row in the case table, or the beginning of its case_id."""
         row = row_of(wanted)
         ids = self.values("case_id") if row is None else np.empty(0)
         again = ""
@@ -206,8 +208,8 @@ class ArchiveGroup:
 
 
 def found_cases(wanted: str, rows: np.ndarray, ids: np.ndarray, name: str, remedy: str = "") -> np.ndarray:
-    """The places, among cases of `name`, of the case that `#7`, its row, or the beginning of its case_id names: one,
-    unless several have this row. ids: not read for a row; remedy: what else to do where it is not here. Raises Problem
+    """The places, among cases of `name`, of the case with this row, `#7`, or beginning of a case_id: one, unless
+    several have this row. ids: not read for a row; remedy: a further remedy where the case is missing. Raises Problem
     E321, E322."""
     row = row_of(wanted)
     if row is not None:
@@ -224,7 +226,7 @@ def found_cases(wanted: str, rows: np.ndarray, ids: np.ndarray, name: str, remed
 
 
 def _cases_here(rows: np.ndarray) -> str:
-    """Say which cases an archive has: all of a table, or some of it."""
+    """The text that says which cases an archive has: all of a table, or some of it."""
     if not len(rows):
         return "there is no case here"
     if len(rows) == 1:
@@ -236,7 +238,7 @@ def _cases_here(rows: np.ndarray) -> str:
 
 
 class ArchiveFile:
-    """An open archive; use it in a `with`. Raises Problem E301 (no such file), E302 (no archive), E303 (newer)."""
+    """An open archive, to be used in a `with`. Raises Problem E301 (no such file), E302 (no archive), E303 (newer)."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
@@ -270,7 +272,7 @@ class ArchiveFile:
             raise Unlike("it does not say where it comes from")
 
     def __enter__(self) -> ArchiveFile:
-        """Numbers of an archive may be as large as doubles are: what becomes too large for one is infinite, unsaid."""
+        """Open the archive. Its numbers may be as large as doubles are: overflows give infinity without a warning."""
         self._arithmetic.__enter__()
         return self
 
@@ -291,7 +293,8 @@ class ArchiveFile:
         return groups
 
     def need_every_row(self, what: str) -> None:
-        """Refuse a question to all cases of an archive that keeps a summary of them. Raises Problem E330."""
+        """Refuse an operation that needs all cases where an archive keeps only a summary of them. Raises Problem
+        E330."""
         for group in self.groups:
             if group.summary is not None:
                 message = f"{what} needs a row a case, and {self.path} keeps a summary of `{group.name}`"
@@ -305,7 +308,7 @@ class ArchiveFile:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Versions, git commit and whether MET's source was changed, defines."""
+        """Versions, git commit, whether MET's source was changed, and defines."""
         with reading(self.path):
             return {name: _plain(value) for name, value in self._file["provenance"].attrs.items()}
 
@@ -321,7 +324,7 @@ class ArchiveFile:
             return dict(zip(names.tolist(), texts.tolist(), strict=True))
 
     def plan(self, *, as_written: bool = False) -> Plan:
-        """The plan that was run, whole. as_written: to be looked at, not run (met.plan.file.loads)."""
+        """The whole plan that was run. as_written: for display only (met.plan.file.loads)"""
         from met.plan import file as plan_file
         from met.plan.codec import Damaged
 
@@ -339,7 +342,7 @@ class ArchiveFile:
             return plan
 
     def _check_plan(self, plan: Plan) -> None:
-        """Check that the plan is that of the groups: the same experiments, cases and varied parameters."""
+        """Check that the plan matches the groups: the same experiments, cases and varied parameters."""
         known = {experiment.name: experiment for experiment in plan.experiments}
         if len(known) != len(plan.experiments) or known.keys() != {group.name for group in self.groups}:
             raise Unlike("its plan is of other runs than it holds")
@@ -358,7 +361,7 @@ IN_A_FILE = "an archive is read from a file: save it as NAME.h5 first"
 
 
 def check_signature(path: Path) -> None:
-    """Refuse kindly what is no HDF5 file at all."""
+    """Refuse a file that is not an HDF5 file at all, with a clear message."""
     try:
         with open_regular(path) as file:
             begins = file.read(len(SIGNATURE))
@@ -378,9 +381,9 @@ HEAD_BYTES = 4096
 
 
 def is_archive(path: Path) -> bool:
-    """True if a file is an archive of MET, sound or damaged: one that may be written over.
+    """True if a file is an archive of MET, sound or damaged, which may be overwritten.
 
-    HDF5 does not open it: over a damaged file it may never come back.
+    HDF5 does not open it, since it may hang on a damaged file.
     """
     with open_regular(path) as file:
         head = file.read(HEAD_BYTES)

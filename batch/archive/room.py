@@ -1,9 +1,9 @@
-"""Whether a file has room for what it says it holds: asked of every dataset before its values are.
+"""A check that a file has room for each dataset that it declares, made before the values are read.
 
-HDF5 unpacks a chunk until its packer's stream ends, however little the chunk should hold, packers may be stacked, and
-any number of strings may be the same bytes of the file. So some kilobytes could fill the memory of a machine. Here a
-chunk is unpacked no further than to what it should hold, and strings are counted by their lengths. And where strings
-lie is walked through once, for HDF5 itself does so without an end in a heap that is damaged.
+HDF5 unpacks a chunk until its compressed stream ends, even beyond the chunk's size, filters may be stacked, and any
+number of strings may share the same bytes of the file. So some kilobytes could fill the memory of a machine. Here a
+chunk is unpacked only up to its size, and strings are counted by their lengths. The heaps of strings are walked through
+once, since HDF5 itself would loop for ever in a damaged one.
 """
 
 from __future__ import annotations
@@ -22,30 +22,31 @@ from batch.archive.hdf5 import h5py
 from batch.archive.stored import Unlike
 
 PACKED = 1100
-"""Bytes that a byte of a file may hold, at most: what deflate makes of zeros, 1032, and a little."""
+"""Largest number of bytes that a byte of a file can hold: 1032 for deflated zeros, and a little more."""
 
 SMALL = 1 << 20
-"""Bytes that a dataset may have in any file."""
+"""Size of a dataset, in bytes, that is allowed in any file."""
 
 CHECKSUM = 4
-"""Bytes that fletcher32 puts behind a chunk."""
+"""Number of bytes that fletcher32 appends to a chunk."""
 
 HEAP = b"GCOL\x01\0\0\0"
-"""The bytes that a global heap, HDF5's store of strings, begins with."""
+"""The first bytes of a global heap, HDF5's store of strings."""
 
 SEARCHED = 64 << 20
-"""Bytes at either end of a file in which heaps are looked for: more would take seconds of a large archive."""
+"""Size of the parts at both ends of a file in which heaps are searched for: more would take seconds for a large
+archive."""
 
 PIECE = 16 << 16
-"""Bytes of a dataset that are looked at together, a whole number of strings."""
+"""Bytes of a dataset that are examined together, a whole number of strings."""
 
 REFERENCE = np.dtype([("length", "<u4"), ("address", "<u8"), ("index", "<u4")])
-"""A string of any length, as a dataset has it: its length, and where it is."""
+"""The stored reference of a variable-length string in a dataset: its length and place."""
 
 
 def check_heaps(raw: BufferedReader, size: int) -> None:
-    """Refuse heaps of strings in which HDF5 would go round for ever: those with a gap of no bytes, as a damaged disk
-    leaves them. size: of the file. Raises Unlike."""
+    """Refuse heaps of strings in which HDF5 would loop for ever: those with a gap of no bytes, as on a damaged disk.
+    size: of the file. Raises Unlike."""
     if not size:
         return
     with mmap.mmap(raw.fileno(), 0, access=mmap.ACCESS_READ) as data:
@@ -58,7 +59,7 @@ def check_heaps(raw: BufferedReader, size: int) -> None:
 
 
 def _endless(data: mmap.mmap, start: int, size: int) -> bool:
-    """True if a heap that begins here has a gap of no bytes, over which a reader would never get on."""
+    """True if a heap that begins here has a gap of no bytes, which would stop a reader's progress."""
     if start + 16 > size:
         return False
     end = min(size, start + int.from_bytes(data[start + 8 : start + 16], "little"))
@@ -73,7 +74,7 @@ def _endless(data: mmap.mmap, start: int, size: int) -> bool:
 
 
 def check(node: Any, size: int, file: int) -> str:
-    """Why a dataset (h5py.h5d.DatasetID) holds more than its file has room for; empty where it does not.
+    """The reason why a dataset (h5py.h5d.DatasetID) declares more than its file has room for; empty where it does not.
 
     size   of the file, in bytes
     file   the same file's descriptor, to read what HDF5 does not tell
@@ -101,11 +102,11 @@ def check(node: Any, size: int, file: int) -> str:
 
 
 class _Overfull(Exception):
-    """A chunk's stream goes on when the chunk is full, or is no such stream."""
+    """Raised for a chunk whose stream goes on after the chunk is full, or is invalid."""
 
 
 def _packers(node: Any) -> list[int]:
-    """HDF5's numbers of the filters of a dataset, in the order in which they pack."""
+    """HDF5's numbers of the filters of a dataset, in the order in which they compress."""
     made = node.get_create_plist()
     return [made.get_filter(number)[0] for number in range(made.get_nfilters())]
 
@@ -119,10 +120,10 @@ def _stored(node: Any, packers: list[int], file: int, width: int) -> Iterator[by
         offset, size = node.get_offset(), node.get_storage_size()
         for at in range(0, size, PIECE) if offset is not None else ():
             piece = os.pread(file, min(PIECE, size - at), offset + at)
-            if not piece:  # the file ends before its own words say so
+            if not piece:  # the file ends before its declared end
                 break
             yield piece
-    elif layout == module.h5d.COMPACT:  # a few values, in the file's own words about the dataset: one by one
+    elif layout == module.h5d.COMPACT:  # a few values, stored in the dataset's header: one by one
         read = module.Dataset(node)
         for place in np.ndindex(node.shape):
             yield np.array((len(read[place]), 0, 0), REFERENCE).tobytes()
@@ -142,7 +143,7 @@ def _stored(node: Any, packers: list[int], file: int, width: int) -> Iterator[by
 
 
 def _unpacked(data: bytes, packers: list[int], mask: int, full: int, width: int) -> bytes:
-    """A chunk's bytes, `full` of them. mask: bits of the packers that this chunk went without. Raises _Overfull."""
+    """A chunk's bytes, `full` of them. mask: bits of the filters that this chunk skipped. Raises _Overfull."""
     module = h5py()
     for number in reversed(range(len(packers))):
         if mask >> number & 1:
@@ -163,6 +164,6 @@ def _unpacked(data: bytes, packers: list[int], mask: int, full: int, width: int)
 
 
 def _lengths(stored: bytes) -> int:
-    """The letters of the strings that these bytes refer to."""
+    """The total length of the strings to which these references point."""
     count = len(stored) // REFERENCE.itemsize
     return int(np.frombuffer(stored, REFERENCE, count)["length"].sum(dtype=np.uint64))

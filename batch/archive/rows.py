@@ -1,13 +1,13 @@
-"""How commands name a case by its place in the case table: `#7`."""
+"""Names of cases by their place in the case table: `#7`."""
 
 from __future__ import annotations
 
 MOST_DIGITS = 18
-"""More than the rows of any table have, and few enough for an int64."""
+"""Largest number of digits of a row: more than any table needs, and few enough for an int64."""
 
 
 def row_of(case: str) -> int | None:
-    """The row that `#7` names; None for what is no such name. A row that no table can have is the largest int64."""
+    """The row that `#7` names; None for other text. For a row that no table can have, the largest int64."""
     digits = case[1:].lstrip("0")
     if not case.startswith("#") or not case[1:].isdecimal():
         return None

@@ -55,7 +55,7 @@ def attributes(search: Search, metric: str) -> dict[str, Any]:
 
 
 def of_coordinate(search: Search | None, path: str) -> dict[str, Any]:
-    """The attributes of a coordinate that is chosen; of any other none."""
+    """The attributes of a coordinate that a search chooses; none for any other."""
     for each in search.parameters if search is not None else ():
         if each.path == path:
             return {"low": each.low, "high": each.high, "steps": "ratios" if each.logarithmic else "equal"}
@@ -63,8 +63,8 @@ def of_coordinate(search: Search | None, path: str) -> dict[str, Any]:
 
 
 def why_unsound(group: StoredGroup) -> str:
-    """Why a group says of a search what none is; empty where it is one, or says nothing. Its cases
-    rise, and it has some."""
+    """The reason why a group's data about a search is invalid; empty where it is valid or absent. The group's cases
+    must rise, and there must be some."""
     told = group.attributes
     if "search" not in told:
         return ""
@@ -104,7 +104,7 @@ def why_unsound(group: StoredGroup) -> str:
 
 
 def _why_not_against(told: Mapping[str, Any], *, more: int) -> str:
-    """Why a search cannot be held against the plants that are told. more: coordinates that are not chosen."""
+    """The reason why a search cannot be judged against the stored plants. more: coordinates that are not chosen"""
     against, plants, tunes = told.get("search_against", ""), told.get("search_plants", 0), told["search"] == "tune"
     if not bool(against) == bool(plants) == (more > 0):
         return "attribute `search_plants` is not of its coordinates"
@@ -115,7 +115,8 @@ def _why_not_against(told: Mapping[str, Any], *, more: int) -> str:
 
 
 def _why_not_asked(group: StoredGroup) -> str:
-    """Why its cases were not asked for in these generations: they rise from 0, and each has a case."""
+    """The reason why its cases cannot have been asked for in these generations, which must rise from 0 and each have a
+    case."""
     generation, case = (group.values(name).astype(np.int64) for name in (GENERATION, "case"))
     if case[-1] >= group.attributes["cases_in_table"]:
         return "its cases are more than its table has"
@@ -126,7 +127,7 @@ def _why_not_asked(group: StoredGroup) -> str:
 
 
 def _why_not_in(group: StoredGroup, chosen: Sequence[Stored]) -> str:
-    """Why a coordinate that is chosen cannot have its values, or be tried so often."""
+    """The reason why a coordinate that a search chooses cannot have its values, or so many of them."""
     columns = [group.values(each.name) for each in chosen]
     for each, values in zip(chosen, columns, strict=True):
         if not ((values >= each.attributes["low"]) & (values <= each.attributes["high"])).all():
@@ -154,8 +155,8 @@ def is_search(group: StoredGroup) -> bool:
 
 
 def search_of(group: StoredGroup) -> Search | None:
-    """The search whose cases are a group's, of which the goal is a variable's name, and plants are counted alone; None
-    where it is none, or some of its cases alone."""
+    """The search whose cases are a group's; its goal is a variable's name, and its plants are only counted. None where
+    there is no search, or the group has only some of its cases."""
     told: Mapping[str, Any] = group.attributes
     if "search" not in told or group.shape("case")[0] < told["cases_in_table"]:
         return None

@@ -1,11 +1,11 @@
 """The file under an archive that is being written.
 
 HDF5 does not survive a write that fails: its caches stay dirty, every close fails again, and the process may die at
-exit. So it writes through this object, which remembers the first failure, takes everything after it without a word,
-and lets the writer raise what happened.
+exit. So it writes through this object, which remembers the first failure, silently accepts everything after it, and
+lets the writer raise it.
 
 The file has a temporary name that follows from the archive's, and is locked while it is written: two runs into one
-archive cannot both have it, and what a run left that was killed is taken over by the next.
+archive cannot both have it, and the file of a killed run is taken over by the next.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 
 
 class FileBusy(Exception):
-    """Another run has the file, in this process or in another."""
+    """Raised where another run has the file, in this process or in another."""
 
 
 def temporary_of(target: Path) -> Path:
@@ -26,7 +26,8 @@ def temporary_of(target: Path) -> Path:
 
 
 class Sink:
-    """A new file, as HDF5 wants it: seek, then read or write. Raises Busy where it is being written already."""
+    """A new file with the interface that HDF5 needs: seek, then read or write. Raises Busy where it is being written
+    already."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -37,7 +38,7 @@ class Sink:
         self.failure: OSError | None = None
 
     def check(self) -> None:
-        """Raise what went wrong since the file was made."""
+        """Raise the first failure since the file was made."""
         if self.failure is not None:
             raise self.failure
 
@@ -49,7 +50,7 @@ class Sink:
         return self._at
 
     def readinto(self, buffer: memoryview) -> int:
-        """Bytes beyond the end, and all after a failure, are zeros."""
+        """Read into a buffer; bytes beyond the end, and all after a failure, are zeros."""
         view = memoryview(buffer).cast("B")
         got = 0
         if self.failure is None:
@@ -62,7 +63,7 @@ class Sink:
         return len(view)
 
     def read(self, size: int = -1) -> bytes:
-        """As `readinto`; h5py takes what has it for a file."""
+        """Read bytes, as `readinto` does; h5py takes an object with this method for a file."""
         buffer = bytearray(self._size - self._at if size < 0 else size)
         self.readinto(memoryview(buffer))
         return bytes(buffer)
@@ -92,20 +93,20 @@ class Sink:
         return size
 
     def flush(self) -> None:
-        """Nothing is held back."""
+        """Do nothing: no bytes are buffered."""
 
     def settle(self) -> None:
-        """See everything on the disk."""
+        """Write everything to the disk."""
         self.check()
         os.fsync(self._file)
 
     def remove(self) -> None:
-        """Leave nothing under the temporary name, unless what is there is another's by now."""
+        """Remove the file of the temporary name, unless that is another's by now."""
         if self._file >= 0 and is_at(self._file, self._path):
             self._path.unlink()
 
     def close(self) -> None:
-        """Give the file up, and with it the lock: only after it has got its name, or is removed."""
+        """Close the file, and with it the lock: only after it has got its name, or is removed."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
@@ -121,12 +122,12 @@ def _locked(path: Path) -> int:
             os.close(file)
             raise FileBusy from None
         except OSError as reason:
-            if reason.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a disk without locks: do without
+            if reason.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a disk without locks: none is used
                 os.close(file)
                 raise
         if is_at(file, path):
             return file
-        os.close(file)  # between its opening and its locking, it was given its name or removed
+        os.close(file)  # it was renamed or removed before it was locked
 
 
 def is_at(file: int, path: Path) -> bool:

@@ -1,7 +1,7 @@
-"""Whether an experiment's group holds what MET writes into one: checked once, when an archive is opened.
+"""A check that an experiment's group matches the archive format, made once, when an archive is opened.
 
-Who reads an archive may rely on it: cases rise and are there once, a status is one that a case can have, times rise,
-sizes are those of the dimensions. Values of signals, metrics and coordinates may be any number.
+Readers of an archive may rely on it: cases rise and are unique, statuses are valid, times rise, sizes are those of the
+dimensions. Values of signals, metrics and coordinates may be any number.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from met.run import DONE, LOST
 from met.statistics.confidence import can_be_shown
 
 NUMBERS, WHOLE, WORDS = "iuf", "iu", "O"
-"""Kinds of numpy's types: of numbers, of whole ones, and of strings as h5py has them."""
+"""Kinds of numpy's types: of numbers, of whole numbers, and of strings in h5py."""
 
 ATTRIBUTES: dict[str, tuple[type, ...]] = {
     "experiment": (str,),
@@ -34,7 +34,7 @@ ATTRIBUTES: dict[str, tuple[type, ...]] = {
 """Attributes that every experiment's group has, with their types; numbers are above 0."""
 
 WORDED = ("sweep", "structure_key", "code_key", "frame", "coordinates", "allowed", *searched.WORDS)
-"""Attributes in words that an experiment's group may have besides."""
+"""Optional text attributes of an experiment's group."""
 
 VARIABLES = {"case": WHOLE, "case_id": WORDS, "cause": WORDS, "status": WHOLE, "n_valid": WHOLE}
 """Variables along `case` that every experiment's group has, with their types."""
@@ -50,7 +50,7 @@ OTHERS: dict[str, tuple[tuple[str, ...], str]] = {
     "requirement": (("requirement",), WORDS),
     "met": (("case", "requirement"), WHOLE),
 }
-"""Variables that a group may have besides: dimensions and type of each."""
+"""Optional variables of a group: dimensions and type of each."""
 
 OF_ROLES: dict[str, str | tuple[str, ...]] = {
     "coordinate": ("<f8",),
@@ -62,20 +62,20 @@ OF_ROLES: dict[str, str | tuple[str, ...]] = {
     "signal": ("<f8", "<f4"),
     "choice": WORDS,
 }
-"""Types by what a variable is for: kinds, or types as numpy writes them."""
+"""Types of variables by role: kinds, or types in numpy's notation."""
 
 MOST = 1e15
-"""Seconds, hertz and cases that no run has; nor one by it of seconds and hertz."""
+"""Bound of seconds, hertz and cases; the inverse bounds seconds and hertz from below."""
 
 LONGEST = 10_000
-"""Letters of a name or a unit: a picture of longer ones takes minutes."""
+"""Largest length of a name or a unit: a picture with longer ones takes minutes."""
 
 MOST_CASE = 1 << 53
-"""Numbers of cases are exact as doubles, too."""
+"""Largest number of a case, since such numbers are exact as doubles too."""
 
 
 def check(group: StoredGroup) -> None:
-    """Raises Unlike; what HDF5 says of bytes that are damaged passes through."""
+    """Check a group. Raises Unlike; HDF5's own errors over damaged bytes pass through."""
     _attributes(group.attributes)
     variables = group.variables
     shapes = {name: group.shape(name) for name in variables}
@@ -101,7 +101,7 @@ def check(group: StoredGroup) -> None:
 
 
 def _names(group: StoredGroup) -> None:
-    """Check that the deck's names are names: letters, numbers and marks that can be seen, in one line."""
+    """Check that the deck's names are names: letters, numbers and visible marks, in one line."""
     attributes = group.attributes
     names = [attributes["experiment"], attributes.get("sweep", ""), *group.variables]
     for variable in group.role("signal"):
@@ -133,7 +133,7 @@ def _attributes(attributes: dict[str, Any]) -> None:
 
 
 def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
-    """Check that a variable's type and dimensions go with its role. types: of all variables, as numpy writes them."""
+    """Check that a variable's type and dimensions match its role. types: of all variables, in numpy's notation"""
     kinds = {name: each[1] for name, each in types.items()}
     name, dims = variable.name, variable.dims
     wanted = OF_ROLES.get(variable.role, NUMBERS + WORDS)
@@ -184,7 +184,7 @@ def _requirements(group: StoredGroup) -> None:
 
 
 def _values(group: StoredGroup) -> None:
-    """Check that cases rise, and that statuses, times and names have values that they can have."""
+    """Check that cases rise, and that statuses, times and names have valid values."""
     count = group.shape("case")[0]
     if not count:
         raise Unlike("it has no case")
@@ -228,7 +228,7 @@ def _rises(values: np.ndarray) -> bool:
 
 
 def are_cases(group: StoredGroup, wanted: np.ndarray) -> np.ndarray:
-    """True for each of these positions in the case table of which the group has a case."""
+    """True for each of these positions in the case table whose case is in the group."""
     found = np.zeros(np.shape(wanted), bool)
     for piece in blocks(group.shape("case")[0]):
         found |= np.isin(wanted, group.stretch("case", piece.start, piece.stop))

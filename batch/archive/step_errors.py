@@ -1,5 +1,5 @@
-"""Requirements on errors by the step, as an archive keeps them: JSON in the attribute `step_errors` of an experiment's
-group, where its deck has any."""
+"""Requirements on errors due to the step in an archive: JSON in the attribute `step_errors` of an experiment's group,
+if its deck has any."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from met.plan.judged import StepErrorLimit
 ATTRIBUTE = "step_errors"
 
 FIELDS = {"text": str, "metric": str, "comparison": str, "limit": float, "share": bool}
-"""What is kept of each, and its type."""
+"""The fields of each requirement, with their types."""
 
 
 def written(limits: Iterable[StepErrorLimit], names: Mapping[str, str]) -> str:
-    """The attribute's value. names: of the metrics' variables, by the metrics' own."""
+    """The value of the attribute. names: of the metrics' variables, by the metrics' own"""
     plain = [{name: getattr(each, name) for name in FIELDS} | {"metric": names[each.metric]} for each in limits]
     return json.dumps(plain, sort_keys=True, separators=(",", ":"))
 

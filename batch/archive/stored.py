@@ -1,4 +1,4 @@
-"""What of an archive is looked at before it is believed: a variable as it lies in the file, and a group of them."""
+"""The unchecked contents of an archive: a variable as it is stored, and the interface of a group of them."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from met.frozen import frozen
 
 
 class Unlike(ValueError):
-    """An archive lacks something that all archives have: what."""
+    """Raised where an archive lacks a part that all archives have; the message names it."""
 
 
 @frozen
 class Stored:
-    """One variable as it lies in the file."""
+    """One variable as it is stored in the file."""
 
     name: str
     dims: tuple[str, ...]
@@ -38,7 +38,7 @@ class Stored:
 
 
 class StoredGroup(Protocol):
-    """One experiment's group of an archive, as far as it is checked: `batch.archive.read.ArchiveGroup` is one."""
+    """One experiment's group of an archive, before it is fully checked: `batch.archive.read.ArchiveGroup` is one."""
 
     attributes: dict[str, Any]
 
@@ -47,16 +47,16 @@ class StoredGroup(Protocol):
         """All variables, in the file's order."""
 
     def role(self, role: str) -> tuple[Stored, ...]:
-        """The variables that are for this: `coordinate`, `metric`, `signal` ..."""
+        """The variables with this role: `coordinate`, `metric`, `signal` ..."""
 
     def shape(self, name: str) -> tuple[int, ...]:
         """Sizes of a variable along its dimensions."""
 
     def type(self, name: str) -> str:
-        """A variable's type, as numpy writes it: `<f8`; `|O` of strings."""
+        """A variable's type in numpy's notation: `<f8`; `|O` for strings."""
 
     def values(self, name: str) -> np.ndarray:
         """All of a variable; strings as an array of str."""
 
     def stretch(self, name: str, first: int, last: int) -> np.ndarray:
-        """A variable in the cases at positions `first` to `last`, not itself."""
+        """A variable in the cases at positions `first` to `last` (exclusive)."""

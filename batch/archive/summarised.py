@@ -1,4 +1,4 @@
-"""The group `summary-of-cases` of an experiment of which the archive has the rows of few cases: what came of all.
+"""The group `summary-of-cases` of an experiment of whose cases the archive has few rows: the results of all of them.
 
     cause               why cases failed, or are doubtful, numbers aside; a dimension. cause_status: how they ended, -1
                         doubtful; cause_cases: how many; cause_first: the first, by position in the case table
@@ -35,7 +35,7 @@ from met.run import LOST
 NAME = "summary-of-cases"
 
 DOUBTFUL = -1
-"""The status of a cause that makes cases doubtful which reached their end."""
+"""The status of a cause that makes finished cases doubtful."""
 
 VARIABLES: tables.Declared = {
     "cause": (("cause",), WORDS, "why cases failed or are doubtful"),
@@ -80,8 +80,8 @@ ROUNDING = 1e-9
 
 @frozen
 class CaseSummary:
-    """Counts, moments and extremes of all cases of an experiment. values: arrays by `VARIABLES`; the rest as the
-    attributes."""
+    """Counts, moments and extremes of all cases of an experiment. values: arrays by `VARIABLES`; other fields:
+    attributes"""
 
     cases: int
     limited: int
@@ -90,7 +90,7 @@ class CaseSummary:
     values: dict[str, np.ndarray]
 
     def judged(self, requirement: int, *, whole: bool) -> list[dict[str, Any]]:
-        """The rows of a requirement, of all cases or of its design points, as plain numbers by names without
+        """The rows of a requirement, for all cases or for its design points, as plain numbers by names without
         `judged_`."""
         values = self.values
         here = (values["judged_requirement"] == requirement) & ((values["judged_point"] < 0) == whole)
@@ -101,7 +101,7 @@ class CaseSummary:
 
 
 def write(parent: Any, found: CaseSummary) -> None:
-    """Write the group into an experiment's, of a file that is open."""
+    """Write the group into an experiment's group of an open file."""
     node = parent.create_group(NAME, track_order=True)
     node.attrs["cases"], node.attrs["limited"] = found.cases, found.limited
     node.attrs["rows"], node.attrs["drawn"] = found.rows, found.drawn
@@ -109,7 +109,7 @@ def write(parent: Any, found: CaseSummary) -> None:
 
 
 def read(node: Any, group: StoredGroup) -> CaseSummary | None:
-    """The summary of an experiment's group, checked; None where the archive has a row a case. Raises Unlike."""
+    """The summary of an experiment's group, checked; None where the archive has a row for each case. Raises Unlike."""
     inside = node.get(NAME)
     if inside is None:
         return None
@@ -129,7 +129,7 @@ def read(node: Any, group: StoredGroup) -> CaseSummary | None:
 
 
 def _check(found: CaseSummary, group: StoredGroup) -> None:
-    """Check that counts are of its cases, and that names and places are those of the group. Raises Unlike."""
+    """Check that counts are those of its cases, and that names and places exist in the group. Raises Unlike."""
     values = found.values
     for name in COUNTS:
         _within(name, values[name], 0, found.cases)
@@ -152,8 +152,8 @@ def _check(found: CaseSummary, group: StoredGroup) -> None:
 
 
 def _check_metrics(found: CaseSummary) -> bool:
-    """Check that every case has its place in the counts of each metric, and that its moments go with its extremes; True
-    where values are so far apart that their moments overflow. Raises Unlike."""
+    """Check that the counts of each metric include every case, and that its moments match its extremes; True where
+    values are so far apart that their moments overflow. Raises Unlike."""
     values = found.values
     finite, least, most = values["finite"], values["least"], values["most"]
     _need("finite", finite + values["infinite"] + values["unknown"] == found.cases)
@@ -173,7 +173,7 @@ def _check_metrics(found: CaseSummary) -> bool:
 
 
 def _check_judged(found: CaseSummary, group: StoredGroup, *, overflows: bool) -> None:
-    """Check that each requirement has a row of all cases, and of a share of cases one for each design point as well.
+    """Check that each requirement has a row for all cases, and one over a share of cases also for each design point.
     Raises Unlike."""
     values = found.values
     required = group.shape("requirement")[0] if "requirement" in group.variables else 0

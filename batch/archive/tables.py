@@ -1,5 +1,5 @@
-"""A group inside an experiment's whose variables are known beforehand: written as they are declared, read if they are
-so. The groups of verified cases and of a summary of cases are such."""
+"""A group inside an experiment's whose variables are declared in advance: written by the declaration, and checked
+against it when read. The groups of verified cases and of a summary of cases are such."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from batch.archive.hdf5 import h5py
 from batch.archive.stored import Unlike
 
 COUNT, NUMBER, WORDS = "<i8", "<f8", "|O"
-"""Types of variables, as numpy writes them."""
+"""Types of variables in numpy's notation."""
 
 Declared = Mapping[str, tuple[tuple[str, ...], str, str]]
 """Dimensions, type and meaning of each variable, by its name. A dimension is a variable of one dimension: itself."""
 
 
 def write(node: Any, declared: Declared, values: Mapping[str, np.ndarray]) -> None:
-    """Write the variables into a group of a file that is open, their dimensions as scales."""
+    """Write the variables into a group of an open file, their dimensions as scales."""
     scales = dimensions(declared)
     for name, (_, kind, words) in declared.items():
         dtype = h5py().string_dtype("utf-8") if kind == WORDS else kind
@@ -34,7 +34,7 @@ def write(node: Any, declared: Declared, values: Mapping[str, np.ndarray]) -> No
 
 
 def read(node: Any, declared: Declared, group: str) -> dict[str, np.ndarray]:
-    """The variables of a group, as they are declared; `group` is its name, for messages. Raises Unlike."""
+    """The variables of a group, checked against the declaration; `group` is its name, for messages. Raises Unlike."""
     values = {name: _values(node, name, declared, group) for name in declared}
     sizes = {dim: len(values[dim]) for dim in dimensions(declared)}
     for name, (dims, _, _) in declared.items():

@@ -1,4 +1,4 @@
-"""The values of an archive's variables from what the engine gives, by the variable's name: for a file, or in memory."""
+"""The values of an archive's variables from the engine's results, by the variable's name: for a file, or in memory."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from met.run import Run
 
 KINDS = {"float64": np.float64, "float32": np.float32, "int64": np.int64, "int8": np.int8, "str": object}
-"""The type that an array of each kind of variable has."""
+"""The type of an array for each kind of variable."""
 
 
 def values_of_cases(experiment: Experiment, layout: Layout, run: Run, id_head: bytes | None = None) -> dict[str, Any]:
-    """Everything that is one value a case, of the cases of a run; keys as arrays of bytes, other strings in lists.
+    """All variables with one value a case, for the cases of a run; keys as arrays of bytes, other strings in lists.
 
     id_head  of the experiment, as `keys.id_head` gives it, where known
     """
@@ -45,7 +45,7 @@ def values_of_cases(experiment: Experiment, layout: Layout, run: Run, id_head: b
         **{EXTREME_AT + metric: number for metric, number in run.extreme_at.items()},
         **{GRAPPLE + of: figure for of, figure in run.grapples.items()},
     }
-    for role in ("limit", "excess", "extreme", "grapple"):  # by the name that is free
+    for role in ("limit", "excess", "extreme", "grapple"):  # by the free name
         values |= {variable.name: values[variable.key] for variable in layout.role(role)}
     for choice, variable in zip(experiment.cases.choices, layout.role("choice"), strict=True):
         values[variable.name] = [choice.value] * len(rows)
@@ -58,7 +58,7 @@ def values_of_cases(experiment: Experiment, layout: Layout, run: Run, id_head: b
 
 
 def values_of_dimensions(experiment: Experiment) -> dict[str, Any]:
-    """The values of dimensions that do not depend on which cases are run."""
+    """The values of dimensions that do not depend on the cases that are run."""
     schedule = experiment.structure.schedule
     values: dict[str, Any] = {"requirement": np.array([r.text for r in experiment.requirements], dtype=object)}
     values["time"] = np.arange(schedule.rows) * schedule.record / schedule.base_hz

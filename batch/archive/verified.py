@@ -6,7 +6,7 @@
     instant           s, of a metric that is an instant seen at whole steps: a quarter of the step; 0 for others
     attributes        `order` of the integrator; `step_s`, the campaign's own step
 
-The values at the step itself are the campaign's own. Numbers are kept and no conclusions: errors follow from them.
+The values at the step itself are the campaign's own. Only these numbers are stored; errors are computed from them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from met.frozen import frozen
 NAME = "verification"
 
 MOST_ORDER = 100
-"""No integrator has such an order."""
+"""Upper bound of an integrator's order."""
 
 DIMENSIONS = ("verified_case", "verified_metric")
 
@@ -60,7 +60,7 @@ class Verified:
 
 
 def write(parent: Any, found: Verified) -> None:
-    """Write the group into an experiment's, of a file that is open."""
+    """Write the group into an experiment's group of an open file."""
     node = parent.create_group(NAME, track_order=True)
     node.attrs["order"] = found.order
     node.attrs["step_s"] = found.step
@@ -77,7 +77,7 @@ def write(parent: Any, found: Verified) -> None:
 def read(node: Any, group: StoredGroup) -> Verified | None:
     """The verified metrics of an experiment's group, checked; None where nothing was verified. Raises Unlike."""
     inside = node.get(NAME)
-    if not isinstance(inside, h5py().Group):  # a metric of an older archive may be called so
+    if not isinstance(inside, h5py().Group):  # a metric of an older archive may have this name
         return None
     values = tables.read(inside, VARIABLES, NAME)
     cases, metrics = values["verified_case"], tuple(map(str, values["verified_metric"].tolist()))

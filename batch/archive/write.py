@@ -1,7 +1,7 @@
 """Writing an archive, some cases at a time, so that the bytes do not depend on how they were run.
 
-All of a signal's chunks are allocated when the file is laid out, so signals only fill them in, in any order; what is
-one value a case comes in order, in blocks of one size. No times are kept. The file has a temporary name in the same
+All of a signal's chunks are allocated when the file is laid out, so signals only fill them in, in any order; variables
+with one value a case come in order, in blocks of one size. No times are kept. The file has a temporary name in the same
 folder until it is whole and on the disk.
 """
 
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 @frozen
 class ArchivePart:
-    """One experiment of an archive. rows: of its case table, rising; kept: places among them of the cases whose
-    histories are here; single: as numbers of four bytes.
+    """One experiment of an archive. rows: of its case table, ascending; kept: places among them of the cases whose
+    histories are in the archive; single: as numbers of four bytes.
 
     code     key of the program (`met.run.Prepared.code_key`)
     results  keys of what metrics and signals compute beyond the state (`met.run.Prepared.result_keys`)
@@ -58,7 +58,7 @@ class ArchivePart:
 
 @frozen
 class OpenGroup:
-    """A part on its way into the file, and the variables along recorded_case, which are gathered from the cases."""
+    """A part that is being written, with the variables along recorded_case, which are collected from the cases."""
 
     part: ArchivePart
     layout: Layout
@@ -67,8 +67,9 @@ class OpenGroup:
 
 
 class ArchiveWriter:
-    """An archive being written: `put_cases` in order, `put_signals` in any, then `finish`; or `abandon`, which leaves
-    nothing. `case_values`, what `put_cases` takes, writes nothing: any thread may have it made beforehand."""
+    """An archive being written: `put_cases` in order, `put_signals` in any order, then `finish`; or `abandon`, which
+    leaves nothing. `case_values`, which prepares the argument of `put_cases`, writes nothing: any thread may call it
+    beforehand."""
 
     def __init__(self, temporary: Path, plan: Plan, parts: Sequence[ArchivePart]) -> None:
         self.plan = plan
@@ -84,8 +85,8 @@ class ArchiveWriter:
             raise
 
     def put_signals(self, number: int, first: int, run: Run, kept: np.ndarray | None = None) -> None:
-        """The histories of some cases of an experiment: of its recorded cases from the `first` one on. kept: a mask of
-        those of `run` that are recorded; None: all."""
+        """Write the histories of some cases of an experiment: its recorded cases from the `first` one on. kept: a mask
+        of the cases of `run` that are recorded; None: all"""
         group = self.groups[number]
         last = first + (len(run.case) if kept is None else int(kept.sum()))
         for variable in group.layout.role("signal"):
@@ -117,7 +118,8 @@ class ArchiveWriter:
     def look_back(self, number: int) -> None:
         """Read what was put of an experiment's cases, its status and its metrics, a bounded number of cases at a time.
 
-        Nothing comes of it but where HDF5 puts what it keeps for itself, which archives have always had after this.
+        The values are not used; reading them only affects where HDF5 puts its own data, which keeps the bytes of
+        archives unchanged.
         """
         group = self.groups[number]
         for each in [*(each.name for each in group.layout.role("metric")), "status"]:
@@ -126,17 +128,17 @@ class ArchiveWriter:
                 stored[rows]
 
     def put_verified(self, number: int, found: verified.Verified) -> None:
-        """Write the metrics that shorter steps gave for some cases of an experiment, in a group of its own."""
+        """Write the metrics from shorter steps for some cases of an experiment, in a group of its own."""
         verified.write(self.groups[number].node, found)
         self._sink.check()
 
     def put_summary(self, number: int, found: summarised.CaseSummary) -> None:
-        """Write what came of all cases of an experiment, in a group of its own."""
+        """Write the summary of all cases of an experiment, in a group of its own."""
         summarised.write(self.groups[number].node, found)
         self._sink.check()
 
     def finish(self) -> None:
-        """Write what is left, and see the file safely on the disk under its temporary name, still locked."""
+        """Write the rest, and flush the file to the disk under its temporary name, still locked."""
         for group in self.groups:
             _write_rest(group)
         self._write_provenance()
@@ -145,11 +147,11 @@ class ArchiveWriter:
 
     @property
     def failure(self) -> OSError | None:
-        """The first error of the disk, whatever HDF5 made of it; None for none."""
+        """The first error of the disk, regardless of HDF5; None if there was none."""
         return self._sink.failure
 
     def close(self) -> None:
-        """Let go of the file, which has its name by now."""
+        """Close the file, which has got its name."""
         self._sink.close()
 
     def abandon(self) -> None:
@@ -169,7 +171,7 @@ class ArchiveWriter:
         return [root if path == "/" else root.create_group(path, track_order=True) for path in paths]
 
     def _group(self, node: Any, part: ArchivePart) -> OpenGroup:
-        """Lay a group out: every variable in its order, the signals with all their chunks."""
+        """Lay out a group: every variable in its order, the signals with all their chunks."""
         layout = archive_layout.layout(part.experiment, len(part.rows), len(part.kept), part.single)
         early = {"until_shown": part.until_shown} if part.until_shown else {}
         for name, value in {**layout.attributes, **early, "code_key": part.code}.items():
@@ -190,7 +192,7 @@ class ArchiveWriter:
         return OpenGroup(part, layout, node, gathered)
 
     def _write_provenance(self) -> None:
-        """The deck, the plan and the versions that made the numbers."""
+        """Write the deck, the plan and the versions that made the numbers."""
         group = self._file.create_group("provenance", track_order=True)
         commit, changed = self._revision.read()
         versions = {"met": _met_version(), **backends.find().libraries(), "numpy": np.__version__}
@@ -251,7 +253,7 @@ def _table_sum(experiment: Experiment) -> str:
 
 
 def _put(dataset: Any, first: int, last: int, values: Any) -> None:
-    """Write a stretch of a variable. Bytes are written as the strings that they are, in a third of the time."""
+    """Write a stretch of a variable. Bytes are written as the strings that they encode, in a third of the time."""
     if getattr(values, "dtype", np.dtype(object)).kind != "S":
         dataset[first:last] = values
         return
@@ -279,7 +281,7 @@ def _make(group: Any, layout: Layout, variable: Variable) -> Any:
     if chunks is not None:
         early = module.h5p.create(module.h5p.DATASET_CREATE)
         early.set_alloc_time(module.h5d.ALLOC_TIME_EARLY)
-        # checksums cost a second a gigabyte; without them, a flipped bit on a disk would be a result
+        # checksums cost a second a gigabyte; without them, a flipped bit on a disk would go unnoticed
         options = {"chunks": chunks, "dcpl": early, "fill_time": "never", "fletcher32": True}
     dtype = module.string_dtype("utf-8") if variable.kind == "str" else np.dtype(variable.kind).newbyteorder("<")
     dataset = group.create_dataset(variable.name, layout.shape(variable), dtype=dtype, track_order=True, **options)
@@ -289,7 +291,7 @@ def _make(group: Any, layout: Layout, variable: Variable) -> Any:
 
 
 def _text(text: str) -> str:
-    """HDF5's strings end at a null character; a deck has none unless somebody put it there."""
+    """A text without null characters, which would end HDF5's strings; decks normally have none."""
     return text.replace("\0", "\N{REPLACEMENT CHARACTER}")
 
 

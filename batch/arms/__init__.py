@@ -1,4 +1,4 @@
-"""An arm as it is drawn: where its links are, and what they look like, of a case or for all cases at once.
+"""Drawing of arms: poses and shapes of links, for one case or for all cases at once.
 
 placing   the links' frames in the world, from the numbers of a case
 shapes    simple solids and lines, fixed to the links' frames

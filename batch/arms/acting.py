@@ -1,8 +1,8 @@
-"""What acts on an arm, as formulas of what a run records: loads of its environment, gas of thrusters, payloads.
+"""Loads on an arm as formulas of a run's recorded signals: those of its environment, gas of thrusters, and payloads.
 
 The environment models are asked as the simulation asks them (`met.program.motion.world`), once, over inputs instead of
-numbers; a page (`assets/acting.js`) replays the formulas at each instant that it shows. Every ghost replays the
-scene's, so these are apart. Gravitation is not among them: it acts on every part of the arm, so no arrow shows it.
+numbers; a page (`assets/acting.js`) replays the formulas at each instant that it shows. Every ghost replays the scene's
+formulas, so these are separate. Gravitation is left out: it acts on every part of the arm, so no arrow can show it.
 """
 
 from __future__ import annotations
@@ -29,14 +29,15 @@ from met.vectors import Vector, scale
 
 RATE = "qd"
 MOST_NODES = 20_000
-"""Operations and entries of tables that the formulas of all models may have: a page holds them, some 25 bytes each."""
+"""Largest number of operations and entries of tables in the formulas of all models: a page holds them, some 25 bytes
+each."""
 
 Kind = Literal["load", "contact", "plume"]
 
 
 @frozen
 class ActingArrow:
-    """An arrow. name: the deck's for the model; unit: N of a force, N*m of a moment."""
+    """An arrow of a load. name: the deck's for the model; unit: N for a force, N*m for a moment"""
 
     kind: Kind
     name: str
@@ -45,7 +46,8 @@ class ActingArrow:
 
 @frozen
 class PayloadInHand:
-    """A payload that flies for a time; link: that carries it at others; body: its number in the scene, -1 of none."""
+    """A payload that flies for a time; link: the one that carries it at other times; body: its number in the scene, or
+    -1."""
 
     name: str
     link: str
@@ -64,7 +66,7 @@ class NotDrawn:
 
 @frozen
 class ActingOnArm:
-    """What acts on an arm.
+    """The loads on an arm, with their gas jets and payloads.
 
     formulas  of each arrow the point where it acts and its components (N, N m); of each jet the nozzle, its direction,
               the share of the step in which it fires, its exponent, and middle and sides of the plate that it meets
@@ -84,7 +86,7 @@ class ActingOnArm:
 
 
 class RecordedWorld(ArmWorld):
-    """The world as environment models see it, made of what a run records; payloads in flight too."""
+    """The world of environment models, made from a run's recorded signals; payloads in flight too."""
 
     def __init__(self, system: System, graph: Graph, memory: Mapping[str, Any], time: Real, read: ReadCell) -> None:
         def three(name: str) -> Vector:
@@ -116,7 +118,7 @@ class RecordedWorld(ArmWorld):
 
 
 def acting_on(experiment: Experiment, scene: ArmScene, recorded: Collection[str]) -> ActingOnArm:
-    """What acts on the arm of a scene. recorded: channels that there are; what needs others is told in `not_drawn`."""
+    """The loads on the arm of a scene. recorded: existing channels; loads that need others are listed in `not_drawn`"""
     system, graph = System(experiment), Graph()
     varied = {each.path: graph.input(each.path) for each in experiment.cases.coordinates}
     values = {path: _settled(value) for path, value in parameters(experiment, varied).items()}
@@ -172,7 +174,7 @@ def acting_on(experiment: Experiment, scene: ArmScene, recorded: Collection[str]
 
 
 def acting_json(acting: ActingOnArm) -> dict[str, Any]:
-    """What acts, as a page's script takes it."""
+    """The loads as a page's script takes them."""
     return {
         "nodes": [list(node) for node in acting.formulas.nodes],
         "outputs": list(acting.formulas.outputs),
@@ -185,7 +187,7 @@ def acting_json(acting: ActingOnArm) -> dict[str, Any]:
 
 
 def _kind(model: Environment) -> Kind:
-    """The kind of a model's loads: of what has a spring that touches (`Environment.springs`) a contact's."""
+    """The kind of a model's loads: "contact" for a model with a spring that touches (`Environment.springs`)."""
     if model.jet is not None:
         return "plume"
     return "contact" if model.springs else "load"
@@ -194,8 +196,8 @@ def _kind(model: Environment) -> Kind:
 def _arrows(
     loads: Loads, world: ArmWorld, joints: Mapping[str, Joint], values: Mapping[str, Any]
 ) -> Iterable[tuple[Literal["N", "N*m"], list[Real]]]:
-    """Unit, and point and components in the world, of each load but what is nothing at all times. A torque on a joint
-    acts on the link that the joint moves, along the joint's axis."""
+    """Unit, and point and components in the world, of each load that is not always zero. A torque on a joint acts on
+    the link that the joint moves, along the joint's axis."""
     for force in loads.forces:
         if world.is_ground(force.link):
             continue
@@ -220,7 +222,7 @@ def _jet(jet: Jet, world: ArmWorld) -> list[Real]:
 
 
 def _stage(payload: Payload, time: Real, values: Mapping[str, Any], early: float) -> Real:
-    """The stage of a payload at a time, as `met.program.grapple` has it: grappled, then released."""
+    """The stage of a payload at a time, as in `met.program.grapple`: grappled, then released."""
     head = f"payloads.{payload.name}"
     held = time >= values[f"{head}.grapple"] - early if payload.grappled else True
     gone = both(held, time >= values[f"{head}.release"] - early) if payload.released else False
@@ -228,7 +230,7 @@ def _stage(payload: Payload, time: Real, values: Mapping[str, Any], early: float
 
 
 def _size(formulas: Formulas) -> int:
-    """How many operations and entries of tables formulas have."""
+    """The number of operations and entries of tables in formulas."""
     return sum(len(node[2]) if node[0] == "gather" else 1 for node in formulas.nodes)
 
 
@@ -246,6 +248,6 @@ def _settled(value: Any) -> Any:
 
 
 def _signals(missing: Collection[str], joints: Sequence[Joint]) -> tuple[str, ...]:
-    """Signals of these channels, as a deck records them."""
+    """Signals that contain these channels, by their names in a deck's record."""
     of_joints = {f"{joint.name}.{of}": of for joint in joints for of in (POSITION, RATE)}
     return tuple(sorted({of_joints.get(name, name.rpartition(".")[0]) for name in missing}))

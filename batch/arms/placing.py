@@ -1,4 +1,4 @@
-"""Where the links are: their frames in the world, from the numbers of a case, of all its rows at once, or traced."""
+"""Poses of the links in the world, from the numbers of a case: at all its rows at once, or traced."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ INSTANT = 1e-6
 
 
 def parameters(experiment: Experiment, varied: Mapping[str, Any]) -> dict[str, Any]:
-    """The numbers among a case's parameters, of which some follow from what is varied. varied: numbers, or arrays of
-    one shape or traced numbers, with which those that follow are such too."""
+    """The numbers among a case's parameters, of which some follow from varied ones. varied: numbers, arrays of one
+    shape, or traced numbers; dependent parameters are of the same kind"""
     outputs = experiment.formulas.replay({path: _plain(value) for path, value in varied.items()})
     out = {}
     for path, quantity in experiment.parameters.items():
@@ -45,7 +45,7 @@ def free_pose(position: np.ndarray, orientation: np.ndarray) -> Pose:
 
 
 def prescribed_pose(experiment: Experiment, values: Mapping[str, Any], time: np.ndarray) -> Pose:
-    """A prescribed base's pose at rows of these times, s: that of the step's instant, as all that is recorded."""
+    """A prescribed base's pose at rows of these times, s: that of the step's instant, like all recorded values."""
     memory = {PARAMETER + path: value for path, value in values.items()}
     step = experiment.structure.schedule.step
     instant: Any = np.floor(time / step + INSTANT) * step
@@ -55,7 +55,7 @@ def prescribed_pose(experiment: Experiment, values: Mapping[str, Any], time: np.
 def world_poses(
     experiment: Experiment, values: Mapping[str, Any], q: Sequence[Any], base: Pose = HERE
 ) -> dict[str, Pose]:
-    """Every link's frame in the world, whose numbers are those of all rows at once where they change."""
+    """Every link's frame in the world; where it changes, its numbers are arrays over all rows."""
     system = System(experiment)
     memory = {PARAMETER + path: value for path, value in values.items()}
     system.keep_tree(memory.__getitem__, memory.__setitem__)

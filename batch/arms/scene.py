@@ -1,8 +1,8 @@
-"""An arm as formulas: its bodies' frames and shapes, from what a case records and what a sweep varies.
+"""An arm as formulas: its bodies' frames and shapes, from a case's recorded signals and varied parameters.
 
 The functions of the simulation are recorded once, over inputs instead of numbers, and stored as `met.trace.Formulas`; a
-page (`assets/formulas.js`) and `met plot --arm` replay them. So one kinematics is drawn everywhere, for each case with
-its own numbers, a base that moves and payloads that fly included.
+page (`assets/formulas.js`) and `met plot --arm` replay them. So all pictures use the same kinematics, for each case
+with its own numbers, including moving bases and flying payloads.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from met.program.system import PARAMETER, System
 from met.trace import Formulas, Graph, Scalar
 
 LIMB, LIMB_OF_LINK = 0.03, 0.32
-"""Radius of a limb that has none: at most this share of the arm's reach, and of its middle link's length."""
+"""Radius of a limb without a size of its own: at most this share of the arm's reach, and of its middle link's
+length."""
 
 NO_REACH = 1.0
 POSE_NUMBERS, SHAPE_NUMBERS = 12, 9
@@ -30,7 +31,7 @@ POSE_NUMBERS, SHAPE_NUMBERS = 12, 9
 
 @frozen
 class ArmBody:
-    """A link, a payload or the base. carrier: number of the body that carries it, -1 of none."""
+    """A link, a payload or the base. carrier: number of the body that carries it, or -1"""
 
     name: str
     carrier: int
@@ -38,7 +39,7 @@ class ArmBody:
 
 @frozen
 class SceneShape:
-    """A shape that the body of this number has, and of a joint its number among those that move (-1: of none)."""
+    """A shape of the body with this number; for a joint, its number among those that move (otherwise -1)."""
 
     body: int
     kind: str
@@ -76,8 +77,8 @@ class ArmScene:
 
 
 def arm_scene(experiment: Experiment, recorded: Sequence[str]) -> ArmScene:
-    """The scene of an experiment. recorded: channels that there are; payloads that fly for a time are drawn only where
-    their position and orientation are among them."""
+    """The scene of an experiment. recorded: existing channels; payloads that fly for a time are drawn only where their
+    position and orientation are among them"""
     structure = experiment.structure
     graph = Graph()
     varied = {each.path: graph.input(each.path) for each in experiment.cases.coordinates}
@@ -142,7 +143,7 @@ def arm_scene(experiment: Experiment, recorded: Sequence[str]) -> ArmScene:
 
 
 def lacking(scene: ArmScene, recorded: Sequence[str]) -> tuple[str, ...]:
-    """Signals that must be recorded for the scene to be drawn, as a deck names them, and are not."""
+    """Signals, by a deck's names, that are needed to draw the scene and are not recorded."""
     missing = set(scene.channels) - set(recorded)
     joints = [name for name in scene.joints if f"{name}.{POSITION}" in missing]
     every = [POSITION] if joints and len(joints) == len(scene.joints) else [f"{name}.{POSITION}" for name in joints]
@@ -175,7 +176,7 @@ def _channels(name: str, parts: str) -> list[str]:
 
 
 def _recorded_pose(graph: Graph, position: str, orientation: str) -> Pose:
-    """A frame in the world as two signals have it."""
+    """The frame in the world that two signals give."""
     x, y, z = (graph.input(name) for name in _channels(position, "xyz"))
     turn = [graph.input(name) for name in _channels(orientation, "wxyz")]
     return Pose(rotation_quaternion(turn[0], turn[1], turn[2], turn[3]), (x, y, z))
@@ -190,7 +191,7 @@ def _rigid_with(joints: Sequence[Joint], moving: Mapping[str, int]) -> dict[str,
 
 
 def _lengths(experiment: Experiment, first: Mapping[str, float]) -> dict[str, float]:
-    """By link: the way from the base to its far end, along the links that carry it, m."""
+    """By link, the distance from the base to its far end, along the links that carry it, m."""
     carrier = {joint.child: joint for joint in experiment.structure.joints}
     out: dict[str, float] = {}
     for link in experiment.structure.links:
@@ -207,7 +208,7 @@ def _lengths(experiment: Experiment, first: Mapping[str, float]) -> dict[str, fl
 
 
 def _size(experiment: Experiment, first: Mapping[str, float], name: str) -> float:
-    """The way from a link's origin to its far end, m."""
+    """The distance from a link's origin to its far end, m."""
     end = _end(ArmNumbers(experiment, first, {}, first, {}, NO_REACH), name)
     return math.hypot(*(float(x) for x in end))
 
@@ -235,7 +236,7 @@ def _limb(experiment: Experiment, first: Mapping[str, float], reach: float) -> f
 def _gravity(
     experiment: Experiment, first: Mapping[str, float], varied: Collection[str]
 ) -> tuple[float, float, float] | None:
-    """The pull in the world, m/s^2; None where there is none, or cases differ in it."""
+    """The gravity in the world, m/s^2; None where there is none, or cases differ in it."""
     for use in experiment.structure.environment:
         if use.model == "gravity":
             path = f"environment.{use.name}.g"
@@ -245,7 +246,7 @@ def _gravity(
 
 
 def _up(experiment: Experiment, first: Mapping[str, float]) -> tuple[float, float, float]:
-    """Against gravity, along the axis of the world that is nearest; z where there is none."""
+    """The direction against gravity, along the nearest axis of the world; z where there is none."""
     for use in experiment.structure.environment:
         if use.model == "gravity":
             g = [first.get(f"environment.{use.name}.g.{part}", 0.0) for part in "xyz"]

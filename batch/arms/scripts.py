@@ -11,7 +11,7 @@ from batch.arms.look import look_json
 FOLDER = Path(__file__).with_name("assets")
 
 SCRIPTS = ("formulas.js", "arm.js", "camera.js", "webgl.js", "painter.js", "acting.js", "triad.js", "stage.js")
-"""In the order in which they stand in a page; each builds on those before."""
+"""The scripts in the order in which they stand in a page; each builds on those before."""
 
 
 @cache

@@ -1,8 +1,8 @@
 """The looks of the links: the deck's shapes as simple solids and lines, each fixed to its link's frame.
 
 A rod, a box and a cylinder begin at the link frame's origin and extend along one of its axes; a sphere is centred there
-(ic/meaning/mechanics/shapes.py). Where the deck writes a centre of mass and leaves the inertia to the shape, the solid
-that is simulated is centred on it, and so it is drawn. A link without a shape is a line to each joint that it carries,
+(ic/meaning/mechanics/shapes.py). Where the deck writes a centre of mass and leaves the inertia to the shape, the
+simulated solid is centred on it, and it is drawn there. A link without a shape is a line to each joint that it carries,
 or to its centre of mass. Joints are drawn besides: a short cylinder about the axis of a revolute joint, and for a
 prismatic one a cube on a rail, which is as long as the case uses it.
 """
@@ -23,16 +23,16 @@ SIZES = {
     "sphere": ("radius",),
     "box": ("size_x", "size_y", "size_z"),
 }
-"""Parameters of the shapes that are drawn; a link of another shape, which a later MET may know, is drawn as one
+"""Parameters of the shapes that are drawn; a link of another shape, which a later MET may have, is drawn like one
 without."""
 
 JOINT_RADIUS, JOINT_LENGTH, MASS = 0.02, 0.05, 0.015
-"""Radii and lengths of what has none, in the arm's size: of a joint, of a point with mass."""
+"""Default radii and lengths, relative to the arm's size: of a joint, of a point with mass."""
 
 
 @frozen
 class ArmNumbers:
-    """The numbers of which an arm's shapes are made, floats or traced.
+    """The numbers that determine an arm's shapes, floats or traced.
 
     values  a case's parameters by path, in SI;  varied  those of them that the sweep varies by themselves
     first   the values of the case in which shapes are as the plan has them
@@ -88,7 +88,7 @@ def shapes(arm: ArmNumbers, bodies: Sequence[Link | Payload]) -> dict[str, list[
 
 
 def head(body: Link | Payload) -> str:
-    """The beginning of the paths of a link's or payload's parameters."""
+    """The prefix of the paths of a link's or payload's parameters."""
     return f"payloads.{body.name}" if isinstance(body, Payload) else f"links.{body.name}"
 
 
@@ -100,8 +100,9 @@ def drawn(body: Link | Payload) -> bool:
 def shape_of(arm: ArmNumbers, body: Link | Payload) -> tuple[str, dict[str, Real]]:
     """A body's shape: kind and sizes, in m; `along` as 0, 1 or 2.
 
-    The plan has the sizes of its first case. Where a sweep varies a size by its path, a case has its own; and where
-    a length follows from something else that varies, it is twice as far as the shape's centre, which the case has.
+    The plan has the sizes of its first case. Where a sweep varies a size by its path, a case has its own; and where a
+    length depends on another varied parameter, it is twice the distance of the shape's centre, which is known for each
+    case.
     """
     assert body.shape is not None
     kind, given = body.shape
@@ -144,7 +145,7 @@ def _solid(arm: ArmNumbers, body: Link | Payload, role: Literal["link", "payload
 def _bare(
     arm: ArmNumbers, body: Link | Payload, carried: Sequence[Joint], role: Literal["link", "payload"]
 ) -> list[ArmShape]:
-    """A body that has no shape: lines to its joints, or to its centre of mass."""
+    """The shapes of a body without one of its own: lines to its joints, or to its centre of mass."""
     if carried:
         return [line(role, ZERO, numbers(arm, f"{joint.name}.at")) for joint in carried]
     com, radius = numbers(arm, f"{head(body)}.com"), MASS * arm.size
@@ -152,7 +153,7 @@ def _bare(
 
 
 def _joint(arm: ArmNumbers, joint: Joint) -> list[ArmShape]:
-    """The joint that carries a link, in the link's frame."""
+    """The shape of the joint that carries a link, in the link's frame."""
     radius, length = JOINT_RADIUS * arm.size, JOINT_LENGTH * arm.size
     if joint.kind == "revolute":
         axis, pivot = numbers(arm, f"{joint.name}.axis"), numbers(arm, f"{joint.name}.pivot")
@@ -163,7 +164,7 @@ def _joint(arm: ArmNumbers, joint: Joint) -> list[ArmShape]:
 
 
 def _rails(arm: ArmNumbers, carried: Sequence[Joint]) -> list[ArmShape]:
-    """The rails of joints that slide on a link, in the link's frame."""
+    """The rails of prismatic joints on a link, in the link's frame."""
     out = []
     for joint in carried:
         if joint.name in arm.travel:
@@ -179,11 +180,11 @@ def line(role: Literal["link", "payload", "joint", "rail"], begin: Vector, end: 
 
 
 def numbers(arm: ArmNumbers, path: str) -> Vector:
-    """A parameter of three numbers; zeros where it has none."""
+    """The three numbers of a vector parameter; zeros where it does not exist."""
     x, y, z = (arm.values.get(f"{path}.{part}", 0.0) for part in "xyz")
     return (x, y, z)
 
 
 def _there(shape: ArmShape) -> bool:
-    """False of a line that has no length in any case."""
+    """False for a line that has no length in any case."""
     return shape.kind != "line" or not all(constant(x) and x == 0.0 for x in shape.axis)
