@@ -45,7 +45,7 @@ class BedProgress:
             self._bar.end()
 
     def say(self, line: str) -> None:
-        """Write a line in the bar's place."""
+        """Print a line in the bar's place."""
         if not self._quiet:
             self._bar.end()
             say(line)
@@ -57,7 +57,7 @@ def timings(executor: OnBeds) -> dict[str, Timing]:
     for joint in executor.ports:
         cases = executor.known.of(joint)
         if cases and not executor.lock_step:
-            # a bed's ticks, and the host's clock, begin anew with a case
+            # a bed's ticks, and the host's clock, restart with each case
             drifts = [timing(rows, hz).drift for hz, rows in cases]
             known = [drift for drift in drifts if math.isfinite(drift)]
             drift = float(np.median(known)) if known else math.nan
@@ -70,7 +70,7 @@ WORST = 0.01
 
 
 def timing_lines(executor: OnBeds) -> list[str]:
-    """Lines about how well the loop kept its time, with a warning where the bed did not."""
+    """Lines about the loop's timing, with a warning where it was bad."""
     lines = []
     for joint, found in timings(executor).items():
         late = found.woken + found.computed + found.waited
@@ -100,7 +100,7 @@ def timing_lines(executor: OnBeds) -> list[str]:
 
 
 def sidecar_entries(executor: OnBeds) -> Mapping[str, Any]:
-    """The entries for the file beside the archive: the beds, and how well time was kept, s."""
+    """The entries for the file beside the archive: the beds, and the loop's timing, s."""
     executor.know_all()
     kept = timings(executor)
     return {

@@ -49,12 +49,13 @@ class BedSize:
 
     @property
     def bauds(self) -> tuple[int, int]:
-        """The least rates of a serial line: with the tachometer alone, and with all sensors that the wire knows."""
+        """The lowest baud rates of a serial line: with the tachometer alone, and with all sensors of the wire's
+        protocol."""
         return least_baud(Capability(0), self.exchanges.period), least_baud(ALL_SENSORS, self.exchanges.period)
 
 
 def joint_of(experiment: Experiment, name: str | None, texts: Mapping[str, str] | None = None) -> str:
-    """The joint that a bed is for: the one that is named, else the only one on a bed. Raises Problem E440.
+    """The joint of a bed: the named one, else the only one on a bed. Raises Problem E440.
 
     texts  of the deck's files, by name, to show a line of
     """
@@ -120,7 +121,7 @@ def bed_size(
 
 
 def _candidates(named: Mapping[str, MotorPart], listed: PartsList) -> list[Candidate]:
-    """The parts that are asked about: those that were named, else all, each as drive and as load."""
+    """The candidate parts: the named ones, else all, each as drive and as load."""
     if not named:
         return [Candidate(role, MotorFigures(each)) for role in ("drive", "load") for each in listed.motors.values()]
     beside = named["drive"].figure("inertia") if "drive" in named else None

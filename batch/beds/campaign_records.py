@@ -1,4 +1,4 @@
-"""The records of a campaign's cases: which beds they were driven on, and every exchange with them."""
+"""The records of a campaign's cases: the beds on which they were driven, and every exchange with them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class CampaignRecords:
                 self.beds[joint].append(about)
 
     def add_all(self, folder: Path) -> None:
-        """Add the cases in a folder that are not here yet."""
+        """Add the cases in a folder that are not known yet."""
         for path in sorted(folder.glob("*.records")):
             experiment, _, row = path.stem.partition("-")
             if not (experiment.isdecimal() and row.isdecimal()):

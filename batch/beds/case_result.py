@@ -1,6 +1,6 @@
 """The result of a case from its records: the run is computed again from the rates that were read.
 
-So nothing but the exchanges has to outlive a crash, and an archive follows from what was on the wire.
+So only the exchanges have to survive a crash, and an archive follows from the traffic on the wire.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class CaseResult:
 
 
 def read_rates(recorded: records.Records, beds: int) -> np.ndarray:
-    """The rates as the kernel had them, [servo tick, bed]. Where no answer came it had the one before."""
+    """The rates as the kernel had them, [servo tick, bed]. Where an answer was missing it had the one before."""
     repeats = int(recorded.head["repeats"])
     rows = recorded.rows[: len(recorded.rows) // beds * beds].reshape(-1, beds)
     rates = rows["rate"].copy()

@@ -1,4 +1,4 @@
-"""The bed that a user means by `--port`: a port, and the deck's joint where the bed is simulated."""
+"""The bed that `--port` chooses: a port, and the deck's joint where the bed is simulated."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def chosen_bed(
     settings: tuple[str, ...] = (),
     quiet: bool = False,
 ) -> ChosenBed:
-    """The bed of `PORT`, or of `JOINT=PORT` with a deck, whose first case counts. Raises Problem."""
+    """The bed of `PORT`, or of `JOINT=PORT` with a deck, whose first case is used. Raises Problem."""
     found = _chosen_bed(
         word,
         None

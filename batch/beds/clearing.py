@@ -1,4 +1,4 @@
-"""`met bed clear`: have a bed forget the faults that it has latched."""
+"""`met bed clear`: clear a bed's latched faults."""
 
 from __future__ import annotations
 

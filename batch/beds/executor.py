@@ -1,7 +1,7 @@
 """Cases on motor beds, one after another: each in a process of its own, its records made into a shard at its end.
 
-A case whose records are there already, because whoever drove it was killed, is not driven again: what was recorded is
-what came of it. Where a bed was never armed, nothing came of it.
+A case whose records exist already, because its process was killed, is not driven again: its result is computed from the
+records. Records of a bed that was never armed do not count.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from met.plan import file as plan_file
 from met.run import FAILED
 
 ANOTHER, FULL = "E407", "E413"
-"""Codes of errors that say nothing about a bed that was armed: another transcript's, a full disk. Any other error is
-the end of the case."""
+"""Codes of errors that say nothing about a bed that was armed: another transcript's, a full disk. Any other error ends
+the case."""
 
 
 @frozen
 class Ports:
-    """The ports of a campaign, and how its cases are driven.
+    """The ports of a campaign, and the way in which its cases are driven.
 
     by_joint     port by joint
     transcripts  a folder for what goes over the lines; None: none is kept
@@ -59,7 +59,7 @@ class Ports:
 
 @frozen
 class Driving:
-    """The case that is being driven. exchange_hz: exchanges a second with all its beds;  seconds: length of the case"""
+    """The case that is being driven. exchange_hz: exchanges a second with all its beds; seconds: length of the case"""
 
     records: Path
     exchange_hz: float
@@ -142,8 +142,8 @@ class OnBeds:
         self._waiting.clear()
 
     def check(self, before: Mapping[str, str], what: str) -> None:
-        """Raise Problem E353 where cases were driven at other ports. before: port by joint;  what: says where those
-        cases are"""
+        """Raise Problem E353 where cases were driven at other ports. before: port by joint; what: the place of those
+        cases, in words"""
         for joint, port in before.items():
             if not same_bed(port, self.ports.get(joint, "")):
                 message = f"{what}, driven at `{port}`, and is left as it is"
@@ -151,7 +151,8 @@ class OnBeds:
                 raise Problem(error("E353", message, help=helps))
 
     def _case(self, section: CampaignSection, row: int) -> tuple[CaseResult, str]:
-        """Drive a case, or take up its records. Returns the result, and why it ended early, "" where it did not."""
+        """Drive a case, or use its records. Returns the result, and the reason why it ended early, "" where it did
+        not."""
         path = self._folder.beds / f"{section.experiment}-{row}.records"
         ended_file = path.with_suffix(".ended")
         try:
@@ -214,7 +215,7 @@ class OnBeds:
                 ended = line.get("ended", ended)
         except Problem as problem:
             code = problem.diagnostics[0].code
-            if code == ANOTHER or not _recorded(path):  # nothing came of it, and it is driven anew
+            if code == ANOTHER or not _recorded(path):  # no result: it is driven again
                 for name in (path, *map(Path, begun)):
                     name.unlink(missing_ok=True)
                 raise
@@ -224,12 +225,12 @@ class OnBeds:
         finally:
             self.driving = None
             if ended is not None:
-                # what the case's process says of a full disk is what counts
+                # the case's own message about a full disk takes precedence
                 with contextlib.suppress(OSError), new_file(ended_file) as file:
                     file.write(json.dumps(ended).encode())
 
     def _greeted(self, joint: str, bed: str) -> None:
-        """Say which bed a joint is on, where it is another than in the case before."""
+        """Print which bed a joint is on, where it differs from the case before."""
         if self._greeted_beds.get(joint) != bed:
             self._greeted_beds[joint] = bed
             self._say(f"{joint}: {bed}")

@@ -1,4 +1,4 @@
-"""Cut-offs of a bed's filter under which its loop is stable, with the arm that a run's cases show."""
+"""Cut-offs of a bed's filter for which its loop is stable, with the arm as a run's cases show it."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from met.frozen import frozen
 from met.plan import Experiment, Origin, Quantity
 
 TRIED = 9
-"""Cut-offs that are tried, a constant share apart, from a hundredth of the servo's rate to half of it."""
+"""Number of cut-offs that are tried, spaced geometrically from a hundredth of the servo's rate to half of it."""
 
 
 @frozen
 class FilterRange:
-    """The loop with the filter that the bed has, and with others.
+    """The loop with the bed's own filter, and with others.
 
     own      the tightest margin with the bed's filter, held against the arms of the run;  f_cut: the filter's, Hz
     tried    cut-offs, Hz, and whether the loop is stable there with the margin that was asked
@@ -35,8 +35,8 @@ class FilterRange:
 def filter_range(
     experiment: Experiment, joint: str, rows: Sequence[int], ratio: tuple[float, float], margin: float
 ) -> FilterRange:
-    """The filters of a joint's bed. rows: cases that are looked at;  ratio: least and largest r over a run. Where other
-    joints are on beds too, r is that of all their motions at the start instead."""
+    """The filters of a joint's bed. rows: cases to examine; ratio: smallest and largest r over a run. If other joints
+    are on beds too, r is that of all their motions at the start instead."""
     alone = len(experiment.structure.substitutions) == 1
     path = f"{joint}.bed.f_cut"
 

@@ -1,4 +1,4 @@
-"""`met bed firmware`: the image of a board, to be dragged onto it."""
+"""`met bed firmware`: writes the image of a board, to be dragged onto it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`met bed identify`: a bed's parameters from guided moves, with what they are sure to, as a deck to include."""
+"""`met bed identify`: a bed's parameters from guided moves, with their uncertainty, as a deck to include."""
 
 from __future__ import annotations
 
@@ -45,20 +45,20 @@ UNITS = {
 """The parameters that are found or given, with their units, in the order of the table."""
 
 OF_SERVO = {"kt": "kt", "resistance": "resistance", "tau_max": "tau_max", "f_c": "f_c", "f_v": "f_v", "inertia": "j_m"}
-"""The servo's parameter that is the data sheet of each of these parameters."""
+"""The servo's parameter that is the data sheet's value of each of these parameters."""
 
 MEASURED_BY = ("resistance", "tau_max", "f_c", "f_v", "inertia")
-"""The parameters with the relative error of the load motor's torque constant, where that is given: all torques are
-measured by it."""
+"""The parameters that share the relative error of a given torque constant of the load motor: all torques are measured
+by it."""
 
 UNEXPLAINED = 0.1
-"""Largest share of the measured rate, rms, that may be left unexplained. A bed with more of it is not what the model
-is."""
+"""Largest share of the measured rate, rms, that may be left unexplained. With more, the bed does not match the
+model."""
 
 
 @frozen
 class DataSheet:
-    """The parameters that are believed before a bed is identified.
+    """The parameters that are assumed before a bed is identified.
 
     values  SI, by the names of `UNITS`, and `v_max`, V, where the servo has it
     said    True where `kt_load` is given by the deck or by the user, and is no default
@@ -69,8 +69,8 @@ class DataSheet:
 
 
 def sheet_of(experiment: Experiment, joint: str, kt_load: float | None) -> DataSheet:
-    """The data sheet of a joint's motor in the first case: the motor as the servo has it, over the scales of the bed
-    where it has some, and the rest as the bed has it."""
+    """The data sheet of a joint's motor in the first case: the servo's motor, over the scales of the bed where it has
+    some, and the bed's other parameters."""
     inputs = {each.path: float(each.values[0]) for each in experiment.cases.coordinates}
     outputs = experiment.formulas.replay(inputs)
 
@@ -158,8 +158,8 @@ def _check_sheet(sheet: DataSheet, joint: str) -> None:
 
 
 def _check_output(deck: Path, records: Path) -> None:
-    """Raise Problem E305 where the deck cannot be written or is there already, or the records would replace
-    something that is no regular file."""
+    """Raise Problem E305 where the deck cannot be written or exists already, or where the records would replace
+    something that is not a regular file."""
     wrong, helps = "", "give another name with `-o`"
     if deck.suffix != ".ic":
         wrong, helps = f"cannot write {deck}: it is to be a deck, which ends in .ic", f"`-o {deck.with_suffix('.ic')}`"
@@ -173,7 +173,7 @@ def _check_output(deck: Path, records: Path) -> None:
 
 
 def check(found: FitResult, about: About) -> None:
-    """Raise Problem E423 where the bed does not do what the model does."""
+    """Raise Problem E423 where the bed does not behave like the model."""
     left = float((found.residual**2).mean() ** 0.5)
     worst = int(found.residual.argmax())
     if not found.settled:
@@ -192,8 +192,8 @@ def check(found: FitResult, about: About) -> None:
 
 
 def widened(found: Mapping[str, Estimate], kt_load_error: float) -> dict[str, Estimate]:
-    """The estimates with the error of a given torque constant in their intervals. kt_load_error: half of its own 95
-    % interval, as a share"""
+    """The estimates, with the error of a given torque constant added to their intervals. kt_load_error: half of its own
+    95 % interval, as a share"""
     from hw.identify.fit import Estimate
 
     if found["kt_load"].found or not kt_load_error:
@@ -208,7 +208,7 @@ def widened(found: Mapping[str, Estimate], kt_load_error: float) -> dict[str, Es
 
 
 def table_lines(found: FitResult, estimates: Mapping[str, Estimate], sheet: DataSheet) -> list[str]:
-    """For people."""
+    """The lines of the result for people."""
     rows = [["", "found", "95 % interval", "", "data sheet", "off by"]]
     for name, unit in UNITS.items():
         each, believed = estimates[name], sheet.values[name]
@@ -232,7 +232,7 @@ def table_lines(found: FitResult, estimates: Mapping[str, Estimate], sheet: Data
 
 
 def reasons(found: FitResult) -> list[str]:
-    """The reasons for which parameters were not found, in words."""
+    """The reasons, in words, why parameters were not found."""
     missing = [name for name, each in found.parameters.items() if not each.found]
     out = []
     if "kt_load" in missing:
@@ -260,7 +260,7 @@ def digits(each: Estimate, value: float) -> str:
 
 
 def origin_of(about: About, ended: Mapping[str, Any], estimates: Mapping[str, Estimate]) -> list[str]:
-    """The remark at the head of the deck that says where its numbers are from."""
+    """The comment at the head of the deck about the source of its numbers."""
     reference = (
         "drive current as the bed measures it"
         if estimates["kt_load"].found
@@ -276,7 +276,7 @@ def origin_of(about: About, ended: Mapping[str, Any], estimates: Mapping[str, Es
 def included(
     deck: Path, experiment: Experiment, joint: str, estimates: Mapping[str, Estimate], origin: Sequence[str]
 ) -> str:
-    """The text of the deck to include, laid out as `met fmt` does."""
+    """The text of the deck to include, formatted as `met fmt` does."""
     from ic.formatting.formatter import formatted
 
     head = re.sub(r"\W", "_", joint)
@@ -348,7 +348,7 @@ def _believed(experiment: Experiment, use: Substitution) -> list[str]:
 
 
 def _packed(words: Iterable[str], indent: int) -> list[str]:
-    """Words put into lines, without breaking one."""
+    """Words joined into lines, without breaking one."""
     lines = [" " * indent]
     for word in words:
         if len(lines[-1]) + len(word) > 105:
@@ -384,7 +384,7 @@ def as_data(
 
 
 def _driven(request: MovesRequest, say: Callable[[str], None]) -> tuple[About, dict[str, Any]]:
-    """Lead the bed through the moves. Returns its description and the course of the moves. Raises Problem, and
+    """Lead the bed through the moves. Returns its description and the record of the moves. Raises Problem, and
     KeyboardInterrupt once the bed is stopped."""
     about: About | None = None
     found = dict[str, Any]()

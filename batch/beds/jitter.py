@@ -1,4 +1,4 @@
-"""`met bed jitter`: how late exchanges with a bed begin and how long they take, as histograms. Never arms."""
+"""`met bed jitter`: the lateness and duration of exchanges with a bed, as histograms. It never arms."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from met.plan import Plan
 from met.plan import file as plan_file
 
 HZ, SECONDS = 1000.0, 10.0
-"""Rate (Hz) and length (s) of a measurement where the user gives none, and no deck has a rate."""
+"""Rate (Hz) and length (s) of a measurement where neither the user nor a deck gives one."""
 
 WIDTH = 40
 """Length of the longest bar, characters."""
@@ -112,8 +112,7 @@ def lines(data: Mapping[str, Any]) -> list[str]:
 
 
 def histogram(stretches: Sequence[Mapping[str, Any]]) -> list[str]:
-    """A bar for each bin from the first to the last that is not empty. A bin with any count has a bar that can be
-    seen."""
+    """A bar for each bin from the first to the last non-empty one. A bin with any count has a visible bar."""
     full = [at for at, each in enumerate(stretches) if each["count"]]
     if not full:
         return ["  (none)"]

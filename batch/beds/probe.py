@@ -1,4 +1,4 @@
-"""`met bed probe`: who is at a port, what its sensors say, and for which rates the line is fast enough. Never arms."""
+"""`met bed probe`: the bed at a port, its sensors, and the rates for which the line is fast enough. It never arms."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from met.messages.visible import say
 from met.substitution.bed import DRIVES
 
 ASKED = 32
-"""The number of times that the sensors are read, to measure how long an answer takes."""
+"""Number of times that the sensors are read, to measure the duration of an answer."""
 
 RATES = (500.0, 1000.0, 2000.0, 4000.0)
 """Rates in Hz for which the probe says whether the line is fast enough."""
@@ -52,7 +52,7 @@ class ProbeResult:
 
     @property
     def fastest(self) -> float:
-        """The rate of exchanges, Hz, at which one takes the largest share of a period that it may; infinite in
+        """The rate of exchanges, Hz, at which one takes the largest allowed share of a period; infinite in
         lock-step."""
         longest = max(self.needed, statistics.median(self.trips) if self.trips else 0.0)
         stepped = Capability.LOCK_STEP in self.about.capabilities
@@ -153,7 +153,7 @@ def data(result: ProbeResult) -> dict[str, Any]:
 
 
 def capabilities(about: About) -> list[str]:
-    """The properties that not every bed has, in words."""
+    """The optional properties of the bed, in words."""
     words = {
         Capability.WATCHDOG: "a watchdog of its own",
         Capability.LOCK_STEP: "no time of its own",
@@ -174,7 +174,7 @@ def _firmware(about: About) -> str:
 
 
 def _properties(about: About) -> list[str]:
-    """Outputs and sensors in words. A bed that speaks no protocol of MET's has drives that tell their rate."""
+    """Outputs and sensors in words. A bed without a protocol of MET's has drives that report their rate."""
     if not about.version:
         drive = "drive rate" if about.drive == "rate" else "drive torque"
         drive += " of an armature at a voltage" * (Capability.ARMATURE in about.capabilities)

@@ -1,4 +1,4 @@
-"""`met bed size`: what the two motors of a bed must do for a joint, and which parts can."""
+"""`met bed size`: the demands on the two motors of a bed for a joint, and the parts that meet them."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def _figures(figures: Mapping[str, Extreme], margin: float) -> dict[str, Any]:
 
 
 def _extreme(one: Extreme) -> dict[str, Any]:
-    """An extreme without what it does not have."""
+    """An extreme as data, without empty fields."""
     return {name: value for name, value in asdict(one).items() if value is not None}
 
 

@@ -58,7 +58,7 @@ def size_lines(size: BedSize, *, named: bool, curves: bool = False) -> Iterator[
 
 
 def _curves(motor: MotorFigures) -> Iterator[str]:
-    """The torque that is asked at a rate or above, driving and braking."""
+    """The required torque at a rate or above, driving and braking."""
     rows = [["at or above", "driving", "braking"]]
     for rate, driving, braking in zip(motor.rates, *map(motor.envelope, ("driving", "braking")), strict=True):
         rows.append([_with(rate, "rad/s"), _with(driving, "N*m"), _with(braking, "N*m")])
@@ -66,7 +66,7 @@ def _curves(motor: MotorFigures) -> Iterator[str]:
 
 
 def _rest(size: BedSize, several: bool) -> Iterator[Sequence[str]]:
-    """Rows of what is of neither motor alone."""
+    """Rows of figures that belong to both motors."""
     figures, own = size.figures, size.filter.own
     (light, heavy), (least, most) = figures.arm, figures.ratio
     yield (
@@ -106,7 +106,7 @@ def _filter(size: BedSize) -> str:
 
 
 def _named(size: BedSize, several: bool) -> Iterator[str]:
-    """The verdicts of parts that were named, check by check."""
+    """The verdicts of named parts, check by check."""
     for verdict in size.verdicts:
         yield f"  {verdict.role} {verdict.part.name}: {_verdict(verdict)}"
         rows = [
@@ -120,7 +120,7 @@ def _named(size: BedSize, several: bool) -> Iterator[str]:
 
 
 def _listed(size: BedSize) -> Iterator[str]:
-    """All parts by role, those that fit first and the tightest of them before; then benches, both motors on a shaft."""
+    """All parts by role, fitting ones first and the tightest of them before; then benches, both motors on a shaft."""
     rows = [["part", "", "fits", "what binds"]]
     for role in ROLES:
         of_role = [each for each in size.verdicts if each.role == role]
@@ -160,12 +160,12 @@ def _share(verdict: PartVerdict) -> float:
 
 
 def _check(check: PartCheck) -> str:
-    """`torque, peak: 0.3 of 1.1 N*m, 27 %`."""
+    """One check in words: `torque, peak: 0.3 of 1.1 N*m, 27 %`."""
     return f"{check.what}: {_digits(check.asked)} of {_with(check.has, check.unit)}, {100.0 * check.share:.0f} %"
 
 
 def _where(name: str, one: Extreme, several: bool) -> str:
-    """`#3, 0.16 s, at 8.77 rad/s`: case, instant and operating point."""
+    """The place of an extreme in words, `#3, 0.16 s, at 8.77 rad/s`: case, instant and operating point."""
     if one.value == 0.0:
         return "never"
     place = _place(one, several)
@@ -195,7 +195,7 @@ def _span(ends: tuple[float, float]) -> str:
 
 
 def _digits(value: float) -> str:
-    """Four digits; what is nothing but rounding is 0."""
+    """Four digits; a number that is only rounding is 0."""
     return f"{0.0 if abs(value) < 1e-12 else value:.4g}"
 
 

@@ -1,7 +1,8 @@
-"""The figures of `met bed size`: what the two motors of a bed must do over all cases of a run, and which parts can.
+"""The figures of `met bed size`: the demands on a bed's two motors over all cases of a run, and the parts that meet
+them.
 
-Torques are on the shaft. A figure is the largest of all cases, with the case and the instant where it is. Figures are
-of instants: between two of them nothing was looked at. A mean or an energy is of one case, from its begin to its end.
+Torques are on the shaft. A figure is the largest of all cases, with its case and instant. Only instants are examined,
+not the time between them. A mean or an energy is of one case, from its begin to its end.
 """
 
 from __future__ import annotations
@@ -28,14 +29,14 @@ UNITS: Mapping[str, str] = {
     "current_peak": "A",
     "voltage": "V",
 }
-"""Figures of a motor and their units, SI. heat: the torque that, given for ever, heats the winding as much as the case
-does at its hottest, the case being run again and again."""
+"""Figures of a motor and their units, SI. heat: the constant torque that heats the winding as much as the case does at
+its hottest, when the case is run again and again"""
 
 ROUNDING = 1e-9
-"""Share by which two values of a figure may differ and be one."""
+"""Relative difference below which two values of a figure count as equal."""
 
 ENVELOPE = 12
-"""Rates at which the torque-speed curve is asked, evenly spaced up to the largest."""
+"""Number of rates of the torque-speed curve, evenly spaced up to the largest."""
 
 
 @frozen
@@ -54,23 +55,23 @@ class Extreme:
 
 
 class Largest:
-    """The largest values so far, by name; blocks of cases come one after the other."""
+    """The largest values so far, by name, updated block by block."""
 
     def __init__(self) -> None:
         self.found: dict[str, Extreme] = {}
 
     def of_cases(self, name: str, values: np.ndarray, work: ShaftWork) -> None:
-        """values: [case]"""
+        """Take the values of cases. values: [case]"""
         if np.isfinite(values).any():
             row = int(np.nanargmax(values))
             self._keep(name, Extreme(float(values[row]), int(work.case[row])))
 
     def of_instants(self, name: str, values: np.ndarray, work: ShaftWork, torque: np.ndarray | None = None) -> None:
-        """values: [case, instant];  torque: of the motor, which is told beside"""
+        """Take the values at instants. values: [case, instant]; torque: of the motor, which is reported with them"""
         if not np.isfinite(values).any():
             return
         most = float(np.nanmax(values))
-        # the first instant that has it but for rounding, so that a rate which is kept up is told where it is reached
+        # the first instant with the value but for rounding, so that a constant rate is reported where it is reached
         row, k = np.unravel_index(int(np.argmax(values >= most - ROUNDING * abs(most))), values.shape)
         at = (float(work.time[k]), None, None) if torque is None else _at(work, torque, int(row), int(k))
         self._keep(name, Extreme(most, int(work.case[row]), *at))
@@ -85,14 +86,14 @@ def _at(work: ShaftWork, torque: np.ndarray, row: int, k: int) -> tuple[float, f
 
 
 def over_case(values: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """The integral over each case by trapezoids, as far as the case went, [case]. values: [case, instant]"""
+    """The integral over each case by trapezoids, up to its end, [case]. values: [case, instant]"""
     pieces = 0.5 * (values[:, 1:] + values[:, :-1]) * np.diff(time)
     whole: np.ndarray = np.nansum(pieces, 1)
     return whole
 
 
 def root_mean_square(values: np.ndarray) -> np.ndarray:
-    """The root of the mean square over the instants that a case has, as the metric `rms` has it, [case]."""
+    """The root of the mean square over a case's instants, as in the metric `rms`, [case]."""
     count = np.isfinite(values).sum(1)
     with np.errstate(invalid="ignore"):
         return np.sqrt(np.nansum(values * values, 1) / np.where(count, count, np.nan))
@@ -118,7 +119,7 @@ def hottest(torque: np.ndarray, time: np.ndarray, constant: float) -> np.ndarray
 
 
 class MotorFigures:
-    """The figures of one motor, gathered block by block: of the deck's, or of a part that would take its place."""
+    """The figures of one motor, collected block by block: of the deck's motor, or of a part in its place."""
 
     def __init__(self, part: MotorPart | None = None) -> None:
         self.part, self.largest = part, Largest()
@@ -126,13 +127,13 @@ class MotorFigures:
 
     @property
     def found(self) -> dict[str, Extreme]:
-        """By the names of `UNITS`, those that there are."""
+        """The known figures by the names of `UNITS`."""
         return {name: self.largest.found[name] for name in UNITS if name in self.largest.found}
 
     def see(
         self, work: ShaftWork, torque: np.ndarray, kt: np.ndarray | None = None, voltage: np.ndarray | None = None
     ) -> None:
-        """Take a block in. torque: of this motor, N m, [case, instant];  kt: N m/A, [case];  voltage: V."""
+        """Add a block. torque: of this motor, N m, [case, instant]; kt: N m/A, [case]; voltage: V"""
         keep, power = self.largest, torque * work.rate
         keep.of_cases("torque_rms", root_mean_square(torque), work)
         keep.of_instants("torque_peak", np.abs(torque), work, torque)
@@ -157,7 +158,7 @@ class MotorFigures:
     def _of_part(
         self, work: ShaftWork, torque: np.ndarray, part: MotorPart
     ) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Torque constants and voltages of a part, as far as its source goes."""
+        """Torque constants and voltages of a part, as far as its source gives them."""
         kt, resistance, constant = (part.figure(name) for name in ("kt", "resistance", "thermal_time"))
         if constant is not None:
             self.largest.of_cases("heat", hottest(torque, work.time, constant), work)
@@ -173,15 +174,15 @@ class MotorFigures:
         return [float(rate) for rate in np.linspace(0.0, fastest, ENVELOPE)]
 
     def envelope(self, name: str) -> list[float]:
-        """The torque-speed curve that is asked, `driving` or `braking`: the largest torque (N m) at each of `rates` or
-        any above; 0 where there is none."""
+        """The required torque-speed curve, `driving` or `braking`: the largest torque (N m) at each of `rates` or any
+        above; 0 where there is none."""
         points = self._corners[name]
         above = (points[points[:, 0] >= rate * (1.0 - ROUNDING), 1] for rate in self.rates)
         return [float(torques.max(initial=0.0)) for torques in above]
 
 
 def corners(points: np.ndarray) -> np.ndarray:
-    """Those points of [point, (rate, torque)] that no other exceeds in both, by falling rate."""
+    """The points of [point, (rate, torque)] that no other exceeds in both, by falling rate."""
     ordered = points[np.lexsort((-points[:, 1], -points[:, 0]))]
     if not len(ordered):
         return ordered
@@ -217,8 +218,8 @@ class BedFigures:
 
 @frozen
 class Candidate:
-    """A part for one motor of the bed. beside: inertia of the other motor's rotor on the shaft, kg m^2; None: that of
-    the joint's"""
+    """A candidate part for one motor of the bed. beside: inertia of the other motor's rotor on the shaft, kg m^2; None:
+    that of the joint's"""
 
     role: str
     figures: MotorFigures
@@ -230,7 +231,7 @@ class Candidate:
         return self.figures.part
 
     def see(self, work: ShaftWork) -> None:
-        """Take a block in: the load motor's own rotor is on the shaft, and stands in for a part of the arm."""
+        """Add a block: the load motor's own rotor is on the shaft, and replaces a part of the arm."""
         if self.role == "drive":
             self.figures.see(work, work.drive)
         else:
@@ -239,7 +240,7 @@ class Candidate:
 
 
 def gather(blocks: Iterable[ShaftWork], candidates: Sequence[Candidate] = ()) -> BedFigures | None:
-    """The figures over all blocks; None where no case has got anywhere."""
+    """The figures over all blocks; None where no case has any instant."""
     drive, load, rest = MotorFigures(), MotorFigures(), Largest()
     ends: dict[str, list[float]] = {"rotor": [], "shaft": []}
     cases = instants = failed = limited = at_most = 0
@@ -292,12 +293,12 @@ CHECKS = (
     ("current, peak", "current_peak", "current_peak"),
     ("voltage", "voltage", "voltage"),
 )
-"""What is held against a part: in words, what is asked (`UNITS`), and what the part has (hw.motor_parts.FIGURES)."""
+"""The checks of a part: in words, the required figure (`UNITS`), and the part's figure (hw.motor_parts.FIGURES)."""
 
 
 @frozen
 class PartCheck:
-    """One figure of a part against what is asked, margin included, SI. at: where it is asked"""
+    """One figure of a part against the required one, margin included, SI. at: where that occurs"""
 
     what: str
     unit: str
@@ -307,13 +308,13 @@ class PartCheck:
 
     @property
     def share(self) -> float:
-        """The part of what it has that is asked; above 1 it does not fit."""
+        """The required share of the part's figure; above 1 it does not fit."""
         return self.asked / self.has
 
 
 @frozen
 class PartVerdict:
-    """A part's verdict. missing: figures that would have to be known, in words"""
+    """A part's verdict. missing: unknown figures that would be needed, in words"""
 
     role: str
     part: MotorPart
@@ -327,14 +328,14 @@ class PartVerdict:
 
     @property
     def fits(self) -> bool | None:
-        """None: it is not known, for its source leaves out too much."""
+        """True if all checks fit; None where it is not known, since its source leaves out too much."""
         if self.binds is not None and self.binds.share > 1.0:
             return False
         return None if self.missing else True
 
 
 def judge_part(candidate: Candidate, margin: float) -> PartVerdict:
-    """Hold a part against what is asked of it times the margin."""
+    """Compare a part with its required figures times the margin."""
     asked, part, checks = candidate.figures.found, candidate.part, []
     for what, name, own in CHECKS:
         has = part.figure(own)
