@@ -1,1 +1,1 @@
-"""Campaigns: what is run, in which tasks, into which folder, and how it goes on and ends."""
+"""Campaigns: their cases, tasks and folders, and their progress from start to end."""

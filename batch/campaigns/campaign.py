@@ -1,7 +1,7 @@
-"""A campaign: which cases of a plan are run, what is kept of them, and the running itself.
+"""A campaign: the cases of a plan to run, and the results to keep.
 
 `prepare` settles everything that can be refused (names, cases, room on the disk, the output) and writes nothing;
-batch/campaigns/performing.py runs what is missing, and puts it together.
+batch/campaigns/performing.py runs the missing cases, and merges them.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ from met.plan import Experiment, Plan
 from met.plan.columns import CaseValues, are_among, places_among
 
 KEPT_BYTES = 1 << 30
-"""Histories are kept by default while the archive stays below this."""
+"""Histories are kept by default while the archive stays below this size."""
 
 OUTPUTS = 8
-"""Numbers of a case in a shard besides its coordinates and metrics."""
+"""Number of values of a case in a shard besides its coordinates and metrics."""
 
 
 @frozen
 class Wires:
-    """Real beds stand at the wires. late: ticks of their delay that pass on the wires."""
+    """Real beds at the wires. late: ticks of their delay that pass on the wires"""
 
     late: int
 
@@ -85,7 +85,7 @@ class CampaignPart:
         return self.stops_early or self.searches
 
     def prepared(self) -> engine.Prepared:
-        """The program that runs it."""
+        """The program that runs these cases."""
         if self.wires is None:
             return engine.prepare(self.experiment)
         return engine.prepare(self.experiment, wire=True, late=self.wires.late)
@@ -101,14 +101,14 @@ class CampaignPart:
 
     @property
     def bytes(self) -> int:
-        """About what is in the archive of it."""
+        """Approximate size of this part in the archive."""
         described = archive_layout.PARAMETER_TEXT * len(self.experiment.parameters)
         rows = self.most if self.written is None else min(self.written, len(self.rows))
         return archive_layout.layout(self.experiment, rows, self.recorded, self.single).bytes + described
 
     @property
     def shard_bytes(self) -> int:
-        """About what its shards take."""
+        """Approximate size of this part's shards."""
         numbers = OUTPUTS + len(self.experiment.cases.coordinates) + len(self.experiment.metrics)
         histories = self.recorded * self.experiment.structure.history_bytes // (2 if self.single else 1)
         return 8 * numbers * self.most + histories
@@ -116,9 +116,9 @@ class CampaignPart:
 
 @frozen
 class Campaign:
-    """A campaign that is ready to run, all of it checked. words: the choice of histories, as `prepare` takes it;
-    verify: which cases are run with shorter steps besides (batch/campaigns/verification/when.py); kept_rows: whose rows
-    the archive has."""
+    """A campaign that is ready to run and fully checked. words: the choice of histories, as `prepare` takes it; verify:
+    the cases that are run with shorter steps too (batch/campaigns/verification/when.py); kept_rows: the choice of cases
+    with rows in the archive."""
 
     plan: Plan
     parts: tuple[CampaignPart, ...]
@@ -140,22 +140,22 @@ class Campaign:
 
     @property
     def open_ended(self) -> bool:
-        """True if it is not known beforehand how many cases are run: then `cases` and `bytes` are the most."""
+        """True if the number of cases is not known beforehand: then `cases` and `bytes` are upper bounds."""
         return any(part.open_ended for part in self.parts)
 
     @property
     def bytes(self) -> int:
-        """About the size of the archive."""
+        """Approximate size of the archive."""
         return sum(part.bytes for part in self.parts)
 
     def bytes_of(self, histories: Sequence[tuple[CampaignPart, int]]) -> int:
-        """About the room for the histories of so many cases of each part, in shards and in the archive."""
+        """Approximate room for the histories of these numbers of cases of each part, in shards and in the archive."""
         whole = sum(part.experiment.structure.history_bytes // (2 if part.single else 1) * n for part, n in histories)
         return self.bytes + 2 * whole
 
     @property
     def bytes_missing(self) -> int:
-        """About the room on the disk that is needed until the archive is whole, beside the shards that are there."""
+        """Approximate room on the disk that is needed until the archive is whole, besides the existing shards."""
         shards = sum(part.shard_bytes for part in self.parts)
         return self.bytes + shards - min(shards, Folder(beside(self.output)).bytes())
 
@@ -175,7 +175,7 @@ def prepare(
     decided: Collection[str] = (),
     rows: str = "all",
 ) -> Campaign:
-    """Settle what will be run; raises Problem for anything that would stop it later, and writes nothing.
+    """Determine the cases to run, without writing anything; raises Problem for anything that would stop the run later.
 
     output       None: `default_output`, in the current folder
     experiments  names; None: all of the plan's
@@ -235,14 +235,14 @@ def prepare(
     checked: Verify = "none" if wires else verify
     campaign = Campaign(kept_plan, parts, wanted, words, target, tuple(notes), checked, chosen_rows)
     check_output(target, kept_plan)
-    if not target.exists():  # one that is there may be whole, and need nothing: then `perform` sees to it
+    if not target.exists():  # an existing one may be whole, and need nothing: then `perform` decides
         check_room(target, campaign.bytes_missing)
     return campaign
 
 
 def _histories_of_a_summary(rows: str, histories: str | int | Sequence[str | int], verify: Verify) -> Literal["none"]:
     """The choice of histories beside `--rows` other than `all`: none. Raises Problem E351 for any other, and where all
-    cases are to be verified, whose rows would have to be there."""
+    cases should be verified, which needs their rows."""
     if as_list(histories) not in (["default"], ["none"]):
         message = f"rows `{rows}` keep no histories"
         remedy = "`met run ARCHIVE.h5 --case '#7'` computes a case again, with its history; `--rows all` keeps any"
@@ -254,8 +254,8 @@ def _histories_of_a_summary(rows: str, histories: str | int | Sequence[str | int
 
 
 def _summarised(part: CampaignPart, rows: KeptRows) -> CampaignPart:
-    """A part of which the archive has a summary. Raises Problem E351 where it has too many design points, or stops by
-    its results."""
+    """A part that the archive summarises. Raises Problem E351 where it has too many design points, or stops by its
+    results."""
     experiment = part.experiment
     if part.open_ended:
         does = "chooses its cases by what others gave" if part.searches else "stops when its requirements are decided"
@@ -269,7 +269,7 @@ def _summarised(part: CampaignPart, rows: KeptRows) -> CampaignPart:
 def _parts(
     selected: Sequence[tuple[Experiment, CaseValues]], wanted: Keep, single: bool, decided: Collection[str]
 ) -> tuple[CampaignPart, ...]:
-    """The experiments with what is kept of them. Raises Problem E311, E312 for cases that are none."""
+    """The experiments with their histories to keep. Raises Problem E311, E312 for unknown cases."""
     chosen = choosing.select_rows([experiment for experiment, _ in selected], wanted.cases) if wanted.cases else []
     named = {experiment.name: rows for experiment, rows in chosen}
     strays, run = set[int](), set[int]()
@@ -289,7 +289,7 @@ def _parts(
             part = CampaignPart(experiment, rows, kept, wanted.at_most(len(rows)), single)
         else:
             part = CampaignPart(experiment, rows, np.empty(0, np.int64))
-        # some that a user chooses are all run, whatever they show
+        # cases that a user chooses are all run, whatever they show
         whole = len(rows) == experiment.cases.count or experiment.name in decided
         part = replace(part, stops_early=experiment.cases.until_shown > 0 and whole)
         if experiment.search is not None and not experiment.search.complete and whole:
@@ -300,7 +300,7 @@ def _parts(
 
 
 def values_sections(campaign: Campaign) -> list[CampaignSection]:
-    """The first pass: all cases, with their histories where those of all are kept."""
+    """The first pass: all cases, with their histories where those of all cases are kept."""
     return [
         CampaignSection(number, number, part.prepared(), part.rows, part.all_recorded, part.single)
         for number, part in enumerate(campaign.parts)

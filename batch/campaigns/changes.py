@@ -1,5 +1,5 @@
-"""What differs between two plans, in the words of their decks: for who comes back to a campaign with another deck, and
-for who compares two archives."""
+"""Differences between two plans, in the words of their decks: for a campaign that is continued with another deck, and
+for comparisons of archives."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ AXES = ("x", "y", "z")
 
 @frozen
 class Change:
-    """A change that may change numbers, in words.
+    """A change, in words, that may affect numbers.
 
     follows  whether it cannot be the cause: it follows from something else that is told
     before   the place that wrote the old value, now: the new one, where a parameter differs
@@ -38,7 +38,7 @@ class Change:
 
 
 def changes(before: Plan, now: Plan, *, ordered: bool = True) -> list[str]:
-    """Each change that may change numbers, a line; none where there is none. ordered: another order of cases is one."""
+    """The changes that may affect numbers, one a line. ordered: another order of cases counts as a change"""
     out = []
     old, new = ({experiment.name: experiment for experiment in plan.experiments} for plan in (before, now))
     if list(old) != list(new):
@@ -52,13 +52,13 @@ def changes(before: Plan, now: Plan, *, ordered: bool = True) -> list[str]:
 
 
 def between(before: Experiment, now: Experiment, *, ordered: bool) -> list[Change]:
-    """The differences of two experiments. ordered: True where another order of cases is one."""
+    """The differences of two experiments. ordered: True where another order of cases counts"""
     structures = [*_structures(before.structure, now.structure)]
     new = {entity for entity, _ in structures if entity}
     out = [Change(text) for _, text in structures if text]
     if before.search is None or now.search is None:
         cases = [Change(text) for text in _cases(before.cases, now.cases, ordered)]
-    else:  # of which the cases follow from what is searched for
+    else:  # whose cases follow from the search
         cases = [Change(text) for text in _searches(before.search, now.search)]
         cases += [Change(text) for text in _tuned_limits(before, now)]
     cases += [Change(text) for text in _stops(before, now)]
@@ -67,7 +67,7 @@ def between(before: Experiment, now: Experiment, *, ordered: bool) -> list[Chang
     if before.formulas != now.formulas and not out:
         out.append(Change("what follows from the varied parameters is computed otherwise"))
     if not out and structure_key(before.structure, inputs(before)) != structure_key(now.structure, inputs(now)):
-        out.append(Change("the structure"))  # no words for it here
+        out.append(Change("the structure"))  # no words for the difference
     return out
 
 
@@ -98,7 +98,7 @@ def _figures(experiment: Experiment) -> dict[str, str]:
 
 
 def _parameters(before: Experiment, now: Experiment, new: set[str]) -> Iterator[Change]:
-    """new: beginnings of the paths of what is new or gone, or of another kind, as a whole."""
+    """Changes of parameters. new: prefixes of the paths of things that are new, gone, or of another kind"""
     computed = _Computed(before, now)
     for path, old in sorted(before.parameters.items()):
         if path in now.parameters and _unlike(old, now.parameters[path]):
@@ -118,18 +118,18 @@ def _unlike(old: Quantity, new: Quantity) -> bool:
 
 
 def _changed(path: str, old: Quantity, new: Quantity) -> Change:
-    """A parameter that both have. One that is computed, or becomes one that a sweep varies, follows from what is told
-    beside it."""
+    """The change of a parameter that both have. One that is computed, or newly varied by a sweep, follows from other
+    changes."""
     follows = new.origin.kind == "derived" or isinstance(old.value, Formula) or isinstance(new.value, Formula)
     return Change(f"{path}: {' -> '.join(_apart(old, new))}{_at(new)}", follows, old.origin.place, new.origin.place)
 
 
 MOST_CASES = 10_000
-"""Cases, spread over the table, in which parameters that vary with the case are compared."""
+"""Number of cases, spread over the table, in which parameters that vary with the case are compared."""
 
 
 class _Computed:
-    """Parameters that vary with the case in both, computed for the same cases by the formulas of each."""
+    """Parameters that vary with the case in both, computed for the same cases by each plan's formulas."""
 
     def __init__(self, before: Experiment, now: Experiment) -> None:
         self.before, self.now = before, now
@@ -139,7 +139,7 @@ class _Computed:
             self.values = before.formulas.replay(cases), now.formulas.replay(cases)
 
     def change(self, path: str) -> Iterator[Change]:
-        """The change of a parameter that follows from others; nothing where it has the same values."""
+        """The change of a parameter that follows from others; none where its values are the same."""
         old, new = self.before.parameters[path], self.now.parameters[path]
         if not self.values[0] or not isinstance(old.value, Formula) or not isinstance(new.value, Formula):
             return
@@ -159,7 +159,7 @@ class _Computed:
 
 
 def _some_cases(before: Cases, now: Cases) -> dict[str, np.ndarray]:
-    """Values of all that is varied, of the cases of `now`; what it does not vary has the values that it had before."""
+    """Values of all varied parameters in cases of `now`; those that it does not vary have their former values."""
     rows = np.unique(np.linspace(0, max(0, now.count - 1), MOST_CASES, dtype=np.int64)) if now.count else np.arange(0)
     found = {each.path: np.resize(each.values[: len(rows)], len(rows)) for each in before.coordinates}
     return found | {each.path: each.values[rows] for each in now.coordinates}
@@ -171,7 +171,7 @@ def _at(quantity: Quantity) -> str:
 
 
 def _vectors(paths: Iterable[str]) -> dict[str, list[str]]:
-    """The paths by name; three that are a vector's components, under the vector's."""
+    """The paths by name; three components of a vector come under its name."""
     found: dict[str, list[str]] = {}
     known = dict.fromkeys(paths)
     for path in known:
@@ -187,7 +187,7 @@ def _value(quantity: Quantity) -> Any:
 
 
 def _apart(before: Quantity, now: Quantity) -> tuple[str, str]:
-    """Two parameters' values in as few digits as tell them apart, but six at least."""
+    """The values of two parameters in the fewest digits, but at least six, that distinguish them."""
     for digits in range(6, 18):
         texts = _shown(before, digits), _shown(now, digits)
         if texts[0] != texts[1]:
@@ -233,7 +233,7 @@ def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
 
 
 def _stops(before: Experiment, now: Experiment) -> Iterator[str]:
-    """Changes of what decides how many cases of a design point are run, where that is decided by results."""
+    """Changes that affect how many cases of a design point are run, where results decide that."""
     early = [bool(each.cases.until_shown) for each in (before, now)]
     if early[0] != early[1]:
         yield "cases are run until it is shown what is required" if early[1] else "all cases are run"
@@ -252,7 +252,7 @@ def _stops(before: Experiment, now: Experiment) -> Iterator[str]:
 
 
 def _searches(before: Search, now: Search) -> Iterator[str]:
-    """Changes of what is searched for, between which ends, and in how many cases."""
+    """Changes of a search's parameters, their bounds, and its number of cases."""
     if before.goal != now.goal:
         yield f"goal: {before.goal} -> {now.goal}"
     old, new = ({each.path: each for each in search.parameters} for search in (before, now))
@@ -273,7 +273,7 @@ def _searches(before: Search, now: Search) -> Iterator[str]:
 
 
 def _tuned_limits(before: Experiment, now: Experiment) -> Iterator[str]:
-    """Changes of the requirements of a tuning, which decide what its cases are worth, and so which ones follow."""
+    """Changes of the requirements of a tuning, which decide the worth of its cases, and so its later cases."""
     old, new = ([each.text for each in run.requirements] for run in (before, now))
     if old != new and now.search is not None and now.search.kind == "tune":
         gone, come = ([text for text in one if text not in other] for one, other in ((old, new), (new, old)))
@@ -281,12 +281,12 @@ def _tuned_limits(before: Experiment, now: Experiment) -> Iterator[str]:
 
 
 def _shown_by(requirement: Requirement) -> tuple[object, ...]:
-    """All that decides which cases meet a requirement, and how many of them are to."""
+    """Everything that decides which cases meet a requirement, and how many of them should."""
     return requirement.metric, requirement.comparison, requirement.limit, requirement.share, requirement.confidence
 
 
 def _same(before: CaseValues, now: CaseValues, ordered: bool) -> bool:
-    """True if a parameter takes the same values; ordered: in the same cases of the table."""
+    """True if a parameter takes the same values. ordered: in the same cases of the table"""
     return _alike(before, now) if ordered else _alike(different(before), different(now))
 
 
@@ -302,7 +302,7 @@ def _count(cases: Cases) -> str:
 
 
 def _span(coordinate: Any) -> str:
-    """Say which values a varied parameter takes, in the deck's unit."""
+    """The values of a varied parameter in words, in the deck's unit."""
     values = different(coordinate.values) / coordinate.scale
     unit = f" {coordinate.unit}" if coordinate.unit not in ("", "1") else ""
     if len(values) <= 3:
@@ -328,8 +328,8 @@ ENTITIES = {
     "guides": ("guide", ("guides.{}.",)),
     "sensors": ("sensor", ("sensors.{}.",)),
 }
-"""The fields of a structure that hold several things: the word for one of them, and how the paths of its parameters
-begin."""
+"""The fields of a structure that hold several things: the word for one of them, and the prefixes of its parameters'
+paths."""
 
 WHOLE = {
     "joints": {"kind"},
@@ -340,15 +340,15 @@ WHOLE = {
     "sensors": {"model"},
     "substitutions": {"bed", "law", "scaled"},
 }
-"""Fields by whose change a thing has other parameters."""
+"""Fields whose change gives a thing other parameters."""
 
 NOT_TOLD = frozenset({"channels", "words", "schedule", "base"})
-"""Fields that are not told by themselves, besides those in no key: channels follow from what is recorded, words are
-parameters too, a schedule has rates, and the base is told of first."""
+"""Fields that are not reported separately, besides those in no key: channels follow from the record, words are
+parameters too, a schedule has rates, and the base is reported first."""
 
 
 def _structures(before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
-    """Changes in words, each with the beginning of the paths of the parameters that follow from it; "" of none."""
+    """Changes in words, each with the prefix of the paths of the parameters that follow from it, or ""."""
     yield from (("", text) for text in _schedule(before.schedule, now.schedule))
     yield from _base(before.base, now.base)
     for field in dataclasses.fields(Structure):
@@ -389,7 +389,7 @@ def _courses(what: str, path: str, before: Sequence[Course], now: Sequence[Cours
 
 
 def _entities(field: str, before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
-    """Changes of the things that one field holds: which are new or gone, and what differs in the others."""
+    """Changes of the things in one field: new and missing ones, and differences in the others."""
     what, begins = ENTITIES[field]
     old, new = ({_name(each): each for each in getattr(structure, field)} for structure in (before, now))
     if list(old) != list(new) and sorted(old) == sorted(new) and field != "servos":
@@ -408,7 +408,7 @@ def _entities(field: str, before: Structure, now: Structure) -> Iterator[tuple[s
 
 
 def _thing(field: str, old: Any, new: Any, before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
-    """Changes of one thing: the name of its field, and words."""
+    """Changes of one thing: the names of its fields, in words."""
     for each in dataclasses.fields(new):
         one, two = getattr(old, each.name), getattr(new, each.name)
         if each.name == "divisor":
@@ -429,7 +429,7 @@ def _thing(field: str, old: Any, new: Any, before: Structure, now: Structure) ->
 
 
 def _with_dynamics(one: int | None, two: int | None, before: Structure, now: Structure) -> bool:
-    """True if something ticked once a step of the dynamics and still does: the dynamics' own change then covers its
+    """True if a part ticked once a step of the dynamics and still does: the dynamics' own change then covers its
     rate."""
     return one == before.schedule.dynamics and two == now.schedule.dynamics
 
@@ -447,7 +447,7 @@ def _rate(divisor: int | None, schedule: Schedule) -> str:
 
 
 def _name(each: Any) -> str:
-    """The name of one of several things: of a servo its joint, of a link its own."""
+    """The name of one of several things: for a servo its joint, for a link its own."""
     return str(getattr(each, "joint", None) or each.name)
 
 

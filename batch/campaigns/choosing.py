@@ -1,4 +1,4 @@
-"""Which runs and sweeps of a plan, and which of their cases, a user means."""
+"""The user's choice among a plan's runs and sweeps, and among their cases."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from met.settings import varied_run, varies
 def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experiment, ...]:
     """The plan's experiments of these names; all of them for None. Raises Problem E310.
 
-    Of a run that the command line varied, the experiments of its sweep.
+    For a run that the command line varied, these are the experiments of its sweep.
     """
     if names is None:
         return plan.experiments
@@ -44,8 +44,8 @@ def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experime
 def select_rows(
     experiments: Sequence[Experiment], cases: Sequence[int | str] | None
 ) -> list[tuple[Experiment, CaseValues]]:
-    """The rows of each experiment that some cases are, by position (`7`, `"#7"`) or the beginning of a case_id; all for
-    None. An experiment that has none of them is left out. Raises Problem E311, E312."""
+    """The rows of each experiment that contain the given cases, by position (`7`, `"#7"`) or the beginning of a
+    case_id; all for None. An experiment without any of them is left out. Raises Problem E311, E312."""
     if cases is None:
         return [(experiment, all_rows(experiment.cases.count)) for experiment in experiments]
     found: dict[str, set[int]] = {experiment.name: set() for experiment in experiments}
@@ -66,7 +66,7 @@ def select_rows(
             some = ", ".join(f"#{e.cases.table[row]} of `{e.name_in_deck}`" for e, row in matches[:4])
             message = f"case `{case}` may be any of {len(matches)}: {some}"
             position, alike = matches[0][0].cases.table[matches[0][1]], len({_id_of(*match) for match in matches}) == 1
-            remedy = "" if alike else "give more of its id, or "  # cases that differ in structure alone share their ids
+            remedy = "" if alike else "give more of its id, or "  # cases that differ only in structure share their ids
             raise Problem(error("E312", message, help=f"{remedy or 'give '}its position: `--case '#{position}'`"))
         for experiment, row in matches:
             found[experiment.name].add(row)
@@ -74,7 +74,7 @@ def select_rows(
 
 
 def _of_search(name: str, case: int | str) -> str:
-    """Remedies where a case may be one of a search that is yet to run."""
+    """Remedies where a case may belong to a search that has not run yet."""
     again = f"`met run ARCHIVE.h5 --case {quoted(_case_text(case))}`"
     return f"each case of the search `{name}` follows from those before: run one again from its archive: {again}"
 

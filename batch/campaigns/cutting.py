@@ -1,26 +1,27 @@
-"""How large the next task of a section is: a second or two of work, so that starting it costs nothing and losing it
-little, longer where very many workers ask for tasks; smaller towards the end, so that nobody waits for the last one. It
-decides nothing but speed."""
+"""The size of a section's next task: a second or two of work, so that its start costs little and its loss too; more
+if very many workers ask for tasks, and less towards the end, so that nobody waits for the last one. It affects only
+speed."""
 
 from __future__ import annotations
 
 from batch.campaigns.tasks import GRANULE, CampaignSection
 
 WORK_SECONDS = 1.5
-"""Time that a task is to take on the worker that runs it, s, where workers are few."""
+"""Intended duration of a task on its worker, s, where workers are few."""
 
 TASKS_A_SECOND = 100.0
-"""Tasks that end on all workers together, at most: a scheduler hands out several hundred, and has more to do."""
+"""Largest number of tasks that end in a second on all workers together: a scheduler handles several hundred, and has
+other work."""
 
 FIRST_SECONDS = 0.2
-"""Time that the first tasks are to take, s, by a guess that may be off by a factor of ten."""
+"""Intended duration of the first tasks, s, by a guess that may be off by a factor of ten."""
 
 GUESS_NS = 40.0
-"""Time of one joint's step, ns, assumed before anything was measured."""
+"""Time of one joint's step, ns, assumed before any measurement."""
 
 
 class Cutter:
-    """Learns from the tasks that are done how long a case takes."""
+    """Estimates the duration of a case from finished tasks."""
 
     def __init__(self, section: CampaignSection) -> None:
         structure = section.prepared.experiment.structure
@@ -30,12 +31,12 @@ class Cutter:
         self._seconds, self._cases = 0.0, 0.0
 
     def learn(self, cases: int, seconds: float) -> None:
-        """Note that a worker took so long for so many cases."""
+        """Note the time that a worker took for these cases."""
         if cases >= GRANULE:  # fewer take as long as a whole block
             self._seconds, self._cases = 0.5 * self._seconds + seconds, 0.5 * self._cases + cases
 
     def size(self, left: int, workers: int) -> int:
-        """Cases of the next task, where so many are left for so many workers."""
+        """The number of cases of the next task, for so many cases left and so many workers."""
         if self._cases:
             wanted = max(WORK_SECONDS, workers / TASKS_A_SECOND) * self._cases / max(self._seconds, 1e-9)
         else:

@@ -1,7 +1,7 @@
-"""Getting a campaign's cases done: what is missing is cut into tasks, tasks that are lost are tried again in parts.
+"""Running a campaign's cases: missing ones are cut into tasks, and lost tasks are tried again in parts.
 
-A case that kills its worker, or never ends, is found by halving: a lost task is cut into pieces, each is tried again,
-and what is lost in the end is one case, `TRIES` times. Its status says so, and all others are done.
+A case that kills its worker, or never ends, is found by division: a lost task is cut into pieces, each is tried again,
+and in the end only one case is lost, `TRIES` times. Its status says so, and all others are done.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from batch.campaigns.tasks import CampaignSection, Task
 from met.run import LOST, TIMED_OUT
 
 TRIES = 3
-"""Times that a case whose worker dies is tried in all: a machine may fail by itself."""
+"""Total number of tries of a case whose worker dies: a machine may fail for other reasons."""
 
 PIECES = 16
 """The number of pieces that a lost task is cut into."""
 
 AHEAD = 1
-"""Tasks that wait for a worker."""
+"""Number of tasks that wait for a worker."""
 
 
 class Progress(Protocol):
-    """Who is told how far a campaign is (batch/terminal/progress.py). cases: 0 where nobody knows how many there will
-    be; more: what else is told, in words."""
+    """The display of a campaign's progress (batch/terminal/progress.py). cases: 0 where their number is not known;
+    more: further text"""
 
     def begin(self, name: str, cases: int, done: int, failed: int, workers: str) -> None: ...
     def advance(self, done: int, failed: int, more: str = "") -> None: ...
@@ -39,16 +39,16 @@ class Progress(Protocol):
 
 
 class Stopped(Exception):
-    """A campaign cannot go on; the message says why. What is done is kept."""
+    """Raised where a campaign cannot go on; the message says why. Finished cases are kept."""
 
 
 class TooManyFailures(Stopped):
-    """More cases failed than were allowed."""
+    """Raised where more cases failed than were allowed."""
 
 
 @dataclass
 class Count:
-    """Cases of a section that are done, and how many of them failed; seconds of computing that they took."""
+    """The number of finished cases of a section, and of failed ones; seconds: their computing time."""
 
     done: int = 0
     failed: int = 0
@@ -76,7 +76,7 @@ class Driver:
     _at: int | None = None
 
     def find(self, section: CampaignSection) -> list[tuple[int, int]]:
-        """Count what is there of a section; the stretches that are missing."""
+        """Count the finished cases of a section; returns the missing stretches."""
         kept, told = self.folder.sound_tasks(section)
         self.told += told
         missing = uncovered(kept, len(section.rows))
@@ -87,8 +87,7 @@ class Driver:
         return missing
 
     def run(self, section: CampaignSection, missing: Sequence[tuple[int, int]], cases: int | None = None) -> None:
-        """Run the cases that are missing. cases: of how many it is told how far it is; None: the section's. Raises
-        Stopped."""
+        """Run the missing cases. cases: the total for the progress display; None: the section's. Raises Stopped."""
         self.check()
         if missing:
             with self.telling(section, cases or len(section.rows)):
@@ -96,7 +95,8 @@ class Driver:
 
     @contextmanager
     def telling(self, section: CampaignSection, cases: int) -> Iterator[None]:
-        """Tell how far a section is, of so many cases, while it is worked at; 0 where their number is not known."""
+        """Show the progress of a section with this number of cases during its work; 0 where their number is not
+        known."""
         if self.progress is not None:
             count = self.counts[section.number]
             self.progress.begin(section.name, cases, count.done, count.failed, self.executor.about)
@@ -107,14 +107,14 @@ class Driver:
             self.progress.end()
 
     def work(self, section: CampaignSection, missing: Sequence[tuple[int, int]], *, checked: bool = True) -> None:
-        """Run cases of a section of which it is being told. Raises Stopped.
+        """Run cases of a section whose progress is shown. Raises Stopped.
 
         checked  whether it stops in the midst of them where too many fail
         """
         _SectionWork(self, section, missing, checked).run()
 
     def tell(self) -> None:
-        """Pass on how far the section is that is being run."""
+        """Report the progress of the running section."""
         if self.progress is not None and self._at is not None:
             count = self.counts[self._at]
             self.progress.advance(count.done + self.executor.under_way, count.failed, self.more)
@@ -130,7 +130,7 @@ class Driver:
 
 
 class _SectionWork:
-    """One section on its way."""
+    """One section under way."""
 
     def __init__(
         self, driver: Driver, section: CampaignSection, missing: Sequence[tuple[int, int]], checked: bool

@@ -1,4 +1,4 @@
-"""An executor as a campaign sees it: opened on its folder, given tasks, and asked what has come of them."""
+"""The executor of a campaign: it is opened on its folder, given tasks, and asked for their outcomes."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ class Executor(Protocol):
 
     @property
     def workers(self) -> int:
-        """Tasks that it runs at a time; more that are submitted wait. May change."""
+        """Number of tasks that it runs at a time; more that are submitted wait. It may change."""
 
     @property
     def under_way(self) -> int:
-        """Cases that are done of tasks that are not."""
+        """Number of finished cases of unfinished tasks."""
 
     def open(self, folder: Folder, sections: Mapping[int, CampaignSection], tell: Callable[[], None]) -> None:
-        """Begin. tell: to be called now and then while `wait` waits. `sections` may grow."""
+        """Begin. tell: called now and then while `wait` waits. `sections` may grow"""
 
     def submit(self, task: Task) -> None:
-        """Have a task run, after those submitted before."""
+        """Submit a task, to run after those submitted before."""
 
     def wait(self) -> list[Outcome]:
-        """The outcomes since the last call; waits for one at least, unless none is submitted."""
+        """The outcomes since the last call; waits for at least one, unless none is submitted."""
 
     def close(self) -> None:
         """Stop at once. Tasks that are not done are forgotten."""

@@ -1,4 +1,4 @@
-"""A campaign's folder, beside the archive until that is whole: what was asked for, the shards, who works in it.
+"""A campaign's folder, beside the archive until that is whole: the campaign's description, its shards, and its lock.
 
     two_link.gains.h5.campaign/
       campaign.json     what is computed: sections, the keys of their code and cases
@@ -57,7 +57,7 @@ SHARD = re.compile(r"(\d+)-(\d+)-(\d+)")
 
 
 class FolderBusy(Exception):
-    """Somebody else works in the folder."""
+    """Raised where somebody else works in the folder."""
 
 
 class Folder:
@@ -92,7 +92,8 @@ class Folder:
     # Who works here
 
     def lock(self, *, together: bool = False) -> None:
-        """Raises Busy where somebody works here, unless both do so `together`; makes the folder where there is none."""
+        """Lock the folder, which is made if it does not exist. Raises Busy where somebody works here, unless both do so
+        `together`."""
         while self._lock < 0:
             self.path.mkdir(exist_ok=True)
             self._lock = _lock_file(self.path / "lock")
@@ -114,19 +115,19 @@ class Folder:
             self._lock = -1
 
     def foreign(self) -> list[str]:
-        """Names of files in a folder that is no campaign's; none of them is ours to remove."""
+        """Names of files in a folder that do not belong to a campaign, and must not be removed."""
         if self.exists() or not self.path.is_dir():
             return []
         return sorted(path.name for path in self.path.iterdir() if not OURS.match(path.name))
 
     def empty(self) -> None:
-        """Take all but the lock out of the folder, which is locked by us."""
+        """Remove everything but the lock from the folder, which we have locked."""
         for path in self.path.iterdir():
             if path.name != "lock":
                 _remove(path)
 
     def remove(self) -> None:
-        """Take the folder away, which is locked by us, or of nobody's."""
+        """Remove the folder, which we have locked or nobody has."""
         leaving = self.path.with_name(f".{self.path.name}.{os.getpid()}.leaving")
         if self.path.is_symlink():  # the folder that it leads to is its owner's
             self.empty()
@@ -143,7 +144,7 @@ class Folder:
         self.close()
 
     def finish_removal(self) -> None:
-        """Take away what was on its way out, now or in a run that was killed over it."""
+        """Complete a removal that was begun, now or by a run that was killed meanwhile."""
         for leaving in self.path.parent.glob(f".{glob.escape(self.path.name)}.*.leaving"):
             shutil.rmtree(leaving, ignore_errors=True)
 
@@ -157,7 +158,7 @@ class Folder:
         searches: Mapping[int, int] = MappingProxyType({}),
         **about: Any,
     ) -> None:
-        """Write down what is computed, for workers and for who comes back later.
+        """Write the campaign's description, for workers and for later runs.
 
         stops_early  numbers of sections of which no more cases are run than decide what is required
         searches     of those whose cases are chosen as they go, by number, how many they are at most
@@ -207,9 +208,9 @@ class Folder:
         return plan_file.read(self.path / "plan.json", every_case=every_case)
 
     def sections(self) -> dict[int, CampaignSection]:
-        """The sections by their numbers, for a worker. Raises Problem E353 where the code here is not that of the
-        campaign, as after an update of MET or of models while jobs waited: what it gave would count for nothing."""
-        plan = self.plan(every_case=False)  # whoever wrote it had checked all of them
+        """The sections by their numbers, for a worker. Raises Problem E353 where this code is not that of the campaign,
+        as after an update of MET or of models while jobs waited: its results would not count."""
+        plan = self.plan(every_case=False)  # its writer has checked all of them
         experiments = [engine.prepare(experiment) for experiment in plan.experiments]
         out = {}
         described = self.described()
@@ -231,7 +232,8 @@ class Folder:
         return out
 
     def with_new_cases(self, section: CampaignSection) -> CampaignSection:
-        """A section of a search with the cases that were asked for meanwhile; any other as it is. Raises Problem."""
+        """A section of a search with the cases that were asked for meanwhile; any other is unchanged. Raises
+        Problem."""
         if section.prepared.experiment.search is None or not points_path(self.path, section.number).exists():
             return section
         prepared = self._grown(section.prepared, section.number)
@@ -248,7 +250,7 @@ class Folder:
             raise self._damaged(path) from reason
 
     def _rows(self, told: dict[str, Any], count: int) -> CaseValues:
-        """The rows of a section of an experiment with so many cases. Raises Problem."""
+        """The rows of a section of an experiment with `count` cases. Raises Problem."""
         rows: CaseValues
         if told["rows"] is None:
             rows = all_rows(count)
@@ -269,11 +271,11 @@ class Folder:
         helps = "`--fresh` starts over, and removes what is in it"
         return Problem(error("E350", f"{path} is damaged, or of another version of MET", help=helps))
 
-    # What is done
+    # Finished tasks
 
     def named_tasks(self, number: int, stretch: tuple[int, int] | None = None) -> list[Task]:
-        """The tasks of a section that have a file, sound or not, by their first cases; of those within a stretch of
-        cases alone where one is given."""
+        """The tasks of a section that have a file, sound or not, by their first cases; only those within a stretch of
+        cases where one is given."""
         found, (first, last) = [], stretch or (0, MOST_SWEPT)
         for path in self._shard_files():
             parts = SHARD.fullmatch(path.name)
@@ -295,13 +297,13 @@ class Folder:
                     yield self.shards / each.name
 
     def _path(self, task: Task) -> Path:
-        """The file of a task's shard: in its place, or beside all others, as an older MET wrote it."""
+        """The file of a task's shard: in its own folder, or beside all others, where an older MET wrote it."""
         path = self.shards / task.path
         beside = self.shards / task.name
         return beside if path != beside and beside.exists() else path
 
     def read(self, section: CampaignSection, task: Task) -> shard.Shard:
-        """A task's shard. Raises shard.UnsoundShard where it is none of this section's, OSError."""
+        """A task's shard. Raises shard.UnsoundShard where it is not one of this section's, OSError."""
         found = shard.read(self._path(task), task.cases * _bytes_of_case(section))
         if not 0 <= task.first < task.last <= len(section.rows) or len(found.outputs) != task.cases:
             raise shard.UnsoundShard("holds other cases than its name says")
@@ -312,7 +314,7 @@ class Folder:
         return found
 
     def sound_tasks(self, section: CampaignSection) -> tuple[dict[Task, Done], list[str]]:
-        """The tasks of a section whose shards count, and what is told of those that do not, which are removed: their
+        """The tasks of a section whose shards count, and messages about those that do not, which are removed: their
         cases are run again."""
         kept: dict[Task, Done] = {}
         told = []
@@ -325,16 +327,16 @@ class Folder:
                 told.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
                 _remove(self._path(task))
             else:
-                kept[task] = Done(found.seconds, found.failed_from(at - task.first))  # a case counts once
+                kept[task] = Done(found.seconds, found.failed_from(at - task.first))  # each case counts once
                 at = max(at, task.last)
         return kept, told
 
     def remove_shard(self, task: Task) -> None:
-        """Take away a task's shard, sound or not: its cases are run again."""
+        """Remove a task's shard, sound or not: its cases are run again."""
         _remove(self._path(task))
 
     def bytes(self) -> int:
-        """The size of the shards that are there."""
+        """The size of all existing shards."""
         sizes = 0
         with contextlib.suppress(OSError):
             for path in self._shard_files():
@@ -342,7 +344,7 @@ class Folder:
         return sizes
 
     def seconds(self, enough: float) -> float:
-        """Computing time of the shards that are there, s; once it is `enough`, no more are looked at."""
+        """Computing time of the existing shards, s; once it is `enough`, no more are read."""
         total = 0.0
         for path in self._shard_files():
             with contextlib.suppress(shard.UnsoundShard, OSError):
@@ -352,7 +354,7 @@ class Folder:
         return total
 
     def remove_partial_shards(self) -> None:
-        """Remove what workers that were killed had begun to write; there are none at work."""
+        """Remove the unfinished files of workers that were killed; none may be at work."""
         for path in self._shard_files():
             if path.name.startswith(".") and path.name.endswith(".tmp"):
                 path.unlink(missing_ok=True)
@@ -368,7 +370,7 @@ def _other_code(name: str, path: Path, described: dict[str, Any]) -> Any:
 
 
 def _remove(path: Path) -> None:
-    """Take away what has this name, whatever it is."""
+    """Remove the file, link or folder of this name."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:
@@ -376,8 +378,8 @@ def _remove(path: Path) -> None:
 
 
 def _lock_file(path: Path) -> int:
-    """The file that is locked, open; made where there is none. A link in its place would lock another's file, and
-    never be the file that was opened. Raises Problem E350, OSError."""
+    """The open lock file; made where there is none. A link in its place, which would lock another's file, is refused.
+    Raises Problem E350, OSError."""
     helps = f"nobody at work in a campaign has such a lock: remove it, `rm -r {shlex.quote(str(path))}`"
     try:
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
@@ -424,7 +426,7 @@ def _checked(data: Any) -> dict[str, Any]:
 
 
 def _rise(rows: np.ndarray, count: int) -> bool:
-    """True if these are rows of a case table with so many cases, each once and in order."""
+    """True if these are rows of a case table with `count` cases, each once and in order."""
     return len(rows) == 0 or bool(rows[0] >= 0 and rows[-1] < count and (np.diff(rows) > 0).all())
 
 
@@ -435,7 +437,7 @@ def _bytes_of_case(section: CampaignSection) -> int:
 
 
 def _fits(section: CampaignSection, found: shard.Shard) -> bool:
-    """True if the arrays of a shard are of the program's size, and its failures such as there are."""
+    """True if the arrays of a shard have the program's sizes, and its failures are possible."""
     program, structure = section.prepared.program, section.prepared.experiment.structure
     if found.outputs.shape[1] != len(section.prepared.outputs):
         return False

@@ -1,4 +1,4 @@
-"""The warning of a joint, or a guided point, that does not follow what it is commanded (D348), in words."""
+"""The warning, in words, about a joint or guided point that does not follow its command (D348)."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ from met.passing import Memories
 from met.plan import Experiment
 
 LOOPS = frozenset({"D317", "D320", "D321", "D322"})
-"""Warnings of a loop or a step with which nothing follows: what they tell, at the check too, is not told again."""
+"""Warnings of a loop or a step because of which nothing follows: with one of these, at the check too, D348 is left
+out."""
 
 
 def not_followed(
     experiment: Experiment, memories: Memories, cells: Sequence[str], said: Sequence[Diagnostic]
 ) -> list[Diagnostic]:
-    """The warning of what does not follow its command, if there is one: of the worst, with the others by name.
+    """The warning about joints and points that do not follow their commands, if there are any: the worst, with the
+    others by name.
 
     said  what else is told of the same instants
     """
@@ -44,7 +46,7 @@ def not_followed(
 
 
 def _off(experiment: Experiment, found: Unfollowed) -> str:
-    """`1.047 rad off, of 1.047 rad that it is told to move`."""
+    """The error in words: `1.047 rad off, of 1.047 rad that it is told to move`."""
     straight = found.kind == "path" or any(
         each.name == found.of and each.kind == "prismatic" for each in experiment.structure.joints
     )
@@ -57,7 +59,7 @@ def _off(experiment: Experiment, found: Unfollowed) -> str:
 
 
 def _remedy(experiment: Experiment, found: Unfollowed) -> str:
-    """The ways to let it follow, in words."""
+    """The remedies, in words, with which it may follow."""
     if found.kind == "path":
         return "let the path stay where the arm reaches, and within what rates and damping leave"
     structure, beside = experiment.structure, []
@@ -72,7 +74,7 @@ def _remedy(experiment: Experiment, found: Unfollowed) -> str:
 
 
 def _place(experiment: Experiment, found: Unfollowed) -> Place | None:
-    """Where the command, or the guide, is written."""
+    """The place where the command, or the guide, is written."""
     if found.kind == "path":
         return next(use.place for use in experiment.structure.guides if use.name == found.of)
     asked = (one for path, one in experiment.parameters.items() if path.startswith(f"{found.of}.servo.command."))

@@ -1,4 +1,5 @@
-"""The step of the dynamics against the arm at instants that a campaign's cases pass: warnings, decided by counts alone.
+"""Warnings about the step of the dynamics at instants that a campaign's cases pass; the choice of cases depends on
+counts alone.
 
 Of a small campaign the memory of cases is kept while they run; of a large one some cases are run again. Both give the
 same bits, so it does not matter who ran them, nor how often they were interrupted.
@@ -28,27 +29,28 @@ from met.plan.columns import are_among
 CODES = ("D317", "D318", "D319", "D320", "D321", "D322", "D348")
 
 SHARE = 0.03
-"""Of a campaign's steps: so much more is done to look at some of its cases again. A block is run, whatever is in it."""
+"""Largest share of a campaign's steps that is spent on running some of its cases again. One block is run in any
+case."""
 
 MOST_CASES = 8
-"""Cases that are looked at."""
+"""Largest number of cases that are examined."""
 
 STANDS_OUT, LEAST_CASES, MOST_OUT, ROUNDING = 20.0, 16, 2, 1e-6
-"""A metric of a case stands out where it is so many times the width of the middle half of all cases away from their
-median, and more than a rounding: of so many cases at least, and so many of them at most."""
+"""A metric of a case stands out where its distance from the median exceeds this many widths of the middle half of all
+cases, and rounding; for at least so many cases, and at most so many outliers."""
 
 MOST_EXPERIMENTS = 8
-"""Experiments of a campaign that are looked at: a sweep of structures may have hundreds."""
+"""Largest number of experiments of a campaign that are examined: a sweep of structures may have hundreds."""
 
 
 def with_memories(sections: Sequence[CampaignSection]) -> list[CampaignSection]:
-    """The sections of a campaign; those that are looked at, and are small, keep the memory of the cases for that."""
+    """The sections of a campaign; small ones that are examined keep the memory of their cases."""
     wanted = set(np.linspace(0, len(sections) - 1, MOST_EXPERIMENTS).astype(int).tolist())
     return [replace(each, memories=_memories(each)) if at in wanted else each for at, each in enumerate(sections)]
 
 
 def _memories(section: CampaignSection) -> Memories | None:
-    """None where nothing is to be said of this experiment."""
+    """The storage for memories; None for an experiment without such warnings."""
     experiment, rows = section.prepared.experiment, section.rows
     structure = experiment.structure
     known = structure.integrator in models.find_own("integrator")  # another package's is only recorded
@@ -64,13 +66,13 @@ def _memories(section: CampaignSection) -> Memories | None:
 
 
 def _is_small(section: CampaignSection) -> bool:
-    """True where another block of cases is no small share of the campaign's."""
+    """True where another block of cases would be a large share of the campaign's."""
     return SHARE * len(section.rows) < GRANULE
 
 
 def step_warnings(section: CampaignSection, outcomes: CaseOutcomes, threads: int | None = None) -> list[Diagnostic]:
-    """Warnings of modes that the steps of a campaign's cases do not follow at instants that they pass, but for what
-    its run allows, and what the check tells of the poses in which they begin."""
+    """Warnings of modes that the steps of a campaign's cases do not follow at instants that they pass, except those
+    that the run allows, and those that the check reports for the initial poses."""
     experiment, memories = section.prepared.experiment, section.memories
     if memories is None:
         return []
@@ -92,13 +94,13 @@ def step_warnings(section: CampaignSection, outcomes: CaseOutcomes, threads: int
         ]
         said += not_followed(experiment, memories, section.prepared.recording.cells, said)
         return [each for each in said if not experiment.allows(each.code)]
-    except Problem:  # a program that cannot be put together but for a kernel
+    except Problem:  # a program that needs a kernel
         return []
 
 
 def _cases(section: CampaignSection, outcomes: CaseOutcomes, memories: Memories) -> list[int]:
-    """The cases that are looked at: those whose memory was asked for, and any that stand out; the first, the last and
-    the worst of each metric where memory was asked for of all, or of none."""
+    """The cases to examine: those whose memory was kept, and any that stand out; where memory was kept of all cases or
+    of none, the first, the last and the worst of each metric."""
     out = [int(section.rows[place]) for place in standing_out(outcomes)]
     if memories.cases and len(section.rows) > GRANULE:
         return sorted({*memories.cases, *out})
@@ -108,8 +110,8 @@ def _cases(section: CampaignSection, outcomes: CaseOutcomes, memories: Memories)
 
 
 def standing_out(outcomes: CaseOutcomes) -> list[int]:
-    """Places of the cases of which a metric is far from all others', the furthest first: one row of many that went
-    another way. None of a few cases or of very many, nor where metrics are spread evenly."""
+    """Places of the cases with a metric far from all others', the furthest first: single rows that went another way.
+    None for few cases or very many, nor where metrics are spread evenly."""
     found: dict[int, float] = {}
     for values in outcomes.few_values():
         fine = np.flatnonzero(np.isfinite(values))
@@ -138,7 +140,7 @@ def _passed(section: CampaignSection, memories: Memories, cases: Sequence[int]) 
 
 
 def _warning(experiment: Experiment, found: passed.Lasting) -> Diagnostic:
-    """A warning of what lasts, in words."""
+    """A warning about a lasting finding, in words."""
     hz = experiment.structure.schedule.base_hz
     where = from_instants(experiment, found.case, float(found.at.tick[0]) / hz, found.until)
     if not isinstance(found.fault, StepFault):

@@ -1,7 +1,8 @@
-"""Which histories are kept: of all cases, of none, of every n-th, of named ones, of those that failed, of the worst.
+"""The choice of histories to keep: of all cases, of none, of every n-th, of named ones, of those that failed, of the
+worst.
 
-What is known of a case before it is run (its place, its name) is recorded when it is run. Cases that failed, and the
-worst by a metric, are known when all are done, and are run again for their histories, with the same bits.
+Cases that are chosen by place or name are recorded when they are run. Cases that failed, and the worst by a metric, are
+known when all are done, and are run again for their histories, with the same bits.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ ROW_WORDS = ("all", "summary", "worst")
 ROWS_HELP = "rows are kept of: all, summary, worst:N, or worst:N:METRIC, N up to 100,000"
 
 MOST_WORST = 100_000
-"""Rows of the worst cases beside a summary, at most."""
+"""Largest number of rows of the worst cases beside a summary."""
 
 
 @frozen
@@ -48,11 +49,11 @@ class Keep:
 
     @property
     def later(self) -> bool:
-        """True if some of the choice can be made only when all cases are done."""
+        """True if a part of the choice depends on results."""
         return self.failed or bool(self.worst)
 
     def at_most(self, cases: int) -> int:
-        """The most cases that are chosen later; no failures are expected."""
+        """The most cases that may be chosen by results; no failures are expected."""
         return min(cases, sum(count for count, _ in self.worst))
 
 
@@ -88,7 +89,7 @@ def kept_rows(word: str, experiments: Sequence[Experiment]) -> KeptRows:
 
 
 def as_list(words: str | int | Sequence[str | int]) -> list[str | int]:
-    """One word or several, numbers of numpy's kind as Python's."""
+    """One word or several as a list, with numpy's numbers as Python's."""
     several: Sequence[Any] = [words] if isinstance(words, str) or not hasattr(words, "__iter__") else list(words)
     return [word if isinstance(word, str) else int(word) for word in several]
 
@@ -147,7 +148,7 @@ def _check_metric(metric: str, experiments: Sequence[Experiment]) -> None:
 
 
 def kept_before(found: Keep, experiment: Experiment, rows: CaseValues, named: np.ndarray) -> np.ndarray:
-    """Places in `rows` of the cases whose histories are kept for what they are. named: rows of `found.cases`."""
+    """Places in `rows` of the cases whose histories are kept whatever their results. named: rows of `found.cases`"""
     if found.everything:
         return np.arange(len(rows))
     kept = [places_among(rows, named[are_among(rows, named)])]
@@ -158,7 +159,7 @@ def kept_before(found: Keep, experiment: Experiment, rows: CaseValues, named: np
 
 
 def worst_wanted(found: Keep, experiment: Experiment) -> dict[str, int]:
-    """How many of the worst by each metric have their histories kept, the most of what was asked for."""
+    """The number of worst cases by each metric whose histories are kept; the largest where several are asked for."""
     wanted: dict[str, int] = {}
     for count, by in found.worst:
         metric = by or (experiment.metrics[0].name if experiment.metrics else "")
@@ -167,7 +168,7 @@ def worst_wanted(found: Keep, experiment: Experiment) -> dict[str, int]:
 
 
 def kept_by_outcome(found: Keep, experiment: Experiment, results: CaseOutcomes) -> np.ndarray:
-    """Places of the cases whose histories are kept for what became of them: results of all."""
+    """Places of the cases whose histories are kept because of their results. results: of all cases"""
     kept = [results.worst(metric) for metric in worst_wanted(found, experiment)]
     if found.failed:
         kept.append(results.failed.select(np.arange(results.failed.set)))

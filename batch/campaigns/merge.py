@@ -1,4 +1,5 @@
-"""The shards of a campaign into its archive: in order, a bounded number of cases at a time, each shard proved again.
+"""Merging of a campaign's shards into its archive: in order, a bounded number of cases at a time, each shard checked
+again.
 
 One thread writes, for HDF5 has no more; others read and prove the shards and make what is written, some stretches
 ahead of it. What is written, and in which pieces, does not depend on them.
@@ -30,17 +31,17 @@ if TYPE_CHECKING:
     from batch.archive.write import ArchiveWriter
 
 BLOCK = 1 << 16
-"""Cases that are written at a time, however they were run: where HDF5 puts strings depends on it."""
+"""Number of cases that are written at a time, however they were run: HDF5's placing of strings depends on it."""
 
 
 AHEAD = 2
-"""Shards that are read, and blocks that are made, while one is written."""
+"""Number of shards that are read, and of blocks that are made, while one is written."""
 
 T = TypeVar("T")
 
 
 class Missing(Exception):
-    """A shard that was there does not count any more, and why. Its cases have to be run again."""
+    """Raised where a shard does not count any more, with the reason. Its cases have to be run again."""
 
 
 def merge(
@@ -53,7 +54,7 @@ def merge(
     *,
     threads: int | None = None,
 ) -> CaseOutcomes:
-    """Write one experiment; what became of its cases. Raises Missing.
+    """Write one experiment; returns the outcomes of its cases. Raises Missing.
 
     values     all of its cases;  histories: those that were run again for them
     progress   told how many cases are written
@@ -106,26 +107,26 @@ def merge(
 
 
 def without_history(folder: Folder, values: CampaignSection, histories: CampaignSection) -> dict[int, str]:
-    """Rows whose worker died, or that found no end, when they were run again for their histories, and why: they have
-    none. Those of which that was found the first time keep theirs, which is empty."""
+    """Rows whose worker died, or that did not end, when they were run again for their histories, with the reasons: they
+    have no history. Rows with the same outcome the first time keep their empty one."""
     first = {row for row, _ in _alone(folder, values)}
     return {row: why for row, why in _alone(folder, histories) if row not in first}
 
 
 def _alone(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, str]]:
-    """Rows that could not be run, and why; each has a shard of its own. One that a shard before it holds as well counts
-    as it is there, as in `shards_in_order`: a worker that was thought dead may have come to its end."""
+    """Rows that could not be run, with the reasons; each has a shard of its own. If an earlier shard has the row too,
+    that counts, as in `shards_in_order`: a worker that was thought dead may have finished."""
     at = 0
     for task in folder.named_tasks(section.number):
         if task.cases == 1 and task.first >= at:
-            with contextlib.suppress(shard.UnsoundShard, OSError):  # `pieces` comes upon it, too
+            with contextlib.suppress(shard.UnsoundShard, OSError):  # `pieces` meets it, too
                 for _, why in folder.read(section, task).fates.values():
                     yield int(section.rows[task.first]), why
         at = max(at, task.last)
 
 
 def results(folder: Folder, section: CampaignSection, most: Mapping[str, int] | None = None) -> CaseOutcomes:
-    """The outcomes of all cases of a section, by which histories are chosen. most: as `CaseOutcomes`."""
+    """The outcomes of all cases of a section, by which histories are chosen. most: as for `CaseOutcomes`"""
     outcomes = CaseOutcomes(section.prepared.experiment, most)
     for at, found in shards_in_order(folder, section):
         outcomes.add_run(_results(section, at, found.outputs, None, dict(found.fates)))
@@ -135,8 +136,8 @@ def results(folder: Folder, section: CampaignSection, most: Mapping[str, int] | 
 def shards_in_order(
     folder: Folder, section: CampaignSection, pool: ThreadPoolExecutor | None = None
 ) -> Iterator[tuple[int, shard.Shard]]:
-    """The shards of a section in order, less what was had before, each with the place of its first case. pool: reads
-    some ahead, where they have no histories, which would take much memory. Raises Missing."""
+    """The shards of a section in order, without cases of earlier ones, each with the place of its first case. pool:
+    reads some in advance, unless they have histories, which would take much memory. Raises Missing."""
 
     def read(task: Task, at: int) -> tuple[int, shard.Shard]:
         try:
@@ -157,8 +158,7 @@ def shards_in_order(
 def in_blocks(
     shards: Iterable[tuple[int, shard.Shard]],
 ) -> Iterator[tuple[int, np.ndarray, dict[int, tuple[int, str]]]]:
-    """Outputs and fates of cases in blocks of `BLOCK`, however the shards were cut, each with the place of its first
-    case."""
+    """Outputs and fates of cases in blocks of `BLOCK`, whatever the shards, each with the place of its first case."""
     waiting: list[np.ndarray] = []
     fates: dict[int, tuple[int, str]] = {}
     first = held = 0
@@ -188,8 +188,8 @@ def runs_in_blocks(folder: Folder, section: CampaignSection, threads: int | None
 
 
 def ahead(pool: ThreadPoolExecutor | None, calls: Iterable[Callable[[], T]], most: int) -> Iterator[T]:
-    """The answers of these calls, in order, made by a pool of threads, so many at most beyond the one that is waited
-    for; without a pool, each when it is asked for."""
+    """The results of these calls, in order, computed by a pool of threads, at most `most` beyond the current one;
+    without a pool, each on request."""
     waiting: deque[Future[T]] = deque()
     try:
         for call in calls:
@@ -215,7 +215,7 @@ def with_rows(folder: Folder, section: CampaignSection, places: np.ndarray, numb
     done = at = 0
     for task in folder.named_tasks(section.number):
         first, last = np.searchsorted(places, [max(task.first, at), task.last]).tolist()
-        at = max(at, task.last)  # a case counts once
+        at = max(at, task.last)  # each case counts once
         if last <= first:
             continue
         try:
@@ -232,7 +232,7 @@ def with_rows(folder: Folder, section: CampaignSection, places: np.ndarray, numb
 
 
 def _part(found: shard.Shard, cases: np.ndarray, key: str) -> shard.Shard:
-    """Some cases of a shard as a shard of their own; the time they took stays with the shard that they are of."""
+    """Some cases of a shard as a new shard, without computing time, which stays with the original."""
     history = None if found.history is None else found.history[cases]
     to = {case: place for place, case in enumerate(cases.tolist())}
     fates = {to[case]: fate for case, fate in found.fates.items() if case in to}
@@ -240,7 +240,7 @@ def _part(found: shard.Shard, cases: np.ndarray, key: str) -> shard.Shard:
 
 
 def _without(found: shard.Shard, first: int) -> shard.Shard:
-    """A shard less its first cases."""
+    """A shard without its first cases."""
     if not first:
         return found
     history = None if found.history is None else found.history[first:]
@@ -260,8 +260,8 @@ def _results(
 
 
 def _check_bits(section: CampaignSection, at: int, now: np.ndarray, before: np.ndarray, fates: Iterable[int]) -> None:
-    """A case that was run again for its history gave the numbers that it gave before; those of `fates` gave none."""
-    own = len(section.prepared.program.outputs)  # linear answers hang on the processor in their last bits
+    """Check that a case run again for its history gave the same numbers; cases in `fates` gave none."""
+    own = len(section.prepared.program.outputs)  # the last bits of linear answers depend on the processor
     now, before = np.ascontiguousarray(now[:, :own]), np.ascontiguousarray(before[:, :own])
     alike = ((now.view(np.int64) == before.view(np.int64)) | (np.isnan(now) & np.isnan(before))).all(axis=1)
     alike[list(fates)] = True

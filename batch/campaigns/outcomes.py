@@ -1,5 +1,5 @@
-"""What became of an experiment's cases, gathered as they come, in memory that hardly grows: which reached their end,
-and the worst by each metric. Which cases are run again, and how, is decided by it."""
+"""Outcomes of an experiment's cases, collected as they come in nearly constant memory: finished cases, and the worst by
+each metric. They decide which cases are run again, and how."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from met.plan.swept import RowBits
 from met.run import DONE, Run
 
 FEW = 1 << 17
-"""Cases up to which all values of metrics are kept."""
+"""Largest number of cases for which all values of metrics are kept."""
 
 
 @frozen
 class CountedCases:
-    """Numbers of an experiment's cases: all, those that failed, those whose histories are kept; and by the text of each
-    requirement those that meet it, miss it, leave it open, and of these those that reached their end."""
+    """Counts of an experiment's cases: all, failed ones, those with histories; and by the text of each requirement
+    those that meet it, miss it, leave it open, and of these those that reached their end."""
 
     cases: int
     failed: int
@@ -81,18 +81,18 @@ class CaseOutcomes:
             self._met[each.text] = self._met.get(each.text, 0) + counts
 
     def counted(self, recorded: int) -> CountedCases:
-        """How many cases there are of each kind. recorded: of how many histories are kept."""
+        """The number of cases of each kind. recorded: number of cases with histories"""
         met = {text: (int(a), int(b), int(c), int(d)) for text, (a, b, c, d) in self._met.items()}
         return CountedCases(self.count, self.count - self.done.set, recorded, met)
 
     @cached_property
     def done(self) -> RowBits:
-        """The cases that reached their end, by their places, when all have been added."""
+        """Places of the cases that reached their end, once all have been added."""
         return RowBits(np.concatenate([*self._packed, np.packbits(self._left)]), self.count)
 
     @cached_property
     def failed(self) -> RowBits:
-        """The cases that did not."""
+        """Places of the cases that failed."""
         return RowBits(~self.done.packed, self.count)
 
     def ends(self) -> tuple[int, int] | None:
@@ -103,12 +103,12 @@ class CaseOutcomes:
         return first, last
 
     def few_values(self) -> list[np.ndarray]:
-        """All values of each metric, [case], not a number where a case failed; none where there are more than `FEW`
+        """All values of each metric, [case], not-a-number where a case failed; empty where there are more than `FEW`
         cases."""
         return [np.concatenate(parts) for parts in self._values.values()] if self.count <= FEW else []
 
     def worst(self, metric: str) -> np.ndarray:
-        """Places of the worst by a metric, worst first, of those that have a value: as many as were wanted."""
+        """Places of the worst cases by a metric, worst first, among those with a value: as many as were wanted."""
         return self._worst[metric].places if metric in self._worst else np.zeros(0, np.int64)
 
     def worst_finite(self) -> list[int]:
@@ -135,6 +135,6 @@ class _Worst:
 
 
 def sign(experiment: Experiment, metric: str) -> float:
-    """1 where large values of a metric are bad; -1 where the first requirement of it sets a lower limit."""
+    """1 where large values of a metric are bad; -1 where its first requirement sets a lower limit."""
     limits = [r.comparison for r in experiment.requirements if r.metric == metric]
     return -1.0 if limits and limits[0].startswith(">") else 1.0

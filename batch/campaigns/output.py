@@ -1,4 +1,4 @@
-"""Where an archive goes: its default name, what is refused as a place for it, and its name once it is whole."""
+"""The place of an archive: its default name, checks of the path, and the final renaming."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ def default_output(
     selected: Sequence[tuple[Experiment, CaseValues]] = (),
     whole: int | None = None,
 ) -> Path:
-    """`two_link.h5`; `two_link.gains.h5` where runs are named; `two_link.gains.case7.h5` for some of the cases.
+    """The default name: `two_link.h5`; `two_link.gains.h5` where runs are named; `two_link.gains.case7.h5` for some of
+    the cases.
 
     They are named here, or were when the plan was made (`two_link.all.h5` where all were asked for).
     So a case that is run again does not take its sweep's place. A deck of the standard library is called `<name>`.
@@ -104,7 +105,8 @@ def _check_output(output: Path, plan: Plan) -> None:
 
 
 def check_room(output: Path, needed: int) -> None:
-    """Refuse what the disk cannot hold. needed: bytes, about, until it is whole. Raises Problem E306."""
+    """Refuse an output that does not fit on the disk. needed: bytes, approximately, until it is whole. Raises Problem
+    E306."""
     free = shutil.disk_usage(output.parent).free
     if needed > free:
         needs, has = size_text(needed), size_text(free)
@@ -117,12 +119,13 @@ def check_room(output: Path, needed: int) -> None:
 
 
 def cannot_write(output: Path, reason: OSError, kept: str = "") -> Any:
-    """kept: what of the work is kept, and where; nothing is without it."""
+    """The error that a file cannot be written. kept: the part of the work that is kept, and its place; "" where none
+    is"""
     why = outputs.refusal_text(reason)
-    if reason.errno in (errno.EMFILE, errno.ENFILE):  # whatever it was that could not be opened
+    if reason.errno in (errno.EMFILE, errno.ENFILE):  # the name of the unopened file does not matter
         return error("E305", f"cannot write {output}: {why}", help=f"{kept or 'nothing was kept'}; {more_files()}")
     where = str(reason.filename) if isinstance(reason.filename, str | os.PathLike) else ""
-    if where and Path(where).is_relative_to(beside(output)):  # the archive itself is in nobody's way
+    if where and Path(where).is_relative_to(beside(output)):  # the archive itself is not the obstacle
         why = f"{where}: {why}"
     helps = kept or "nothing was kept; `-o FILE` names another place"
     if reason.errno in (errno.EEXIST, errno.EISDIR, errno.ENOTDIR):

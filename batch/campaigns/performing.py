@@ -1,4 +1,4 @@
-"""Performing a campaign: find what is done, run what is missing, merge all into the archive, give it its name.
+"""Performing a campaign: find finished cases, run missing ones, merge all into the archive, and rename it.
 
 However it ends, nothing that took a second of work or more is lost: the shards stay in the folder beside the archive,
 and the next run of the same campaign goes on from there.
@@ -40,10 +40,11 @@ if TYPE_CHECKING:
     from batch.archive.write import ArchiveWriter
 
 WORTH_SECONDS = 1.0
-"""Work that took less is not kept where a campaign ends early: it is done again as fast as it is found."""
+"""Computing time, s, below which unfinished work is discarded where a campaign ends early: repeating it is as fast as
+reading it."""
 
 ATTEMPTS = 3
-"""Times that shards are run again which are found to be damaged in merging."""
+"""Number of times that shards which turn out damaged in merging are run again."""
 
 
 @frozen
@@ -65,7 +66,7 @@ class Performed:
 
 
 class TooMany(Problem):
-    """More cases failed than were allowed: an answer, and no mistake of who asked."""
+    """Raised where more cases failed than were allowed: an answer, not a mistake of the user."""
 
 
 def perform(
@@ -179,7 +180,7 @@ class _CampaignWork:
         self.ours = self.resumed = False
 
     def begin(self, fresh: bool) -> None:
-        """Make the folder, or take up the one that is there. Raises Problem E353 where it is of another campaign."""
+        """Make the folder, or take up the existing one. Raises Problem E353 where it belongs to another campaign."""
         self.resumed = bool(self.folder.named_tasks(0)) and not fresh
         for note in resuming.take_up(self.folder, self.campaign, self.values, self.key, fresh):
             self._note(note)
@@ -235,7 +236,7 @@ class _CampaignWork:
         return Performed(seconds, notes=notes, warned=warned, counted=self.counted)
 
     def leave(self, state: str) -> str:
-        """Give up, for now. What is worth keeping stays; in words how much and where, else "" and nothing stays."""
+        """Stop for now. Work worth keeping stays; returns its amount and place in words, or "" where nothing stays."""
         if not self.ours:
             return ""
         self.folder.remove_partial_shards()
@@ -258,11 +259,11 @@ class _CampaignWork:
         return cases - sum(last - first for first, last in uncovered(tasks, cases))
 
     def _of_all(self, done: int) -> str:
-        """So many cases of those that are to be run, where it is known how many these are."""
+        """The progress in words: so many cases of the total, where that is known."""
         return f"{done:,} cases" if self.campaign.open_ended else f"{done:,} of {self.campaign.cases:,} cases"
 
     def _settle(self, stops: Mapping[int, StoppingPoints], searches: Mapping[int, CampaignSearch]) -> None:
-        """Go on with the cases that are known now: those up to these stops, and those of these searches, by section."""
+        """Go on with the final cases: those up to these stops, and those of these searches, by section."""
         if not stops and not searches:
             return
         self.kept = [
@@ -283,7 +284,7 @@ class _CampaignWork:
             self._note(note)
 
     def _summarise(self) -> None:
-        """Go on with the few cases whose rows are kept, and a summary of all, where that is asked for."""
+        """Go on with the few cases whose rows are kept, and a summary of all, if a summary is asked for."""
         if self.campaign.kept_rows.all:
             return
         kept, parts = [], []
@@ -401,7 +402,7 @@ class _CampaignWork:
         return getattr(self.driver and self.driver.executor, "threads", None)
 
     def _verify(self, writer: ArchiveWriter, number: int, section: CampaignSection, outcomes: CaseOutcomes) -> None:
-        """Run some of an experiment's cases, which are all in the archive by now, with shorter steps, where that is
+        """Run some of an experiment's cases, which are all in the archive by now, with shorter steps, if that is
         wanted."""
         way = when.resolve(self.campaign.verify, section.prepared, len(section.rows))
         if way == "none":

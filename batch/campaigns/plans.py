@@ -30,7 +30,7 @@ def read_plan(
     from ic.find import find
 
     select: Any = "all" if everything else names or None
-    find(source, include_dirs)  # a misspelt name is told with the one that was probably meant
+    find(source, include_dirs)  # a misspelt name is reported with the one that was probably meant
     compiled = ic.check(source, include_dirs=include_dirs, defines=defines, **settings_of(settings), select=select)
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)

@@ -1,6 +1,6 @@
 """The case table of a search as it grows: cases appended to an experiment, kept in the campaign's folder for workers.
 
-The file is not what a campaign goes on from: that is the shards, from which the same cases follow again.
+A campaign does not resume from the file but from the shards, from which the same cases follow again.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from met.plan.searches import MOST_SEARCHED
 from met.run import Prepared
 
 NPY_HEAD_BYTES = 4096
-"""Before the numbers of a `.npy` file; numpy writes 128."""
+"""Largest number of bytes before the numbers of a `.npy` file; numpy writes 128."""
 
 
 def points_path(folder: Path, number: int) -> Path:
@@ -29,8 +29,8 @@ def points_path(folder: Path, number: int) -> Path:
 
 
 def write_points(folder: Path, number: int, table: np.ndarray) -> None:
-    """Keep the cases of a search that were asked for so far, [case, coordinate], SI. They follow again from the shards,
-    so nobody waits until they are on the disk."""
+    """Keep the cases of a search that were asked for so far, [case, coordinate], SI. The file is not flushed to the
+    disk, since the cases follow again from the shards."""
     path = points_path(folder, number)
     temporary = path.with_name(f".{path.name}.tmp")
     temporary.write_bytes(array_bytes(np.asarray(table, "<f8")))
@@ -38,7 +38,7 @@ def write_points(folder: Path, number: int, table: np.ndarray) -> None:
 
 
 def read_points(path: Path, experiment: Experiment) -> np.ndarray:
-    """The cases in such a file. Raises OSError, ValueError where it is none of this experiment."""
+    """The cases in such a file. Raises OSError, and ValueError where it does not belong to this experiment."""
     width = len(experiment.cases.coordinates)
     data = read_regular(path, MOST_SEARCHED * width * np.dtype(float).itemsize + NPY_HEAD_BYTES)
     try:
@@ -60,10 +60,10 @@ def with_cases(experiment: Experiment, table: np.ndarray) -> Experiment:
 
 
 def grown(section: CampaignSection, table: np.ndarray) -> CampaignSection:
-    """All cases of a search so far as a section, with the kernel that it has."""
+    """All cases of a search so far as a section, with its existing kernel."""
     return replace(section, prepared=grown_program(section.prepared, table), rows=all_rows(len(table)))
 
 
 def grown_program(prepared: Prepared, table: np.ndarray) -> Prepared:
-    """The program of an experiment that has these cases by now."""
+    """The program of an experiment with the cases so far."""
     return prepared.of_cases(with_cases(prepared.experiment, table))

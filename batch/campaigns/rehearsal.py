@@ -32,10 +32,10 @@ from met.host import interpreter
 from met.host.entry_points import PACKAGE, offered
 
 LEAST_SECONDS = 60.0
-"""The least time limit for reading and recording, s, whatever that of a case is."""
+"""The least time limit for reading and recording, s, even if that of a case is shorter."""
 
 END_SECONDS = 5.0
-"""After which a process that does not say where it was is killed."""
+"""Seconds after which a process that does not report its traceback is killed."""
 
 DONE = "done"
 FRAME = re.compile(r'^  File "(?P<file>.+)", line (?P<line>\d+) in (?P<name>.+)$', re.MULTILINE)
@@ -74,11 +74,11 @@ def rehearse(timeout: float | None, **asked: Any) -> None:
 
 
 def _ended(process: subprocess.Popen[bytes], limit: float | None) -> str:
-    """Say in words how the process ended."""
+    """The end of the process, in words."""
     try:
         status = process.wait(limit)
     except subprocess.TimeoutExpired:
-        process.send_signal(signal.SIGABRT)  # it says where it is
+        process.send_signal(signal.SIGABRT)  # it prints its traceback
         with suppress(subprocess.TimeoutExpired):
             process.wait(END_SECONDS)
         return f"has not ended after {limit:g} s"
@@ -94,7 +94,8 @@ def _all_of(file: Any) -> str:
 
 
 def _taken_along(at: str, how: str, said: str) -> Problem:
-    """at: what it was recording, empty while the deck was read;  said: a traceback of `faulthandler`, if any."""
+    """The error about models that end the process. at: the recorded experiment, empty while the deck was read; said: a
+    traceback of `faulthandler`, if any"""
     what = f"of `{at}`" if at else "of the deck"
     found = next((frame for frame in FRAME.finditer(said) if _is_a_models(frame["file"])), None)
     helps = ("mend the model, or tell its author", "without `--processes` or `--timeout` it would take `met` along")
@@ -125,7 +126,7 @@ def _is_a_models(file: str) -> bool:
 
 
 def main(lines: Sequence[str]) -> None:
-    """Record all that is asked for, and say how far it is."""
+    """Record all models of the question, and report progress."""
     from batch.archive.read import ArchiveFile
     from batch.campaigns.plans import read_plan
     from hw import realtime
@@ -143,7 +144,7 @@ def main(lines: Sequence[str]) -> None:
 
     os._exit = end  # type: ignore[assignment]  # a model that ends the process says where it does
     out = os.dup(sys.stdout.fileno())
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a model prints is no word of ours
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # a model's own output is not part of the answers
 
     def say(word: str) -> None:
         os.write(out, f"{word}\n".encode())

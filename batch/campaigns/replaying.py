@@ -1,4 +1,4 @@
-"""Cases of an archive run again, from the archive alone: with full histories, and the same bits."""
+"""Cases of an archive run again from the archive alone: with full histories, and the same bits."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from met.plan.columns import are_among
 from met.run import comparable
 
 MOST_IN_NAME = 4
-"""Cases that an archive of them is called after."""
+"""Largest number of cases in the name of their archive."""
 
 MOST_TOLD = 8
-"""Differences that are named."""
+"""Largest number of differences that are named."""
 
 
 @frozen
@@ -112,15 +112,15 @@ def _row(group: ArchiveGroup, position: int) -> int:
 
 
 def differences(before: str | Path, after: str | Path) -> list[str]:
-    """Say which cases of the second archive came out otherwise than in the first, a line each; none where all of their
-    bits are the same. How a case ended that was lost or timed out does not count."""
+    """The cases of the second archive with other results than in the first, a line each; none where all of their bits
+    are the same. Cases that were lost or timed out do not count."""
     out = []
     with ArchiveFile(before) as old_file, ArchiveFile(after) as new_file:
         groups = {group.name: group for group in old_file.groups}
         for new in new_file.groups:
             old = groups[new.name]
             places = np.searchsorted(old.values("case"), new.values("case"))
-            there = are_among(old.values("case"), new.values("case"))  # a summary has rows of few
+            there = are_among(old.values("case"), new.values("case"))  # a summary has few rows
             places = np.where(there, places, 0)
             ran = (old.at("status", places) < 2) & there
             out += _signals(old, new, places, ran)
@@ -146,7 +146,7 @@ def in_both(before: str | Path, after: str | Path) -> tuple[int, int]:
 
 
 def _signals(old: ArchiveGroup, new: ArchiveGroup, places: np.ndarray, ran: np.ndarray) -> list[str]:
-    """Lines about signals that differ, in cases whose histories both archives have. places: of new's cases in old."""
+    """Lines about differing signals, in cases whose histories both archives have. places: of new's cases in old"""
     out = []
     for variable in new.role("signal"):
         if variable.name not in old.variables or old.variables[variable.name].role != "signal":
@@ -154,7 +154,7 @@ def _signals(old: ArchiveGroup, new: ArchiveGroup, places: np.ndarray, ran: np.n
         for place in np.flatnonzero(ran).tolist():
             if places[place] in old.recorded_positions and place in new.recorded_positions:
                 a, b = old.signal(variable.name, int(places[place])), new.signal(variable.name, place)
-                if a.dtype != b.dtype:  # of four bytes on one side
+                if a.dtype != b.dtype:  # one side has numbers of four bytes
                     a, b = a.astype(np.float32), b.astype(np.float32)
                 if a.shape == b.shape and not _alike(a, b).all():
                     row = int(np.argmin(_alike(a, b).reshape(len(a), -1).all(axis=1)))

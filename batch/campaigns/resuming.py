@@ -1,4 +1,4 @@
-"""What is there already of a campaign: its archive, whole, or shards of it in its folder; or of another one."""
+"""The existing parts of a campaign: its whole archive, or shards in its folder; or those of another campaign."""
 
 from __future__ import annotations
 
@@ -30,25 +30,25 @@ from met.plan.swept import blocks
 WHOLE, DAMAGED = "whole", "damaged"
 
 GUARDED_SECONDS = 60.0
-"""Computing time, s, from which a finished archive is not replaced by another campaign's unless that is asked for."""
+"""Computing time, s, from which a finished archive is replaced by another campaign's only on request."""
 
 MOST_SECONDS = 1e12
-"""More computing time, s, than any campaign takes: a sidecar that claims more is not believed."""
+"""Upper bound of a campaign's computing time, s: a sidecar that claims more is not believed."""
 
 MOST_CHANGES = 8
-"""Changes that a refusal names."""
+"""Largest number of changes that a refusal names."""
 
 
 def campaign_key(values: Sequence[CampaignSection]) -> str:
-    """A digest of all that decides the numbers of a campaign: code, and what goes into it. Which cases are run again
-    for their histories may change on the way."""
+    """A digest of everything that decides the numbers of a campaign: code and inputs. The choice of cases that are run
+    again for their histories may change meanwhile."""
     told = [[section.name, section.key(), *_search_of(section)] for section in values]
     return hashlib.sha256(json.dumps(told).encode()).hexdigest()
 
 
 def _search_of(section: CampaignSection) -> list[Any]:
-    """All that decides which cases a search asks for besides its first ones; of a tuning also the limits that its cases
-    are worth more or less by; nothing of what is no search."""
+    """Everything that decides which cases a search asks for after its first ones; for a tuning also the limits that
+    affect worths; nothing for a section without a search."""
     experiment = section.prepared.experiment
     search = experiment.search
     if search is None:
@@ -58,8 +58,8 @@ def _search_of(section: CampaignSection) -> list[Any]:
 
 
 def as_begun(folder: Folder, campaign: Campaign, values: list[CampaignSection]) -> tuple[list[CampaignSection], str]:
-    """The sections with the keys of programs that an older MET wrote, where what stands in the folder, or beside the
-    archive, is this campaign under those keys; else as they are. And the campaign's key."""
+    """The sections, with the keys of an older MET's programs where the folder or the archive is this campaign under
+    those keys; and the campaign's key."""
     key = campaign_key(values)
     begun = _begun_key(folder, campaign)
     if begun in ("", key):
@@ -69,14 +69,14 @@ def as_begun(folder: Folder, campaign: Campaign, values: list[CampaignSection]) 
 
 
 def settled(campaign: Campaign, values: Sequence[CampaignSection]) -> Campaign:
-    """The campaign, with `verify` as "auto" where that asks for the same."""
-    if campaign.verify == "auto" or campaign.open_ended:  # of how many cases is not known yet
+    """The campaign, with `verify` as "auto" where that has the same effect."""
+    if campaign.verify == "auto" or campaign.open_ended:  # the number of cases is not known yet
         return campaign
     return replace(campaign, verify=when.settled(campaign.verify, ((each.prepared, len(each.rows)) for each in values)))
 
 
 def _begun_key(folder: Folder, campaign: Campaign) -> str:
-    """The key of what was begun in the folder, else of what made the archive; "" where neither can be read."""
+    """The key of the campaign in the folder, else of the one that made the archive; "" where neither can be read."""
     try:
         if folder.exists():
             return str(folder.described()["key"])
@@ -86,13 +86,13 @@ def _begun_key(folder: Folder, campaign: Campaign) -> str:
 
 
 def proof(campaign: Campaign, key: str, archive: Path) -> dict[str, str]:
-    """Entries of a finished archive's sidecar by which `finished_state` knows it again."""
+    """Entries of a finished archive's sidecar by which `finished_state` recognises it."""
     return {"campaign": key, "asked_sha256": _asked_sum(campaign), "archive_sha256": _file_sum(archive)}
 
 
 def finished_state(campaign: Campaign, key: str) -> str:
-    """WHOLE where the archive is there, of this very campaign and plan, and as it was written; DAMAGED where it is not
-    as it was written; else ""."""
+    """WHOLE where the archive exists, belongs to this very campaign and plan, and is unchanged since it was written;
+    DAMAGED where it has changed; else ""."""
     output = campaign.output
     try:
         told = read_json(sidecar_path(output))
@@ -126,7 +126,7 @@ def guard(campaign: Campaign) -> None:
 
 
 def _what(found: Sequence[str]) -> list[str]:
-    """Help for an error: what has changed, and what to do."""
+    """Help for an error: the changes, and the remedies."""
     most = [*found[:MOST_CHANGES], *([f"and {len(found) - MOST_CHANGES} more"] if len(found) > MOST_CHANGES else [])]
     return [
         "changed since: " + most[0],
@@ -144,7 +144,8 @@ def is_begun(folder: Folder, key: str) -> bool:
 
 
 def remove_leftovers(folder: Folder, key: str) -> None:
-    """Remove what a run left that was killed after its archive had got its name; not what another campaign began."""
+    """Remove the files of a run that was killed after its archive had got its name, but not those of another
+    campaign."""
     folder.finish_removal()
     if not folder.exists():
         return
@@ -160,7 +161,7 @@ def remove_leftovers(folder: Folder, key: str) -> None:
 def take_up(
     folder: Folder, campaign: Campaign, values: Sequence[CampaignSection], key: str, fresh: bool
 ) -> Iterator[str]:
-    """See to what is in the folder, which is locked; what is to be told. Raises Problem E350, E353."""
+    """Take up the contents of the folder, which is locked; returns messages. Raises Problem E350, E353."""
     if not folder.exists():
         return
     held = sum(task.cases for number in range(len(values)) for task in folder.named_tasks(number))
@@ -168,7 +169,7 @@ def take_up(
         folder.empty()
         yield f"starts over: {held:,} cases that were done before are removed"
         return
-    if not held and not folder.submitted and not folder.recorded:  # whoever began it had done nothing
+    if not held and not folder.submitted and not folder.recorded:  # the earlier run had done nothing
         folder.empty()
         return
     told = folder.described()
@@ -177,7 +178,7 @@ def take_up(
 
 
 def describe(folder: Folder, campaign: Campaign, sections: Iterable[CampaignSection], key: str) -> None:
-    """Write down in the folder what is computed there."""
+    """Write the description of the computations into the folder."""
     folder.describe(
         campaign.plan,
         sections,
@@ -247,7 +248,7 @@ def _asked_sum(campaign: Campaign) -> str:
         summed.update(f"rows {campaign.kept_rows.word}".encode())
 
     def refer(experiment: Any, index: int) -> dict[str, Any]:
-        if not index and campaign.kept_rows.all:  # else the campaign's key says it, which is of all inputs
+        if not index and campaign.kept_rows.all:  # else the campaign's key covers it, which depends on all inputs
             for _, _, values in plan_file.table_pieces(experiment):
                 summed.update(values.tobytes())
         return {"index": index}

@@ -1,8 +1,7 @@
-"""A search as a campaign: each generation is a batch of cases, run as any are, and what it gave decides the next one.
+"""A search as a campaign: each generation is a batch of ordinary cases, and its results decide the next one.
 
-What is asked for depends on the search and on what the shards hold, and on nothing else. So a campaign that was killed
-asks again for what it had asked for, finds it done, and goes on to the same bits and the same answer; and it does not
-matter who ran which case, nor when.
+The next cases depend only on the search and on the shards. So a campaign that was killed asks for the same cases again,
+finds them done, and goes on to the same bits and the same answer; it does not matter who ran which case, or when.
 """
 
 from __future__ import annotations
@@ -28,11 +27,11 @@ from met.searches.answer import Answer, answer
 from met.searches.values import hurt, served
 
 READS = 2
-"""Times that what was just computed is read back."""
+"""Number of tries to read back results that were just computed."""
 
 
 def check_first_generation(experiment: Experiment) -> None:
-    """Refuse a plan of a search whose cases are not those that the search asks for first. Raises Problem E302."""
+    """Refuse a plan of a search whose cases are not the search's first generation. Raises Problem E302."""
     assert experiment.search is not None
     asked = search_method(experiment.search).ask()
     table = np.stack([np.asarray(each.values) for each in experiment.cases.coordinates], axis=1)
@@ -138,7 +137,7 @@ def run_search(driver: Driver, search: CampaignSearch, sections: dict[int, Campa
 
 
 Held = list[tuple[Task, shard.Shard]]
-"""Shards, with the tasks whose they are."""
+"""Shards with their tasks."""
 
 
 def _held(

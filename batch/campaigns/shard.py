@@ -1,4 +1,4 @@
-"""One shard: what a worker computed of some cases, in a file that proves itself.
+"""One shard: a worker's results for some cases, in a file with its own checksum.
 
     line       MET shard 1
     8 bytes    length of the head, little-endian
@@ -6,9 +6,9 @@
     arrays     outputs [case, output], history [case, row, column]; little-endian, one after the other
     32 bytes   SHA-256 of all before
 
-It has its name only when it is whole and on the disk. Names are no proof, though: `read` checks the sum, and who reads
-compares the key, which is of all that decided the numbers. A shard from another plan, cut short, or with a bit turned
-over, does not count.
+It gets its name only when it is whole and on the disk. Still, `read` checks the sum, and its caller compares the key,
+which covers everything that decided the numbers. A shard from another plan, cut short, or with a bit turned over, does
+not count.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ SUM_BYTES = SUM().digest_size
 TYPES: dict[str, np.dtype[Any]] = {"f8": np.dtype("<f8"), "f4": np.dtype("<f4")}
 
 HEAD_BYTES = 64 << 20
-"""The most that a shard's head may have, bytes: why cases were not run takes most of it."""
+"""Largest size of a shard's head, bytes: the reasons why cases were not run take most of it."""
 
 
 class UnsoundShard(Exception):
-    """A file that does not count as a shard, and why, in words that go on after its name."""
+    """Raised for a file that does not count as a shard, with the reason, in words that follow its name."""
 
 
 @frozen
@@ -70,7 +70,7 @@ class Shard:
 
 
 def write(path: Path, shard: Shard) -> None:
-    """Write a shard whole, or nothing. Raises OSError."""
+    """Write a shard whole, or not at all. Raises OSError."""
     arrays = {"outputs": shard.outputs, **({} if shard.history is None else {"history": shard.history})}
     head = {
         "key": shard.key,
@@ -90,8 +90,7 @@ def write(path: Path, shard: Shard) -> None:
 
 
 def read(path: Path, most: int | None = None) -> Shard:
-    """The shard in a file; its arrays may be written to. most: bytes of them that there may be. Raises Unsound,
-    OSError."""
+    """The shard in a file; its arrays are writable. most: largest number of bytes. Raises Unsound, OSError."""
     with open_regular(path) as file:
         size = os.fstat(file.fileno()).st_size
         if size > (memory() if most is None else most + HEAD_BYTES):
@@ -114,8 +113,8 @@ def read(path: Path, most: int | None = None) -> Shard:
 
 
 def _made(head: Any, data: bytearray, at: int) -> Shard:
-    """The shard with this head, whose arrays begin at a place of its file. Raises ValueError and its like for a head
-    that is none, though its sum is right: whoever can write a file can sum it."""
+    """The shard with this head, whose arrays begin at a place of its file. Raises ValueError and the like for an
+    invalid head, whose checksum may be right if it was forged."""
     arrays = {}
     for name, kind, shape in head["arrays"]:
         if not all(map(is_count, shape)):
@@ -140,7 +139,7 @@ def _made(head: Any, data: bytearray, at: int) -> Shard:
 
 
 def cannot_keep(folder: Path, reason: OSError) -> str:
-    """Say why a shard cannot be written."""
+    """The error that a shard cannot be written."""
     return f"cannot keep what was computed in {folder}: {(reason.strerror or str(reason)).lower()}"
 
 

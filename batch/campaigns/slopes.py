@@ -1,4 +1,4 @@
-"""Slopes of a tuning's metrics, by the program that runs with tangents beside it."""
+"""Slopes of a tuning's metrics, by the program with tangents."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from met.searches.slopes import CaseSlopes
 
 
 class TuningSlopes:
-    """See `SlopeSource`. The program is compiled when slopes are first asked for.
+    """Slopes of a campaign's tuning (`SlopeSource`). The program is compiled when slopes are first asked for.
 
-    What it gives follows from the cases alone, to the bit, so a tuning that goes on asks for the same cases again.
+    The results depend on the cases alone, to the bit, so a resumed tuning asks for the same cases again.
     """
 
     def __init__(self, experiment: Experiment) -> None:
@@ -29,7 +29,7 @@ class TuningSlopes:
 
     @property
     def requirements(self) -> Sequence[Requirement]:
-        """Of the run, as each case is held against them."""
+        """The run's requirements, by which each case is judged."""
         return self._experiment.requirements
 
     @cached_property
@@ -37,7 +37,7 @@ class TuningSlopes:
         return GradientProgram(self._experiment, len(self._search.parameters))
 
     def slopes(self, cases: np.ndarray) -> CaseSlopes | str:
-        """See `SlopeSource`."""
+        """The slopes of these cases, or the reason why there are none (`SlopeSource.slopes`)."""
         experiment = with_cases(self._experiment, cases)
         try:
             found = self._program.of(range(len(cases)), self._metrics, experiment=experiment, edges=False)

@@ -1,4 +1,4 @@
-"""How far a campaign is: written into its folder every second by who works there, read by `met status`."""
+"""The progress of a campaign: its processes write it into its folder every second, and `met status` reads it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from met.host.files import is_count, read_json
 WRITE_SECONDS = 1.0
 
 STALE_SECONDS = 30.0
-"""Who has written nothing for so long is not at work any more."""
+"""Age, s, from which a status file counts as that of a dead process."""
 
 
 TYPES: dict[str, type | tuple[type, ...]] = {
@@ -33,11 +33,11 @@ TYPES: dict[str, type | tuple[type, ...]] = {
     "section_began": (int, float),
     "at_first": int,
 }
-"""Entries that a status file has at least, with their types."""
+"""Required entries of a status file, with their types."""
 
 
 class Reporter:
-    """Passes on how far it is, and writes it down. name: of one job among several that work in a folder."""
+    """Progress display that also writes a status file. name: of one job among several that work in a folder"""
 
     def __init__(self, folder: Folder, cases: int, progress: Progress | None = None, name: str = "") -> None:
         self._path = folder.path / (f"status.{name}.json" if name else "status.json")
@@ -87,7 +87,7 @@ class Reporter:
             self._progress.end()
 
     def state(self, state: str) -> None:
-        """running, merging, interrupted, stopped, done."""
+        """Write a state: running, merging, interrupted, stopped, or done."""
         self._told["state"] = state
         self._write()
 
@@ -99,7 +99,7 @@ class Reporter:
         self._told["updated"] = time.time()
         try:
             write_json(self._path, self._told)
-        except OSError:  # a full disk stops who writes results, and is told by them
+        except OSError:  # the writer of results reports a full disk
             pass
 
 
@@ -117,8 +117,8 @@ def status_records(folder: Folder) -> list[dict[str, Any]]:
 
 
 def find_folder(name: str) -> Folder | None:
-    """The folder that a user means: its own name, or its archive's; None where there is none. Raises
-    Problem for what is no sound archive."""
+    """The folder that a user means: by its own name, or its archive's; None where there is none. Raises Problem for an
+    unsound archive."""
     path = Path(name)
     for each in (path, beside(path) if path.name else path):
         if Folder(each).exists():
@@ -127,7 +127,8 @@ def find_folder(name: str) -> Folder | None:
 
 
 def report(folder: Folder, now: float) -> dict[str, Any]:
-    """The progress of a campaign as data: what is done of each section, by the shards that are there, and who works."""
+    """The progress of a campaign as data: the finished cases of each section, by its shards, and the processes at
+    work."""
     sections = []
     told_here = folder.described()
     for each in told_here["sections"]:
@@ -209,7 +210,7 @@ def lines(data: dict[str, Any]) -> list[str]:
 
 def finished_archive(archive: Path) -> dict[str, Any] | None:
     """Data about a finished archive from its sidecar: its cases, and when it was begun; None where there is none.
-    Raises Problem for what is no sound archive."""
+    Raises Problem for an unsound archive."""
     try:
         told = read_json(sidecar_path(archive))
         cases = sum(each["cases"] for each in told["experiments"] if is_count(each["cases"]))
@@ -231,7 +232,7 @@ AT_WORK = ("starting", "running", "merging")
 
 
 def died_lines(folder: Folder) -> Iterator[str]:
-    """Lines about an earlier run that ended without a word."""
+    """Lines about an earlier run that ended without a message."""
     for each in status_records(folder):
         if not each["name"] and each["state"] in AT_WORK and not alive(each, time.time()):
             alone = "thread" in each["workers"] and not each["workers"].startswith("Dask")
@@ -240,7 +241,7 @@ def died_lines(folder: Folder) -> Iterator[str]:
 
 
 def alive(told: dict[str, Any], now: float) -> bool:
-    """True if the process that wrote this status is still at work, as far as that can be known."""
+    """True if the process that wrote this status is still at work, as far as is known."""
     if told["state"] not in AT_WORK:
         return False
     if told["host"] == socket.gethostname():
@@ -249,7 +250,7 @@ def alive(told: dict[str, Any], now: float) -> bool:
 
 
 def duration(seconds: float) -> str:
-    """95 -> `1 min 35 s`."""
+    """A duration in words: 95 -> `1 min 35 s`."""
     if seconds < 10:
         return f"{seconds:.1f} s"
     if seconds < 60:

@@ -1,5 +1,5 @@
-"""The summary of very many cases in place of a row of each (`met run --rows`), and which few cases have their rows
-kept."""
+"""The summary of very many cases in place of a row for each (`met run --rows`), and the choice of the few rows to
+keep."""
 
 from __future__ import annotations
 
@@ -51,12 +51,12 @@ def point_sizes(experiment: Experiment, rows: CaseValues) -> list[int]:
 
 
 def _chosen(experiment: Experiment) -> tuple[Coordinate, ...]:
-    """The coordinates that tell design points apart: none where nothing is drawn, or nothing is chosen."""
+    """The coordinates that distinguish design points: none where nothing is drawn, or nothing is chosen."""
     return tuple(each for each in experiment.cases.coordinates if not each.design) if _drawn(experiment) else ()
 
 
 def _drawn(experiment: Experiment) -> bool:
-    """True where something is drawn at random: parameters of a sample, or noise of repeats."""
+    """True where values are drawn at random: parameters of a sample, or noise of repeats."""
     repeats = experiment.cases.repeats
     return any(each.design for each in experiment.cases.coordinates) or (repeats is not None and span(repeats)[1] > 0)
 

@@ -1,7 +1,7 @@
-"""The one verb underneath every campaign: run some cases of a section, write one shard.
+"""The unit of work of every campaign: run some cases of a section, and write one shard.
 
 A section is cases of one experiment that are run alike, with their histories or without; a task is a stretch of them.
-How cases are cut into tasks, and who carries them out, decides nothing about what they give.
+The results do not depend on how cases are cut into tasks, or on who runs them.
 """
 
 from __future__ import annotations
@@ -23,16 +23,17 @@ from met.plan.swept import BLOCK
 from met.run import Prepared
 
 GRANULE = 32
-"""Cases of a task are a multiple of this, the widest block of a kernel, where there are so many."""
+"""The number of cases of a task is a multiple of this, the widest block of a kernel, where there are enough."""
 
 MOST_CASES = 1 << 18
-"""Cases of a task without histories."""
+"""Largest number of cases of a task without histories."""
 
 STRETCH = 1 << 16
-"""Cases whose shards lie in one folder: some thousand files at most, for tasks have `GRANULE` cases or more."""
+"""Number of cases whose shards lie in one folder: some thousand files at most, since tasks have `GRANULE` cases or
+more."""
 
 MOST_BYTES = 128 << 20
-"""Histories of a task, which lie in memory at a time."""
+"""Largest size of the histories of a task, which are in memory together."""
 
 
 @frozen
@@ -67,14 +68,14 @@ class CampaignSection:
 
     @property
     def most(self) -> int:
-        """Cases of a task at most."""
+        """Largest number of cases of a task."""
         if not self.recorded:
             return MOST_CASES
         cases = max(1, min(MOST_CASES, MOST_BYTES // self.prepared.experiment.structure.history_bytes))
         return cases if cases < GRANULE else cases // GRANULE * GRANULE
 
     def key(self, first: int = 0, last: int | None = None) -> str:
-        """A digest of all that decides what these cases give: the code, how long it runs, what goes into it, what is
+        """A digest of everything that decides the results of these cases: code, duration, inputs, and the records
         kept."""
         experiment = self.prepared.experiment
         last = len(self.rows) if last is None else last
@@ -89,7 +90,7 @@ class CampaignSection:
 
 @frozen
 class Task:
-    """Cases `first` to `last` (not itself) of a section, by their places in its rows."""
+    """Cases `first` to `last` (exclusive) of a section, by their places in its rows."""
 
     section: int
     first: int
@@ -106,14 +107,14 @@ class Task:
 
     @property
     def path(self) -> str:
-        """Where the task's shard lies below `shards/`: those of a long section in folders of a stretch of cases each,
-        so that no folder has very many files."""
+        """The path of the task's shard below `shards/`: those of a long section are in one folder for each stretch of
+        cases, so that no folder has very many files."""
         return self.name if self.first < STRETCH else f"{self.first // STRETCH:05}/{self.name}"
 
 
 @frozen
 class Done:
-    """A task that was carried out: seconds of computing, and how many of its cases failed."""
+    """A task that was carried out: its computing time, s, and the number of its failed cases."""
 
     seconds: float
     failed: int
@@ -159,7 +160,7 @@ def compute(
         memories=section.memories,
     )
     if history is not None and section.single:
-        with np.errstate(over="ignore"):  # what is too large for four bytes is infinite there
+        with np.errstate(over="ignore"):  # numbers too large for four bytes become infinite
             history = history.astype(np.float32)
     return shard.Shard(
         key=section.key(task.first, task.last), outputs=outputs, history=history, seconds=time.perf_counter() - began

@@ -1,9 +1,9 @@
 """Cases of design points in order, until the requirements with a confidence of each are decided (`until_shown`).
 
 A design point stops at the first of its cases after which a test that may be looked at after every case
-(met/statistics/sequential.py) has decided all of these requirements, or at its last. That is a matter of its cases in
-their order alone. Where the tasks end, who runs them and when they are looked at decide how many cases are computed
-beyond it, and these are dropped: they reach neither the archive nor a verdict.
+(met/statistics/sequential.py) has decided all of these requirements, or at its last. That depends only on its cases in
+their order. The tasks' ends, their workers and the times of the tests decide how many cases are computed beyond it, and
+these are dropped: they reach neither the archive nor a verdict.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from met.statistics.design_points import design_points
 from met.statistics.sequential import limits
 
 FIRST_CASES = 256
-"""Cases of a design point that are run before it is looked at, unless fewer may decide it."""
+"""Number of cases of a design point before its first test, unless fewer may decide it."""
 
 GROWTH = 2
-"""Of the cases that a design point has, one in so many is run more before it is looked at again."""
+"""Divisor of a design point's cases that gives the number of further cases before the next test."""
 
 
 class StoppingPoints:
-    """The design points of a section: which of their cases are known, and where each of them stops."""
+    """The design points of a section, with their known cases and their stops."""
 
     def __init__(self, section: CampaignSection) -> None:
         experiment = section.prepared.experiment
@@ -53,19 +53,19 @@ class StoppingPoints:
 
     @property
     def decided(self) -> int:
-        """The number of design points that have come to their stop."""
+        """The number of design points that have reached their stop."""
         return sum(stop is not None for stop in self._stops)
 
     @property
     def failed(self) -> int:
-        """The number of cases that failed, of those that are not dropped, as far as they are known."""
+        """The number of failed cases among those known and not dropped."""
         kept = [
             p[: self._prefix(p) if stop is None else stop] for p, stop in zip(self._places, self._stops, strict=True)
         ]
         return sum(int(self._failed[places].sum()) for places in kept)
 
     def read(self, folder: Folder) -> None:
-        """Take what the shards hold by now; one that is unsound holds nothing. A case counts once, as it is merged."""
+        """Read the shards so far; an unsound one counts as empty. A case counts once, as in merging."""
         self._known[:] = False
         for task in folder.named_tasks(self._section.number):
             if task not in self._read:
@@ -80,12 +80,12 @@ class StoppingPoints:
         self._stops = [self._stop(places) for places in self._places]
 
     def kept(self) -> np.ndarray:
-        """Places in the section of the cases up to each design point's stop, rising."""
+        """Places in the section of the cases up to each design point's stop, ascending."""
         parts = [places[:stop] for places, stop in zip(self._places, self._stops, strict=True)]
         return np.sort(np.concatenate(parts))
 
     def next_batch(self, workers: int) -> list[tuple[int, int]]:
-        """Stretches of cases to run next: of each design point that is undecided, its next ones that are not known."""
+        """Stretches of cases to run next: for each undecided design point, its next unknown cases."""
         undecided = [places for places, stop in zip(self._places, self._stops, strict=True) if stop is None]
         busy = GRANULE * -(-2 * workers // max(1, len(undecided)))
         stretches: list[tuple[int, int]] = []
@@ -98,16 +98,16 @@ class StoppingPoints:
         return sorted(stretches)
 
     def _batch(self, places: np.ndarray, known: int, busy: int) -> int:
-        """The number of cases of a design point that are run before it is looked at again, `busy` of them at least; one
-        on motor beds, where each is driven for as long as it lasts."""
+        """The number of cases of a design point that are run before its next test, at least `busy`; one on motor beds,
+        where each case takes its full time."""
         if self._section.prepared.wire:
             return 1
         batch = max(busy, min(self._needed(places, known), max(FIRST_CASES, known // GROWTH)))
         return -(-batch // GRANULE) * GRANULE
 
     def _outcomes(self, task: Task, found: shard.Shard) -> np.ndarray:
-        """Whether each case of a shard misses each of the requirements, as the archive says it, and whether it failed:
-        [case, requirement], the last for failed."""
+        """For each case of a shard, whether it misses each of the requirements, by the archive's rule, and whether it
+        failed: [case, requirement], the last for failed."""
         rows = self._section.rows[task.first : task.last]
         run = engine.results(self._section.prepared, rows, None, found.outputs, dict(found.fates))
         met = [run.met[each.text] & ~np.isnan(run.metrics[each.metric]) & (run.status == DONE) for each in self._wanted]
@@ -119,7 +119,7 @@ class StoppingPoints:
         return len(places) if known.all() else int(known.argmin())
 
     def _stop(self, places: np.ndarray) -> int | None:
-        """The number of cases at which a design point stops; None where its cases that are known do not say it."""
+        """The number of cases at which a design point stops; None where its known cases do not decide it."""
         known = self._prefix(places)
         cases, stop = np.arange(1, known + 1), 0
         for found, missed in zip(self._limits, self._missed[places[:known]].T, strict=True):
@@ -130,7 +130,7 @@ class StoppingPoints:
         return known if known == len(places) else None
 
     def _needed(self, places: np.ndarray, known: int) -> int:
-        """The fewest cases more that may decide all requirements of a design point."""
+        """The fewest further cases that may decide all requirements of a design point."""
         most = 1
         for found, missed in zip(self._limits, self._missed[places[:known]].T, strict=True):
             if not found.verdicts(np.arange(1, known + 1), np.cumsum(missed)).any():
@@ -158,6 +158,6 @@ def run_until_shown(driver: Driver, section: CampaignSection, points: StoppingPo
 
 
 def without_dropped(folder: Folder, section: CampaignSection, points: StoppingPoints, number: int) -> CampaignSection:
-    """The section less the cases that are dropped, with shards of its own under this number. Raises Missing."""
+    """The section without dropped cases, with shards of its own under this number. Raises Missing."""
     places = points.kept()
     return section if len(places) == len(section.rows) else with_rows(folder, section, places, number)

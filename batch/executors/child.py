@@ -1,4 +1,4 @@
-"""A process that runs tasks for this one, and may die or hang without taking more along than its task.
+"""A process that runs tasks for this one, and may die or hang without affecting more than its task.
 
 Parent and child talk in lines of JSON: {"task": [section, first, last]} one way; the other way {"begun": []} once there
 is a kernel, {"progress": cases}, and {"done": [seconds, failed]} or {"broken": why}. A child whose parent is gone ends.
@@ -29,7 +29,8 @@ COMMAND = tuple(interpreter.command("batch.executors.worker"))
 WATCH_SECONDS = 0.2
 
 STILLBORN = 3
-"""Workers in a row that are killed before they have begun, after which no more are started: it is no case's doing."""
+"""Number of successive workers killed before they have begun, after which no more are started: the cause is not a
+case."""
 
 NO_MEMORY = 3
 """Exit status of a process that could not get the memory it needs; fewer cases at once may do."""
@@ -58,7 +59,7 @@ class Child:
         self.begun = False
 
     def carry_out(self, task: Task, timeout: float | None = None) -> Outcome:
-        """Have a task run, and wait for what comes of it. timeout: s without any progress, once there is a kernel."""
+        """Run a task, and wait for its outcome. timeout: s without any progress, once there is a kernel."""
         self.under_way = 0
         try:
             assert self._process.stdin is not None
@@ -87,11 +88,11 @@ class Child:
                 return Outcome(task, "broken", why=message["broken"])
 
     def kill(self) -> None:
-        """Stop the process at once; whoever waits for it is told that it is lost."""
+        """Kill the process at once; its waiting callers get the outcome that it is lost."""
         self._process.kill()
 
     def end(self) -> None:
-        """Stop the process, and let go of it."""
+        """Kill the process, and release its resources."""
         self.kill()
         self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout, self._words):
@@ -102,7 +103,7 @@ class Child:
                 pass
 
     def _message(self, seconds: float) -> dict[str, Any] | None:
-        """The next message; None where there is none so soon, or none any more (`_ended`)."""
+        """The next message; None where there is none within this time, or none any more (`_ended`)."""
         assert self._process.stdout is not None
         pipe = self._process.stdout.fileno()
         poll = select.poll()
@@ -120,7 +121,8 @@ class Child:
         return found
 
     def _death(self, task: Task) -> Outcome:
-        """The outcome of a task whose process is dead: killed, it is lost; ended by itself, none will do better."""
+        """The outcome of a task whose process is dead: lost if it was killed; broken if it ended by itself, since
+        another try would not help."""
         status = self._process.wait()
         if status < 0:
             name = {each.value: each.name for each in signal.Signals}.get(-status, f"signal {-status}")
@@ -141,7 +143,7 @@ def _no_start(reason: OSError) -> str:
 
 
 class Crew:
-    """Children that are taken for one task after the other; whoever calls waits. Several may call at once."""
+    """Children that take one task after the other; calls block. Several threads may call at once."""
 
     def __init__(
         self, folder: Path, *, threads: int = 1, timeout: float | None = None, command: Sequence[str] = COMMAND
@@ -155,11 +157,11 @@ class Crew:
 
     @property
     def under_way(self) -> int:
-        """Cases that are done of tasks that are not."""
+        """Number of finished cases of unfinished tasks."""
         return sum(child.under_way for child in list(self._all))
 
     def carry_out(self, task: Task) -> Outcome:
-        """Have a task run by an idle child, or by a new one."""
+        """Run a task by an idle child, or by a new one."""
         try:
             child = self._take()
         except OSError as reason:
@@ -183,14 +185,14 @@ class Crew:
         return outcome
 
     def stop(self) -> None:
-        """Stop all children at once; whoever waits for one is told that it is lost."""
+        """Kill all children at once; callers that wait for one get the outcome that it is lost."""
         with self._lock:
             self._over = True
             for child in self._all:
                 child.kill()
 
     def close(self) -> None:
-        """Stop all children and let go of them, when nobody waits for one any more."""
+        """Kill all children and release them, when nobody waits for one any more."""
         self.stop()
         with self._lock:
             ending, self._all, self._idle = self._all, [], []

@@ -1,4 +1,4 @@
-"""The executor that a user asks for."""
+"""The choice of an executor."""
 
 from __future__ import annotations
 

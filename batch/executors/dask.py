@@ -34,8 +34,8 @@ COUNT_SECONDS = 0.5
 CLOSE_SECONDS = 3.0
 FETCHES = 50
 
-# What a worker runs, as text: code would have to suit its Python, and a name would have to be known to it, and to the
-# scheduler.
+# The function that a worker runs, as text: code would have to suit its Python, and a name would have to be known to it,
+# and to the scheduler.
 ERRAND = f"""
 try:
     from batch.executors.dask_worker import carry_out
@@ -54,8 +54,8 @@ def _say(text: str) -> None:
 
 
 async def _held(future: Any) -> Any:
-    """The value of a Dask future. If it cannot be fetched, that may be a worker's end: then it will be computed again;
-    or the scheduler's, for which the future is cancelled, a little later."""
+    """The value of a Dask future. If it cannot be fetched, the worker may have ended: then it will be computed again;
+    or the scheduler has: then the future is cancelled a little later."""
     from distributed.comm import CommClosedError
 
     for _ in range(FETCHES):
@@ -66,7 +66,7 @@ async def _held(future: Any) -> Any:
 
 
 class Dask:
-    """As many tasks at a time as all workers of the cluster have threads; workers may come and go.
+    """Executor on a Dask cluster: as many tasks at a time as its workers have threads; workers may come and go.
 
     dask      "local", the address of a scheduler, its file (`*.json`), or a `distributed.Client`
     threads   of each task
@@ -140,7 +140,7 @@ class Dask:
     # In this thread
 
     def _on_loop(self, work: Coroutine[Any, Any, Any]) -> Future[Any]:
-        """Have work done in the client's event loop."""
+        """Run a function in the client's event loop."""
         return asyncio.run_coroutine_threadsafe(work, self._client.loop.asyncio_loop)
 
     def _await_worker(self) -> None:
@@ -160,7 +160,7 @@ class Dask:
             self._tell()
 
     def _stuck(self) -> str:
-        """Why nothing can be hoped for any more; empty where something can."""
+        """The reason why no further progress is possible; empty where it is."""
         if self._client.status == "closed":
             return LOST
         if time.monotonic() - self._seen > WORKER_SECONDS:
@@ -168,7 +168,7 @@ class Dask:
         return ""
 
     def _tell_all(self, dismiss: Callable[..., Any]) -> None:
-        """Have all workers let go of what they keep for us; one that does not hear of it does so by itself, later."""
+        """Tell all workers to release their children for us; one that does not hear it does so itself later."""
 
         async def tell() -> None:
             await self._client.run(dismiss, self._name, on_error="ignore")
@@ -184,7 +184,7 @@ class Dask:
         while True:
             try:
                 self._workers = await self._client.nthreads()
-            except Exception:  # whatever a connection that was lost gives rise to
+            except Exception:  # any error of a lost connection
                 self._workers = {}
             if self._workers:
                 self._seen = time.monotonic()
@@ -192,7 +192,7 @@ class Dask:
             await asyncio.sleep(COUNT_SECONDS)
 
     async def _carry_out(self, task: Task) -> Outcome:
-        """Have a task run on some worker. One whose worker is lost is run again by Dask, on another."""
+        """Run a task on some worker. If that worker is lost, Dask runs it again on another."""
         from distributed.comm import CommClosedError
         from distributed.scheduler import KilledWorker
 
@@ -214,7 +214,7 @@ class Dask:
             return self._outcome(task, await _held(dask_future))
         except KilledWorker:
             return Outcome(task, "lost", why="died with its Dask worker")
-        except CancelledError:  # not by us: that would be asyncio's
+        except CancelledError:  # unless by us: that would be asyncio's
             if self._client.status == "running":
                 return Outcome(task, "lost", why="was told by Dask to stop")
             return Outcome(task, "broken", why=LOST)

@@ -1,4 +1,4 @@
-"""A client of a Dask cluster, from what a user calls it: `local`, an address, a scheduler file, or a client."""
+"""A client of a Dask cluster, from the user's argument: `local`, an address, a scheduler file, or a client."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LOCAL = "local"
 
 
 def check(dask: object) -> None:
-    """Refuse what calls no cluster, before anything is begun. Raises Problem, TypeError."""
+    """Refuse an argument that names no cluster, before any work begins. Raises Problem, TypeError."""
     if isinstance(dask, str | os.PathLike):
         return
     from distributed import Client
@@ -63,7 +63,7 @@ def dask_client(dask: object, threads: int) -> Iterator[Any]:
 
 @contextmanager
 def silenced_dask() -> Iterator[None]:
-    """A block in which Dask prints nothing about connections and workers: what matters of it is an outcome."""
+    """A block in which Dask prints nothing about connections and workers: what matters is reported as an outcome."""
     import distributed  # noqa: F401 - it sets the levels of its loggers when it is imported
 
     names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in ("distributed", "tornado")]
@@ -78,7 +78,7 @@ def silenced_dask() -> Iterator[None]:
 
 
 def _address(called: str) -> str:
-    """The address of a scheduler, which may stand in a file. Raises Problem."""
+    """The address of a scheduler, which may be in a file. Raises Problem."""
     path = Path(called)
     if path.suffix != ".json":
         return called
@@ -107,7 +107,7 @@ def _reached(address: str) -> Iterator[Any]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", VersionMismatchWarning)  # what it is about does not travel
             client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
-    except Exception as reason:  # anything at all, where the address is none or something else answers
+    except Exception as reason:  # any error, where the address is invalid or something else answers
         helps = "`dask scheduler` starts one, and says its address"
         raise Problem(error("E356", f"no Dask scheduler answers at `{address}`", help=helps)) from reason
     with client:
@@ -125,8 +125,8 @@ async def _greet(address: str) -> None:
 
 @contextmanager
 def _started(threads: int) -> Iterator[Any]:
-    """A client of a scheduler and a worker inside this process, which no other can reach: whoever reaches a scheduler
-    has it run code. Its tasks are in children of the worker all the same."""
+    """A client of a scheduler and a worker inside this process, which others cannot reach, since a scheduler runs its
+    clients' code. Its tasks are in children of the worker all the same."""
     from distributed import Client, LocalCluster
 
     at_once = max(1, len(os.sched_getaffinity(0)) // threads)
@@ -149,5 +149,5 @@ def _started(threads: int) -> Iterator[Any]:
         Client(cluster, set_as_default=False) as client,
     ):
         for each in (cluster.scheduler, *cluster.workers.values()):
-            each.http_server.stop()  # each has one to be looked at with, which cannot be declined
+            each.http_server.stop()  # each has a web server, which cannot be switched off
         yield client

@@ -1,4 +1,4 @@
-"""What runs on a Dask worker: tasks, in children that it keeps for as long as a campaign sends it some.
+"""The code on a Dask worker: it runs tasks in child processes, which it keeps while a campaign sends it tasks.
 
 So a case that kills its process, or never ends, takes down a child and never the worker. The children of a campaign
 are a plugin of the worker: it goes when the campaign says so, when nobody waits for a running task any more, when
@@ -27,7 +27,7 @@ from batch.executors.child import Crew
 from met.version import VERSION
 
 IDLE_SECONDS = 60.0
-"""Without a task, after which children are let go of: whoever sent them may have been killed."""
+"""Seconds without a task after which children are released: their campaign may have been killed."""
 
 LOOK_SECONDS = 1.0
 
@@ -66,7 +66,7 @@ def carry_out(order: Mapping[str, Any]) -> dict[str, Any]:
 
 
 async def dismiss(campaign: str, dask_worker: Worker) -> None:
-    """Let go of the children that a worker keeps for a campaign."""
+    """Release the children that a worker keeps for a campaign."""
     if campaign in dask_worker.plugins:
         await dask_worker.plugin_remove(name=campaign)
 
@@ -100,8 +100,8 @@ class WorkerChildren(WorkerPlugin):
         return kept
 
     def carry_out(self, task: Task, key: str) -> Outcome:
-        """Have a task run, for which they were asked `on` the worker. Raises Reschedule where they were sent home: then
-        nothing has come of it, and somebody else may have it."""
+        """Run a task, for which the children were requested with `on`. Raises Reschedule where they were released
+        before: then it has no result, and may be run elsewhere."""
         try:
             outcome = self._crew.carry_out(task)
         except RuntimeError:

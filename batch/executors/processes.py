@@ -1,4 +1,4 @@
-"""Tasks in processes of their own on this machine: one that dies or hangs takes its task along, and no other."""
+"""Tasks in processes of their own on this machine: one that dies or hangs affects only its task."""
 
 from __future__ import annotations
 

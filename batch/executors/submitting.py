@@ -1,4 +1,4 @@
-"""`met submit --slurm`: a campaign as a job array, a share of its cases each, and a job that puts it together."""
+"""`met submit --slurm`: a campaign as a job array, each job with a share of its cases, and a job that merges them."""
 
 from __future__ import annotations
 
@@ -19,15 +19,17 @@ from met.frozen import frozen
 from met.host import interpreter
 
 STRIPES = 8
-"""Stretches of a job's share, spread over all cases: neighbours in a sweep often take alike, and all jobs as long."""
+"""Number of stretches of a job's share, spread over all cases: neighbours in a sweep often take equally long, and all
+jobs should."""
 
 JOBS = 16
-"""Jobs, unless so many are asked for."""
+"""Default number of jobs."""
 
 
 @frozen
 class Submitted:
-    """array, end: numbers of the job array and of the job that merges; jobs: of the array; cases: that are missing."""
+    """Submitted jobs. array, end: numbers of the job array and of the job that merges; jobs: of the array; cases:
+    missing ones"""
 
     array: str
     end: str
@@ -44,7 +46,7 @@ def submit(
     fresh: bool = False,
     say: Callable[[str], None] = lambda _: None,
 ) -> Submitted | None:
-    """Hand what is missing of a campaign to SLURM; None where its archive is whole. Raises Problem.
+    """Submit a campaign's missing cases to SLURM; None where its archive is whole. Raises Problem.
 
     jobs     of the array; None: `JOBS`, or fewer where there is less to share
     options  further words for sbatch, of both jobs: `--partition=long`
@@ -101,17 +103,17 @@ def submit(
     try:
         return _hand_over(campaign, folder, count if cases else 0, cases, options)
     except Problem:
-        if cases == campaign.cases:  # nothing is done that would be lost
+        if cases == campaign.cases:  # no finished case would be lost
             folder.remove()
         raise
 
 
 def _hand_over(campaign: Campaign, folder: Folder, count: int, cases: int, options: Sequence[str]) -> Submitted:
-    """Have sbatch take the array, of so many jobs, and the job that merges."""
+    """Submit the array, of so many jobs, and the job that merges."""
     program, tasks = str(shutil.which("sbatch")), folder.path / "jobs.json"
     logs = folder.path / "logs"
     logs.mkdir(exist_ok=True)
-    log = str(logs.resolve()).replace("%", "%%")  # as sbatch reads names
+    log = str(logs.resolve()).replace("%", "%%")  # in the syntax of sbatch
     name = campaign.output.stem
     common = [program, "--parsable", f"--job-name=met-{name}", *options]
     array = ""
@@ -126,7 +128,7 @@ def _hand_over(campaign: Campaign, folder: Folder, count: int, cases: int, optio
 
 
 def shares(missing: Sequence[Task], count: int) -> list[list[Task]]:
-    """Cut the missing tasks into stretches and deal them out, so that each job has about as many cases, from
+    """Cut the missing tasks into stretches and distribute them, so that each job has about as many cases, from
     everywhere."""
     whole = sum(task.cases for task in missing)
     each = max(GRANULE, -(-whole // (count * STRIPES * GRANULE)) * GRANULE)
@@ -146,7 +148,7 @@ def _script(folder: Path, *words: str) -> str:
 
 
 def _sbatch(command: Sequence[str], script: str, more: bool) -> str:
-    """Number of the job. Raises Problem E358 with SLURM's own words."""
+    """Submit a job; returns its number. Raises Problem E358 with SLURM's own words."""
     done = subprocess.run(command, input=script, capture_output=True, text=True)
     number = re.match(r"\d+", done.stdout.strip())
     if done.returncode != 0 or number is None:

@@ -1,4 +1,4 @@
-"""An end by SIGTERM, as `kill` and batch systems send it: what was begun is cleaned up, as after Ctrl-C."""
+"""Handling of SIGTERM, as sent by `kill` and batch systems: the process cleans up, as after Ctrl-C."""
 
 from __future__ import annotations
 
@@ -13,13 +13,12 @@ TERMINATED = 128 + signal.SIGTERM
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM came; whatever looks for an interrupt sees one."""
+    """Raised for SIGTERM; handlers of interrupts catch it."""
 
 
 @contextmanager
 def terminable() -> Iterator[None]:
-    """A block in which SIGTERM raises Terminated, once: what follows it is cleaning up, which a second one does not
-    disturb."""
+    """A block in which SIGTERM raises Terminated, once: a second one does not disturb the cleaning up."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,4 +1,4 @@
-"""Tasks in this process: one at a time, its cases over several threads, while the shard before is written."""
+"""Tasks in this process: one at a time, its cases over several threads, while the previous shard is written."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from batch.campaigns.tasks import CampaignSection, Done, Task
 
 
 class Threads:
-    """The executor that needs nothing started."""
+    """The executor in this process, which needs no further processes."""
 
     workers = 1
 

@@ -1,4 +1,4 @@
-"""A worker process: `python -m batch.executors.worker FOLDER --threads N` runs what its parent sends it.
+"""A worker process: `python -m batch.executors.worker FOLDER --threads N` runs its parent's tasks.
 
 The parent's side is batch/executors/child.py.
 """
@@ -30,7 +30,7 @@ class Parent:
 
     def __init__(self) -> None:
         self._out = os.dup(sys.stdout.fileno())
-        os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a model prints is no message
+        os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # a model's output is not a message
         self.tasks: queue.SimpleQueue[Task] = queue.SimpleQueue()
         threading.Thread(target=self._listen, daemon=True).start()
 
@@ -43,7 +43,7 @@ class Parent:
             os._exit(0)
 
     def _listen(self) -> None:
-        """A parent that is gone, killed or not, has closed its end: then there is nobody to work for."""
+        """Watch the parent: one that is gone, killed or not, has closed its end of the pipe, and the worker ends."""
         for line in sys.stdin:
             self.tasks.put(Task(*json.loads(line)["task"]))
         os._exit(0)
@@ -51,7 +51,7 @@ class Parent:
 
 def main(arguments: list[str]) -> None:
     """Run tasks until the parent is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to all; the parent decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to all processes; the parent decides
     folder, threads = Folder(Path(arguments[0])), int(arguments[2])
     parent = Parent()
     sections: dict[int, CampaignSection] = {}
@@ -71,7 +71,7 @@ def main(arguments: list[str]) -> None:
                 folder.shards,
                 threads=threads,
                 progress=_slowly(parent),
-                computed=lambda: parent.tell(computed=[]),  # a slow disk is no case without an end
+                computed=lambda: parent.tell(computed=[]),  # a slow disk does not count as a case without an end
             )
             parent.tell(done=[done.seconds, done.failed])
         except MemoryError:

@@ -1,5 +1,5 @@
-"""Some of a campaign's cases again, with the dynamics at half and a quarter of the step.
+"""Solution verification: some of a campaign's cases again, with the dynamics at half and a quarter of the step.
 
-Solution verification, as NASA-STD-7009 has it. `when` says whether, `choosing` which cases, and `verifying` runs them;
-`batch/archive/verified.py` keeps what was computed, and `batch/queries/step_errors` makes errors of it.
+The method is that of NASA-STD-7009. `when` decides whether to verify, `choosing` chooses the cases, and `verifying`
+runs them; `batch/archive/verified.py` stores the results, and `batch/queries/step_errors` computes errors from them.
 """

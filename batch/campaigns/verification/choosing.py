@@ -1,4 +1,4 @@
-"""Which cases of an experiment are verified: by counts and the seed alone, so the same ones each time."""
+"""The choice of cases to verify in an experiment, by counts and the seed alone, so that it is reproducible."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from met.distinct import distinct
 from met.plan import Experiment
 
 SEEDED = 2
-"""Cases that the seed chooses among all."""
+"""Number of cases that the seed chooses among all."""
 
 
 def chosen(experiment: Experiment, results: CaseOutcomes) -> np.ndarray:
@@ -30,7 +30,7 @@ def chosen(experiment: Experiment, results: CaseOutcomes) -> np.ndarray:
 
 
 def _done_beside(results: CaseOutcomes, places: list[int], number: int) -> int:
-    """The case of this number among those that reached their end, without these, all of which did."""
+    """The case of this number among those that reached their end, not counting these places, all of which did."""
     ranks = np.sort(results.done.rank(distinct(np.array(places, np.int64))))
     for rank in ranks.tolist():
         number += rank <= number
@@ -38,5 +38,5 @@ def _done_beside(results: CaseOutcomes, places: list[int], number: int) -> int:
 
 
 def most(metrics: int, cases: int) -> int:
-    """The largest number of cases that `chosen` may choose of so many cases with so many metrics."""
+    """The largest number of cases that `chosen` chooses from this many cases with these metrics."""
     return min(cases, 2 + metrics + SEEDED)

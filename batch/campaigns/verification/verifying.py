@@ -1,4 +1,4 @@
-"""Runs chosen cases again with shorter steps of the dynamics."""
+"""Verification runs: chosen cases again with shorter steps of the dynamics."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from met.plan import Experiment
 from met.plan.channel import channels
 
 FACTORS = (2, 4)
-"""Steps in the place of one: so a case that is verified takes 2 + 4 times its steps besides."""
+"""Numbers of steps in place of one: a verified case takes 2 + 4 times its own steps in addition."""
 
 
 def verify(
@@ -64,7 +64,7 @@ def _metrics(
 def _instant(experiment: Experiment, name: str) -> float:
     """A quarter of the step, s, where a metric is an instant that is seen at whole steps; else 0.
 
-    One of what a servo's computer holds is seen at its ticks, which stay as they are.
+    A metric of a servo's memory is seen at the servo's ticks, which do not change.
     """
     structure = experiment.structure
     use = next(each for each in structure.metrics if each.name == name)

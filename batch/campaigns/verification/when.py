@@ -1,4 +1,5 @@
-"""Whether a campaign's experiment is verified, decided by counts alone: the same campaign, the same answer anywhere."""
+"""The decision whether a campaign's experiment is verified, by counts alone: the same for the same campaign
+anywhere."""
 
 from __future__ import annotations
 
@@ -13,23 +14,23 @@ from met.run import Prepared
 Verify = Literal["auto", "none", "some", "all"]
 
 WORDS: tuple[Verify, ...] = ("auto", "none", "some", "all")
-"""What may be asked for; `auto` is `some` where that is cheap."""
+"""Allowed choices; `auto` is `some` where that is cheap."""
 
 SHARE = 0.03
-"""Of the campaign's steps: so much more is not asked about."""
+"""Share of the campaign's steps up to which verification is always cheap enough."""
 
 PREPARING = 250_000
-"""Steps of a campaign's cases, side by side in vectors, that take as long as making a program whose machine code is
-kept, whatever its size: 12 to 20 ms; measured on the decks shipped."""
+"""Number of steps of a campaign's cases, in vectors side by side, that takes as long as recording a program with cached
+machine code, whatever its size: 12 to 20 ms; measured on the shipped decks."""
 
 SHORT_OPERATIONS, SHORT_PROGRAM = 400_000_000, 15_000
-"""Operations of the steps that are added to a single case, about 0.3 s; operations of a program, whose machine code is
-made in some seconds and kept: so the error of almost every single case is known without asking."""
+"""Largest number of operations of the steps added for a single case, about 0.3 s, and of a program's operations, whose
+machine code takes some seconds once: so almost every single case gets its errors by default."""
 
 
 def resolve(wanted: Verify, prepared: Prepared, cases: int) -> Verify:
-    """`none`, `some` or `all`: what is wanted of so many cases of an experiment; `auto` is `some` where
-    the deck requires something of errors by the step, and else settled by what it costs."""
+    """`none`, `some` or `all`: the resolved choice for this many cases of an experiment; `auto` is `some` where the
+    deck limits errors due to the step, and otherwise decided by cost."""
     experiment = prepared.experiment
     metrics = len(experiment.structure.metrics)
     if not metrics or not cases:
@@ -48,8 +49,8 @@ def resolve(wanted: Verify, prepared: Prepared, cases: int) -> Verify:
 
 
 def settled(wanted: Verify, sections: Iterable[tuple[Prepared, int]]) -> Verify:
-    """`auto` where what is wanted of each experiment, with so many cases, is what `auto` would do; else what is wanted.
-    So a campaign is the same one however that was said."""
+    """`auto` where the choice equals that of `auto` for each experiment; else the choice itself. So equal campaigns are
+    equal however the choice was written."""
     same = all(resolve(wanted, *section) == resolve("auto", *section) for section in sections)
     return "auto" if same else wanted
 
