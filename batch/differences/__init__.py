@@ -1,4 +1,4 @@
-"""What changed between two campaigns: `met diff A B`.
+"""Differences between two campaigns, for `met diff A B`.
 
 matching     which experiment, case, signal of one is which of the other
 tolerance    how much may differ, by signal; nothing unless it is given

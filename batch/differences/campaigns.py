@@ -1,4 +1,4 @@
-"""The difference of two archives, in bounded memory: what made them, status, metrics, signals, and the worst cases."""
+"""The difference of two archives, in bounded memory: provenance, status, metrics, signals, and the worst cases."""
 
 from __future__ import annotations
 
@@ -40,20 +40,20 @@ from met.plan import Plan
 from met.plan.outputs import joint_parts
 
 WORST = 20
-"""Cases that are ranked."""
+"""Number of cases that are ranked."""
 
 NO_CASE = "no case is in both"
 
 LARGEST = float(np.finfo(float).max)
-"""A span is no larger, so that a share of it is a number."""
+"""Upper bound of a span, so that a share of it is a number."""
 
 BLOCK = 1 << 16
-"""Values of a signal that are compared at a time: 512 KiB."""
+"""Number of values of a signal that are compared at a time: 512 KiB."""
 
 
 def diff(a: str | Path, b: str | Path, given: Tolerances | None = None, *, distributions: bool = False) -> Diff:
-    """Compare two archives. given: tolerances, besides and instead of those of b's deck. distributions: compare metrics
-    as samples even where the seeds are the same. Raises Problem."""
+    """Compare two archives. given: tolerances that take precedence over those of b's deck. distributions: compare
+    metrics as samples even where the seeds are the same. Raises Problem."""
     with ArchiveFile(a) as file_a, ArchiveFile(b) as file_b:
         for file in (file_a, file_b):
             file.need_every_row("a comparison of cases")
@@ -74,7 +74,7 @@ def diff(a: str | Path, b: str | Path, given: Tolerances | None = None, *, distr
 
 
 def _check(allowed: Tolerances, groups: Sequence[ArchiveGroup]) -> None:
-    """Check that each tolerance of the command line is of something in one of the archives."""
+    """Check that each tolerance of the command line names a quantity of one of the archives."""
     known: dict[str, Sequence[str]] = {}
     shown: dict[str, None] = {}
     for group in groups:
@@ -98,7 +98,7 @@ def _known(group: ArchiveGroup) -> dict[str, Sequence[str]]:
 
 
 def _plan(file: ArchiveFile) -> Plan | str:
-    """The plan of an archive, or why it cannot be read here."""
+    """The plan of an archive, or the reason why it cannot be read here."""
     try:
         return file.plan(as_written=True)
     except Problem as problem:
@@ -108,7 +108,7 @@ def _plan(file: ArchiveFile) -> Plan | str:
 def _experiment(
     a: ArchiveGroup, b: ArchiveGroup, given: Tolerances, plan: Plan | str, distributions: bool
 ) -> ExperimentDiff:
-    """Compare two groups. plan: that of b, or why it cannot be read."""
+    """Compare two groups. plan: that of b, or the reason why it cannot be read"""
     known = {} if isinstance(plan, str) else {experiment.name: experiment for experiment in plan.experiments}
     given = given.within(_known(a)).within(_known(b))
     allowed = given.over(of_deck(known[b.name], b) if b.name in known else Tolerances())
@@ -143,7 +143,7 @@ def _experiment(
 
 
 def _how(scores: _Scores, matched: MatchedCases, b: ArchiveGroup, found: ExperimentDiff) -> np.ndarray:
-    """The place in VERDICTS of each matched case. One that ended otherwise is different."""
+    """The place in VERDICTS of each matched case. A case with another ending is different."""
     out = np.where(scores.unlike, VERDICTS.index(EQUIVALENT), VERDICTS.index(IDENTICAL)).astype(np.int8)
     out[scores.beyond] = VERDICTS.index(DIFFERENT)
     if found.ended:
@@ -153,13 +153,13 @@ def _how(scores: _Scores, matched: MatchedCases, b: ArchiveGroup, found: Experim
 
 
 def _other_noise(a: ArchiveGroup, b: ArchiveGroup) -> bool:
-    """True if the two have other seeds, so that single cases differ by chance."""
+    """True if the two have different seeds, so that single cases differ by chance."""
     mine, theirs = a.values("seed"), b.values("seed")
     return not np.array_equal(mine, theirs) and not np.array_equal(distinct(mine), distinct(theirs))
 
 
 def _ended(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: ExperimentDiff) -> None:
-    """Cases that ended otherwise, or earlier."""
+    """Cases with another ending, or an earlier one."""
     status, rows = ([group.values(name) for group in (a, b)] for name in ("status", "n_valid"))
     here, there = status[0][matched.a], status[1][matched.b]
     unlike = (here != there) | ((here != 0) & (rows[0][matched.a] != rows[1][matched.b]))
@@ -189,11 +189,11 @@ COUNTS = {
     "friction_undecided": "modes of friction that were left open",
     "bed_limited": "ticks at a bed's limit",
 }
-"""Counters of each case besides what it records, and what they count."""
+"""Counters of each case besides its records, with their meanings."""
 
 
 def _counts(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: ExperimentDiff) -> None:
-    """Notes counts that differ where nothing else does: then something differs that was not recorded."""
+    """Note counts that differ where nothing else does: then something unrecorded differs."""
     if any(signal.equivalent or signal.different for signal in out.signals):
         return
     for name, words in COUNTS.items():
@@ -310,14 +310,14 @@ def _rank_metric(
 
 
 def _unit_of(signal: SignalDiff) -> float:
-    """The size against which a signal's differences are ranked: what the values of a span; finite."""
+    """The scale by which a signal's differences are ranked: the span of its values; finite."""
     if signal.low > signal.high:
         return 1.0
     return min(signal.high - signal.low, LARGEST) or max(abs(signal.high), 1e-300)
 
 
 def _add(out: SignalDiff, found: Difference, where: DiffPlace) -> None:
-    """One more difference. Those beyond a tolerance go before those within, of which none is told then."""
+    """Add a difference. Those beyond a tolerance replace those within, which are then not reported."""
     beyond = bool(found.beyond)
     if out.place is None or (beyond and not out.beyond):
         out.largest, out.most, out.place, out.beyond = found.largest, found.most, where, beyond
@@ -407,7 +407,7 @@ def _histories(group: ArchiveGroup, name: str, places: np.ndarray) -> np.ndarray
 
 
 def _by_joint(group: ArchiveGroup, signal: Stored, allowed: Tolerances) -> dict[str, float]:
-    """The joints of a signal for which something of their own is allowed, be it nothing."""
+    """The joints of a signal with an allowed difference of their own, even if that is 0."""
     joints = tuple(group.joints(signal))
     parts = zip(joints, joint_parts(signal.name, joints), strict=True)
     return {joint: allowed.of(part).absolute for joint, part in parts if part in allowed.absolute}
@@ -432,8 +432,9 @@ def _cases(
     places: np.ndarray,
     numbers: np.ndarray,
 ) -> Iterator[tuple[float, int, DiffPlace, float]]:
-    """Cases of a signal whose bits are not all the same, or may not be. rows: of a, to which those of b belong; places:
-    of the cases among those that are matched; numbers: in the case table of b. Those beyond: how far, and where."""
+    """The cases of a signal whose bits are not known to be the same. rows: of a, to which those of b belong; places: of
+    the cases among the matched ones; numbers: in the case table of b. Returns, for those beyond a tolerance, how far
+    and where."""
     time = passed.times[rows]
     a = passed.values if len(rows) == len(passed.times) else passed.values[:, rows]
     differences = compare_cases(a, b, out.tolerance, passed, absolute)
@@ -457,7 +458,7 @@ def _cases(
 def _recorded(
     a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, about: ExperimentDiff
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Matched cases whose histories both have: their places in `matched`, and along recorded_case of a and b."""
+    """Matched cases whose histories both have: their places in `matched`, and along recorded_case in a and b."""
     has_a, has_b = np.isin(matched.a, a.recorded_positions), np.isin(matched.b, b.recorded_positions)
     for mine, theirs, path in ((has_a, has_b, a.path), (has_b, has_a, b.path)):
         alone = int((mine & ~theirs).sum())
@@ -479,7 +480,7 @@ def _labels(group: ArchiveGroup, variable: Stored) -> list[str]:
 
 
 def _incomparable(a: ArchiveGroup, b: ArchiveGroup, name: str, role: str) -> str:
-    """Why a signal or metric cannot be compared; empty where it can."""
+    """The reason why a signal or metric cannot be compared; empty where it can."""
     for mine, other in ((a, b), (b, a)):
         if name not in other.variables or other.variables[name].role != role:
             return f"only in {mine.path}"

@@ -43,7 +43,7 @@ class Difference:
 
     @property
     def most(self) -> float:
-        """The size of the difference: not-a-number on one side alone counts as infinite."""
+        """The size of the difference; not-a-number on one side only counts as infinite."""
         return float("inf") if self.nan else self.largest
 
     @property
@@ -58,8 +58,8 @@ def compare(
     time: np.ndarray | None = None,
     absolute: np.ndarray | None = None,
 ) -> Difference | None:
-    """None where all bits are the same. time: s of each row, where `allowed` has a tolerance of time; absolute: of each
-    column, where `allowed.absolute` is not for all."""
+    """The difference; None where all bits are the same. time: s of each row, where `allowed` has a tolerance of time;
+    absolute: of each column, where `allowed.absolute` is not the same for all."""
     return compare_cases(
         a[None], b[None], allowed, None if time is None else SampledCourse(time, time, a[None]), absolute
     )[0]
@@ -67,10 +67,10 @@ def compare(
 
 @frozen
 class SampledCourse:
-    """The course of a between its rows: `values`, [case, row, column], at `times` s, which may be more than what is
+    """The course of a between its rows: `values`, [case, row, column], at `times` s, which may be more rows than are
     compared.
 
-    instants   s, of the rows that are compared, as b has them
+    instants s, of the compared rows, as in b
     """
 
     instants: np.ndarray
@@ -84,7 +84,7 @@ def unlike_bits(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def magnitude(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The larger of two values, of which a share may be allowed: of an infinite one none is."""
+    """The larger of two sizes, to which a relative tolerance applies; 0 where one is infinite."""
     larger = np.maximum(np.abs(a), np.abs(b))
     return np.asarray(np.where(np.isinf(larger), 0.0, larger))
 
@@ -109,8 +109,8 @@ def compare_cases(
     passed: SampledCourse | None = None,
     absolute: np.ndarray | None = None,
 ) -> list[Difference | None]:
-    """Compare several cases at once, [case, row, column], as `compare` does: one result a case. passed: where `allowed`
-    has a tolerance of time."""
+    """Compare several cases at once, [case, row, column], with one result a case, as `compare` does. passed: where
+    `allowed` has a tolerance of time"""
     shape = a.shape
     a, b = (_flat(np.ascontiguousarray(array, dtype=np.float64)) for array in (a, b))
     unlike = a.view(np.int64) != b.view(np.int64)
@@ -187,8 +187,8 @@ def _outside(passed: SampledCourse, b: np.ndarray, early: float) -> np.ndarray:
 
 
 def _lowest(values: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """The lowest value of each stretch of rows, `first` to `last`, not itself; not-a-number for none. Made from two
-    stretches of a power of two, which are doubled: O(n log n)."""
+    """The lowest value of each stretch of rows, `first` to `last` (exclusive); not-a-number for an empty one. It
+    combines two stretches of a power of two, found by doubling: O(n log n)."""
     out = np.full((len(first), values.shape[1]), np.nan)
     wide, steps = last - first, 1
     while True:

@@ -1,4 +1,4 @@
-"""`met diff --format json`: the same for programs; `schema` says which version of this layout it is."""
+"""The data of `met diff --format json`; `schema` is the version of their layout."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SCHEMA, VERSION = "met.diff", 2
 
 
 def as_data(found: Diff) -> dict[str, Any]:
-    """Plain data; a number that is not finite is null."""
+    """The comparison as plain data; non-finite numbers are null."""
     data = {
         "schema": SCHEMA,
         "version": VERSION,

@@ -1,4 +1,4 @@
-"""What differs between the decks of two archives: which files, their lines, and the names that stand for values.
+"""Differences between the decks of two archives: files, lines, and names that stand for values.
 
 The texts are an archive's, so nothing here reads a file, runs a deck or follows an `#include`.
 """
@@ -14,31 +14,33 @@ from typing import Any
 from met.frozen import frozen
 
 CONTEXT = 1
-"""Lines that are shown about a difference."""
+"""Number of lines that are shown around a difference."""
 
 MOST_COMPARED = 4_000
-"""Lines, from the first that differs to the last, that are compared one by one: the time is the square of it."""
+"""Largest number of lines, from the first to the last difference, that are compared one by one: the time grows with its
+square."""
 
 LONGEST_READ = 1_000_000
-"""Characters of a file that is searched for names: longer ones take seconds, and nobody wrote them."""
+"""Largest size, in characters, of a file that is searched for names: longer ones take seconds, and are not written by
+hand."""
 
 LONGEST_VALUE = 60
-"""Characters of a macro's text that are shown."""
+"""Largest number of characters of a macro's text that are shown."""
 
 MOST_MOVED = 30
-"""Files of either that are looked for under another name."""
+"""Largest number of files on either side that are searched for under another name."""
 
 OF_ARGUMENTS = "()"
-"""Ending of the names of macros with arguments, whose text says little alone."""
+"""Ending of the names of macros with arguments, whose text alone says little."""
 
 ALIKE = 0.5
-"""Share of the lines that a file has with one of another name, so that it is taken for the same."""
+"""Share of common lines from which files of different names count as the same."""
 
 
 @frozen
 class DeckFileChange:
-    """A file of the decks that differs. said: how, in words; lines: what differs as a unified difference, without its
-    heads; none where a file is new or gone, or too long to be compared."""
+    """A deck file that differs. said: in words; lines: a unified difference without its heads, empty where a file is
+    new or gone, or too long to be compared."""
 
     said: str
     lines: tuple[str, ...] = ()
@@ -108,7 +110,7 @@ def _pairs(a: Mapping[str, str], b: Mapping[str, str]) -> list[tuple[str, str]]:
 
 
 def _alike(old: str, new: str, before: Counter[str], now: Counter[str]) -> float:
-    """The share of lines that two files have in common; more than all where they have one name in other folders."""
+    """The share of lines that two files have in common; above 1 where they have the same name in different folders."""
     return _share(before, now) + float(PurePosixPath(old).name == PurePosixPath(new).name)
 
 
@@ -131,7 +133,7 @@ def _lines(count: int) -> str:
 
 
 def _unified(before: Sequence[str], now: Sequence[str]) -> Iterator[str]:
-    """The lines that differ, each with a mark, under the numbers of the lines: as `diff -U1` has them."""
+    """The differing lines, each with a mark, under their line numbers, as in `diff -U1`."""
     first = next((i for i, (x, y) in enumerate(zip(before, now, strict=False)) if x != y), min(len(before), len(now)))
     most = min(len(before), len(now)) - first
     backwards = zip(reversed(before), reversed(now), strict=False)
@@ -156,8 +158,7 @@ def _unified(before: Sequence[str], now: Sequence[str]) -> Iterator[str]:
 
 
 def _names(a: Mapping[str, str], b: Mapping[str, str]) -> Iterator[str]:
-    """`let`s and macros of both decks that have another text; one that is written several times is left to its
-    lines."""
+    """`let`s and macros of both decks whose texts differ; one that is written several times is left to its lines."""
     old, new = (
         _written({name: text for name, text in mine.items() if other.get(name) != text})
         for mine, other in ((a, b), (b, a))
@@ -215,5 +216,5 @@ def _of_file(name: str, text: str) -> Iterator[tuple[int, str, str]]:
 
 
 def _text(tokens: Sequence[Any]) -> str:
-    """The text of a line as it was written, without comments and with single spaces."""
+    """The text of a line without comments and with single spaces."""
     return " ".join("".join(each.text for each in tokens).split())

@@ -1,4 +1,4 @@
-"""What is required of two archives: which requirements are others, and which cases meet them before and now."""
+"""Changes in the requirements of two archives, and in the cases that meet them."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from batch.queries.step_errors.limits import verdicts
 
 
 def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: ExperimentDiff) -> None:
-    """Count the matched cases that meet each requirement in a and in b; one whose limit is another is taken for the
-    same. Requirements of one archive alone are noted."""
+    """Count the matched cases that meet each requirement in a and in b; a requirement whose limit has changed counts as
+    the same. Requirements of one archive only are noted."""
     met_a, met_b = _met(a, matched.a), _met(b, matched.b)
     known_a, known_b = ({each.text: each for each in requirements.group_requirements(group)} for group in (a, b))
     now = {text: text for text in met_a if text in met_b}
@@ -65,7 +65,7 @@ def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases
 
 
 def _compare_step_errors(a: ArchiveGroup, b: ArchiveGroup, out: ExperimentDiff) -> None:
-    """Note requirements on errors by the step that are met otherwise than before, or are required in one archive."""
+    """Note requirements on errors due to the step whose verdict has changed, or that only one archive has."""
     before, now = ({each.text: each for each in verdicts(group, figures(group))} for group in (a, b))
     for text in [*before, *(text for text in now if text not in before)]:
         one, other = before.get(text), now.get(text)
@@ -79,7 +79,7 @@ def _compare_step_errors(a: ArchiveGroup, b: ArchiveGroup, out: ExperimentDiff) 
 
 
 def _compare_evidence(a: ArchiveGroup, b: ArchiveGroup, now: Mapping[str, str], out: ExperimentDiff) -> None:
-    """Pair the rows of both tables of evidence. now: the text in b of each requirement of a that both have."""
+    """Pair the rows of both tables of evidence. now: the text in b of each common requirement of a"""
     one, other = (requirement_evidence([group], str(group.path), several=True) for group in (a, b))
     rows = {(row.requirement, row.at): row for row in other}
     for row in one:
@@ -98,14 +98,14 @@ def _met(group: ArchiveGroup, cases: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _unlike(one: requirements.GroupRequirement | None, other: requirements.GroupRequirement | None) -> bool:
-    """True if two requirements ask for something else; those of which no limit is known differ in their texts alone."""
+    """True if two requirements demand something different; those without a known limit differ only by their texts."""
     return one is not None and other is not None and (one.comparison, one.limit) != (other.comparison, other.limit)
 
 
 def _limits(
     group: ArchiveGroup, one: requirements.GroupRequirement | None, other: requirements.GroupRequirement | None
 ) -> tuple[str, str]:
-    """The limits of two requirements in the deck's unit, where one text stands for both, as `settle < longest`."""
+    """The limits of two requirements in the deck's unit, where both have the same text, as `settle < longest`."""
     if one is None or other is None or one.limit == other.limit:
         return "", ""
     scale, unit = deck_unit(group.variables[other.metric])

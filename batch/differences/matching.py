@@ -1,4 +1,4 @@
-"""Which experiment, case and signal of one archive is which of the other.
+"""Matching of the experiments, cases and signals of two archives.
 
 Experiments are matched by name, or where each archive has one alone; cases by their case_key, which is made from what
 is varied alone; so the order of cases, and what else is in the archive, do not matter.
@@ -14,12 +14,12 @@ from batch.archive.read import ArchiveFile, ArchiveGroup
 from met.frozen import frozen
 
 BLOCK = 1 << 16
-"""Names of cases that are read at a time."""
+"""Number of names of cases that are read at a time."""
 
 
 @frozen
 class MatchedCases:
-    """Matched cases, by their positions in the two groups; and positions of those that one of them has alone."""
+    """Matched cases, by their positions in the two groups; and positions of cases that only one of them has."""
 
     a: np.ndarray
     b: np.ndarray
@@ -34,7 +34,7 @@ class MatchedCases:
 def match_experiments(
     a: ArchiveFile, b: ArchiveFile
 ) -> tuple[list[tuple[ArchiveGroup, ArchiveGroup]], list[ArchiveGroup], list[ArchiveGroup]]:
-    """Matched groups, and those that one archive has alone."""
+    """Matched groups, and those that only one archive has."""
     if len(a.groups) == len(b.groups) == 1:
         return [(a.groups[0], b.groups[0])], [], []
     theirs = {group.name: group for group in b.groups}
@@ -74,7 +74,7 @@ def _keys(group: ArchiveGroup) -> np.ndarray:
 
 
 def _nth(keys: np.ndarray) -> np.ndarray:
-    """Sorted keys, each with which of its equals it is."""
+    """Sorted keys, each with its number among its equals."""
     starts = np.concatenate([[True], keys[1:] != keys[:-1]]) if len(keys) else np.empty(0, bool)
     place = np.arange(len(keys))
     nth = place - np.maximum.accumulate(np.where(starts, place, 0))

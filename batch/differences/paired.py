@@ -1,5 +1,5 @@
-"""Whether two versions that ran the same cases differ by more than chance: McNemar's test of each requirement, and the
-sign test of each metric.
+"""Paired comparison of two versions that ran the same cases: McNemar's test of each requirement, and the sign test of
+each metric.
 
 Each case is a pair, which is far sharper than two shares with an interval each. The probabilities of all requirements
 and metrics of an experiment are corrected for their number by Holm's method.
@@ -13,11 +13,11 @@ from batch.differences.result import ExperimentDiff
 from met.statistics.significance import holm, sign_test
 
 LEVEL = 0.05
-"""Probability of calling any difference of an experiment shown that is due to chance."""
+"""Probability, over all differences of an experiment, of calling one shown that is due to chance."""
 
 
 def judge_pairs(found: ExperimentDiff) -> None:
-    """Give requirements and metrics of an experiment the probability that chance makes them differ so one-sidedly.
+    """Give requirements and metrics of an experiment the probability that pairs differ so one-sidedly by chance.
 
     One case is no sample, and requirements of which each version has another limit are not compared.
     """

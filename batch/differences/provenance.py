@@ -1,4 +1,5 @@
-"""What made two archives: which decks, names, parameters, models and versions differ, causes before what follows."""
+"""Differences in the provenance of two archives: decks, names, parameters, models and versions, causes before
+effects."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from met.run import comparable
 
 @frozen
 class ProvenanceChanges:
-    """Differences of what two archives were made from, in words.
+    """Differences in the provenance of two archives, in words.
 
     versions   of MET, its libraries and its commit
     decks      files of the decks that differ, and how
@@ -40,7 +41,7 @@ class ProvenanceChanges:
 def provenance_changes(
     a: ArchiveFile, b: ArchiveFile, pairs: Sequence[tuple[ArchiveGroup, ArchiveGroup]], plans: Sequence[Plan | str]
 ) -> ProvenanceChanges:
-    """Compare what two archives were made from. plans: of each, or why it cannot be read here."""
+    """Compare the provenance of two archives. plans: of each, or the reason why it cannot be read here"""
     texts = decks(a.sources(), b.sources())
     meaning, follows, defaults = _meaning(plans, pairs, texts)
     causes = [*_defines(a, b), *(texts.names if meaning or follows else ())]
@@ -57,13 +58,13 @@ def provenance_changes(
 
 
 def _other_code(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
-    """True if two code keys differ; not so where one archive has none, or one of another kind."""
+    """True if two code keys differ; False where one archive has none, or one of another kind."""
     one, two = a.get("code_key"), b.get("code_key")
     return comparable(one, two) and one != two
 
 
 def _other_results(a: ArchiveGroup, b: ArchiveGroup) -> Iterator[str]:
-    """The metrics and signals that two groups of one program compute otherwise."""
+    """The metrics and signals that two groups of one program compute differently."""
     if not _other_code(a.attributes, b.attributes):
         for name, variable in a.variables.items():
             other = b.variables.get(name)
@@ -105,8 +106,8 @@ def _dirty(dirty: str) -> str:
 def _meaning(
     plans: Sequence[Plan | str], pairs: Sequence[tuple[ArchiveGroup, ArchiveGroup]], texts: Decks
 ) -> tuple[list[str], list[str], list[str]]:
-    """Changes of matched experiments: those that were written, and those that follow; parameters that are new, and have
-    their defaults, apart. What is so in all of several experiments is told once."""
+    """Changes of matched experiments: written ones, and those that follow; new parameters with their defaults apart. A
+    change in all of several experiments is reported once."""
     before, now = plans
     if isinstance(before, str) or isinstance(now, str):
         return [f"the plan cannot be read here: {why}" for why in plans if isinstance(why, str)], [], []
@@ -141,7 +142,7 @@ def _follows(change: Change, texts: Decks) -> bool:
     return change.follows or not any(
         place is not None and ((place.file, place.line) in lines or place.file not in texts.known)
         for place, lines in written
-    )  # what stands in no file was written on a command line
+    )  # values without a file were written on a command line
 
 
 def _names(plan: Plan) -> set[str]:
@@ -149,7 +150,7 @@ def _names(plan: Plan) -> set[str]:
 
 
 def _tolerances(before: Experiment, now: Experiment) -> Iterator[str]:
-    """Another tolerance changes no number, but what is said of them."""
+    """Changes of tolerances, which change no number but its verdict."""
     old, new = ({each.of: each for each in one.tolerances} for one in (before, now))
     for name in dict.fromkeys([*old, *new]):
         texts = [one[name].text if name in one else "none" for one in (old, new)]

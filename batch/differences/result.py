@@ -1,4 +1,4 @@
-"""What is found when two archives are compared: of signals, of cases, of experiments, of all."""
+"""Results of a comparison of two archives: for signals, cases, experiments, and the whole."""
 
 from __future__ import annotations
 
@@ -95,14 +95,14 @@ class SignalDiff:
 
     @property
     def share(self) -> float:
-        """The largest difference as a share of what the values of a span."""
+        """The largest difference as a share of the span of a's values."""
         span = self.high - self.low
         return self.largest / span if span > 0.0 else float("inf") if self.largest else 0.0
 
 
 @frozen
 class EndingDiff:
-    """A case that ended otherwise: position in the case table, id, status, cause and rows in a and b."""
+    """A case with another ending: position in the case table, id, status, cause and rows in a and b."""
 
     case: int
     case_id: str
@@ -154,7 +154,7 @@ class RequirementDiff:
 
     @property
     def has_changed(self) -> bool:
-        """True if the requirement is another, or is met by another number of cases."""
+        """True if the requirement has changed, or is met by another number of cases."""
         return self.other or self.before != self.now or self.met_before != self.met_now
 
 
@@ -193,7 +193,7 @@ class ExperimentDiff:
 
     @property
     def other_requirements(self) -> bool:
-        """True if the two do not require the same."""
+        """True if the two have different requirements."""
         return bool(self.required_in_one) or any(each.other for each in self.requirements)
 
     @property
@@ -202,7 +202,7 @@ class ExperimentDiff:
 
     @property
     def of_values(self) -> str:
-        """The verdict on cases, how they end, and values, whatever is required of them."""
+        """The verdict on cases, their endings and values, without requirements."""
         found = [signal.verdict for signal in self.signals]
         if self.ended or self.only_a or self.only_b:
             found.append(DIFFERENT)
@@ -235,7 +235,7 @@ class Diff:
 
     @property
     def of_values(self) -> str:
-        """The verdict on all but requirements."""
+        """The verdict on everything but requirements."""
         found = [experiment.of_values for experiment in self.experiments]
         if not found:
             return INCOMPARABLE

@@ -1,5 +1,5 @@
-"""Metrics as distributions: where seeds differ or motion is chaotic, single cases differ by chance, and only what they
-are like together can be compared.
+"""Metrics as distributions: where seeds differ or motion is chaotic, single cases differ by chance, and only their
+distributions can be compared.
 
 Each metric is compared by the two-sample test of Kolmogorov and Smirnov; as there are several, the probabilities are
 corrected by Holm's method, so that one false alarm among all of them has the stated probability at most.

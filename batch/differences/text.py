@@ -1,4 +1,4 @@
-"""What changed, for people: what made the two, status first, then signals and metrics, then the worst cases."""
+"""A comparison as text for people: provenance, status, signals and metrics, and then the worst cases."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from ic.printing.columns import columns
 from met.frozen import frozen
 
 MOST_LINES, OF_KIND = 12, {"deck": 24, "follows": 6}
-"""Lines of one kind of change that are printed; for some kinds another number."""
+"""Largest number of printed lines of one kind of change; other numbers for some kinds."""
 
 SHOWN_ENDED, SHOWN_WORST, SHOWN_EVIDENCE = 8, 5, 12
 
 LONGEST = 120
-"""Characters of a deck's line."""
+"""Largest number of characters of a deck's line."""
 
 
 @frozen
@@ -26,13 +26,13 @@ class Shortening:
     remedy: str = "`met diff ... --all`"
 
     def cut(self, lines: Sequence[str], most: int, indent: str) -> list[str]:
-        """The first of the lines, and how many more there are."""
+        """The first of the lines, and the number of omitted ones."""
         left = 0 if self.every else max(0, len(lines) - most)
         return [*lines[: len(lines) - left], *([f"{indent}and {left:,} more: {self.remedy}"] if left else [])]
 
 
 def diff_lines(found: Diff, cut: Shortening | None = None) -> list[str]:
-    """The whole comparison in lines, for people; a line about what is left out says how to see it."""
+    """The whole comparison in lines, for people; a line about omitted parts says how to see them."""
     cut = cut or Shortening()
     out = [f"a  {found.a}", f"b  {found.b}", *_changed(found, cut)]
     for line in words.unmatched_runs(found):
@@ -68,7 +68,7 @@ def _experiment(found: Diff, experiment: ExperimentDiff, cut: Shortening) -> lis
 
 
 def _evidence(experiment: ExperimentDiff, cut: Shortening) -> list[str]:
-    """Lines on what the cases show of requirements over a share of cases, where that is something else than before."""
+    """Lines on requirements over a share of cases whose evidence has changed."""
     both = [f"    {what}\n      {said}" for what, said in words.evidence_pairs(experiment)]
     lines = [line for each in cut.cut(both, SHOWN_EVIDENCE, "    ") for line in each.split("\n")]
     return [f"  {words.EVIDENCE}:", *lines] if lines else []

@@ -1,4 +1,4 @@
-"""How much may differ: `qd=1e-6rad/s, settle=0.04s, rel=1e-9, time=1ms`; nothing may unless it is given.
+"""Tolerances of comparisons, `qd=1e-6rad/s, settle=0.04s, rel=1e-9, time=1ms`; without one, nothing may differ.
 
 The deck says so in `tolerances { }`, and its archives with it; the command line has its way over the deck.
 """
@@ -39,7 +39,7 @@ class SignalTolerance:
 
 @frozen
 class Tolerances:
-    """Allowed differences: relative and time (s) of all, None where nothing is said; and absolute, by the name of a
+    """Allowed differences: relative and time (s) of all, None where nothing is given; and absolute, by the name of a
     signal, of a joint's part of one (`elbow.q`), or of a metric: SI value, and as it was written.
 
     alone   whether decks have no say in it
@@ -59,7 +59,7 @@ class Tolerances:
         return SignalTolerance(self.absolute.get(name, (0.0, ""))[0], self.relative or 0.0, self.time or 0.0)
 
     def over(self, deck: Tolerances) -> Tolerances:
-        """These tolerances, and for all that they leave open those of a deck."""
+        """These tolerances, completed by those of a deck."""
         if self.alone:
             return self
         relative = deck.relative if self.relative is None else self.relative
@@ -67,12 +67,12 @@ class Tolerances:
         return Tolerances(relative, time, {**deck.absolute, **self.absolute})
 
     def within(self, known: Mapping[str, Sequence[str]]) -> Tolerances:
-        """Without those of something that has another unit here. known: as `check` has it."""
+        """The tolerances without those of a quantity with another unit here. known: as for `check`"""
         fit = {name: each for name, each in self.absolute.items() if name not in known or fits(each[1], known[name])}
         return replace(self, absolute=fit)
 
     def said(self, names: Mapping[str, str]) -> dict[str, str]:
-        """Tolerances as they were written, by the names that `names` gives them."""
+        """Tolerances as they were written, under the names that `names` gives them."""
         return {called: self.absolute[name][1] for called, name in names.items() if name in self.absolute}
 
     def words(self) -> list[str]:
@@ -85,7 +85,7 @@ class Tolerances:
 
 
 def of_deck(experiment: Experiment, group: ArchiveGroup) -> Tolerances:
-    """The tolerances of an archive's deck. group: of the archive, in which a metric may be called otherwise."""
+    """The tolerances of an archive's deck. group: of the archive, in which a metric may have another name"""
     metrics = {variable.path: variable.name for variable in group.role("metric")}
     signals = {recorded.name for recorded in experiment.structure.record}
     found = {each.of: each for each in experiment.tolerances}
@@ -129,15 +129,15 @@ def tolerances(texts: Iterable[str]) -> Tolerances:
 
 
 def fits(written: str, known: Sequence[str]) -> bool:
-    """True if a tolerance as it was written has the one unit of what it is of."""
+    """True if a tolerance as it was written has the single unit of its quantity."""
     wanted, *others = known
     unit = written.partition(" ")[2]
     return not others and units.same(parse_unit(unit or "1").dimension, parse_unit(wanted or "1").dimension)
 
 
 def check(found: Tolerances, known: Mapping[str, Sequence[str]], shown: Sequence[str]) -> None:
-    """Check that every tolerance of the command line is of something, in its unit. known: SI units by the names of
-    signals, joints' parts of them and metrics, several where a signal's joints have several. Raises E360."""
+    """Check that every tolerance of the command line names a quantity, and has its unit. known: SI units by the names
+    of signals, joints' parts of them and metrics, several where a signal's joints have several. Raises E360."""
     for name, (_, written) in found.absolute.items():
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1)

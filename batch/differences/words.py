@@ -1,4 +1,4 @@
-"""What a difference is in words, part by part, as plain data: `text` sets them in lines, a report in a page."""
+"""Differences in words, part by part, as plain data, which `text` sets in lines and a report in a page."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from met.messages.visible import visible
 from met.outputs import quoted
 
 EVIDENCE = "requirements over cases"
-"""What is said before `evidence_lines`."""
+"""The heading of `evidence_lines`."""
 
 PAIRED = "metrics, case by case"
-"""The heading of what pairs of the same cases show of metrics."""
+"""The heading of metrics compared in pairs of the same cases."""
 
 SMALLEST = 1e-9
-"""Probabilities below this one are not told apart."""
+"""Smallest probability that is printed exactly."""
 
 SAME = "made from the same: deck, parameters, models and versions"
 
 
 def provenance_lines(found: Diff) -> list[tuple[str, tuple[str, ...]]]:
-    """Differences of what the two were made from: kind and lines of each, causes before what follows from them. An
-    indented line belongs to the one above."""
+    """Differences in provenance: kind and lines of each, causes before effects. An indented line belongs to the one
+    above."""
     changed = found.changed
     why = ": constants are part of it" if changed.meaning or changed.structure else ""
     said = [
@@ -54,7 +54,7 @@ def provenance_lines(found: Diff) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def unmatched_runs(found: Diff) -> list[str]:
-    """Runs and sweeps that one archive has alone."""
+    """Runs and sweeps that only one archive has."""
     both = ((found.only_a, found.a), (found.only_b, found.b))
     return [f"`{name}` is only in {where}" for names, where in both for name in names]
 
@@ -69,7 +69,7 @@ def heading(experiment: ExperimentDiff) -> str:
 
 
 def unmatched_cases(found: Diff, experiment: ExperimentDiff) -> list[str]:
-    """Cases that one archive has alone."""
+    """Cases that only one archive has."""
     return [
         f"{len(cases):,} case{'s' if len(cases) > 1 else ''} only in {where}: {ranges(cases)}"
         for cases, where in ((experiment.only_a, found.a), (experiment.only_b, found.b))
@@ -78,14 +78,14 @@ def unmatched_cases(found: Diff, experiment: ExperimentDiff) -> list[str]:
 
 
 def tolerance_lines(found: Diff, experiment: ExperimentDiff) -> list[str]:
-    """The tolerances, and who gives them."""
+    """The tolerances, and their sources."""
     mine, every = set(found.tolerances.words()), experiment.tolerances.words()
     both = (("the deck of b", [each for each in every if each not in mine]), ("--tol", sorted(mine & set(every))))
     return [f"{who} allows {', '.join(what)}" for who, what in both if what]
 
 
 def requirement_lines(experiment: ExperimentDiff) -> list[str]:
-    """Lines about requirements that are others, or are met by another number of cases."""
+    """Lines about requirements that have changed, or are met by another number of cases."""
     count = experiment.cases.count
     return [
         f"require {requirement_text(each)}  {met_by_text(each.met_before, each.met_now, count)}{pairs_text(each)}"
@@ -95,7 +95,7 @@ def requirement_lines(experiment: ExperimentDiff) -> list[str]:
 
 
 def evidence_pairs(experiment: ExperimentDiff) -> list[tuple[str, str]]:
-    """Requirements over a share of cases of which the cases show something else than before, and what."""
+    """Requirements over a share of cases whose evidence has changed, and the change."""
     lines = []
     for each in experiment.evidence:
         before, now = texts_of(each.before), texts_of(each.now)
@@ -110,15 +110,15 @@ def evidence_pairs(experiment: ExperimentDiff) -> list[tuple[str, str]]:
 
 
 def pairs_text(each: RequirementDiff) -> str:
-    """The end of a line: how many cases meet it in one archive alone, and whether that is more than chance."""
+    """The end of a line: the number of cases that meet it in only one archive, and whether that is more than chance."""
     if math.isnan(each.chance) or not each.gained + each.lost:
         return ""
     return f"; {each.gained:,} gained, {each.lost:,} lost: {_chance(each.chance)}"
 
 
 def paired_metrics(experiment: ExperimentDiff) -> list[str]:
-    """For each metric that differs in several cases, in how many it rose and fell, and whether that is more than
-    chance."""
+    """For each metric that differs in several cases, the numbers of cases in which it rose and fell, and whether that
+    is more than chance."""
     return [
         f"{each.name} rose in {each.higher:,} of {each.compared:,}, fell in {each.lower:,}: {_chance(each.chance)}"
         for each in experiment.signals
@@ -133,20 +133,20 @@ def _chance(chance: float) -> str:
 
 
 def requirement_text(each: RequirementDiff) -> str:
-    """A requirement, and what it was before where it is another."""
+    """A requirement, with its former text where it has changed."""
     before, now = each.limits
     text = each.now if each.before == each.now else f"{each.now} (before: {each.before})"
     return f"{text} (limit before: {before}, now: {now})" if now else text
 
 
 def met_by_text(before: int, now: int, of: int) -> str:
-    """Say by how many of the cases in both a requirement is met."""
+    """The numbers of common cases that meet a requirement, in words."""
     return f"met by {before:,}, now by {now:,} of {of:,}"
 
 
 @frozen
 class Ending:
-    """Cases that end otherwise alike: how, which they are, and each of them."""
+    """Cases with the same change of ending: the change, the cases, and each of them."""
 
     text: str
     cases: str
@@ -154,7 +154,7 @@ class Ending:
 
 
 def endings(experiment: ExperimentDiff) -> list[Ending]:
-    """Group the cases that end otherwise by how; those that fail now come first."""
+    """Group the cases with another ending by the change; those that fail now come first."""
     kinds: dict[str, list[EndingDiff]] = {}
     for each in experiment.ended:
         kinds.setdefault(_kind(each), []).append(each)
@@ -184,7 +184,7 @@ def _one(kind: str, count: int) -> str:
 
 
 def cause(each: EndingDiff) -> str:
-    """Why it ended so, now or before."""
+    """The cause of the ending, now or before."""
     return f"{'' if each.after else 'before: '}{each.cause_after or each.cause_before}"
 
 
@@ -247,12 +247,12 @@ SIGNAL_COLUMNS = (
 
 
 def signal_columns(rows: Sequence[SignalRow]) -> list[DiffColumn]:
-    """The columns that these rows have something in."""
+    """The columns that are not empty in these rows."""
     return [column for column in SIGNAL_COLUMNS if column.always or any(getattr(row, column.field) for row in rows)]
 
 
 def signal_row(signal: SignalDiff) -> SignalRow:
-    """The row of a signal or metric, in the unit that people read it in."""
+    """The row of a signal or metric, in the unit for people."""
     if signal.verdict == INCOMPARABLE:
         return SignalRow(signal.name, INCOMPARABLE, signal.why)
     if signal.verdict == IDENTICAL:
@@ -296,7 +296,7 @@ def _by_step(signal: SignalDiff) -> str:
 
 
 def step_error_note(experiment: ExperimentDiff) -> str:
-    """A note on the metrics that differ by no more than their errors by the step; "" where none does."""
+    """A note on the metrics whose differences are within their errors due to the step; "" where there are none."""
     names = [f"`{signal.name}`" for signal in experiment.signals if signal.within_step_error]
     if not names:
         return ""
@@ -327,7 +327,7 @@ def _used(share: float) -> str:
 
 @frozen
 class Distribution:
-    """A metric as a sample of each archive: cases that have a value, medians, distance, and how likely by chance; a
+    """A metric as a sample of each archive: cases with a value, medians, distance, and its probability by chance; a
     star where that is less than `LEVEL`."""
 
     name: str
@@ -338,7 +338,7 @@ class Distribution:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Its row, under `DISTRIBUTION_HEADS`; all but the first are numbers."""
+        """The row under `DISTRIBUTION_HEADS`; all cells but the first are numbers."""
         return self.name, *self.cases, *self.medians, self.distance, self.chance
 
 
@@ -415,7 +415,7 @@ def _again(path: Path, name: str, case: int) -> str:
 
 
 def distinct_texts(before: float, after: float) -> tuple[str, str]:
-    """Two numbers in as few digits as tell them apart, but four at least."""
+    """Two numbers in the fewest digits, but at least four, that distinguish them."""
     for digits in range(4, 18):
         texts = f"{before:.{digits}g}", f"{after:.{digits}g}"
         if texts[0] != texts[1]:
@@ -424,11 +424,11 @@ def distinct_texts(before: float, after: float) -> tuple[str, str]:
 
 
 MOST_REQUIREMENTS = 3
-"""Requirements that the verdict names."""
+"""Largest number of requirements that the verdict names."""
 
 
 def verdict(found: Diff) -> str:
-    """The verdict in a sentence: on values, and where requirements are others, on these first."""
+    """The verdict in a sentence: on values, and first on changed requirements."""
     others = [text for experiment in found.experiments for text in _other_requirements(experiment)]
     if not others:
         return _of_values(found)
@@ -438,7 +438,7 @@ def verdict(found: Diff) -> str:
 
 
 def _other_requirements(experiment: ExperimentDiff) -> list[str]:
-    """`settle < 10 s -> settle < 1 s (30 of 36 cases no longer meet it)`"""
+    """The changed requirements: `settle < 10 s -> settle < 1 s (30 of 36 cases no longer meet it)`."""
     out, of = [], f" of {experiment.cases.count:,}"
     for each in experiment.requirements:
         if each.other:
@@ -454,7 +454,7 @@ def _other_requirements(experiment: ExperimentDiff) -> list[str]:
 
 
 def _of_values(found: Diff) -> str:
-    """The verdict on all but what is required."""
+    """The verdict on everything but requirements."""
     of_values = found.of_values
     said = {
         IDENTICAL: "identical, to the bit",
