@@ -77,7 +77,7 @@ def export(
     layout   of an MCAP: also write how Foxglove shows it, in `<output>.layout.json`
     force    write over a file that is there, whatever it is
 
-    Raises met.diagnostic.Problem for what a user can mend.
+    Raises met.diagnostic.Problem for mistakes that a user can correct.
     """
     from batch.archive.read import ArchiveFile
     from batch.export import case_table
@@ -109,7 +109,7 @@ def export(
 
 
 def _row(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: Sequence[str]) -> Rows:
-    """The rows of a table where nobody names them: cases if there are several, else instants."""
+    """The rows of a table by default: cases if there are several, else instants."""
     from batch.queries.groups import groups_named
 
     groups = groups_named(file, tuple(runs) or (file.groups[0].sweep or file.groups[0].name,))
@@ -118,7 +118,7 @@ def _row(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: 
 
 
 def summary(done: Exported) -> str:
-    """Say in words what an export holds, for the line that names its file."""
+    """The contents of an export in words, for the line that names its file."""
     if done.table == "evidence":
         return f": evidence, {done.rows:,} row{'s' if done.rows != 1 else ''}, one a requirement at a design point"
     cases = f"{done.cases:,} case{'s' if done.cases != 1 else ''}"

@@ -1,4 +1,4 @@
-"""What a case says of itself: lines of a log at their times, and its result as one message."""
+"""The log of a case, with lines at their times, and its result as one message."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class LogLine:
 
 
 def log_lines(case: ExportedCase) -> list[LogLine]:
-    """The log of a case in the order of time: its name, how it ended and when, which requirements it met."""
+    """The log of a case in the order of time: its name, its end, and the requirements that it met."""
     group, position = case.group, case.position
     status, cause = int(_at(group, "status", position)), str(_at(group, "cause", position))
     end = ends(case)
@@ -58,7 +58,7 @@ def log_lines(case: ExportedCase) -> list[LogLine]:
 
 
 def ends(case: ExportedCase) -> float:
-    """When a case ended, s: after its last row, at the instant when it failed if it says so."""
+    """The end of a case, s: after its last row; for a failed one, the instant of the failure, if its cause names it."""
     last = float(case.time[-1]) if len(case.time) else 0.0
     group, position = case.group, case.position
     if int(_at(group, "status", position)) == FAILED:
@@ -71,7 +71,7 @@ def ends(case: ExportedCase) -> float:
 
 
 def result(case: ExportedCase) -> tuple[tuple[MessageField, ...], dict[str, Any]]:
-    """The result of a case as a message: its fields and what is in them, in SI."""
+    """The result of a case as a message: its fields and their contents, in SI."""
     group, position = case.group, case.position
     metrics = group.role("metric")
     numbers = (MessageField("name", "string"), MessageField("value"), MessageField("unit", "string"))

@@ -1,5 +1,5 @@
-"""A table of cases: a row a case, with what is varied in it, how it ended, its metrics and whether it meets each
-requirement. `csv` and `parquet` write it."""
+"""A table of cases for `csv` and `parquet`: a row for each case, with its varied values, its end, its metrics, and
+whether it meets each requirement."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class CaseTable:
         return len(self.places[0])
 
     def blocks(self) -> Iterator[list[list[object]]]:
-        """All rows, some at a time: of each field its values, None where a cell is empty."""
+        """All rows, a block at a time: the values of each field, None where a cell is empty."""
         for first in range(0, self.count, BLOCK):
             group_of, positions = (each[first : first + BLOCK] for each in self.places)
             yield [self._column(field, group_of, positions) for field in self.fields]
@@ -64,8 +64,8 @@ class CaseTable:
 
 
 def table(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], *, deck: bool = False) -> CaseTable:
-    """The cases of these runs and sweeps (none: of the first), in the order they are asked for (none: all, by their
-    positions). deck: numbers in the deck's units. Raises Problem E325, E328."""
+    """The cases of these runs and sweeps (none: of the first), in the given order (none: all, by their positions).
+    deck: numbers in the deck's units. Raises Problem E325, E328."""
     names = tuple(runs) or (file.groups[0].sweep or file.groups[0].name,)
     groups = groups_named(file, names)
     if cases:
@@ -87,7 +87,7 @@ def table(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], *, deck:
 
 
 def _fields(groups: Sequence[ArchiveGroup], *, deck: bool) -> Iterator[TableColumn]:
-    """The columns: which case it is, what is varied, how it ended, metrics, requirements."""
+    """The columns: the case, its varied values, its end, metrics, requirements."""
     if len({group.sweep or group.name for group in groups}) > 1:
         yield TableColumn("run", "", "run or sweep", "str")
     yield TableColumn("case", "1", "position in the case table", "int", "case")
@@ -115,7 +115,7 @@ def varied(groups: Sequence[ArchiveGroup]) -> list[Stored]:
 
 
 def of_varied(variable: Stored, *, deck: bool) -> TableColumn:
-    """The column of what is varied: a deck may vary a `let run`."""
+    """The column of a varied quantity: a deck may vary a `let run`."""
     name = f"coordinates.{variable.name}" if variable.name == "run" else variable.name
     if variable.role == "choice":
         return TableColumn(name, "", variable.long_name, "str", variable.name)
@@ -124,7 +124,7 @@ def of_varied(variable: Stored, *, deck: bool) -> TableColumn:
 
 
 def in_unit(variable: Stored, *, deck: bool) -> tuple[str, float]:
-    """The unit of a variable, and what its SI values are divided by. deck: as the deck writes it, where it does."""
+    """The unit of a variable, and the divisor of its SI values. deck: the deck's unit, if it has one"""
     if not deck or "deck_unit" not in variable.attributes:
         return variable.unit, 1.0
     return str(variable.attributes["deck_unit"]), float(variable.attributes.get("deck_scale", 1.0))

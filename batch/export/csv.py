@@ -5,8 +5,8 @@
     case,gearbox.kp,time,shoulder.q,elbow.q,shoulder.qd
 
 `#` begins a comment (`pandas.read_csv(path, comment="#")`). Numbers are written so that reading gives the same bits.
-Of histories the column `run` is there where there are several, `case` and what is varied where there are cases. No
-name begins as a formula of a spreadsheet does.
+Histories have the column `run` where there are several runs, and `case` and varied parameters for cases. No name begins
+like a spreadsheet's formula.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from met.messages.visible import line
 from met.version import VERSION
 
 BEGINS = "=+-@\t\r\uff1d\uff0b\uff0d\uff20"
-"""Characters by which a spreadsheet takes a cell for a formula; no name that a deck gives begins so."""
+"""Characters by which a spreadsheet takes a cell for a formula; no name of a deck begins with one."""
 
 
 NUMBER = re.compile("[0-9]+(e[0-9]+)?")
-"""A case_id, of sixteen digits from 0 to f, that a reader takes for a number: one in a thousand is."""
+"""A case_id, of sixteen digits from 0 to f, that a reader takes for a number, as one in a thousand."""
 
 
 def safe_word(text: str) -> str:
-    """A word that no spreadsheet takes for a formula: what begins as one gets an apostrophe before it. What begins with
-    an apostrophe gets one, too, so that who takes the first away has the word again."""
+    """A word that no spreadsheet takes for a formula: an apostrophe is put before one that looks like it, and before a
+    word that begins with an apostrophe, so that the original is always found by removing the first."""
     return f"'{text}" if text[:1] in (*BEGINS, "'") else text
 
 
 def _remark(text: str) -> str:
-    """Text behind `#`, with an apostrophe where a spreadsheet, which cuts it into cells, would see a formula."""
+    """Text after `#`, with an apostrophe where a spreadsheet, which cuts it into cells, would see a formula."""
     return re.sub(rf"([,;]\s*)(?=[{re.escape(BEGINS)}])", r"\1'", line(text))
 
 
@@ -98,7 +98,7 @@ def write_rows(file: ArchiveFile, table: CaseTable | EvidenceColumns, output: Pa
 
 
 def _head(file: ArchiveFile, runs: Iterable[str], heads: Sequence[tuple[str, str]]) -> bytes:
-    """The first lines: what the table is of, the columns' units, their names."""
+    """The first lines: the contents of the table, the columns' units, their names."""
     head = io.StringIO()
     lines = csv.writer(head, lineterminator="\n")
     about = _remark(f"{', '.join(runs)} of {' '.join(file.deck.split())}")
@@ -117,12 +117,12 @@ def _column(field: TableColumn, values: Sequence[object]) -> list[str]:
 
 
 def _line(cells: Sequence[object]) -> list[str]:
-    """Cells as CSV has them: numbers as `repr` writes them, words in quotes where they need some."""
+    """Cells of a CSV line: numbers as by `repr`, words in quotes where they need them."""
     return [_cell(cell) if isinstance(cell, str) else "" if cell is None else repr(cell) for cell in cells]
 
 
 def _cells(case: ExportedCase, columns: Sequence[SignalColumn]) -> list[list[str]]:
-    """The numbers of each column as texts; empty ones where the case has no such column."""
+    """The numbers of each column as texts; empty ones where the case lacks the column."""
     mine = {column.path: column for column in case.columns}
     signals = {name: case.signal(name) for name in dict.fromkeys(column.variable for column in case.columns)}
     return [
@@ -134,14 +134,14 @@ def _cells(case: ExportedCase, columns: Sequence[SignalColumn]) -> list[list[str
 
 
 def number_texts(values: np.ndarray) -> list[str]:
-    """The shortest text of each number that gives its bits again."""
+    """The shortest text of each number that gives the same bits when read."""
     if values.dtype == np.float32:
         return [str(value) for value in values]
     return list(map(repr, values.tolist()))
 
 
 class Csv(ExportFormat):
-    """Tables as text. None is overwritten unasked: somebody may have worked on it."""
+    """The CSV format. Existing tables are not overwritten without --force, since a user may have edited them."""
 
     title = "a CSV file"
 

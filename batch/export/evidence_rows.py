@@ -1,4 +1,4 @@
-"""The table of evidence as columns: a row a requirement at a design point. `csv` and `parquet` write it."""
+"""The table of evidence as columns, for `csv` and `parquet`: a row for each requirement at a design point."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from met.frozen import frozen
 
 @frozen
 class EvidenceColumns:
-    """The rows of runs and sweeps. deck: numbers in the units of the deck, else SI; either is the row's own."""
+    """The rows of runs and sweeps. deck: numbers in the deck's units, else SI; each row names its own"""
 
     runs: tuple[str, ...]
     rows: tuple[RequirementEvidence, ...]
@@ -25,7 +25,7 @@ class EvidenceColumns:
         return len(self.rows)
 
     def blocks(self) -> Iterator[list[list[object]]]:
-        """All rows at once: of each field its values, None where a cell is empty."""
+        """All rows at once: the values of each field, None where a cell is empty."""
         yield [[self._cell(field, row) for row in self.rows] for field in self.fields]
 
     def _cell(self, field: TableColumn, row: RequirementEvidence) -> object:

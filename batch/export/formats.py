@@ -1,4 +1,5 @@
-"""What a file format of `met export` declares: one file in this folder each, and one line in `batch.formats.FORMATS`.
+"""The declaration of a file format of `met export`: one file in this folder each, and one line in
+`batch.formats.FORMATS`.
 
 Its module has a `FORMAT`, an object of a class derived from `ExportFormat`.
 """
@@ -71,14 +72,16 @@ class ExportFormat:
     metrics_in: str = ""
 
     def is_own(self, path: Path) -> bool:
-        """Return True where an existing file is an export of MET's in this format, which may be overwritten unasked."""
+        """Return True where an existing file is an export of MET's in this format, which may be overwritten without
+        asking."""
         return False
 
     def check_campaign(self, campaign: Campaign, target: Path) -> None:
         """Refuse, before anything runs, a campaign whose archive could not be exported. Raises Problem."""
 
     def write_table(self, file: ArchiveFile, table: CaseTable | EvidenceColumns, target: Path) -> WrittenExport:
-        """Write a row a case, with what is varied, metrics, requirements; or a row a requirement. Raises Problem."""
+        """Write a row for each case, with its varied values, metrics, requirements; or a row for each requirement.
+        Raises Problem."""
         raise NotImplementedError
 
     def write_histories(
@@ -88,7 +91,7 @@ class ExportFormat:
         raise NotImplementedError
 
     def check_request(self, request: ExportRequest, target: Path) -> None:
-        """Refuse options that this format has no use for. Raises Problem E375, E376."""
+        """Refuse options that this format does not use. Raises Problem E375, E376."""
         if request.layout and "layout" not in self.options:
             helps = "`-o FILE.mcap` writes one, and its layout"
             raise Problem(error("E375", f"a layout shows an MCAP file, and {target} is none", help=helps))

@@ -1,4 +1,4 @@
-"""An export straight from a run, `met run DECK -o FILE.mcap`: of an archive FILE.h5 that is run, and stays."""
+"""An export directly from a run, `met run DECK -o FILE.mcap`: it is made from an archive FILE.h5, which stays."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from met.outputs import quoted
 
 
 def archive_and_export(output: str | os.PathLike[str] | None) -> tuple[Path | None, Path | None]:
-    """The archive and the export that an output names; None for what it does not."""
+    """The archive and the export that an output names; None for the one that it does not name."""
     target = None if output is None else Path(output)
     if target is None or format_of(target) is None:
         return target, None
@@ -23,7 +23,7 @@ def archive_and_export(output: str | os.PathLike[str] | None) -> tuple[Path | No
 
 
 def check(campaign: Campaign, target: Path, *, histories: bool) -> None:
-    """Refuse what could not be exported in the end, before anything runs. histories: whether they were asked for.
+    """Refuse, before anything runs, a campaign that could not be exported. histories: True where they were asked for.
     Raises Problem E305, E323, E370-E376."""
     writer = find(str(format_of(target)))
     kept = sum(len(part.kept) for part in campaign.parts)
@@ -47,5 +47,5 @@ def export_command(campaign: Campaign, target: Path, *, histories: bool) -> str:
 
 
 def export_run(campaign: Campaign, target: Path, *, histories: bool) -> Exported:
-    """Export all that was run. Raises Problem."""
+    """Export everything that was run. Raises Problem."""
     return export(campaign.output, target, runs=campaign.asked, table="histories" if histories else None)

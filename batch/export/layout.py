@@ -1,4 +1,4 @@
-"""What Foxglove and Lichtblick show when an export is opened: the arm in 3D beside plots of q, qd and tau, and the log.
+"""A layout for Foxglove and Lichtblick: the arm in 3D beside plots of q, qd and tau, and the log.
 
 A layout is a JSON file that both import ("Import from file" of the layouts' menu).
 """
@@ -18,7 +18,7 @@ from batch.queries.signals import pretty_unit
 
 ENDING = ".layout.json"
 PLOTTED = ("q", "qd", "tau")
-"""Signals with a panel of their own, where they are there; else the first that are."""
+"""Signals with a panel of their own, if they exist; else the first existing ones."""
 
 LINKS = COLOURS[:-1]
 GHOST = "55"
@@ -100,7 +100,7 @@ def _view(arms: Sequence[PosedArm]) -> dict[str, Any]:
 
 
 def _plot(arms: Sequence[PosedArm], signal: str) -> dict[str, Any]:
-    """A signal over time: a line a joint or component, of each case."""
+    """The panel of a signal over time: a line for each joint or component, in each case."""
     paths, units = [], []
     for number, arm in enumerate(arms):
         for place, column in enumerate(topics.signals(arm.case).get(signal, [])):
@@ -127,7 +127,7 @@ def _plot(arms: Sequence[PosedArm], signal: str) -> dict[str, Any]:
 
 
 def _titled(title: str) -> dict[str, str]:
-    """A panel's title, as either program has it."""
+    """Panels stacked in a column, all of equal height."""
     return {"foxglovePanelTitle": title, "lichtblickPanelTitle": title}
 
 

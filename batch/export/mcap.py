@@ -42,19 +42,19 @@ if TYPE_CHECKING:
 
 MAGIC = b"\x89MCAP0\r\n"
 ABOUT = "met.export"
-"""The record that an export of MET's begins with."""
+"""The first record of an export of MET's."""
 
 HEAD_BYTES = 1000
 OVERLAID = 8
-"""Cases that are shown together unless they are asked for by name."""
+"""Largest number of cases that are shown together unless they are asked for by name."""
 
 BLOCK_ROWS = 1000
-"""Rows whose messages are made at once."""
+"""Number of rows whose messages are made at once."""
 
 SECOND = 1_000_000_000
 
 LONGEST = 1 << 63
-"""Nanoseconds that times stay below: they are counted in 64 bits, one of them a sign."""
+"""Upper bound of times in nanoseconds: they are counted in 64 bits, one of them a sign."""
 
 Message = tuple[int, int, int, bytes]
 """Time, ns; the case and channel, by which messages of one time are ordered; content."""
@@ -81,12 +81,12 @@ def arms(file: ArchiveFile, cases: Sequence[ExportedCase], *, named: bool) -> li
 
 
 def too_many(cases: int, asked: str, helps: Sequence[str]) -> Diagnostic:
-    """More than `OVERLAID` cases of what was asked for."""
+    """The error that more than `OVERLAID` cases were asked for."""
     return error("E372", f"{cases:,} cases of `{asked}` are too many to show over one another", help=helps)
 
 
 def write(file: ArchiveFile, arms: Sequence[PosedArm], output: Path) -> int:
-    """Write the cases of these arms; the number of their rows. Raises Problem E305."""
+    """Write the cases of these arms; returns the number of their rows. Raises Problem E305."""
     from mcap.writer import Writer
 
     with whole(output) as sink:
@@ -103,7 +103,7 @@ def write(file: ArchiveFile, arms: Sequence[PosedArm], output: Path) -> int:
 
 
 def _about(writer: Writer, file: ArchiveFile, arms: Sequence[PosedArm]) -> None:
-    """Write what made the file, before all else: by it a later export knows that it may write over it."""
+    """Write the origin of the file, before all else: a later export recognises by it that it may overwrite the file."""
     told = {
         "archive": file.path.name,
         "deck": file.deck,
@@ -131,7 +131,7 @@ def _about(writer: Writer, file: ArchiveFile, arms: Sequence[PosedArm]) -> None:
 
 
 class Channels:
-    """The channels of a file. A schema that several have is in it once; schemas of one name are alike."""
+    """The channels of a file. A schema that several channels share is stored once; schemas of one name are equal."""
 
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
@@ -147,7 +147,7 @@ class Channels:
         return self._channel(topic, kind.DESCRIPTOR.full_name, data, {})
 
     def own(self, topic: str, name: str, fields: tuple[wire.MessageField, ...], told: dict[str, str]) -> int:
-        """The channel of messages of our own. told: of the channel, such as units."""
+        """The channel of a message type of MET's. told: metadata of the channel, such as units"""
         if (name, fields) not in self._described:
             used = {known.removeprefix(f"{wire.PACKAGE}.") for known, _ in self._described.values()}
             numbered = (f"{name}_{number}" for number in itertools.count(2))  # of another structure of the sweep
@@ -255,7 +255,7 @@ def _log(case: ExportedCase, arm: PosedArm, line: LogLine) -> bytes:
 
 
 def nanoseconds(seconds: np.ndarray) -> list[int]:
-    """Simulated times as a clock has them."""
+    """Simulated times in nanoseconds, as of a clock."""
     whole: list[int] = np.rint(seconds * SECOND).astype(np.int64).tolist()
     return whole
 
@@ -304,7 +304,8 @@ class Mcap(ExportFormat):
         return head.startswith(MAGIC) and ABOUT.encode() in head
 
     def check_campaign(self, campaign: Campaign, target: Path) -> None:
-        """Refuse what cannot be shown: positions that are not recorded, too many cases. Raises Problem E370, E372."""
+        """Refuse a campaign that cannot be shown: positions are not recorded, or it has too many cases. Raises Problem
+        E370, E372."""
         _check_positions(campaign, target)
         kept = sum(len(part.kept) for part in campaign.parts)
         if kept > OVERLAID:

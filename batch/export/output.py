@@ -1,4 +1,4 @@
-"""A file that has its name only when it is whole, and what is not written over."""
+"""Output files: they get their names only when whole, and existing files are protected."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from met.outputs import cannot_write, check_overwrite, check_place
 
 
 def check(output: Path, archive: Path, own: Callable[[Path], bool], *, force: bool | None) -> None:
-    """Refuse a place before anything is written. Raises Problem E305 where nothing can be written, E374 where something
-    is there.
+    """Refuse a place before anything is written. Raises Problem E305 where nothing can be written, E374 where a file
+    exists.
 
     own    whether a file that is there is an export of MET's, and may go
     force  whether any other may; None where the user has no way to say so
@@ -34,9 +34,9 @@ def check(output: Path, archive: Path, own: Callable[[Path], bool], *, force: bo
 
 @contextlib.contextmanager
 def whole(output: Path) -> Iterator[Sink]:
-    """A new file, which gets its name, in the stead of what had it, when the block has ended and all is on the disk.
-    What the block raises leaves nothing; what is killed leaves a file under a temporary name, which the next one takes
-    over. Raises Problem E305, E307."""
+    """A new file, which replaces the file of its name when the block has ended and all is on the disk. If the block
+    raises, nothing is left; a killed process leaves a file under a temporary name, which the next one takes over.
+    Raises Problem E305, E307."""
     temporary = temporary_of(output)
     try:
         sink = Sink(temporary)

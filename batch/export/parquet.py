@@ -32,7 +32,7 @@ MAGIC = b"PAR1"
 ABOUT = "met.export"
 
 GROUP_ROWS = 100_000
-"""Rows of a row group, about: those of whole cases."""
+"""Approximate number of rows of a row group, which holds whole cases."""
 
 
 def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, deck: bool = False) -> int:
@@ -83,7 +83,7 @@ def _about(file: ArchiveFile, runs: Iterable[str]) -> dict[str, str]:
 
 
 def pyarrow_here() -> tuple[Any, Any]:
-    """pyarrow and its parquet. Raises Problem E373 where there is none."""
+    """The modules pyarrow and pyarrow.parquet. Raises Problem E373 where they are missing."""
     try:
         import pyarrow
         from pyarrow import parquet
@@ -97,7 +97,7 @@ def pyarrow_here() -> tuple[Any, Any]:
 def _schema(
     arrow: Any, cases: Sequence[ExportedCase], alike: Sequence[TableColumn], columns: Sequence[SignalColumn]
 ) -> Any:
-    """Names, types and units: what case it is, what is varied, the time, the signals."""
+    """Names, types and units of the columns: the case, varied values, the time, the signals."""
     double = {
         column.path
         for case in _one_each(cases)
@@ -120,7 +120,7 @@ def _told(unit: str, about: str) -> dict[str, str]:
 
 
 def _one_each(cases: Sequence[ExportedCase]) -> list[ExportedCase]:
-    """A case of each structure."""
+    """One case of each structure."""
     return list({case.group.name: case for case in cases}.values())
 
 
@@ -142,12 +142,12 @@ def _table(arrow: Any, schema: Any, case: ExportedCase, fields: Sequence[TableCo
 
 
 class Parquet(ExportFormat):
-    """Tables for other programs; needs pyarrow."""
+    """The Parquet format, for other programs; needs pyarrow."""
 
     title = "a Parquet file"
 
     def is_own(self, path: Path) -> bool:
-        """Return True where the last bytes of the file, which describe it, are of an export of MET's."""
+        """Return True where the last bytes of the file, which describe it, are those of an export of MET's."""
         with open_regular(path) as file:
             size = file.seek(0, 2)
             file.seek(max(0, size - 8))

@@ -1,4 +1,4 @@
-"""What is exported: cases that have histories, and of their signals the numbers that are asked for."""
+"""The choice of an export's contents: cases with histories, and numbers of their signals."""
 
 from __future__ import annotations
 
@@ -54,14 +54,14 @@ class ExportedCase:
         return self.group.sweep or self.group.name
 
     def signal(self, variable: str) -> np.ndarray:
-        """A signal's numbers, (row, place), as they lie in the archive."""
+        """A signal's numbers, (row, place), in the archive's order."""
         values = self.group.signal(variable, self.position)[: len(self.time)]
         return values.reshape(len(values), math.prod(values.shape[1:]))
 
 
 def pick(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: Sequence[str]) -> list[ExportedCase]:
-    """The cases of these runs and sweeps (none: of the first), in the order they are asked for (none: all that have
-    histories, by their positions), with these signals. Raises Problem E321-E325, E328."""
+    """The cases of these runs and sweeps (none: of the first), in the given order (none: all that have histories, by
+    their positions), with these signals. Raises Problem E321-E325, E328."""
     names = tuple(runs) or (file.groups[0].sweep or file.groups[0].name,)
     groups = groups_named(file, names)
     columns = _columns(groups, signals)
@@ -70,7 +70,7 @@ def pick(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: 
     )
     for group, _ in wanted:
         if group.name not in columns:
-            panels(group, signals)  # says which of them this structure of the sweep does not have
+            panels(group, signals)  # raises for signals that this structure of the sweep does not have
     found = []
     for group in groups:
         if group.name in columns:
@@ -92,8 +92,8 @@ def rank(names: Sequence[str], group: ArchiveGroup) -> int:
 
 
 def _columns(groups: Sequence[ArchiveGroup], signals: Sequence[str]) -> dict[str, tuple[SignalColumn, ...]]:
-    """The columns by group. A signal that only some structures of a sweep have is theirs; one that none has is a
-    Problem, and so are groups without histories."""
+    """The columns by group. A signal that only some structures of a sweep have is listed for those; one that none has
+    is a Problem, and so are groups without histories."""
     out: dict[str, list[SignalColumn]] = {}
     known: dict[tuple[str, str], list[SignalColumn]] = {}
     for name in signals or ("",):
@@ -131,7 +131,7 @@ def _columns_of(group: ArchiveGroup, variable: Stored) -> list[SignalColumn]:
 
 
 def _ordered(columns: Sequence[SignalColumn]) -> tuple[SignalColumn, ...]:
-    """The columns, each once: signals as they were asked for, and the numbers of each as they lie in it."""
+    """The columns, each once: signals in the order of the request, and the numbers of each in its own order."""
     signals = list(dict.fromkeys(column.variable for column in columns))
     once = {column.path: column for column in columns}
     return tuple(sorted(once.values(), key=lambda column: (signals.index(column.variable), column.place)))

@@ -1,4 +1,4 @@
-"""Where the links of a case are at each of its rows: from the q that was recorded, and the case's own parameters.
+"""Poses of the links of a case at each of its rows, from the recorded q and the case's own parameters.
 
 So it is with a base that is prescribed; of a free one position and orientation must be recorded too.
 """
@@ -134,8 +134,8 @@ def lacking_help(*, free: bool) -> str:
 
 
 def pose_variables(pose: Pose, rows: int | tuple[int, ...], time: int | None = 0) -> PoseVariables:
-    """A pose with its numbers by row, or by whatever these are the sizes of. time: along which axis of these its
-    orientation is without a jump; None: along none, each with w >= 0."""
+    """A pose with its numbers by row, or by other axes of these sizes. time: along which axis of these its orientation
+    is without a jump; None: along none, each with w >= 0."""
     rotation = tuple(tuple(np.broadcast_to(np.asarray(entry, np.float64), rows) for entry in row) for row in pose.R)
     parts = quaternion(rotation)  # type: ignore[arg-type]
     turn = _rows(parts, rows)
@@ -143,8 +143,8 @@ def pose_variables(pose: Pose, rows: int | tuple[int, ...], time: int | None = 0
 
 
 def without_sign_jumps(q: np.ndarray, axis: int) -> np.ndarray:
-    """Unit quaternions (..., 4) of which each has the sign by which it is nearer the one before it along an axis, as in
-    what is recorded (`met.program.orientations`); rows that are not-a-number are passed over."""
+    """Unit quaternions (..., 4), each with the sign by which it is nearer the one before it along an axis, as in
+    records (`met.program.orientations`); rows of not-a-number are passed over."""
     rows = np.moveaxis(q, axis, 0)
     number = np.arange(len(rows)).reshape(-1, *(1,) * (rows.ndim - 2))
     known = np.maximum.accumulate(np.where(np.isfinite(rows).all(axis=-1), number, 0), axis=0)

@@ -18,21 +18,21 @@ from met.plan import BASE, Link, Payload
 Vector = tuple[float, float, float]
 
 LINKS = COLOURS[:-1]
-"""Colours of the links in turn; the last, black, is not seen before a dark background."""
+"""Colours of the links in turn, without the last, black, which is invisible on a dark background."""
 
 JOINTS = "#8a939c"
 GHOST = 0.22
 """Opacity of every case but the first."""
 
 ROD = 0.02
-"""Radius of a rod, which has none, in its own lengths."""
+"""Radius of a rod, which has no size of its own, relative to its length."""
 
 LINE_PIXELS = 4.0
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
 def size(arms: Sequence[PosedArm]) -> float:
-    """The reach of the arms from the base, m, about."""
+    """Approximate reach of the arms from the base, m."""
     far = 0.0
     for arm in arms:
         for link in arm.experiment.structure.links:
@@ -77,7 +77,7 @@ def _numbers(arm: PosedArm, size: float) -> ArmNumbers:
 
 
 def _entity(scene: Any, frame: str, name: str) -> Any:
-    """An entity that stays and moves with its frame."""
+    """An entity that is fixed to its frame."""
     entity = scene.entities.add(frame_id=frame, id=name, frame_locked=True)
     entity.timestamp.SetInParent()
     entity.lifetime.SetInParent()
@@ -103,7 +103,7 @@ def _draw(entity: Any, found: Sequence[ArmShape], own: Any, grey: Any) -> None:
 
 
 def _lines(entity: Any, lines: Sequence[ArmShape], colour: Any) -> None:
-    """Lines from a point to another, those that have a length."""
+    """Lines between pairs of points, without those of no length."""
     from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
     from foxglove_schemas_protobuf.Point3_pb2 import Point3
 

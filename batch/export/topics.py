@@ -1,4 +1,4 @@
-"""The topics of an MCAP file, the fields of their messages, and the frame under all others: what they are called."""
+"""The names of an MCAP file's topics, of the fields of their messages, and of the root frame."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from batch.export.poses import PosedArm
 
 
 def root(arms: Sequence[PosedArm]) -> str:
-    """The frame that nothing moves: the first of these names that is no link's."""
+    """The name of the root frame: the first of these names that no link has."""
     taken = {arm.prefix + name for arm in arms for name in arm.poses}
     names = itertools.chain(("world", "base", "ground"), (f"world_{number}" for number in itertools.count(2)))
     return next(name for name in names if name not in taken)
 
 
 def topic(arm: PosedArm, name: str) -> str:
-    """The topic of a signal, in which dots would be taken for fields: `/case7/elbow/servo/voltage`."""
+    """The topic of a signal, where dots would be taken for fields: `/case7/elbow/servo/voltage`."""
     return f"/{arm.prefix}{name.replace('.', '/')}"
 
 

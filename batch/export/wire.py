@@ -1,4 +1,4 @@
-"""Messages of our own, as protobuf has them: their schemas, and their bytes.
+"""Protobuf messages of MET's own: their schemas, and their bytes.
 
 The fields of these messages are joints, components and metrics, so they differ from deck to deck and no compiler made
 them. The encoding (protobuf.dev/programming-guides/encoding) is small: a key, which is the field's number and how it is
@@ -17,14 +17,14 @@ from met.frozen import frozen
 
 PACKAGE = "met"
 DOUBLE, VARINT, LENGTH = 1, 0, 2
-"""Protobuf's wire types: 8 bytes, a varint, bytes with their length before them."""
+"""Protobuf's wire types: 8 bytes, a varint, and bytes after their length."""
 
 Kind = Literal["double", "int64", "string"]
 
 
 @frozen
 class MessageField:
-    """A field. within: of a message, its fields;  many: whether there may be several."""
+    """A field of a message. within: the fields of a message field; many: True for a repeated field"""
 
     name: str
     kind: Kind = "double"
@@ -41,7 +41,7 @@ def tree(paths: Sequence[tuple[str, ...]]) -> tuple[MessageField, ...]:
 
 
 def schema(name: str, fields: Sequence[MessageField]) -> bytes:
-    """A FileDescriptorSet with the message `met.<name>`, which tells any reader of such messages what is in them."""
+    """A FileDescriptorSet with the message `met.<name>`, which describes such messages to any reader."""
     from google.protobuf.descriptor_pb2 import FileDescriptorSet
 
     out = FileDescriptorSet()
@@ -51,14 +51,14 @@ def schema(name: str, fields: Sequence[MessageField]) -> bytes:
 
 
 def _describe(message: Any, fields: Sequence[MessageField], path: str) -> None:
-    """Put fields into the description of a message; messages within it that are alike are described once."""
+    """Add fields to the description of a message; equal inner messages are described once."""
     from google.protobuf.descriptor_pb2 import FieldDescriptorProto as Of
 
     kinds = {"double": Of.TYPE_DOUBLE, "int64": Of.TYPE_INT64, "string": Of.TYPE_STRING}
     types: dict[tuple[MessageField, ...], str] = {}
     for number, field in enumerate(fields, 1):
         label = Of.LABEL_REPEATED if field.many else Of.LABEL_OPTIONAL
-        # a name in JSON that is the name itself: those made of it may be alike, as of `a_b` and `aB`
+        # a name in JSON equal to the name itself: derived ones may coincide, as of `a_b` and `aB`
         told = message.field.add(name=field.name, number=number, label=label, json_name=field.name)
         if not field.within:
             told.type = kinds[field.kind]
@@ -90,7 +90,7 @@ def rows(fields: Sequence[MessageField], values: np.ndarray) -> list[bytes]:
 
 
 def _parts(fields: Sequence[MessageField]) -> Iterator[bytes | None]:
-    """A message of numbers in pieces: what is the same in all, and None for a double."""
+    """A message of numbers in pieces: the parts that are the same in all, and None for each double."""
     for number, field in enumerate(fields, 1):
         if field.within:
             inner = list(_parts(field.within))
@@ -117,7 +117,7 @@ def message(fields: Sequence[MessageField], data: Mapping[str, Any]) -> bytes:
 
 
 def plain(text: str) -> str:
-    """Text that has an encoding: names of files may hold what has none."""
+    """Text that can be encoded: file names may contain characters that cannot."""
     return text.encode("utf-8", "replace").decode()
 
 
@@ -126,7 +126,7 @@ def _key(number: int, wire: int) -> bytes:
 
 
 def varint(value: int) -> bytes:
-    """A whole number in groups of seven bits, the last ones first; all but the last group have the eighth bit."""
+    """A whole number in groups of seven bits, the lowest first; all but the last group have the eighth bit set."""
     out = bytearray()
     while value > 0x7F:
         out.append(value & 0x7F | 0x80)

@@ -1,4 +1,4 @@
-"""A run or sweep that simulates elsewhere: as a module of WebAssembly with its description, and as a page.
+"""A run or sweep for simulation elsewhere: as a WebAssembly module with its description, and as a page.
 
 beside       another archive or a measured log beside a page; `mcap_log` reads MCAP files
 page         an archive's run or sweep as one HTML page, with its scripts and style in `assets/`

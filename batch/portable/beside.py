@@ -1,5 +1,5 @@
-"""What a page shows beside its own run, as a second arm and as wide pale lines: another archive's run, computed in the
-page by that archive's own code, or a log of measured signals.
+"""Data that a page shows beside its own run, as a second arm and wide pale lines: another archive's run, computed in
+the page by that archive's own code, or a log of measured signals.
 
 A log is an MCAP file (`batch.portable.mcap_log`), or a CSV file as decks name them: its head names `time` and channels
 of the run, each with its unit. Units may stand in a line of their own above it, as `met export` writes them.
@@ -31,16 +31,16 @@ from met.unit_parser import parse_unit
 TIME, CASE = "time", "case"
 UNITS = "# units: "
 LONGEST_LINE, MOST_REMARKS = 1 << 16, 100
-"""Characters and number of the lines above a head that are looked into."""
+"""Length, and number, of the lines above a head that are searched."""
 
 NANOSECOND = 1e-9
 SHOWN = 12
-"""Channels that a message or a page names."""
+"""Largest number of channels that a message or a page names."""
 
 
 def other_group(archive: ArchiveFile, group: ArchiveGroup, other: ArchiveFile) -> tuple[ArchiveGroup, Experiment]:
-    """The other archive's run or sweep that is matched with `group`: it varies the same numbers. Raises Problem E393
-    where no case is in both."""
+    """The other archive's run or sweep that is matched with `group`: it varies the same parameters. Raises Problem E393
+    where they have no case in common."""
     (found,) = beside(archive, [group], other)
     assert found is not None
     theirs = next(each for each in other.plan().experiments if each.name == found.group.name)
@@ -88,8 +88,8 @@ def log_data(path: str | Path, columns: Sequence[Mapping[str, str]], rows: np.nd
 
 
 def _at(rows: np.ndarray, time: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-    """Numbers at other times, on straight lines; none before the first and after the last, but for what a clock that
-    counts nanoseconds rounds."""
+    """Numbers at other times, by straight lines; not-a-number before the first and after the last, with an allowance
+    for the rounding of a clock in nanoseconds."""
     inside = (rows >= time[0] - NANOSECOND) & (rows <= time[-1] + NANOSECOND)
     return np.where(inside, np.interp(rows, time, numbers), np.nan)
 
@@ -121,8 +121,8 @@ def _csv_signals(path: str | Path, columns: Sequence[Mapping[str, str]]) -> Meas
 
 
 def _with_units(table: CsvTable) -> CsvTable:
-    """The table with the units of the line `# units: s,rad`, which stands above the head of what `met export` wrote.
-    Raises Problem E478 where that line has not a unit a column."""
+    """The table with the units of the line `# units: s,rad`, which stands above the head of a file by `met export`.
+    Raises Problem E478 where that line does not have a unit for each column."""
     line = table.columns[0].place.line
     if any(each.unit is not None for each in table.columns) or line < 2:
         return table
@@ -143,7 +143,7 @@ def _with_units(table: CsvTable) -> CsvTable:
 
 
 def _column(table: CsvTable, recorded: Mapping[str, str]) -> tuple[float, ...] | None:
-    """A channel's numbers in SI; none where the log has it not."""
+    """A channel's numbers in SI; none where the log lacks it."""
     column = table.column(recorded["channel"])
     if column is None:
         return None

@@ -1,4 +1,4 @@
-"""The files of a module: which experiment is meant, where they go, and that they are there whole or not at all."""
+"""The files of a module: the choice of its experiment, checks of the places, and writing whole or not at all."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ENDING = ".wasm"
 
 @frozen
 class ModuleFiles:
-    """The two files that were written, and what the second holds."""
+    """The two written files, and the contents of the second."""
 
     module: Path
     description: Path
@@ -33,8 +33,8 @@ class ModuleFiles:
 
 
 def experiment_of(source: str, names: tuple[str, ...], *, quiet: bool, **options: Any) -> Experiment:
-    """The experiment of a deck, a plan file or an archive that is meant. options: how a deck is read, as
-    `batch.campaigns.plans.read_plan` has it. Raises Problem."""
+    """The experiment of a deck, a plan file or an archive. options: how a deck is read, as for
+    `batch.campaigns.plans.read_plan`. Raises Problem."""
     if names_archive(source):
         with ArchiveFile(source) as file:
             plan = file.plan()
@@ -44,7 +44,7 @@ def experiment_of(source: str, names: tuple[str, ...], *, quiet: bool, **options
 
 
 def _the_one(experiments: tuple[Experiment, ...], source: str) -> Experiment:
-    """The experiment that a module is made of. Raises Problem E472 where there are several."""
+    """The experiment of a module. Raises Problem E472 where there are several."""
     if len(experiments) == 1:
         return experiments[0]
     names = list(dict.fromkeys(each.name_in_deck for each in experiments))
@@ -65,7 +65,7 @@ def _the_one(experiments: tuple[Experiment, ...], source: str) -> Experiment:
 
 
 def check(output: Path) -> None:
-    """Refuse places before anything is compiled. Raises Problem E470, or E471 where the name is no module's."""
+    """Refuse places before anything is compiled. Raises Problem E470, or E471 where the name does not suit a module."""
     if output.suffix != ENDING and not output.is_dir():
         helps = [f"`-o {quoted(output.with_suffix(ENDING))}`"] if output.name else []
         raise Problem(error("E471", f"cannot write {output}: modules are .wasm files", help=helps))
@@ -106,7 +106,7 @@ def check_page(output: Path) -> None:
 
 
 def write_page(text: str, output: Path) -> None:
-    """The page under its name, whole or not at all. Raises Problem E474."""
+    """Write the page under its name, whole or not at all. Raises Problem E474."""
     try:
         with whole_file(output) as file:
             file.write(text.encode())

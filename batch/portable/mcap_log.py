@@ -4,8 +4,8 @@
                                the channel's metadata, `unit`, or `unit.FIELD` where they differ
     any topic                  JSON with the lists `name`, `position`, `velocity`, `effort`, in SI: joints' q, qd, tau
 
-The file is of anybody, and what is taken from it is bounded. Times count from the run's beginning; where they are
-those of a clock (`CLOCK`), from the log's first shown message.
+The file may come from anybody, so the amount of data taken from it is bounded. Times count from the run's beginning;
+where they are those of a clock (`CLOCK`), from the log's first shown message.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from met.unit_parser import parse_unit
 from met.units import same, text
 
 MOST_RECORD = 64 << 20
-"""Bytes of a record, and of a chunk as it was before it was compressed."""
+"""Largest size of a record, and of an uncompressed chunk."""
 
 MOST_BYTES = 1 << 30
-"""Bytes of all messages together."""
+"""Largest size of all messages together."""
 
 MOST_NUMBERS = 5_000_000
-"""Numbers that are taken from a log."""
+"""Largest number of numbers that are taken from a log."""
 
 CLOCK = 1e9
-"""Seconds from which on times are a clock's, which counts from 1970."""
+"""Seconds from which on times count as those of a clock, which counts from 1970."""
 
 SECOND = 1e9
 STATES = {"position": "q", "velocity": "qd", "effort": "tau"}
-"""Lists of a joint state, and the signals that they are."""
+"""Lists of a joint state, with the signals that they hold."""
 
 DEEPEST = 3
-"""Names of a field: its joint, its component, and one more."""
+"""Largest number of names in a field: its joint, its component, and one more."""
 
 SHOWN = 40
-"""Characters of a name that a message shows."""
+"""Largest number of characters of a name in a message."""
 
 
 @frozen
@@ -69,8 +69,7 @@ Reading = Callable[[bytes], Iterator[tuple[str, float]]]
 
 
 def mcap_signals(path: str | Path, columns: Sequence[Mapping[str, str]]) -> MeasuredSignals:
-    """The channels of a run that an MCAP file has. columns: of each its channel, signal and SI unit. Raises Problem
-    E478."""
+    """The channels of a run in an MCAP file. columns: the channel, signal and SI unit of each. Raises Problem E478."""
     from google.protobuf.message import DecodeError
     from mcap.exceptions import EndOfFile, InvalidMagic, McapError
 
@@ -92,7 +91,7 @@ def mcap_signals(path: str | Path, columns: Sequence[Mapping[str, str]]) -> Meas
 
 
 class _Log:
-    """A log while it is read."""
+    """A log while it is being read."""
 
     def __init__(self, path: str, columns: Sequence[Mapping[str, str]]) -> None:
         self.path = path
@@ -110,7 +109,7 @@ class _Log:
         self.prefixes: set[str] = set()
 
     def read(self, file: IO[bytes]) -> None:
-        """All records. Raises what the library does where it is no MCAP file."""
+        """Read all records. Raises the library's errors where it is not an MCAP file."""
         from mcap.records import Channel, Chunk, Message, Metadata, Schema
         from mcap.stream_reader import StreamReader, breakup_chunk
 
@@ -210,7 +209,7 @@ class _Log:
         return scale
 
     def joint_states(self, data: bytes) -> Iterator[tuple[str, float]]:
-        """The numbers of a joint state; none where it is another message."""
+        """The numbers of a joint state; none for another message."""
         try:
             told = json.loads(data)
         except RecursionError:
@@ -229,7 +228,7 @@ class _Log:
                     yield f"{name}.{signal}", float(value) if number else math.nan
 
     def found(self) -> MeasuredSignals:
-        """All that was read, at rising times."""
+        """All data read, at ascending times."""
         unused = [visible(_short(each)) for each in dict.fromkeys(self.topics.values()) if each not in self.shown]
         first = min((min(times) for times, _ in self.taken.values()), default=0)
         begin = first if first / SECOND >= CLOCK else 0
@@ -238,7 +237,7 @@ class _Log:
             instants = (np.array(times, object) - begin).astype(np.float64) / SECOND
             order = np.argsort(instants, kind="stable")
             instants, numbers = instants[order], np.array(values)[order]
-            last = np.append(instants[1:] > instants[:-1], True)  # of several at one instant the last
+            last = np.append(instants[1:] > instants[:-1], True)  # among several at one instant, the last
             signals[channel] = (instants[last], numbers[last])
         told = [f"{name} [{self.units[name]}]" for name in self.units if name in signals]
         since = [f"time since its first message, {begin / SECOND:.3f} s after 1970"] if begin else ["time [s]"]
@@ -249,7 +248,7 @@ class _Log:
 
 
 class _Bounded:
-    """A file of which no more is read at once than a record may have, whatever lengths stand in it."""
+    """A file from which no more is read at once than a record may have, whatever lengths it declares."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self._file = file
@@ -279,7 +278,7 @@ def _numbers(message: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[s
 
 
 def _uncompressed(chunk: Any) -> bytes:
-    """The records of a chunk, which may say of itself what it likes. Raises ValueError."""
+    """The records of a chunk, whose declared sizes are not trusted. Raises ValueError."""
     data: bytes = chunk.data
     try:
         if chunk.compression == "zstd":

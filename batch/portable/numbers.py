@@ -1,4 +1,4 @@
-"""Other numbers than an archive's: a second module of its run, whose inputs are the numbers that the deck writes.
+"""Runs with numbers other than an archive's: a second module of its run, whose inputs are the deck's numbers.
 
 It computes what `met run --vary` of these numbers computes, and is another structure than the archive's.
 """
@@ -26,16 +26,16 @@ from met.settings import varied_run, varies
 from met.units import Measure
 
 MOST = 200
-"""Numbers that are inputs; of more, the first ones are."""
+"""Largest number of inputs; further numbers are left out."""
 
 FAR = 1e3
-"""A number is let go so many times as far as the deck's, or as 1 in SI where that is 0."""
+"""Range of an input, relative to the deck's number, or to 1 in SI where that is 0."""
 
 HALVINGS = 60
-"""Halvings by which the last number is found that the deck's checks allow."""
+"""Number of halvings by which the last number is found that the deck's checks allow."""
 
 MACRO = "macro "
-"""What stands before a macro's name where a sweep chooses its text."""
+"""Prefix of a macro's name where a sweep chooses its text."""
 
 
 @frozen
@@ -60,8 +60,8 @@ class OtherNumbers:
 def deck_of(
     archive: ArchiveFile, experiment: Experiment, deck: str | Path, include_dirs: Sequence[str | Path] = ()
 ) -> OtherNumbers:
-    """The archive's run with the deck's numbers as inputs; of a sweep the run that it varies, with what the group has
-    chosen of its structure. Raises Problem E479 where the deck is not the archive's, or nothing can vary."""
+    """The archive's run with the deck's numbers as inputs; for a sweep, the run that it varies, with the structure that
+    the group has chosen. Raises Problem E479 where the deck is not the archive's, or nothing can vary."""
     plan = archive.plan(as_written=True)
     choices = experiment.cases.choices
     macros = [f"{each.path.removeprefix(MACRO)}={each.value}" for each in choices if each.path.startswith(MACRO)]
@@ -94,8 +94,8 @@ def _run_of(deck: str | Path, sweep: str, defines: Sequence[str], include_dirs: 
 
 
 def varied(run: GivenRun, fixed: tuple[str, ...] = ()) -> OtherNumbers:
-    """The run with the numbers that its deck writes as inputs, in the deck's units, without those that cannot vary.
-    Raises Problem E479 where there is none."""
+    """The run with the numbers in its deck as inputs, in the deck's units, without those that cannot vary. Raises
+    Problem E479 where there is none."""
     there = run.experiment.parameters
     numbers = {
         path: (each.value, each.unit)
@@ -122,14 +122,15 @@ def varied(run: GivenRun, fixed: tuple[str, ...] = ()) -> OtherNumbers:
 
 
 def limits(run: VariedRun) -> list[dict[str, Any]]:
-    """The least and largest number of each input that the deck's checks allow while the others are the deck's, and
-    what they say beyond: SI."""
+    """The least and largest number of each input that the deck's checks allow while the others keep the deck's values,
+    and the checks' messages beyond: SI."""
     paths = [each.path for each in run.experiment.cases.coordinates]
     own = np.array([float(each.values[0]) for each in run.experiment.cases.coordinates])
     count = len(paths)
 
     def broken(ends: np.ndarray) -> np.ndarray:
-        """Answer for cases in each of which one number is at an end, first all least and then all largest ones."""
+        """The failing checks for cases in each of which one number is at an end, first all least and then all largest
+        ones."""
         cases = np.repeat(own[:, None], 2 * count, axis=1)
         for n in range(count):
             cases[n, [n, count + n]] = ends[[n, count + n]]

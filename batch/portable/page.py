@@ -1,7 +1,7 @@
 """A run or sweep of an archive as one HTML page that computes its cases, and any between them, where it is opened.
 
-All is in the page: the module, its description, what the archive has of the cases. The page allows itself one script,
-by its digest, and WebAssembly; module and numbers stand in that script, so that the digest is of them too.
+Everything is in the page: the module, its description, and the archive's data about the cases. The page allows itself
+one script, by its digest, and WebAssembly; module and numbers are in that script, so that the digest covers them too.
 """
 
 from __future__ import annotations
@@ -38,18 +38,18 @@ from met.run import Prepared, inputs, prepare
 from met.version import VERSION
 
 GENERATOR = "MET view"
-"""The name in a page's `generator`, by which it is known as one of ours, which may be written over."""
+"""The name in a page's `generator` that marks it as MET's, so that it may be overwritten."""
 
 KICKER = "A page that simulates"
-"""What stands above the name of a page about an archive."""
+"""The line above the title of a page about an archive."""
 
 SHOWN_KEY = 8
-"""Letters of a program's key that a page shows."""
+"""Number of letters of a program's key that a page shows."""
 
 OTHER_CODE = "by other code than the archive was made with, so that numbers may differ"
 
 OWN = ("beside.js", "traces.js", "knobs.js", "view.js")
-"""Scripts of a page that simulates, in their order; `numbers.js` after them where there is a second module."""
+"""Scripts of a page that simulates, in their order; `numbers.js` follows them where there is a second module."""
 
 _ASSETS = Path(__file__).with_name("assets")
 _CODE = "'wasm-unsafe-eval'"
@@ -87,8 +87,8 @@ def view(
 
 
 def _numbers(numbers: OtherNumbers, of: Experiment) -> dict[str, Any]:
-    """Data of the second module, whose inputs are the deck's numbers, as those of a page of one case. of: what the
-    archive has."""
+    """Data of the second module, whose inputs are the deck's numbers, as for a page of one case. of: the archive's
+    data"""
     experiment, status = numbers.run.experiment, np.full(1, -1, np.int8)
     empty = {use.name: np.full(1, np.nan) for use in experiment.metrics}
     group = GroupInMemory.of_metrics(experiment, np.arange(1), status, empty)
@@ -115,8 +115,8 @@ def _numbers(numbers: OtherNumbers, of: Experiment) -> dict[str, Any]:
 
 
 def _beside(against: str | Path, file: ArchiveFile, group: ArchiveGroup, experiment: Experiment) -> dict[str, Any]:
-    """The data that stand beside the archive on the page: of another archive all that is known of that, of a log its
-    numbers at the rows of a run."""
+    """The data of the other archive or log on the page: for an archive everything known about it, for a log its numbers
+    at the rows of a run."""
     name = visible(Path(against).name)
     if beside.is_archive(against):
         with ArchiveFile(against) as other:
@@ -124,7 +124,7 @@ def _beside(against: str | Path, file: ArchiveFile, group: ArchiveGroup, experim
             theirs, of = beside.other_group(file, group, other)
             units = [each["unit"] for each in described_columns(experiment)]
             found = data_of(of, other, theirs)
-            found["arm"].pop("acting", None)  # of a second arm no more is drawn than where it is
+            found["arm"].pop("acting", None)  # of a second arm only the shape is drawn
             return {"name": name, "page": found | {"own": units}}
     schedule = experiment.structure.schedule
     rows = np.arange(schedule.rows) * schedule.record / schedule.base_hz
@@ -142,7 +142,7 @@ def data_of(
     prepared: Prepared | None = None,
     quick: bool = False,
 ) -> dict[str, Any]:
-    """Data that the script needs: the module, its description, and what the archive has of the first cases.
+    """Data for the script: the module, its description, and the archive's data about the first cases.
 
     archive   the group's; of a group that is in none, the plan
     source    what the page calls whatever its numbers are compared with
@@ -205,7 +205,7 @@ def _in_deck_units(units: DeckUnits, columns: Sequence[Mapping[str, str]]) -> li
 
 
 def _unit(unit: str) -> str:
-    """A unit as the page writes it; nothing where there is none."""
+    """A unit as the page writes it; empty where there is none."""
     return "" if unit == "1" else visible(pretty_unit(unit))
 
 
@@ -215,7 +215,7 @@ def doubles(values: np.ndarray) -> str:
 
 
 def page_of(experiment: Experiment, data: dict[str, Any]) -> str:
-    """The whole file of a page about an archive. The same data give the same text."""
+    """The whole file of a page about an archive; equal data give equal text."""
     start = f"const MET_PAGE = {script_json(data)};\nMET.simulate(MET_PAGE, null);"
     head = data.get("head") or head_of(experiment, data, KICKER, _by(data))
     return page_text(head, [start], own=(*OWN, "numbers.js") if "numbers" in data else OWN)
