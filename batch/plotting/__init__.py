@@ -49,7 +49,7 @@ def plot(
     arm      draws the arm of the first of `cases`, or of the first that has a history
     at       instants of which it is drawn, s; none: some over all of the run
 
-    Raises met.diagnostic.Problem for what a user can mend.
+    Raises met.diagnostic.Problem for mistakes that a user can correct.
     """
     from batch.archive.read import ArchiveFile
     from batch.plotting.sheet import sheet
@@ -76,7 +76,7 @@ def draw(
     against: ArchiveFile | None = None,
     sheet: PictureSheet | None = None,
 ) -> Path:
-    """Draw a picture of archives that are open, as `plot` does."""
+    """Draw a picture of open archives, as `plot` does."""
     from batch.plotting import histories, metrics
     from batch.plotting import output as place
 
@@ -96,7 +96,7 @@ def draw(
     wanted = plot_request(group, pool, names, cases, over)
     matplotlib = _matplotlib()
     with matplotlib.rc_context():
-        matplotlib.rcdefaults()  # a matplotlibrc of the working folder decides nothing: it may have TeX run
+        matplotlib.rcdefaults()  # a matplotlibrc in the working folder, which might start TeX, is ignored
         matplotlib.rcParams.update(sheet.style)
         if wanted.histories:
             found = None if against is None else beside(archive, [group], against)[0]
@@ -118,7 +118,7 @@ def draw_arm(
     at: Sequence[float] = (),
     sheet: PictureSheet | None = None,
 ) -> Path:
-    """Draw the arm of a case of an archive that is open, as `plot` does."""
+    """Draw the arm of a case of an open archive, as `plot` does."""
     from batch.plotting import output as place
     from batch.plotting.arm import arm_picture
     from batch.plotting.sheet import PictureSheet
@@ -138,7 +138,7 @@ def draw_arm(
 
 
 def _with_case(groups: Sequence[ArchiveGroup], case: str) -> ArchiveGroup:
-    """The first experiment that has a case; the first of all where none has it, which says so."""
+    """The first experiment that has a case; where none has it, the first of all, which then reports it."""
     from met.diagnostic import Problem
 
     for group in groups:
@@ -149,7 +149,7 @@ def _with_case(groups: Sequence[ArchiveGroup], case: str) -> ArchiveGroup:
 
 
 def _matplotlib() -> Any:
-    """matplotlib without pyplot, and without its remarks about caches of fonts."""
+    """matplotlib without pyplot, and without its messages about font caches."""
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     import matplotlib
 

@@ -1,4 +1,4 @@
-"""Another archive beside the one that is drawn: its cases by what is varied in them, its signals by their channels."""
+"""Another archive beside the drawn one: its cases matched by varied values, its signals by channels."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from met.outputs import quoted
 from met.plan.channel import channel_paths
 
 LONGEST = 40
-"""Letters of a file's name in a picture: of more, those in the middle are left out."""
+"""Largest number of letters of a file's name in a picture; of a longer one, those in the middle are left out."""
 
 
 class OtherGroup:
-    """The group of another archive that is matched with one that is drawn.
+    """The group of another archive that is matched with a drawn one.
 
     places  of each case of the drawn group its position in the other; -1 where it is not there
     """
@@ -84,14 +84,14 @@ def other_unit(name: str, mine: str, theirs: str, beside: OtherGroup) -> Problem
 
 
 def not_in_other(name: str, beside: OtherGroup, there: Sequence[str]) -> Problem:
-    """The problem that something to be drawn is not in the other archive. there: what is."""
+    """The problem that a quantity to be drawn is not in the other archive. there: the existing ones"""
     helps = f"in {beside.name}: {', '.join(there)}" if there else _differ(beside.drawn.path, beside.group.path)
     return Problem(error("E393", f"no `{name}` in {beside.name} to draw against", help=helps))
 
 
 def beside(archive: ArchiveFile, groups: Sequence[ArchiveGroup], other: ArchiveFile) -> list[OtherGroup | None]:
-    """The other archive's group for each group; None where that has not this structure. Raises Problem E393 where
-    nothing is the same in the two."""
+    """The other archive's group for each group; None where it lacks the structure. Raises Problem E393 where the two
+    have nothing in common."""
     names = file_names(archive.path, other.path)
     pairs = {id(mine): theirs for mine, theirs in matching.match_experiments(archive, other)[0]}
     found = [OtherGroup(group, pairs[id(group)], names) if id(group) in pairs else None for group in groups]
@@ -114,7 +114,7 @@ def file_names(a: Path, b: Path) -> tuple[str, str]:
 
 
 def _labelling(name: str) -> str:
-    """matplotlib leaves out of a legend what begins with `_`, and cannot draw every letter that a file may have."""
+    """A name for a legend, where matplotlib leaves out names that begin with `_`, and lacks glyphs of some letters."""
     name = line(name)
     if len(name) > LONGEST:
         name = f"{name[: LONGEST // 2]}…{name[-LONGEST // 2 :]}"

@@ -20,14 +20,14 @@ from met.plan.channel import channel_paths
 from met.program.courses import TIME
 
 SHOWN, FITTED = 5, 48
-"""Instants that are drawn where none is named; instants that are fitted into the picture."""
+"""Number of instants that are drawn by default, and of instants that determine the picture's frame."""
 
 WIDTH, ASPECT = 8.6, 1.5
-"""Inches of a screen's picture; its width against its height."""
+"""Width of a screen's picture in inches, and its ratio to the height."""
 
 PATH, SHADOW, PAPER = "#0a5a9c", "#d5dade", "#ffffff"
 PALE = 0.62
-"""Share of the paper's colour in the first instant that is drawn; less in each later one."""
+"""Share of the paper's colour in the first drawn instant; less in each later one."""
 
 JOINTS = COLOURS[:-1]
 EDGE, GLEAM = 0.55, 0.5
@@ -76,7 +76,7 @@ def arm_picture(
 
 
 def _recorded(group: ArchiveGroup, position: int) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Times of a case's rows, s, and its channels by path, until it failed, if it did."""
+    """Times of a case's rows, s, and its channels by path, until its end or failure."""
     with reading(group.path):
         valid = int(group.values("n_valid")[position])
         channels: dict[str, np.ndarray] = {}
@@ -103,7 +103,7 @@ def _scene(archive: ArchiveFile, group: ArchiveGroup, position: int, recorded: S
 
 
 def _instants(asked: Sequence[float], time: np.ndarray, case: str) -> list[int]:
-    """The rows that are drawn, in their order. Raises Problem E399."""
+    """The rows to draw, in their order. Raises Problem E399."""
     if len(time) == 0:
         raise Problem(error("E399", f"{case} has no instant: it failed at once", help="`met show` says why"))
     first, last = float(time[0]), float(time[-1])
@@ -161,7 +161,7 @@ def _mixed(colour: str, light: float, pale: float) -> tuple[float, float, float]
 
 
 def _step(reach: float) -> float:
-    """The grid's, m: 1, 2 or 5 of a power of ten, about a quarter of the reach."""
+    """The spacing of the grid, m: 1, 2 or 5 times a power of ten, about a quarter of the reach."""
     power = 10.0 ** math.floor(math.log10(reach / 4.0))
     return power * min((1.0, 2.0, 5.0, 10.0), key=lambda each: abs(each * power - reach / 4.0))
 

@@ -1,4 +1,4 @@
-"""The cells of a map: which value each shows, in which colour, and what is marked on it.
+"""The cells of a map, with their values, colours and marks.
 
 Stripes and greys are drawn as stretches of a row, and signs so far apart that they are read, so that a map of many
 cells is as clear, and nearly as fast, as one of few.
@@ -17,17 +17,17 @@ from batch.queries.grids import cell_cases
 from met.frozen import frozen
 
 INFINITE, FAILED, LACKING = "#c9ced3", "#828c95", "#e9ecee"
-"""Greys of cells without a finite number; colours of numbers are no greys."""
+"""Greys of cells without a finite number, which differ from all colours of numbers."""
 
 STRIPES, DOTTED = "/////", "....."
 FINE = 60 * 60
-"""Cells from which on they have no edges, and lie as an image within an SVG or a PDF."""
+"""Number of cells from which on they have no edges, and are drawn as an image within an SVG or a PDF."""
 
 LEAST_SIGN, MOST_SIGN = 4.0, 5.0
-"""Points: a sign in a cell is no smaller, and no larger."""
+"""Smallest and largest size of a sign in a cell, in points."""
 
 SIGN_ROOM = 5.0
-"""A sign stands so many times its size from the next."""
+"""Distance between signs, relative to their size."""
 
 
 @frozen
@@ -51,7 +51,8 @@ def cell_values(
     *,
     differs: bool,
 ) -> CellValues:
-    """The case that stands for each cell. cells: of each case its cell, -1 for none; differs: changes are shown."""
+    """The case that is shown in each cell. cells: the cell of each case, -1 for none; differs: True where changes are
+    shown"""
     chosen = cell_cases(np.abs(shown) if differs else shown, cells, count, "<" if differs else worse)
     values = np.where(chosen >= 0, shown[chosen], np.nan)
     return CellValues(
@@ -70,7 +71,7 @@ def any_in(cases: np.ndarray, cells: np.ndarray, count: int) -> np.ndarray:
 
 
 def draw(ax: Any, found: CellValues, x: MapSide, y: MapSide, colours: Any, norm: Any, sheet: PictureSheet) -> Any:
-    """Colours, greys, stripes and signs. Gives what a colour bar is of."""
+    """Draw colours, greys, stripes and signs. Returns the mappable for a colour bar."""
     shape = (len(y.levels.texts), len(x.levels.texts))
     values = found.values
     finite = np.isfinite(values)
@@ -131,7 +132,7 @@ def _sign(ax: Any, shape: tuple[int, int]) -> tuple[float, tuple[int, int]]:
 
 
 def _spaced(which: np.ndarray, room: tuple[int, int]) -> np.ndarray:
-    """Thin these cells to one in each block of so many rows and columns: the one nearest to its middle."""
+    """Thin these cells to one in each block of `room` rows and columns: the one nearest to its middle."""
     if room == (1, 1) or not which.any():
         return which
     up, across = np.nonzero(which)
@@ -145,8 +146,8 @@ def _spaced(which: np.ndarray, room: tuple[int, int]) -> np.ndarray:
 
 
 def _signs(ax: Any, x: MapSide, y: MapSide, which: np.ndarray, room: tuple[int, int], text: str, size: float) -> None:
-    """Signs over some of these cells. What is around an infinity sign covers no other cell, and a sign in a stretch
-    that is narrower than itself stands in the stretch's middle, whole also at the map's edge."""
+    """Signs over some of these cells. The outline of an infinity sign covers no other cell, and a sign in a stretch
+    narrower than itself stands in the stretch's middle, whole also at the map's edge."""
     if not which.any():
         return
     up, across = np.nonzero(_spaced(which, room))

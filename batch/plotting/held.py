@@ -1,5 +1,5 @@
-"""Limits over signals: thin dotted lines, their names where they cover the least; what is far off is named above the
-panel, with an arrow that says which way it is."""
+"""Limits over signals: thin dotted lines, named where the name covers least; limits far off are named above the panel,
+with an arrow for their direction."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from batch.queries.limits import LimitMark
 TONE = "#a33a0a"
 DOTS: dict[str, Any] = {"color": TONE, "linewidth": 0.8, "linestyle": (0, (1, 1.6)), "zorder": 1.6, "label": "_limit"}
 PLACES = (0.995, 0.005, 0.5, 0.75, 0.25)
-"""Along a limit's line, where its name may stand."""
+"""Places along a limit's line where its name may stand."""
 
 
 def draw(ax: Any, marks: Sequence[LimitMark], time: np.ndarray, sheet: PictureSheet, columns: int) -> None:
-    """The limits of what is drawn in a panel already. Those that would squeeze it are named alone."""
+    """Draw the limits of a panel's signals. Those that would compress the panel are only named."""
     values = [mark for mark in dict.fromkeys(marks) if not mark.time]
     low, high = ax.dataLim.intervaly
     if not np.isfinite(high - low):
@@ -55,7 +55,7 @@ def write_limits(ax: Any, marks: Sequence[LimitMark], sheet: PictureSheet, colum
 
 
 def _along(ax: Any, value: float, text: str, sheet: PictureSheet, columns: int) -> None:
-    """A name beside a line that lies level, where the fewest points of the data are under it."""
+    """Write a name beside a horizontal line, where it covers the fewest points of the data."""
     left, right = ax.get_xlim()
     low, high = ax.get_ylim()
     size = sheet.small - 1.0

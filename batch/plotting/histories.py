@@ -26,26 +26,27 @@ from met.outputs import quoted
 
 OVERLAID = 8
 LEGEND_EVERY = 4
-"""Panels under one another that a legend serves at most."""
+"""Largest number of stacked panels that share a legend."""
 
 MOST_COLUMNS = 3
 LEAST_COLUMN = 1.5
-"""Inches of a column of panels on paper."""
+"""Smallest width of a column of panels on paper, inches."""
 
 COMMAND = "command"
 DASHED: dict[str, Any] = {"linestyle": (0, (4, 3))}
 ON, NEARLY_ALWAYS = 0.004, 0.9
-"""Lines lie on one another that are nearer than this, against the span of their panel, for this share of the time."""
+"""Lines count as coincident that are nearer than this, relative to the span of their panel, for this share of the
+time."""
 
 ON_ANOTHER: tuple[Any, ...] = ("-", (0, (6, 6)), (0, (3, 9)), (0, (1.5, 10.5)))
-"""A line that lies on others has gaps, through which they are seen."""
+"""Dashes for lines that coincide with others, through whose gaps these are seen."""
 
 WIDER, PALE = 3.0, 0.35
-"""Width, in widths of the own lines, and opacity of another archive's lines."""
+"""Width, relative to the own lines, and opacity of another archive's lines."""
 
 
 class Histories:
-    """The signals of some cases of a group, and how they are drawn."""
+    """The signals of some cases of a group, with the way in which they are drawn."""
 
     def __init__(
         self,
@@ -66,7 +67,7 @@ class Histories:
         self.time = group.values("time")
         self.joints = joints_of(group)
         self.commands = command_curves(group, found, self.positions, apart=not self.single and not self.fan)
-        if not signals:  # a command that is drawn where it belongs needs no panel of its own
+        if not signals:  # a command that is drawn with its signal needs no panel of its own
             drawn = {(command.variable, command.column) for command in self.commands.values()}
             found = [panel for panel in found if not drawn.issuperset((panel.variable, c) for c in panel.columns)]
         self.panels, self.left = layout.as_many_as_fit(found, bool(signals), "signals")
@@ -123,7 +124,7 @@ class Histories:
         return "; ".join(part for part in (below, self.left) if part)
 
     def _is_zero(self, row: Sequence[Cell | None]) -> bool:
-        """True if nothing of a row is ever other than zero."""
+        """True if all values of a row are zero."""
         cells = [cell for cell in row if cell is not None]
         return not any(
             np.any(history(self.group, cell.panel, position)[:, list(cell.lines)])
@@ -157,7 +158,7 @@ class Histories:
         held.draw(ax, self._marks(cell), self.time, self.sheet, columns)
 
     def _above(self, cell: Cell) -> dict[int, int]:
-        """For each line, on how many others it lies."""
+        """For each line, the number of others on which it lies."""
         values = layout.drawable(history(self.group, cell.panel, self.positions[0]))[:, list(cell.lines)]
         finite = values[np.isfinite(values)]
         near = ON * float(np.ptp(finite)) if len(finite) else 0.0
@@ -176,14 +177,14 @@ class Histories:
         return list(dict.fromkeys(mark for marks in found for mark in marks))
 
     def _joint_colour(self, panel: Panel, line: int) -> str:
-        """A joint has one colour in all panels, also where a signal is its alone (`shoulder.servo.voltage`); components
-        of one vector have the colours in turn."""
+        """The colour of a joint, which is the same in all panels, even for a signal of one joint
+        (`shoulder.servo.voltage`); components of a vector have the colours in turn."""
         joint = panel.joints[line]
         own = joint in self.joints and panel.joints.count(joint) == 1
         return COLOURS[(self.joints.index(joint) if own else line) % len(COLOURS)]
 
     def _fan(self, ax: Any, panel: Panel, line: int, colour: str) -> None:
-        """Median, nine in ten, all."""
+        """Draw the median, and the bands of nine in ten and of all."""
         values = layout.drawable(
             np.stack([history(self.group, panel, position)[:, line] for position in fan_cases(self.positions)])
         )
@@ -197,7 +198,8 @@ class Histories:
         ax.plot(time, middle, color=colour, label=layout.legend_label(panel.lines[line]))
 
     def _overlay(self, ax: Any, panel: Panel, line: int, colour: str | None) -> None:
-        """A line a case; where joints share the panel they have the colours, and cases are told apart by how faint."""
+        """Draw a line for each case; where joints share the panel they have the colours, and cases differ by
+        opacity."""
         count = len(self.positions)
         for index, position in enumerate(self.positions):
             y = layout.drawable(history(self.group, panel, position)[:, line])
@@ -208,7 +210,7 @@ class Histories:
                 _line(ax, self.time, y, color=sequence(index, count), label=_case_label(self.group, position))
 
     def _their_lines(self, ax: Any, panel: Panel, line: int, colour: str | None) -> None:
-        """The other archive's cases under the own ones; of a fan its median, and nine in ten between dots."""
+        """Draw the other archive's cases under the own ones; of a fan its median, and nine in ten between dots."""
         other, columns = self.other, self.theirs.get(self.panels.index(panel), [])
         if other is None or columns[line] < 0:
             return
@@ -232,7 +234,7 @@ class Histories:
                 ax.plot(other.time, y, color=tone, linewidth=1.2 + WIDER, **style)
 
     def _draw_command(self, ax: Any, command: CommandCurve | None) -> None:
-        """Dashed, over what followed it; in the cases' colours where each has its own."""
+        """Draw a command dashed, over the signal that follows it; in the cases' colours where each has its own."""
         if command is None:
             return
         if command.shared:
@@ -253,7 +255,8 @@ class Histories:
         flat: Sequence[bool],
         by_joint: bool,
     ) -> None:
-        """Beside the panels, once for some that share it; not beside a flat one, where it has no room."""
+        """Draw the legend beside the panels, once for some that share it; not beside a flat one, where it has no
+        room."""
         archives = self._archives()
         if by_joint and not self.sheet.narrow:
             last: list[str] | None = None
@@ -287,7 +290,7 @@ class Histories:
         layout.legend(figure, known | command | archives | cases, self.sheet, title)
 
     def _cases(self) -> dict[str, Any]:
-        """Legend entries of cases that are told apart by how faint they are."""
+        """Legend entries of cases that differ by opacity."""
         from matplotlib.lines import Line2D
 
         count = len(self.positions)
@@ -314,7 +317,7 @@ def _dashes(line: int) -> str:
 
 
 def _line(ax: Any, time: np.ndarray, y: np.ndarray, **style: Any) -> None:
-    """A line; a cross where it breaks off."""
+    """Draw a line, with a cross where it breaks off."""
     ax.plot(time, y, **style)
     valid = np.flatnonzero(np.isfinite(y))
     if len(valid) and valid[-1] < len(y) - 1:
@@ -322,12 +325,12 @@ def _line(ax: Any, time: np.ndarray, y: np.ndarray, **style: Any) -> None:
 
 
 def _differing(group: ArchiveGroup) -> list[Stored]:
-    """The varied parameters that tell the cases here apart."""
+    """The varied parameters that differ between the cases here."""
     return [v for v in group.role("coordinate") if len(distinct(group.values(v.name))) > 1]
 
 
 def _faint(index: int, count: int) -> float:
-    """The opacity of the lines of one of some cases that share their joints' colours."""
+    """The opacity of the lines of one of several cases that share their joints' colours."""
     return 1.0 - 0.75 * index / max(1, count - 1)
 
 
@@ -342,13 +345,13 @@ def _case_words(group: ArchiveGroup, position: int) -> str:
 
 
 def _case_label(group: ArchiveGroup, position: int) -> str:
-    """The values of what differs; the legend's title says of what."""
+    """The values of the differing parameters, which the legend's title names."""
     values = [number_text(group.values(v.name)[position] / deck_unit(v)[0]) for v in _differing(group)]
     return " · ".join(values) or f"case #{group.values('case')[position]}"
 
 
 def _case_title(group: ArchiveGroup) -> str:
-    """The title of the legend: what its values are of, a line each."""
+    """The title of the legend: the names of its values, one a line."""
     return " ·\n".join(f"{v.name}  ({deck_unit(v)[1]})" if deck_unit(v)[1] else v.name for v in _differing(group))
 
 
@@ -375,7 +378,7 @@ def grid(
 
 
 def label_axes(axes: list[list[Any]], rows: Sequence[Sequence[Cell | None]], sheet: PictureSheet) -> None:
-    """Labels of the axes, once where neighbours share them, and above each panel what it shows."""
+    """Label the axes, once where neighbours share them, and write each panel's heading."""
     for number, (cells, row) in enumerate(zip(rows, axes, strict=True)):
         before = None
         for column, (cell, ax) in enumerate(zip(cells, row, strict=True)):

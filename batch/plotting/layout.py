@@ -1,4 +1,4 @@
-"""Panels under and beside one another, what is written on them, and where legends and the title stand."""
+"""Arrangement of panels, their texts, legends and the title."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ T = TypeVar("T")
 
 PANEL_INCHES, TALL_INCHES = 1.85, (4.2, 2.9)
 FLAT = 0.3
-"""Height of a row that is zero throughout, against the others."""
+"""Height of a row of zeros, relative to the others."""
 
 WIDE, TALL = (1.1, 0.4, 1.5), (1.3, 0.62, 2.6)
-"""On paper: the least and the greatest height of a panel in inches, and between them height against width."""
+"""On paper: the smallest ratio of a panel's height to its width, and its smallest and largest height, inches."""
 
 LETTER = 0.56
-"""Mean width of a letter of DejaVu Sans, against its size."""
+"""Mean width of a letter of DejaVu Sans, relative to its size."""
 
 BESIDE, BESIDE_ON_PAPER = 1.0, 0.75
-"""Inches of a panel's width that its numbers and its label take."""
+"""Width in inches beside a panel for its numbers and label."""
 
 LINE = 1.45
 """Distance of two lines of text, in sizes of the letters."""
 
 TICK_INCHES = 0.5
-"""On paper: of a number below a panel, with room around it."""
+"""Width on paper of a number below a panel, with room around it, inches."""
 
 
 def figure(
@@ -57,26 +57,26 @@ def figure(
         height = panel * max(sum(heights), 1.0 if tall else 1.5) + 1.0
     made = Figure(figsize=(width, height), layout=engine)
     axes = made.subplots(len(heights), columns, sharex=True, sharey=share_y, squeeze=False, height_ratios=list(heights))
-    if sheet.paper:  # its own choice of ticks counts on shorter numbers
+    if sheet.paper:  # its own choice of ticks expects shorter numbers
         axes[0][0].locator_params(axis="x", nbins=max(2, int((width / columns - BESIDE_ON_PAPER) / TICK_INCHES)))
     return made, [list(row) for row in axes]
 
 
 DRAWABLE = 1e300
-"""The largest number that is drawn; a larger one counts as infinite, for the span of an axis would be no number."""
+"""The largest number that is drawn; larger ones count as infinite, since the span of an axis would overflow."""
 
 MOST_PANELS = 40
-"""Panels under one another, at most: more are no picture any more."""
+"""Largest number of stacked panels."""
 
 
 def drawable(values: np.ndarray) -> np.ndarray:
-    """The values, those infinite that no axis has room for."""
+    """The values, with infinity for those outside of any axis."""
     return np.where(np.abs(values) > DRAWABLE, np.copysign(np.inf, values), values)
 
 
 def as_many_as_fit(found: Sequence[T], asked: bool, what: str) -> tuple[Sequence[T], str]:
-    """The panels that a picture has room for, and what to say of the others. asked: True where they were named. Raises
-    Problem E391."""
+    """The panels that fit into a picture, and a remark on the others. asked: True where they were named. Raises Problem
+    E391."""
     if len(found) <= MOST_PANELS:
         return found, ""
     if asked:
@@ -86,12 +86,12 @@ def as_many_as_fit(found: Sequence[T], asked: bool, what: str) -> tuple[Sequence
 
 
 def letters(sheet: PictureSheet, inches: float) -> int:
-    """The number of letters of the small size that stand side by side in a width."""
+    """The number of small letters that fit into a width."""
     return max(12, int(inches * 72 / (LETTER * sheet.small)))
 
 
 def head(ax: Any, text: str, sheet: PictureSheet, columns: int, colour: str = INK) -> None:
-    """Write the text above a panel, in as many lines as its width asks for."""
+    """Write a panel's heading, in as many lines as its width requires."""
     wide = letters(sheet, ax.figure.get_figwidth() / columns - (BESIDE_ON_PAPER if sheet.paper else BESIDE))
     parts = text.split(" · ") if len(text) > wide else [text]
     lines = [line for part in parts for line in textwrap.wrap(part, wide)]
@@ -101,7 +101,7 @@ def head(ax: Any, text: str, sheet: PictureSheet, columns: int, colour: str = IN
 
 
 def _grow(figure: Any, sheet: PictureSheet, lines: float) -> None:
-    """Make room on paper for so many lines more, unless the height is given."""
+    """Make room on paper for further lines, unless the height is given."""
     if sheet.paper and sheet.height is None:
         figure.set_figheight(figure.get_figheight() + lines * LINE * sheet.small / 72)
 
@@ -133,7 +133,8 @@ def legend(
 
 
 def legend_label(text: str) -> str | None:
-    """A line's label: matplotlib leaves out of a legend what begins with `_`, and draws a thin space as nothing."""
+    """The text of a line in a legend: matplotlib leaves out texts that begin with `_`, and does not draw a thin
+    space."""
     return f"\N{THIN SPACE}{text}" if text.startswith("_") else text or None
 
 
@@ -147,7 +148,7 @@ def legend_entries(axes: Sequence[Sequence[Any]]) -> dict[str, Any]:
 
 
 def title(figure: Any, archive: ArchiveFile, name: str, below: str, sheet: PictureSheet) -> None:
-    """Write the title: on a screen deck and run, and `below` what is shown of it; on paper the latter alone."""
+    """Write the title: on a screen deck and run, and `below` the contents; on paper only the latter."""
     if sheet.paper:
         if below:
             text = textwrap.fill(below, letters(sheet, figure.get_figwidth() - 0.1))

@@ -28,16 +28,16 @@ from met.frozen import frozen
 
 RISING, PARTING = "viridis", "RdBu_r"
 BELOW, ABOVE = "#8f7ff0", "#f4724d"
-"""Colours of values below and above the range of colours, and of the colour bar's pointed ends."""
+"""Colours of values below and above the range of colours, also at the colour bar's pointed ends."""
 
 NOWHERE = "#c9ced3"
-"""Behind the cells of a difference, where white is no change."""
+"""Background of the cells of a difference, where white means no change."""
 
 RINGS = {STRIPES: "o", DOTTED: "s"}
 """Markers around a point that stand for the stripes and dots of a cell."""
 
 WIDEST = 2.6
-"""Inches of a map on paper: where there is more room, maps stand beside one another."""
+"""Largest width of a map on paper, inches: where there is more room, maps stand side by side."""
 
 
 @frozen
@@ -74,7 +74,7 @@ def plan(x: CaseColumn, y: CaseColumn, third: CaseColumn | None, other: tuple[st
 def draw(
     sheet: PictureSheet, found: MapLayout, metrics: Sequence[MapMetric], third: CaseColumn | None
 ) -> tuple[Any, list[list[Any]]]:
-    """The figure and its axes; what is written above it is left to the caller."""
+    """The figure and its axes; its heading is left to the caller."""
     every = np.ones(len(found.cells), bool)
     if third is None:
         wide = int(sheet.width / WIDEST) if sheet.width else 2 if len(metrics) < 5 else 3
@@ -102,7 +102,7 @@ def draw(
 
 
 def description(found: MapLayout, metrics: Sequence[MapMetric], third: CaseColumn | None) -> str:
-    """Say what a cell or a point is, and beside a third parameter what is required."""
+    """A description of the cells or points, and for a third parameter the requirement."""
     if not found.filled:
         text = "a point a case"
     elif found.several == 1:
@@ -128,7 +128,7 @@ def _about(each: MapMetric, found: MapLayout) -> str:
 
 
 def _lost(each: MapMetric) -> str:
-    """Say how many cases have no finite number."""
+    """The number of cases without a finite number, in words."""
     infinite, failed = int(np.isinf(each.values).sum()), int(each.failed.sum())
     lacking = int((np.isnan(each.values) & ~each.failed).sum())
     named = ((infinite, "infinite in {:,}"), (failed, "failed: {:,}"), (lacking, "no value in {:,}"))
@@ -144,7 +144,7 @@ def _shown(each: MapMetric, found: MapLayout) -> np.ndarray:
 
 @frozen
 class ColourScale:
-    """The colour of each value; `reach`: how far the colours go, None where no value is finite."""
+    """The colour of each value; `reach`: the range of the colours, None where no value is finite."""
 
     norm: Any
     reach: Reach | None
@@ -180,7 +180,7 @@ def _bar(
     sheet: PictureSheet,
     tones: ColourScale,
 ) -> None:
-    """The colour bar; pointed where values lie beyond it, and how many."""
+    """Draw the colour bar, pointed where values lie beyond it, with their number."""
     far = tones.reach
     if far is None:
         return
@@ -274,11 +274,11 @@ def _points(ax: Any, each: MapMetric, found: MapLayout, here: np.ndarray, norm: 
     return mapped
 
 
-# What is written
+# Texts
 
 
 def _sides(axes: Sequence[Sequence[Any]], found: MapLayout, sheet: PictureSheet) -> None:
-    """Values and names of the parameters, on the left and below all."""
+    """Write values and names of the parameters, on the left and below all."""
     width, height = axes[0][0].figure.get_size_inches()
     across = max(0.6, width / len(axes[0]) - (0.9 if sheet.paper else 1.5))
     up = max(0.5, height / len(axes) - 0.6)
@@ -331,5 +331,5 @@ def _marks(metrics: Sequence[MapMetric], found: MapLayout) -> dict[str, Any]:
 
 
 def _lacking(shown: np.ndarray, each: MapMetric) -> bool:
-    """True if a case that is there and did not fail has no value."""
+    """True if a case that exists and did not fail has no value."""
     return bool(np.isnan(shown[each.both & ~each.failed]).any())

@@ -1,4 +1,4 @@
-"""A metric of the cases of a run or sweep, in the deck's unit: its values, who misses what is required, what to say."""
+"""A metric of the cases of a run or sweep, in the deck's unit: its values, missed requirements, and description."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class MapMetric:
 
     @property
     def worse(self) -> str:
-        """The sense of its first limit, as `grids.cell_cases` takes it."""
+        """The direction of its first limit, as `grids.cell_cases` takes it."""
         return self.column.limits[0].sense if self.column.limits else ""
 
     @property
     def about(self) -> str:
-        """The metric's description, and how many cases miss what is required of it."""
+        """The metric's description, with the number of cases that miss its requirements."""
         parts = [self.column.about] if self.column.about else []
         count = len(self.values)
         if self.column.limits:
@@ -52,7 +52,7 @@ class MapMetric:
 
     @property
     def difference(self) -> np.ndarray:
-        """Own less theirs; 0 where both are infinite alike."""
+        """Own value less the other's; 0 where both are infinite with the same sign."""
         assert self.theirs is not None
         same = self.values == self.theirs
         with np.errstate(invalid="ignore"):
@@ -92,7 +92,7 @@ def _both(pool: Pool, others: Mapping[int, OtherGroup]) -> np.ndarray | bool:
 def _theirs(
     pool: Pool, name: str, others: Mapping[int, OtherGroup], asked: bool
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """The metric of each case in the other archive, in the own unit, and True where it misses what that requires."""
+    """The metric of each case in the other archive, in the own unit, and True where it misses its requirement there."""
     if not others:
         return None, None
     out, missed, found = np.full(pool.count, np.nan), np.zeros(pool.count, bool), False

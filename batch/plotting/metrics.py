@@ -1,4 +1,4 @@
-"""Metrics over what is varied: points over one parameter, maps over two."""
+"""Metrics over varied parameters: points over one parameter, maps over two."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _points(
     sheet: PictureSheet,
     files: tuple[str, str] | None,
 ) -> Any:
-    """A panel a metric."""
+    """Draw a panel for each metric."""
     x = x or CaseColumn("case", "case", "", "case", pool.cases.astype(np.float64))
     figure, axes = layout.figure(sheet, 1, [1.0] * len(metrics))
     mapped = None

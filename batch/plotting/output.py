@@ -1,4 +1,4 @@
-"""Where a picture goes: PNG, SVG or PDF by the name's ending; what is not written over; that it is there whole."""
+"""The output of a picture: PNG, SVG or PDF by the name's ending, written whole, with existing files protected."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from met.outputs import cannot_write, check_overwrite, check_place, quoted
 
 SOFTWARE = "MET"
 MOST_DOTS = 200_000_000
-"""Dots of a PNG, at most: each takes four bytes while it is drawn."""
+"""Largest number of dots of a PNG: each takes four bytes while it is drawn."""
 
 HEAD_BYTES, TAIL_BYTES = 2000, 20_000
 
-# By ending: what is told of its making, without a date, and how that stands in the file.
+# By ending: metadata about the program, without a date, and its bytes in the file.
 METADATA: dict[str, dict[str, str | None]] = {
     ".png": {"Software": SOFTWARE},
     ".svg": {"Creator": SOFTWARE, "Date": None},
     ".pdf": {"Creator": SOFTWARE, "CreationDate": None},
 }
 MARKS = {
-    ".png": b"\0\0\0\x0ctEXtSoftware\0" + SOFTWARE.encode(),  # with its length, for there are others that begin so
+    ".png": b"\0\0\0\x0ctEXtSoftware\0" + SOFTWARE.encode(),  # with its length, since other texts may begin so
     ".svg": f"<dc:title>{SOFTWARE}</dc:title>".encode(),
     ".pdf": f"/Creator ({SOFTWARE})".encode(),
 }
 
 
 def check(output: Path) -> None:
-    """Refuse to write over what is no picture of MET's. Raises Problem E305; E326 for another ending."""
+    """Refuse to overwrite a file that is not a picture of MET's. Raises Problem E305; E326 for another ending."""
     try:
         if output.suffix.lower() not in METADATA and not output.is_dir():
             helps = [f"`-o {quoted(output.with_suffix('.png'))}`"] if output.name else []
@@ -57,7 +57,7 @@ def save(figure: Any, output: Path) -> None:
 
     from matplotlib.text import Text
 
-    for text in figure.findobj(Text):  # names and units of an archive are anybody's
+    for text in figure.findobj(Text):  # names and units in an archive may hold any characters
         text.set_text(visible(text.get_text()))
     kind = output.suffix.lower()
     _check_dots(figure, kind)

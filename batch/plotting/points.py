@@ -17,21 +17,21 @@ from batch.queries.pool import CaseColumn
 from met.frozen import frozen
 
 MARKER, NAMED = 14, 8
-"""Area of a point, in square points; levels that a legend names: of more, a colour bar."""
+"""Area of a point, in square points; number of levels that a legend names: with more, there is a colour bar."""
 
 MANY, DOTS = 20_000, (1600, 500)
-"""Points from which on it is looked which of them hide others; dots of a panel, across and up, that are told apart."""
+"""Number of points from which on hidden ones are left out; resolution of a panel, across and up, in dots."""
 
 RASTERED = 2000
-"""More points than these are a raster within an SVG or a PDF."""
+"""More points than these are drawn as an image within an SVG or a PDF."""
 
 BEHIND, PALE = 3.0, 0.3
 
 BAR = 0.7
-"""Least height of a colour bar, in heights of the picture."""
+"""Smallest height of a colour bar, relative to the picture."""
 
 PANEL = 0.6
-"""Least width of a panel beside a legend, in widths of the picture."""
+"""Smallest width of a panel beside a legend, relative to the picture."""
 
 
 @frozen
@@ -45,7 +45,8 @@ class Set:
 
 
 def scatter(ax: Any, each: MapMetric, x: CaseColumn, by: CaseColumn | None, sheet: PictureSheet) -> Any:
-    """One metric over x, by the levels of another column. Gives what a colour bar is of, if there is to be one."""
+    """Draw one metric over x, by the levels of another column. Returns the mappable for a colour bar, if one is
+    needed."""
     finite = np.isfinite(each.values)
     drawn = _apart(x.values, np.where(finite, each.values, np.nan))
     size = MARKER / marker_scale(len(x.values)) ** 2
@@ -74,7 +75,7 @@ def scatter(ax: Any, each: MapMetric, x: CaseColumn, by: CaseColumn | None, shee
 
 
 def _sets(x: CaseColumn, by: CaseColumn | None) -> list[Set]:
-    """One for each level that the legend names; none where there are too many of them and no curves."""
+    """A set for each level that the legend names; none where there are too many of them and no curves."""
     if by is None:
         every = np.arange(len(x.values))
         return [Set(every, COLOURS[0], "", x.role == "parameter" and len(levels(x.values)) == len(every) < 200)]
@@ -94,7 +95,8 @@ def _sets(x: CaseColumn, by: CaseColumn | None) -> list[Set]:
 
 
 def _scale(by: CaseColumn) -> Any:
-    """Colours by value, where there are too many to name; by its logarithm where its axis would be logarithmic."""
+    """Colours by value, where there are too many levels to name; by the logarithm where the axis would be
+    logarithmic."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm, Normalize
 
@@ -111,7 +113,7 @@ def _curves(x: CaseColumn, by: CaseColumn) -> bool:
 
 
 def _theirs(ax: Any, each: MapMetric, x: CaseColumn, sets: list[Set], by: CaseColumn | None) -> None:
-    """The other archive's cases: hollow, under the own ones, with wide pale curves."""
+    """Draw the other archive's cases: hollow, under the own ones, with wide pale curves."""
     assert each.theirs is not None
     y = np.where(np.isfinite(each.theirs), each.theirs, np.nan)
     drawn = _apart(x.values, y)
@@ -142,7 +144,7 @@ def _theirs(ax: Any, each: MapMetric, x: CaseColumn, sets: list[Set], by: CaseCo
 
 
 def _reach(ax: Any, x: np.ndarray) -> None:
-    """Room for all cases, those among them that stand on the panel's edges alone."""
+    """Extend the axis to all cases, including those whose marks stand on the panel's edges."""
     finite = levels(x)
     if len(finite):
         ax.update_datalim([(finite[0], 0.0), (finite[-1], 0.0)], updatey=False)
@@ -150,8 +152,8 @@ def _reach(ax: Any, x: np.ndarray) -> None:
 
 
 def _edge(ax: Any, values: np.ndarray, x: np.ndarray, size: float, *, hollow: bool = False) -> None:
-    """Draw values that are no number within the panel at its edges: ▲ infinite, ▼ infinite below, × no value. hollow:
-    of another archive."""
+    """Draw non-finite values at the edges of the panel: ▲ infinite, ▼ minus infinite, × no value. hollow: of another
+    archive"""
     from matplotlib.transforms import ScaledTranslation
 
     size = max(12.0, size)
@@ -180,7 +182,7 @@ def _edge(ax: Any, values: np.ndarray, x: np.ndarray, size: float, *, hollow: bo
 
 
 def edge_words(values: np.ndarray) -> str:
-    """Say in words what the marks on the edges stand for."""
+    """The meaning of the marks on the edges, in words."""
     parts = []
     for there, text in ((np.isinf(values), "infinite in {} (▲)"), (np.isnan(values), "no value in {} (×)")):
         if there.any():
@@ -189,7 +191,7 @@ def edge_words(values: np.ndarray) -> str:
 
 
 def _limits(ax: Any, each: MapMetric) -> None:
-    """Lines at the limits that lie near enough to the points."""
+    """Draw lines at the limits that lie near enough to the points."""
     shown = each.values if each.theirs is None else np.concatenate([each.values, each.theirs])
     finite = shown[np.isfinite(shown)]
     for limit in each.column.limits:
@@ -204,8 +206,8 @@ def marker_scale(count: int) -> float:
 
 
 def _apart(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Places of the points to draw, of many: of those that fall on one dot of the picture, the last, which hides the
-    others. So none that stands alone is left out."""
+    """The places of the points to draw: among points on one dot of the picture only the last, which hides the
+    others."""
     if len(x) <= MANY:
         return np.arange(len(x))
     there = np.flatnonzero(np.isfinite(y) & np.isfinite(x))[::-1]
@@ -223,7 +225,7 @@ def legend_of(known: Mapping[str, Any], other: tuple[str, str] | None) -> dict[s
     limit = {text: known[text] for text in ("limit",) if text in known}
     out = {text: handle for text, handle in known.items() if text != "limit"} | limit
     if other is None:
-        return {} if list(out) == ["limit"] else out  # the panel's head says what is required
+        return {} if list(out) == ["limit"] else out  # the panel's heading states the requirement
     dot: dict[str, Any] = {"linestyle": "", "marker": "o", "color": INK}
     return {
         **out,
@@ -243,7 +245,8 @@ def bar(figure: Any, mapped: Any, axes: list[Any], by: CaseColumn, sheet: Pictur
 
 
 def varied_axis(ax: Any, x: CaseColumn, sheet: PictureSheet) -> None:
-    """The axis of what is varied: a choice's words at their places, whole numbers of cases, orders of magnitude."""
+    """Set up the axis of a varied parameter: a choice's words at their places, whole numbers of cases, orders of
+    magnitude."""
     if is_log(x):
         found, wide = line(x), ax.figure.get_figwidth()
         ax.set_xscale("log")

@@ -1,4 +1,5 @@
-"""Solids of an arm as polygons of a picture, seen from one point, the farthest first, as paper needs no renderer."""
+"""Solids of an arm as polygons of a picture from one viewpoint, sorted from back to front, so that paper needs no
+renderer."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from batch.arms.scene import POSE_NUMBERS, SHAPE_NUMBERS, ArmScene
 from met.frozen import frozen
 
 ROUND = 28
-"""Corners of a circle."""
+"""Number of corners of a circle."""
 
 
 @frozen
@@ -72,7 +73,7 @@ def solids(scene: ArmScene, numbers: np.ndarray) -> list[PicturedSolid]:
 
 @frozen
 class Viewpoint:
-    """Where a picture is seen from: right, up and back (to the eye) in the world, and the eye."""
+    """A viewpoint of a picture: right, up and back (to the eye) in the world, and the eye."""
 
     right: np.ndarray
     up: np.ndarray
@@ -87,8 +88,8 @@ class Viewpoint:
 
 
 def viewpoint(found: Sequence[PicturedSolid], aspect: float) -> Viewpoint:
-    """From where the most of these solids' spread is seen, from higher where it is flat; so far that all are seen in a
-    picture of this width against its height."""
+    """The direction from which the spread of these solids is seen best, from higher where it is flat; at such a
+    distance that all are seen in a picture of this ratio of width to height."""
     points = np.concatenate([solid.ends for solid in found])
     radii = np.repeat([solid.radius for solid in found], 2)
     spread = np.cov(points.T, bias=True)

@@ -1,4 +1,4 @@
-"""What is asked for: signals over time, or metrics over what is varied; and over which parameters."""
+"""Resolution of a plot's request: signals over time, or metrics over varied parameters."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from met.outputs import quoted
 
 MOST_OVER = 3
 MOST_BESIDE = 6
-"""Maps beside one another, one for each value of a third parameter."""
+"""Largest number of maps side by side, one for each value of a third parameter."""
 
 MAPPED = 5
-"""Values that two parameters must have for a map where none is asked for: of fewer, curves say more."""
+"""Number of values from which two parameters are drawn as a map by default: with fewer, curves are clearer."""
 
 
 @frozen
 class PlotRequest:
-    """Signals, or metrics; of these both are empty where none is named."""
+    """A request for signals or metrics; both are empty where none is named."""
 
     signals: tuple[str, ...] = ()
     metrics: tuple[str, ...] = ()
@@ -35,7 +35,7 @@ class PlotRequest:
 def plot_request(
     group: ArchiveGroup, pool: Pool, names: Sequence[str], cases: Sequence[str], over: Sequence[str]
 ) -> PlotRequest:
-    """Signals or metrics, by what the names are, and by the other options. Raises Problem E323, E324, E391."""
+    """The requested signals or metrics, from the names and the other options. Raises Problem E323, E324, E391."""
     metrics = {name: v for v in pool_metrics(pool) for name in (v.path, v.name)}
     signals, others = [], []
     for name in names:
@@ -75,7 +75,7 @@ def _is_signal(group: ArchiveGroup, name: str) -> bool:
 
 
 def _unknown(group: ArchiveGroup, name: str, metrics: Sequence[str]) -> Problem:
-    """The problem that a name is neither a metric nor a signal; of signals it is that of `panels`."""
+    """The problem that a name is neither a metric nor a signal; for signals, that of `panels`."""
     signals = [v.name for v in group.role("signal")]
     here = f"metrics here: {', '.join(dict.fromkeys(metrics))}"
     if signals and metrics:
@@ -90,12 +90,12 @@ def _unknown(group: ArchiveGroup, name: str, metrics: Sequence[str]) -> Problem:
     raise AssertionError(name)
 
 
-# Over what
+# Parameters of the axes
 
 
 def map_axes(archive: ArchiveFile, pool: Pool, names: Sequence[str]) -> tuple[CaseColumn, ...]:
-    """The parameters that metrics are drawn over: those that are named; else two that make a grid of some size, or the
-    one with most values; none where nothing is varied. Raises Problem E390."""
+    """The parameters over which metrics are drawn: the named ones; else two that make a grid of some size, or the one
+    with most values; none where nothing is varied. Raises Problem E390."""
     varied = pool.varied()
     if not names:
         x, y = (*varied, None, None)[:2]
@@ -156,8 +156,8 @@ def _here(known: Sequence[str]) -> str:
 
 
 def colour_column(pool: Pool, drawn: Sequence[CaseColumn]) -> CaseColumn | None:
-    """The column that colours points over one parameter: of what else is varied that with most values, which does not
-    go in step with it."""
+    """The column that colours points over one parameter: the varied one with most values that is not in step with
+    it."""
     for column in pool.varied():
         if all(column is not each for each in drawn) and is_independent(column, drawn[0]):
             return column
@@ -165,6 +165,6 @@ def colour_column(pool: Pool, drawn: Sequence[CaseColumn]) -> CaseColumn | None:
 
 
 def is_independent(column: CaseColumn, other: CaseColumn) -> bool:
-    """True if a column does not rise, or fall, wherever another one rises."""
+    """True if a column does not always rise, or fall, where another one rises."""
     ranks, others = (np.searchsorted(levels(each.values), each.values) for each in (column, other))
     return not (np.array_equal(ranks, others) or np.array_equal(ranks, others.max(initial=0) - others))

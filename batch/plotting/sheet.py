@@ -1,4 +1,4 @@
-"""How large a picture is and how it is set: for a screen, or for the column of a paper."""
+"""The size and style of a picture: for a screen, or for the column of a paper."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from met.diagnostic import Problem, error
 from met.frozen import frozen
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe and Ito, "Color Universal Design" (2008): told apart by colour-blind eyes as well."""
+"""Colours of Okabe and Ito, "Color Universal Design" (2008), which colour-blind eyes can distinguish too."""
 
 INK, FAINT, LIGHT = "#22282e", "#8a939c", "#e4e7ea"
 
@@ -38,16 +38,16 @@ STYLE: dict[str, Any] = {
     "text.parse_math": False,  # names of files may have dollars
     "figure.facecolor": "white",
     "agg.path.chunksize": 20000,
-    "svg.fonttype": "path",  # the same wherever it is opened, whatever fonts are there
+    "svg.fonttype": "path",  # the same wherever it is opened, whatever fonts are installed
     "svg.hashsalt": "met",
-    "pdf.fonttype": 42,  # whole fonts, as journals ask for
+    "pdf.fonttype": 42,  # whole fonts, as journals require
 }
 
 SCREEN_DPI, PAPER_DPI = 144, 300
 LEAST_CM, MOST_CM = 4.0, 120.0
 LEAST_DPI, MOST_DPI = 30, 2400
 NARROW = 5.0
-"""Inches: narrower, legends stand under the panels."""
+"""Width in inches below which legends stand under the panels."""
 
 INCHES = {"cm": 1 / 2.54, "mm": 1 / 25.4, "in": 1.0}
 _SIZE = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(?:[x×]\s*(\d+(?:\.\d*)?|\.\d+)\s*)?(cm|mm|in)\s*")
@@ -63,7 +63,7 @@ class PictureSheet:
 
     @property
     def paper(self) -> bool:
-        """True if the picture is for a paper, whose caption says what it is of."""
+        """True if the picture is for a paper, whose caption describes it."""
         return self.width is not None
 
     @property
@@ -111,7 +111,7 @@ def sheet(size: str = "", dpi: int | None = None) -> PictureSheet:
 
 
 def sequence(index: int, count: int) -> Any:
-    """Colours that order cases: from dark blue to yellow, the pale end left out."""
+    """Colours for ordered cases: from dark blue to yellow, without the pale end."""
     import matplotlib
 
     return matplotlib.colormaps["viridis"](0.0 if count == 1 else 0.88 * index / (count - 1))

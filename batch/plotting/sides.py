@@ -1,4 +1,4 @@
-"""The side of a map: where the cells or points of a parameter's values lie, and which numbers are written there."""
+"""The side of a map: the positions of a parameter's values, and the numbers that are written there."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from batch.queries.signals import number_text
 from met.frozen import frozen
 
 MOST_CELLS = 300
-"""Columns and rows of cells in a picture: of more, a cell would be no wider than a dot."""
+"""Largest number of columns and rows of cells in a picture: with more, a cell would be no wider than a dot."""
 
 SHORT = 5
-"""Letters of values that are written rather than round numbers between them."""
+"""Largest number of letters of a value that is written exactly, not replaced by round numbers."""
 
 APART = 0.1
-"""Inches between numbers on an axis."""
+"""Smallest distance between numbers on an axis, inches."""
 
 BEYOND = 0.05
-"""Room beyond the first and the last point, against the span of all."""
+"""Room beyond the first and the last point, relative to the span of all."""
 
 
 @frozen
@@ -72,7 +72,7 @@ def side(column: CaseColumn) -> MapSide:
 
 
 def line(column: CaseColumn) -> MapSide:
-    """The side of points, which lie by their values whatever these are; words, at their places."""
+    """The side of points, which lie at their values; words at their places."""
     found = column_levels(column.values, column.words)
     if column.words:
         return side(column)
@@ -91,7 +91,8 @@ def is_log(column: CaseColumn) -> bool:
 
 
 def write(axis: Any, found: MapSide, inches: float, sheet: PictureSheet, *, upright: bool, cells: bool = True) -> None:
-    """The values that have room on an axis of this length; of many, or of points, round numbers between them."""
+    """Write the values that fit on an axis of this length; if there are many, or for points, round numbers between
+    them."""
     from matplotlib.ticker import NullLocator
 
     axis.set_minor_locator(NullLocator())
@@ -106,8 +107,8 @@ def write(axis: Any, found: MapSide, inches: float, sheet: PictureSheet, *, upri
 
 
 def write_log(axis: Any, found: MapSide, inches: float, sheet: PictureSheet, *, upright: bool = False) -> None:
-    """Write on a logarithmic axis of this length the values, where they are few and short, else round numbers, as many
-    as have room; no others."""
+    """Write on a logarithmic axis of this length the values, if they are few and short, else as many round numbers as
+    fit."""
     from matplotlib.ticker import NullLocator
 
     axis.set_minor_locator(NullLocator())
@@ -118,7 +119,7 @@ def write_log(axis: Any, found: MapSide, inches: float, sheet: PictureSheet, *, 
     values = next((each for each in tries if _apart(each, low, high, inches, sheet, upright=upright)), tries[-1])
     while not _apart(values, low, high, inches, sheet, upright=upright):
         values = values[::2]
-    if len(values) < 2:  # less than a factor of 2.5: rises nearly as a linear axis does
+    if len(values) < 2:  # less than a factor of 2.5: the axis is nearly linear
         values = [x for x in _even_numbers(low, high, inches, sheet) if low <= x <= high]
     axis.set_ticks(values, [number_text(x) for x in values])
 
@@ -133,7 +134,7 @@ def _even_numbers(low: float, high: float, inches: float, sheet: PictureSheet) -
 def _apart(
     values: Sequence[float], low: float, high: float, inches: float, sheet: PictureSheet, *, upright: bool
 ) -> bool:
-    """True if the numbers stand clear of one another on a logarithmic axis."""
+    """True if the numbers do not overlap on a logarithmic axis."""
     if len(values) < 2 or not high > low:
         return True
     places = [inches * math.log(x / low) / math.log(high / low) for x in values]
@@ -143,5 +144,5 @@ def _apart(
 
 
 def _wide(texts: Sequence[str], sheet: PictureSheet) -> float:
-    """Inches of the longest."""
+    """Width of the longest text, inches."""
     return max(map(len, texts)) * LETTER * sheet.normal / 72

@@ -1,4 +1,4 @@
-"""`met report`: an archive as one HTML page, that opens anywhere and asks for nothing.
+"""`met report`: an archive as one HTML page, which opens anywhere without a network.
 
     batch.report.report("two_link.gains.h5")                    # -> two_link.gains.html
     batch.report.report("after.h5", against="before.h5")        # and what changed
@@ -34,7 +34,7 @@ def report(
     simulate     whether the page can run the cases again, and draws the arm
     progress     called with the number of cases whose stability is known, where motors are on beds
 
-    Raises met.diagnostic.Problem for what a user can mend.
+    Raises met.diagnostic.Problem for mistakes that a user can correct.
     """
     from contextlib import ExitStack
 

@@ -1,4 +1,4 @@
-"""Where a report goes: what is refused as a place for it, and that it is there whole or not at all."""
+"""Output of a report: checks of its place, and writing whole or not at all."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from met.outputs import cannot_write, check_overwrite, check_place, quoted
 
 ENDINGS = (".html", ".htm")
 HEAD_BYTES = 400
-"""A page says within these who made it."""
+"""Number of bytes at the beginning of a page that name its program."""
 
 
 def default(archive: Path) -> Path:
-    """Beside the archive: `two_link.gains.html`."""
+    """The default path of a report, beside the archive: `two_link.gains.html`."""
     return archive.with_suffix(".html")
 
 
@@ -34,13 +34,13 @@ def check(output: Path) -> None:
 
 
 def is_report(path: Path) -> bool:
-    """True if a file says that it is a page of ours."""
+    """True if a file is marked as a page of MET's."""
     with open_regular(path) as file:
         return f'<meta name="generator" content="{GENERATOR}">'.encode() in file.read(HEAD_BYTES)
 
 
 def write(output: Path, text: str) -> None:
-    """The page under its name when it is whole. Raises Problem E380 where the system refuses."""
+    """Write the page under its name, whole or not at all. Raises Problem E380 where the system refuses."""
     try:
         with whole_file(output) as file:
             file.write(text.encode("utf-8"))

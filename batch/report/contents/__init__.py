@@ -1,1 +1,1 @@
-"""What a report holds, as plain data, gathered from an archive: `gathering.gather` makes a `parts.Report`."""
+"""The contents of a report as plain data: `gathering.gather` makes a `parts.Report` from an archive."""

@@ -1,4 +1,4 @@
-"""Another archive that a report is held against: which of its cases is which, and what they were there."""
+"""The other archive of a report's comparison: its matching cases, and their results there."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ GOOD = (ENDED.index("met"), ENDED.index("done"))
 
 @frozen
 class ComparedArchive:
-    """The other archive, which is before, and what differs from it, in which both have the names that a page uses."""
+    """The other (earlier) archive, and the differences from it, in which both archives have the names of the page."""
 
     file: ArchiveFile
     found: Diff
 
     def of(self, pool: Pool) -> EarlierCases | None:
-        """The cases that are those of a pool; None where there is no such run or sweep."""
+        """The cases that match those of a pool; None where there is no such run or sweep."""
         groups = {group.name: group for group in self.file.groups}
         by_name = {experiment.name_b: experiment for experiment in self.found.experiments}
         pairs = [
@@ -65,25 +65,25 @@ class EarlierCases:
 
     @cached_property
     def ended(self) -> np.ndarray:
-        """[case] how it came out before: its place in `content.ENDED`; -1 where there is none."""
+        """[case] its outcome before, as its place in `content.ENDED`; -1 where there is none."""
         return np.where(self.there, self.pool.ended[self.place], -1)
 
     @cached_property
     def most(self) -> tuple[int, ...]:
-        """Numbers of the cases that differ most, the first ones first."""
+        """Numbers of the cases that differ most, the largest difference first."""
         ranked = [each for _, _, experiment in self.pairs for each in experiment.worst]
         return tuple(each.case_b for each in sorted(ranked, key=lambda each: -each.score))
 
     def experiments(self) -> dict[str, Experiment]:
-        """Those of the other archive's plan, by name; none where the plan cannot be read here."""
+        """The experiments of the other archive's plan, by name; none where the plan cannot be read here."""
         try:
             return {each.name: each for each in self.file.plan().experiments}
         except Problem:
             return {}
 
     def values(self, metric: CaseColumn) -> np.ndarray | None:
-        """A metric of the pool as it was, in its unit: [case], not a number where there is none; None where the other
-        archive has no such metric in this unit."""
+        """The former values of a metric of the pool, in its unit: [case], not-a-number where there is none; None where
+        the other archive has no such metric in this unit."""
         name = metric.key.partition(":")[2]
         mine, theirs = (
             [
@@ -110,7 +110,7 @@ class EarlierCases:
 
 
 def _places(pool: Pool, number: int) -> np.ndarray:
-    """For each position in one of a pool's groups, which of the pool's cases that is."""
+    """For each position in one of a pool's groups, the place of that case in the pool."""
     here = np.flatnonzero(pool.group_of == number)
     out = np.empty(len(here), np.int64)
     out[pool.position_of[here]] = here
@@ -118,7 +118,7 @@ def _places(pool: Pool, number: int) -> np.ndarray:
 
 
 def change(column: CaseColumn) -> CaseColumn | None:
-    """A metric less what it was; 0 where both are the same infinity. None where nothing is known of it."""
+    """A metric less its former value; 0 where both are the same infinity. None where there are no former values."""
     before = column.before
     if before is None:
         return None
@@ -128,8 +128,7 @@ def change(column: CaseColumn) -> CaseColumn | None:
 
 
 def display_names(before: Path, now: Path) -> tuple[str, str]:
-    """The names of two archives in a page: those of their files, or where these are the same as much of their paths as
-    tells them apart."""
+    """The names of two archives in a page: their files' names, or as much of their paths as distinguishes them."""
     one, two = before.absolute().parts, now.absolute().parts
     for length in range(1, max(len(one), len(two)) + 1):
         if one[-length:] != two[-length:]:
@@ -138,7 +137,7 @@ def display_names(before: Path, now: Path) -> tuple[str, str]:
 
 
 def rename_archives(found: Diff, before: str, now: str) -> Diff:
-    """The same differences, with these names for the two archives in all that is said of them."""
+    """The same differences with these names for the two archives in all texts."""
     names = {str(found.b): now, str(found.a): before}
     either = re.compile("|".join(re.escape(path) for path in sorted(names, key=len, reverse=True)))
 
@@ -157,7 +156,7 @@ def rename_archives(found: Diff, before: str, now: str) -> Diff:
 
 
 def of_groups(found: Diff, groups: Sequence[ArchiveGroup]) -> Diff:
-    """The differences of these runs and sweeps of the second archive alone."""
+    """The differences restricted to these runs and sweeps of the second archive."""
     names = {group.name for group in groups}
     experiments = tuple(each for each in found.experiments if each.name_b in names)
     only_b = tuple(name for name in found.only_b if name in names)

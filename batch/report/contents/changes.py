@@ -1,5 +1,5 @@
-"""What a report holds of a comparison with another archive, which is before, and this one now, as plain data. Its rows
-are those of `met diff`, batch/differences/words.py."""
+"""The contents of a report about a comparison with an earlier archive, as plain data. Its rows are those of `met diff`,
+batch/differences/words.py."""
 
 from __future__ import annotations
 

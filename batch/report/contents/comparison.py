@@ -1,4 +1,4 @@
-"""What changed against another archive, as a page says it; the words are those of `met diff`."""
+"""The comparison with another archive in a page's words, which are those of `met diff`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from batch.report.contents.parts import OutcomeCount, RequirementFlow, Verdict
 from met.messages.visible import visible
 
 MOST_LINES = 200
-"""Lines of one kind of change that are in a page."""
+"""Largest number of lines of one kind of change in a page."""
 
 KINDS = {
     "versions": "Versions",
@@ -31,7 +31,7 @@ KINDS = {
 
 
 def archive_changes(found: Diff) -> ArchiveChanges:
-    """The differences of what the two archives were made from, and the runs that one of them has alone."""
+    """Differences in the provenance of the two archives, and the runs that only one of them has."""
     origins = tuple(
         OtherOrigin(KINDS[kind], lines[:MOST_LINES], max(0, len(lines) - MOST_LINES))
         for kind, lines in words.provenance_lines(found)
@@ -55,8 +55,8 @@ def run_changes(found: Diff, before: EarlierCases | None) -> tuple[RunChanges, .
 
 
 def _run_changes(found: Diff, experiment: ExperimentDiff, several: bool) -> RunChanges:
-    """The changes of one structure. several: True where there are others, so that its requirements are listed here: the
-    verdict has those of all structures together."""
+    """The changes of one structure. several: True where there are others, so that its requirements are listed here;
+    otherwise the verdict has them"""
     alone = words.unmatched_cases(found, experiment)
     if several:
         alone += words.requirement_lines(experiment)
@@ -87,7 +87,8 @@ def _run_changes(found: Diff, experiment: ExperimentDiff, several: bool) -> RunC
 
 
 def verdict(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases | None]]) -> Verdict:
-    """The verdict of the comparison, of all cases together. pairs: what the page is about, with what it was before."""
+    """The verdict of the comparison, over all cases. pairs: runs and sweeps of the page, with their earlier
+    counterparts"""
     found = against.found
     both = [(pool, before) for pool, before in pairs if before is not None]
     said = words.verdict(found).removeprefix(found.verdict).lstrip(",;: ")
@@ -118,8 +119,8 @@ def _parts(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases | 
 
 
 def _figure(both: Sequence[tuple[Pool, EarlierCases]]) -> tuple[int, int, int] | None:
-    """The number of cases that meet all that is required, before and now, and of all that are in both; None where
-    nothing is required."""
+    """The number of cases that meet all requirements, before and now, and of all common cases; None where there are no
+    requirements."""
     judged = [(pool, before) for pool, before in both if pool.requirements and before.pool.requirements]
     total = sum(int(before.there.sum()) for _, before in judged)
     if total < 2:
@@ -130,7 +131,8 @@ def _figure(both: Sequence[tuple[Pool, EarlierCases]]) -> tuple[int, int, int] |
 
 
 def _flows(pool: Pool, before: EarlierCases, *, named: bool) -> list[RequirementFlow]:
-    """For each requirement of both, which cases meet it now, and which no longer. named: True to say of which run."""
+    """For each common requirement, the cases that meet it now, and those that no longer do. named: True to name the
+    run"""
     out = []
     pairs = {each.now: each for _, _, experiment in before.pairs for each in experiment.requirements}
     for place, text in enumerate(pool.requirements):
@@ -150,7 +152,7 @@ def _flows(pool: Pool, before: EarlierCases, *, named: bool) -> list[Requirement
 
 
 def _ends(both: Sequence[tuple[Pool, EarlierCases]]) -> RequirementFlow | None:
-    """Which cases reach their end now, and which no longer; None where all do as before."""
+    """The cases that reach their end now, and those that no longer do; None where nothing has changed."""
     gained: list[str] = []
     lost: list[str] = []
     was = now = of = 0

@@ -1,4 +1,4 @@
-"""The design to use, as `met best` says it: the first answer of a report on a sweep that chooses."""
+"""The design to use, as in `met best`: the first answer of a report on a sweep with choices."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from batch.terminal.best import BestAnswer, context
 from met.diagnostic import Problem
 
 MOST_CELLS = 10_000
-"""Cells of a map, at most: more would be smaller than a dot."""
+"""Largest number of cells of a map: more would be smaller than a dot."""
 
 
 def design_answer(archive: ArchiveFile, pool: Pool) -> DesignAnswer | None:
-    """The answer for a sweep, or of a search; None where nothing is chosen in it, or nothing required."""
+    """The answer for a sweep, or for a search; None where nothing is chosen in it, or there are no requirements."""
     if (searched := search_answer(archive, pool.groups[0])) is not None:
         return searched
     if pool.count < 2 or not pool.requirements:
         return None
     try:
         designs = Designs(pool)
-    except Problem:  # it chooses nothing
+    except Problem:  # there are no choices
         return None
     answer = BestAnswer(designs, (), (), **context(archive, pool))
     if answer.best is None:
@@ -54,7 +54,7 @@ def _table(cells: list[list[str]], right: list[int]) -> TextTable:
 
 
 def design_map(designs: Designs, best: int) -> DesignMap | None:
-    """The map over the two ordered axes that have most values; the others are as in the best."""
+    """The map over the two ordered axes that have most values; the others have the best design's values."""
     sides = sorted((axis for axis in designs.axes if axis.ordered), key=lambda axis: -len(axis.values))[:2]
     steps = designs.steps
     if len(sides) < 2 or steps is None or len(sides[0].values) * len(sides[1].values) > MOST_CELLS:

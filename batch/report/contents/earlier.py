@@ -1,4 +1,4 @@
-"""What another archive has recorded of a page's cases, and what changed in them since."""
+"""Histories of another archive for a page's cases, and the changes since."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class EarlierHistories:
         self._panels: dict[tuple[bool, str], dict[tuple[str, str], Panel]] = {}
 
     def of(self, case: int, number: int, position: int) -> tuple[History | None, History | None]:
-        """The other archive's history of the case at a position of the pool's structure `number`, and this less that,
-        at the instants that both have; None where it has no history there."""
+        """The other archive's history of the case at a position of the pool's structure `number`, and the change since,
+        at the common instants; None where it has no history there."""
         there = self.before.history_of(number, position)
         if there is None:
             return None, None

@@ -1,4 +1,4 @@
-"""The table of evidence of a page: what the cases show of each requirement, the rows of `met show --evidence`."""
+"""The table of evidence of a page, with the rows of `met show --evidence`."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from batch.report.contents.parts import EvidenceLine, EvidencePart
 from met.outputs import quoted
 
 MOST_ROWS = 200
-"""Rows of a page; of more, those that are not met come first, and the rest is told in a sentence."""
+"""Largest number of rows of a page; of more, unmet ones come first, and a sentence counts the rest."""
 
 
 def evidence_part(pool: Pool, archive: str, *, several: bool) -> EvidencePart | None:
-    """The rows, those of a requirement together, and notes; None where nothing is required. archive: its name in
-    commands; several: whether these have to name the run or sweep. None of a search too: the verdict says all that its
-    answer shows."""
+    """The rows, those of a requirement together, and notes; None where there are no requirements, or for a search,
+    whose verdict says everything. archive: its name in commands; several: whether these must name the run or sweep"""
     if any(map(is_search, pool.groups)):
         return None
     found = requirement_evidence(pool.groups, archive, several=several)
@@ -34,6 +33,6 @@ def evidence_part(pool: Pool, archive: str, *, several: bool) -> EvidencePart | 
 
 
 def _page(found: EvidenceTexts) -> EvidenceTexts:
-    """The texts with the dash of a page where there is nothing."""
+    """The texts with the page's dash in place of missing ones."""
     names = EvidenceTexts.__dataclass_fields__
     return EvidenceTexts(**{n: "\N{EN DASH}" if (text := getattr(found, n)) == NONE else text for n in names})

@@ -1,4 +1,4 @@
-"""What goes into a report: an archive's contents, gathered as plain data."""
+"""Gathering of a report's contents from an archive, as plain data."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from met.host.files import open_regular
 from met.plan import Experiment
 
 MOST_LINES, MOST_LETTERS = 2000, 200_000
-"""Lines, and letters, of a file of the deck that are in a page, at most."""
+"""Largest number of lines, and of letters, of a deck file in a page."""
 
 MOST_HASHED = 4 << 30
-"""Bytes of an archive whose digest is looked for."""
+"""Largest size of an archive whose digest is computed."""
 
 BEGINS = 200
-"""Letters of a title that is written by whoever makes the report: more are cut off."""
+"""Largest length of a title in letters; longer ones are cut."""
 
 
 def gather(
@@ -106,10 +106,10 @@ def _stem(deck: str) -> str:
 
 
 def _experiments(archive: ArchiveFile) -> tuple[dict[str, Experiment], str]:
-    """The plan's experiments by name; or none, and why."""
+    """The plan's experiments by name; or none, and the reason."""
     try:
         return {experiment.name: experiment for experiment in archive.plan().experiments}, ""
-    except Problem as problem:  # such as: a model of the plan's is not installed here
+    except Problem as problem:  # for instance, a model of the plan is not installed here
         return {}, "; ".join(diagnostic.message for diagnostic in problem.diagnostics)
 
 
@@ -184,7 +184,7 @@ def _signals(
     return signals(pool, values, before, units, computed)
 
 
-# What was run
+# The run
 
 
 def _all(pool: Pool, attribute: str, form: str = "{}") -> str:
@@ -216,7 +216,7 @@ def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Fact, ...
         Fact("velocity products", _all(pool, "velocity_products")),
     ]
     facts += [Fact("allowed", each) for each in dict.fromkeys(line for group in pool.groups for line in group.allowed)]
-    servos: dict[str, dict[str, None]] = {}  # joints by what moves them
+    servos: dict[str, dict[str, None]] = {}  # joints by their servo
     others: dict[str, dict[str, None]] = {}
     for experiment in experiments.values():
         structure, base = experiment.structure, experiment.structure.schedule.base_hz

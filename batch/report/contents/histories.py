@@ -20,23 +20,23 @@ from batch.report.contents.thinning import stretch, thin, thin_clock
 from met.plan.channel import channel_paths
 
 MOST_POINTS = 4000
-"""Points of a line: of more rows each stretch gives its smallest and its largest value."""
+"""Largest number of points of a line: with more rows each stretch gives its smallest and its largest value."""
 
 FEWEST_POINTS = 500
 MOST_VALUES = 400_000
-"""Numbers that a page holds, over all its lines; about five bytes each."""
+"""Largest number of values in a page, over all its lines; about five bytes each."""
 
 WHERE_RUN_AGAIN = 60_000
-"""The same where the page can run cases again."""
+"""The largest number of values where the page can run cases again."""
 
 MOST_HISTORIES, COMPARED = 200, 3
-"""Cases whose signals are in a page; cases that are drawn together at first."""
+"""Largest number of cases whose signals are in a page, and number of cases that are drawn together at first."""
 
 FEWEST_COMPARED = 5
-"""Cases of which one is in the middle: it is drawn beside the worst."""
+"""Smallest number of cases for which the middle one is drawn beside the worst."""
 
 MOST_PANELS = 32
-"""Plots under one another."""
+"""Largest number of stacked plots."""
 
 
 def signals(
@@ -56,7 +56,7 @@ def signals(
     known = _kept(pool, before)
     if not known and not computed:
         return None
-    values = values if before is None else values // 3  # what it is, what it was, and the difference
+    values = values if before is None else values // 3  # now, before, and the difference
     scaled: dict[tuple[str, str], Panel] = {}
     groups = []
     for n, group in enumerate(pool.groups):
@@ -121,8 +121,8 @@ def signals(
 
 
 def _kept(pool: Pool, before: EarlierCases | None = None) -> list[tuple[int, int]]:
-    """Group and position of the cases that have histories, worst first. Where there is a `before`, those that differ
-    most from it come first, and the worst of all in the second place."""
+    """Group and position of the cases that have histories, worst first; with `before`, those that differ most from it
+    come first, and the worst of all second."""
     kept = [set(group.recorded_positions.tolist()) if group.role("signal") else set() for group in pool.groups]
     if not any(kept):
         return []
@@ -139,8 +139,8 @@ def _kept(pool: Pool, before: EarlierCases | None = None) -> list[tuple[int, int
 def _said(
     groups: Sequence[_Group], known: int, here: int, plots: int, points: int, compared: bool, *, again: bool
 ) -> tuple[str, ...]:
-    """Say what is not in the page. known, here: the numbers of recorded cases, and of those of them that are in it;
-    again: whether others are run again there."""
+    """A sentence about histories that are not in the page. known, here: the numbers of recorded cases, and of those in
+    the page; again: whether others are run again there"""
     out = []
     if again and here < known:
         out.append(f"{here:,} of {known:,} recorded cases are in this page; the others are run again where it is read.")
@@ -159,7 +159,7 @@ def _said(
 
 
 def no_signals(pool: Pool) -> str:
-    """Say how to record signals, where there are none."""
+    """A sentence about how to record signals, where there are none."""
     if any(group.attributes.get("cases_in_table", 0) > 1 for group in pool.groups):
         return "No histories were kept. The commands of the table above run a case again, with its signals."
     return "No histories were kept: `--histories all` keeps them."

@@ -1,4 +1,4 @@
-"""Which varied parameters explain each metric: what `met sensitivity` prints, as a table with a tornado."""
+"""The varied parameters that explain each metric: the result of `met sensitivity`, as a table with a tornado."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from met.diagnostic import Problem
 from met.statistics.sensitivity import FEWEST
 
 MOST_METRICS, MOST_INPUTS, MOST_CASES = 6, 12, 50_000
-"""Metrics, and parameters of each, that a page has, and the cases of a sweep that are looked at for it."""
+"""Largest number of metrics, of parameters of each, and of cases that are used."""
 
 
 def influences(pool: Pool) -> tuple[InfluencePart, ...]:
-    """A part for each metric of a sweep of one structure that draws or has cases enough, those that something is
-    required of first; none where one parameter varies, or a search chose the cases, which are no sample."""
+    """A part for each metric of a sweep of one structure with draws or enough cases, those with requirements first;
+    none where one parameter varies, or a search chose the cases, which are not a sample."""
     if len(pool.groups) != 1 or is_search(pool.groups[0]):
         return ()
     [group] = pool.groups
@@ -35,7 +35,7 @@ def influences(pool: Pool) -> tuple[InfluencePart, ...]:
 
 
 def _metrics(group: ArchiveGroup) -> list[str]:
-    """The group's metrics, those that something is required of first."""
+    """The group's metrics, those with requirements first."""
     required = dict.fromkeys(each.metric for each in group_requirements(group))
     return list(dict.fromkeys([*required, *(variable.name for variable in group.role("metric"))]))
 

@@ -1,4 +1,4 @@
-"""Two parameters that make a grid, and what a metric is in each cell of it."""
+"""Maps of metrics over two parameters that make a grid."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def _map(pool: Pool, x: CaseColumn, y: CaseColumn, metrics: Sequence[CaseColumn]
 
 
 def ruler(found: Levels) -> Ruler:
-    """The positions of values along an axis, by their steps or factors, as in `met plot`: of stretches of values round
-    numbers are written."""
+    """The positions of values along an axis, by their steps or factors, as in `met plot`: for stretches of values,
+    round numbers are written."""
     count = len(found.texts)
     if found.scale == "place":
         edges = np.linspace(0.0, 1.0, count + 1)

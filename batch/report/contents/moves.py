@@ -1,4 +1,4 @@
-"""Which way required metrics went since another archive: away from their limits, which is better, or towards them."""
+"""Changes of required metrics since another archive: away from their limits, which is better, or towards them."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from batch.report.contents.parts import MetricMove
 
 
 def metric_moves(pool: Pool, before: EarlierCases, requirement: str) -> tuple[MetricMove | None, MetricMove | None]:
-    """The cases in both in which the metric of a requirement is better now, and those in which it is worse. Less than
-    the comparison allows is neither, and so is a value that is not a number in one of the two."""
+    """The cases in both archives in which the metric of a requirement is better now, and those in which it is worse.
+    Changes within the tolerances, and values that are missing in one of the two, do not count."""
     for column in pool.metrics():
         sense = next((limit.sense for limit in column.limits if limit.text == requirement), None)
         was = None if sense is None else before.values(column)
@@ -27,7 +27,7 @@ def metric_moves(pool: Pool, before: EarlierCases, requirement: str) -> tuple[Me
 
 
 def _beyond(pool: Pool, before: EarlierCases, column: CaseColumn) -> np.ndarray:
-    """[case] whether a metric differs by more than the comparison of its structure allows."""
+    """[case] whether a metric differs by more than its structure's tolerances."""
     name = column.key.partition(":")[2]
     now = pool.gathered(name)
     was = np.where(before.there, before.pool.gathered(name)[before.place], np.nan)

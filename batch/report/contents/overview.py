@@ -1,4 +1,4 @@
-"""The cases as points of a plot: which of many are drawn, and against what at first."""
+"""The cases as points of a plot: the choice of points and of the first axes."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from batch.report.contents.parts import Overview
 from met.distinct import distinct
 
 MOST_POINTS = 12_000
-"""Cases that a page holds. Of more, those go that lie on a dot with another one."""
+"""Largest number of cases in a page. Among more, those are left out that lie on a dot with another one."""
 
 DOTS = (1600, 500)
 """Dots of a plot, across and up, told apart where there is room for it (as batch/plotting/points.py has it)."""
 
 MOST_CAUSES = 300
 KEPT = 200
-"""So many of the worst cases are always drawn."""
+"""Number of the worst cases that are always drawn."""
 
 BAD_CASE = "case"
 
@@ -76,8 +76,8 @@ def _at(column: CaseColumn, places: np.ndarray) -> CaseColumn:
 
 
 def _compared(pool: Pool, before: EarlierCases) -> tuple[CaseColumn, ...]:
-    """Columns that compare each case with the other archive: the verdict of `met diff`, and whether it meets what is
-    required."""
+    """Columns that compare each case with the other archive: the verdict of `met diff`, and whether it meets the
+    requirements."""
     verdicts = (*VERDICTS[:3], "only now")
     how = np.where(before.there, before.how, len(verdicts) - 1).astype(float)
     yes, no = ("meets all", "does not") if pool.requirements else ("reaches its end", "does not")
@@ -92,8 +92,8 @@ def _compared(pool: Pool, before: EarlierCases) -> tuple[CaseColumn, ...]:
 
 
 def _noted(pool: Pool, before: EarlierCases | None, changes: tuple[CaseColumn, ...]) -> np.ndarray:
-    """Places of the cases that are drawn since they changed: those that changed most, and in each metric the extremes;
-    and of those that came to miss a requirement, or to meet it, the first."""
+    """Places of the cases that are drawn because they changed: those that changed most, and in each metric the
+    extremes; and the first of those that now miss a requirement, or now meet it."""
     if before is None:
         return np.zeros(0, np.int64)
     was, now = np.isin(before.ended, GOOD), np.isin(pool.ended, GOOD)
@@ -111,7 +111,7 @@ def _extremes(column: CaseColumn) -> np.ndarray:
 def _drawn(
     pool: Pool, against: tuple[CaseColumn, ...], metrics: tuple[CaseColumn, ...], noted: np.ndarray
 ) -> tuple[np.ndarray, tuple[int, ...]]:
-    """Places of the cases to draw, among them those noted, and the dots that were told apart to choose them.
+    """Places of the cases to draw, including the noted ones, and the resolution in dots by which they were chosen.
 
     Of every metric against every parameter each dot that any case lies on has a case, the worst of those on it; and the
     extremes of each metric are there. Where that makes too many, dots are made larger.
@@ -138,7 +138,7 @@ def _on_dots(x: np.ndarray, y: np.ndarray, rank: np.ndarray, across: int, up: in
 
 
 def _strips(values: np.ndarray, count: int) -> np.ndarray:
-    """The stretch, of `count` equal ones, that each value lies in; then one each for inf, -inf and not a number."""
+    """The stretch, of `count` equal ones, in which each value lies; then one each for inf, -inf and not-a-number."""
     finite = np.isfinite(values)
     out = np.full(len(values), count + 3)
     low, high = values[finite].min(initial=np.inf), values[finite].max(initial=-np.inf)

@@ -20,10 +20,10 @@ from met.plan import Experiment, Formula, Origin, Quantity
 
 SAID = {"deck": "deck", "case": "varied", "default": "default", "derived": "computed"}
 MOST_LISTED = 6
-"""Values that are listed; of more the ends."""
+"""Largest number of values that are listed; of more only the ends."""
 
 MOST_ROWS = 10_000
-"""Cases, spread over all, from which the range of what follows from the varied parameters is taken."""
+"""Largest number of cases, spread over all, from which the range of dependent parameters is computed."""
 
 
 def spot(place: Place | None) -> Spot | None:
@@ -55,7 +55,7 @@ def parameters(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Param
 
 
 def _spans(experiment: Experiment) -> dict[int, tuple[float, float]]:
-    """For each output of the formulas, the smallest and the largest value, over as many cases as are looked at."""
+    """For each output of the formulas, the smallest and the largest value, over at most `MOST_ROWS` cases."""
     count = experiment.cases.count
     rows = distinct(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(int))
     inputs = {coordinate.path: coordinate.values[rows] for coordinate in experiment.cases.coordinates}
@@ -100,7 +100,7 @@ def _value(quantity: Quantity, spans: Mapping[int, tuple[float, float]]) -> str:
 
 
 def varied(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[VariedParameter, ...]:
-    """The parameters and choices that tell the cases apart, with their values."""
+    """The parameters and choices that differ between cases, with their values."""
     places: dict[str, tuple[Spot | None, tuple[str, ...]]] = {}
     for experiment in experiments.values():
         for choice in experiment.cases.choices:

@@ -1,4 +1,4 @@
-"""What a report holds, as plain data: texts and numbers, without HTML. Values are in the deck's units.
+"""The contents of a report as plain data: texts and numbers, without HTML. Values are in the deck's units.
 
 A report has a section for each run or sweep that is asked for. A sweep of several structures is one section: its cases
 are numbered through, and what decides the structure is a column of words.

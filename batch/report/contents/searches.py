@@ -1,4 +1,4 @@
-"""The answer of a search, and how it came: the first answer of a report on one."""
+"""The answer of a search with its progress: the first answer of a report on a search."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from batch.report.contents.parts import DesignAnswer, TextTable
 from batch.terminal.search import search_result
 
 MOST_LOOKS, MOST_ROWS = 200, 24
-"""Generations after which a report looks at the best, spread over all; and rows of those that changed it."""
+"""Largest number of generations after which a report examines the best, spread over all; and of rows for those that
+changed it."""
 
 
 def search_answer(archive: ArchiveFile, group: ArchiveGroup) -> DesignAnswer | None:
-    """The answer of a search with the best after each of some generations; None of what is none."""
+    """The answer of a search with the best after each of some generations; None for other runs."""
     answer, result = SearchAnswer.of(group), search_result(archive, group)
     if answer is None or result is None:
         return None

@@ -1,4 +1,4 @@
-"""What a page holds by which it runs cases again, as plain data."""
+"""The data of a page for running cases again."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class SimulatedStructure:
 
 @frozen
 class PageSimulation:
-    """The structures whose cases a page can run again. said: what is left out."""
+    """The structures whose cases a page can run again. said: text about omitted ones"""
 
     structures: tuple[SimulatedStructure, ...]
     said: tuple[str, ...]

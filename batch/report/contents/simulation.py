@@ -1,4 +1,4 @@
-"""How a page runs cases again: each structure's module, the cases' inputs, and what the archive has of them.
+"""Data for a page that runs cases again: each structure's module, the cases' inputs, and the archive's results.
 
 A page that has only the histories of a few cases computes all others where it is read. Inputs and metrics are kept to
 the bit, so that it can compare what it computed.
@@ -26,10 +26,10 @@ from met.plan import Experiment
 from met.run import inputs, prepare
 
 MOST_STRUCTURES = 8
-"""Structures of a page that have a module: one takes seconds to make."""
+"""Largest number of structures of a page with a module: each takes seconds to compile."""
 
 MOST_EXACT = 600_000
-"""Bytes of inputs and metrics of a section's cases."""
+"""Largest size in bytes of inputs and metrics of a section's cases."""
 
 
 def simulation(
@@ -83,8 +83,8 @@ def _earlier(
     sources: Sequence[Sequence[str]],
     left: int,
 ) -> tuple[SimulatedStructure | None, int]:
-    """The other archive's data of a structure's cases, and the bytes that are left; None where it has none of them or
-    its plan cannot be read here. number: the structure's place in the pool."""
+    """The other archive's data of a structure's cases, and the remaining bytes; None where it has none of them or its
+    plan cannot be read here. number: the structure's place in the pool"""
     for place, group, matched in before.pairs:
         if place != number or group.name not in experiments:
             continue
@@ -102,8 +102,8 @@ def _earlier(
 def _structure(
     group: ArchiveGroup, experiment: Experiment, wanted: np.ndarray, sources: Sequence[Sequence[str]], left: int
 ) -> tuple[SimulatedStructure, int]:
-    """A structure with as many of the cases that are wanted as `left` bytes hold, and the bytes that are left. sources:
-    the channel of each line of each panel."""
+    """A structure with as many of the wanted cases as fit in `left` bytes, and the remaining bytes. sources: the
+    channel of each line of each panel"""
     from met.backends.wasm.module import compiled
 
     prepared = prepare(experiment)
@@ -131,7 +131,7 @@ def _structure(
 
 
 class ComputedGroup(ArchiveGroup):
-    """A group whose signals are in no archive: what a run of its experiment would record."""
+    """A group whose signals are in no archive: those that a run of its experiment would record."""
 
     def __init__(self, group: ArchiveGroup, experiment: Experiment) -> None:
         self.__dict__.update(group.__dict__)

@@ -1,4 +1,4 @@
-"""Whether the motors on beds are stable, of the plan that was run: r of the cases, and where it would be too large."""
+"""Stability of the motors on beds in the plan that was run: r of the cases, and its limits."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from met.distinct import distinct
 from met.plan import Experiment
 
 MOST_CASES = 60
-"""Cases whose margin is computed, spread over all, the worst among them."""
+"""Largest number of cases whose margin is computed, spread over all, including the worst."""
 
 MOST_LOOPS = 6
-"""Different servos, beds and laws: each takes seconds."""
+"""Largest number of different combinations of servo, bed and law: each takes seconds."""
 
 
 def stability(
@@ -50,7 +50,7 @@ def stability(
 
 
 def _chosen(pool: Pool, experiment: Experiment, places: np.ndarray) -> np.ndarray:
-    """Places of the cases to look at: of few different loops, spread over all, the worst one among them."""
+    """Places of the cases to examine: of few different loops, spread over all, including the worst."""
     own = tuple(
         f"{use.joint}.{part}." for use in experiment.structure.substitutions for part in ("servo", "bed", "law")
     )
@@ -106,7 +106,7 @@ def _words(texts: Iterable[str]) -> str:
 def _unstable(
     pool: Pool, places: np.ndarray, found: Mapping[int, Sequence[Margin]], joints: Sequence[str]
 ) -> tuple[str, ...]:
-    """For each joint that is not stable everywhere, in which cases."""
+    """The cases in which each joint is not stable, in words."""
     out = []
     for joint in joints:
         here = [(place, _of(found[place], joint)) for place in places.tolist()]

@@ -22,9 +22,9 @@ MISSES = "\N{BALLOT X}"
 
 
 def best(pool: Pool, archive: str, only: str, before: EarlierCases | None = None) -> NotableCases | None:
-    """The cases that meet all that is required and stay furthest from their limits, the best first; None where nothing
-    is required, no case meets it, or all cases are in the other table at a glance. Of a search too: its answer is the
-    best. only, before: as `worst` has them."""
+    """The cases that meet all requirements and stay furthest from their limits, the best first; None where there are no
+    requirements, no case meets them, or the other table has all cases. For a search, its answer is the best. only,
+    before: as for `worst`"""
     if not pool.requirements or pool.count <= MOST_BEST or any(map(is_search, pool.groups)):
         return None
     order = pool.worst_first[::-1]
@@ -38,8 +38,8 @@ def best(pool: Pool, archive: str, only: str, before: EarlierCases | None = None
 
 
 def worst(pool: Pool, archive: str, only: str, before: EarlierCases | None = None) -> NotableCases | None:
-    """The worst cases, failed ones first. only: the run or sweep to be named in commands; "" where there is one.
-    before: how they came out in another archive."""
+    """The worst cases, failed ones first. only: the run or sweep to name in commands; "" where there is one. before:
+    outcomes in another archive"""
     if pool.count < 2:
         return None
     made = _case_table(pool, pool.worst_first[:MOST_CASES], archive, only, before)
@@ -82,7 +82,7 @@ def replay(archive: str, only: str, case: int | str) -> str:
 
 
 def cell_text(column: CaseColumn, place: int) -> str:
-    """A value as a table shows it."""
+    """A value as shown in a table."""
     value = float(column.values[place])
     if column.words:
         return column.words[int(value)] if np.isfinite(value) else ""
@@ -106,8 +106,8 @@ def _title(pool: Pool, shown: int) -> str:
 
 
 def structures(pool: Pool, before: EarlierCases | None = None) -> TextTable | None:
-    """A row a structure: what is chosen, cases, how many meet all, those in another archive before, and the median of
-    each metric."""
+    """A row for each structure: its choices, number of cases, number that meet all requirements, those in another
+    archive before, and the median of each metric."""
     if len(pool.groups) < 2:
         return None
     metrics = pool.metrics()

@@ -1,4 +1,4 @@
-"""Lines with fewer points, of which none that stands out is lost."""
+"""Thinning of lines that keeps their extremes."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 
 
 def stretch(rows: int, points: int) -> int:
-    """Rows that two points stand for; 1 where every row has its point."""
+    """Number of rows for two points; 1 where every row has its point."""
     return 1 if rows <= points else -(-rows // (points // 2))
 
 
 def thin_clock(time: np.ndarray, points: int) -> np.ndarray:
-    """The times of the points: of each stretch its first row and the one in its middle."""
+    """The times of the points: the first row and the middle one of each stretch."""
     each = stretch(len(time), points)
     if each == 1:
         return time

@@ -1,4 +1,4 @@
-"""How the cases of a run or sweep came out: yes or no, by requirement, by cause; and their metrics."""
+"""The outcomes of the cases of a run or sweep: the verdict, by requirement, by cause; and their metrics."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ from met.plan import Experiment
 from met.run import DONE
 
 BARS = 36
-"""Stretches of a histogram."""
+"""Number of stretches of a histogram."""
 
 WORSE = ("", "met", "demonstrated", "not shown", "missed", "refuted")
-"""Verdicts on a requirement over a share of cases, each worse than those before it."""
+"""Verdicts on a requirement over a share of cases, from best to worst."""
 
 FEWEST = 8
-"""Values that have a shape worth drawing."""
+"""Smallest number of values for a histogram."""
 
 
 def verdict(pool: Pool, experiments: Mapping[str, Experiment], *, named: bool) -> Verdict:
-    """The verdict on a run or sweep: yes if all cases reached their end and met all that is required.
+    """The verdict on a run or sweep: yes if all cases reached their end and met all requirements.
 
     experiments  of the plan, by name, for places in the deck;  named: True to say of which run or sweep
     """
@@ -74,7 +74,8 @@ def verdict(pool: Pool, experiments: Mapping[str, Experiment], *, named: bool) -
 
 
 def _of_answer(pool: Pool, answer: SearchAnswer, experiments: Mapping[str, Experiment], *, named: bool) -> Verdict:
-    """The verdict on the answer of a search, in its cases alone: shares of what an optimiser chose say nothing."""
+    """The verdict on the answer of a search, in its cases alone: shares among cases that an optimiser chose mean
+    nothing."""
     summary, errors = summary_of(pool.groups[0]), verdicts(pool.groups[0], figures(pool.groups[0]))
     outcome = answer_outcome(answer)
     tunes = answer.search.kind == "tune"
@@ -121,7 +122,7 @@ def _of_step_error(each: StepErrorVerdict) -> str:
 
 
 def _headline(pool: Pool, good: int) -> str:
-    """`31 of 37 cases meet every requirement`."""
+    """The headline of the verdict: `31 of 37 cases meet every requirement`."""
     several = len(pool.requirements) > 1
     if pool.count == 1:
         if pool.status[0] != DONE:
@@ -174,7 +175,7 @@ def _notes(pool: Pool) -> tuple[str, ...]:
 
 
 def _warnings(pool: Pool) -> list[str]:
-    """The doubts about cases that are done, each with the cases of which it is so."""
+    """The doubts about finished cases, each with its cases."""
     warnings = np.array(pool.texts("warning", np.arange(pool.count)), dtype=object)
     doubtful = np.flatnonzero(warnings != "")
     found = failures(np.zeros(len(doubtful)), warnings[doubtful], pool.cases[doubtful], pool.cases[doubtful])
@@ -184,7 +185,8 @@ def _warnings(pool: Pool) -> list[str]:
 def metric_rows(
     pool: Pool, before: EarlierCases | None = None, errors: Verification | None = None
 ) -> tuple[MetricRow, ...]:
-    """before: the cases of another archive to compare with; errors: those by the step, where they are known."""
+    """The rows of the table of metrics. before: the cases of another archive to compare with; errors: those due to the
+    step, where they are known"""
     return tuple(
         _metric(column, None if before is None else before.values(column), _by_step(pool, column, errors))
         for column in pool.metrics()
@@ -202,7 +204,8 @@ def _by_step(pool: Pool, column: CaseColumn, errors: Verification | None) -> str
 
 
 def _metric(column: CaseColumn, before: np.ndarray | None, by_step: str) -> MetricRow:
-    """Spread of the finite values; of how many there are others is said. before: the values of the other archive."""
+    """The spread of the finite values, with a remark on the number of others. before: the values of the other
+    archive"""
     found, finite = spread(column.values), column.values[np.isfinite(column.values)]
     was = np.zeros(0) if before is None else np.sort(before[np.isfinite(before)])
     was_text = "" if before is None else page_number(spread(was).median)

@@ -1,4 +1,4 @@
-"""Parts of a page that are text: the verdict, what was run, metrics, where it comes from."""
+"""Text blocks of a page: the verdict, the run, metrics, and provenance."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from batch.report.contents.parts import (
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
 
 Anchors = Mapping[str, tuple[int, int]]
-"""For each file whose text is in the page: its number, and how many of its lines are there."""
+"""For each file whose text is in the page: its number, and the number of its lines there."""
 
 WORDS = {"met": "meet all", "missed": "miss a requirement", "unknown": "not known", "done": "reached their end"}
 
@@ -31,7 +31,7 @@ NOTHING_ASKED = ("All ran to the end", "Not all ran to the end")
 
 
 def share(part: int, of: int) -> str:
-    """A share in per cent that says 100 and 0 only where it is all and none."""
+    """The share in per cent; 100 and 0 are shown only for all and none."""
     if part in (0, of) or of == 0:
         return "100 %" if part and part == of else "0 %"
     text = f"{100 * part / of:.3g}"
@@ -65,7 +65,7 @@ def spot_link(spot: Spot | None, anchors: Anchors) -> Html | None:
 
 
 def verdict(found: Verdict, anchors: Anchors) -> Html:
-    """The answer, large; beside it what it rests on, and what makes it doubtful."""
+    """The answer, large, beside its grounds and doubts."""
     if found.kind == "comparison":
         return _comparison(found)
     yes, no = (found.word, found.word) if found.kind == "answer" else _words(found)
@@ -86,15 +86,15 @@ def verdict(found: Verdict, anchors: Anchors) -> Html:
 
 
 def _words(found: Verdict) -> tuple[str, str]:
-    """The answer in two words, where it is yes and where it is no."""
+    """The answer in two words, for yes and for no."""
     if not found.demands:
         return NOTHING_ASKED
-    of_all = {"demonstrated", "not shown", "refuted"}  # the cases that may be drawn
+    of_all = {"demonstrated", "not shown", "refuted"}  # cases that may be drawn
     return ALL_SHOWN if any(each.verdict in of_all for each in found.demands) else ALL_MET
 
 
 def _warning(each: ReportWarning, anchors: Anchors) -> Html:
-    """A warning beside the verdict: what was seen, the line of the deck that it is about, and the remedies."""
+    """A warning beside the verdict: the finding, the line of the deck, and the remedies."""
     place = spot_link(each.spot, anchors)
     return el(
         "div",
@@ -112,7 +112,7 @@ def _warning(each: ReportWarning, anchors: Anchors) -> Html:
 
 
 def mark(ok: bool) -> Html:
-    """A tick or a cross before the word that says the same."""
+    """A tick or a cross, before the word of the same meaning."""
     return _drawn("M3 8.5l3.2 3.2L13 4.6" if ok else "M4 4l8 8M12 4l-8 8")
 
 
@@ -129,7 +129,7 @@ UNCLEAR = "M5.2 6q0-3 2.8-3t2.8 2.6q0 1.6-1.6 2.4T7.9 10.4M7.9 13v.3"
 
 
 def likeness(word: str) -> Html:
-    """Before the word of a comparison: two lines, two waves, two lines crossed out, a question mark."""
+    """A sign before the word of a comparison: two lines, two waves, two lines crossed out, a question mark."""
     return _drawn(ALIKE.get(word, UNCLEAR))
 
 
@@ -143,8 +143,8 @@ SHARES = {
 
 
 def _comparison(found: Verdict) -> Html:
-    """The share of cases that meet all, before and now; how many cases differ; what each requirement gains and
-    loses."""
+    """The share of cases that meet all requirements, before and now; the number of differing cases; gains and losses of
+    each requirement."""
     figure: list[Child] = []
     if found.figure is not None:
         was, now, of = found.figure
@@ -181,7 +181,7 @@ def _flows(found: Sequence[RequirementFlow]) -> Html | None:
 
 
 def _moves(found: Sequence[RequirementFlow], *, better: bool) -> Html:
-    """The requirements that come out better now, or worse, in any case: a row for each."""
+    """The requirements with better, or worse, values in some case: a row for each."""
     rows = []
     for each in found:
         crossed, moved = (each.gained, each.better) if better else (each.lost, each.worse)
@@ -287,7 +287,7 @@ def _demand(each: RequirementCounts, single: bool, shares: bool, missed: bool, u
 
 
 def _share_verdict(word: str) -> Html:
-    """The verdict on a requirement over a share of cases; nothing for one that every case is to meet."""
+    """The verdict on a requirement over a share of cases; empty for one on every case."""
     if not word:
         return el("td", "–")
     ok = word in ("met", "demonstrated")
@@ -295,12 +295,12 @@ def _share_verdict(word: str) -> Html:
 
 
 def case_link(case: int) -> Html:
-    """A case by its number: chosen where there are scripts."""
+    """A case by its number, as a button that chooses it where there are scripts."""
     return el("button", f"#{case}", type="button", cls="case", data_case=case, title=f"Choose case #{case}")
 
 
 def _failing(found: Sequence[FailureRow], *, single: bool) -> Html:
-    """The causes, the cases of each, and what they have in common once."""
+    """The causes of failures, with the cases of each, and their common properties once."""
     rows = []
     for each in found:
         who: Child = f"case #{each.first}" if each.count == 1 else f"{each.count:,} cases"
@@ -393,7 +393,7 @@ def _metric(each: MetricRow, single: bool, remarks: bool, compared: bool, verifi
 
 
 def histogram(each: MetricRow) -> Html | None:
-    """Counts as bars, limits as lines; those before as an outline."""
+    """Counts as bars, limits as lines; those of the earlier archive as an outline."""
     if not each.bars:
         return None
     top, wide = max(each.bars + each.bars_before), 160 / len(each.bars)
@@ -425,5 +425,5 @@ def histogram(each: MetricRow) -> Html | None:
 
 
 def scrolling(table: Html, label: str) -> Html:
-    """A table that scrolls by itself where the page is narrower, also by the keyboard."""
+    """A table that scrolls within a narrower page, also by the keyboard."""
     return el("div", table, cls="wide", tabindex=0, role="region", aria_label=label)

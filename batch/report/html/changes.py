@@ -1,4 +1,4 @@
-"""What changed against another archive, as parts of a page: what made the two, then cases, signals, the worst."""
+"""Changes against another archive, as parts of a page: provenance, then cases, signals, and the worst."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from batch.report.html.markup import Child, Html, breaking, el, join, lines
 from batch.report.html.tables import command, table
 
 SHOWN_LINES, SHOWN_WORST, SHOWN_DIFF = 12, 5, 60
-"""Lines of one kind of change, cases of those that changed most, and lines of a deck's file that are open; the others
+"""Numbers of visible lines of one kind of change, of cases that changed most, and of lines of a deck's file; the others
 are folded away."""
 
 MOST_ENDED = 20
-"""Cases that are listed of those that end otherwise alike."""
+"""Largest number of listed cases with the same change of ending."""
 
 
 def origins(found: ArchiveChanges) -> Html:
-    """The section on what the two archives were made from, and on runs that one of them has alone."""
+    """The section on the provenance of the two archives, and on runs that only one of them has."""
     rows = [el("div", el("dt", each.about), el("dd", _lines(each))) for each in found.origins]
     same = el("p", SAME[0].upper() + SAME[1:], ".", cls="said") if not rows and not found.decks else None
     decks = [el("h3", "The decks' text"), [_deck(each) for each in found.decks]] if found.decks else None
@@ -44,7 +44,7 @@ MARKS = {"+": "new", "-": "gone", "@": "at"}
 
 
 def _deck(found: DeckTextChange) -> Html:
-    """A file's text before and now: each line that differs with its mark, those about it, and where they stand."""
+    """The differences of a file's text: each differing line with its mark, its context, and the line numbers."""
     if not found.lines:
         return el("p", found.said)
     rows = [el("li", el("code", line), cls=MARKS.get(line[:1])) for line in found.lines]
@@ -95,7 +95,7 @@ def run_changes(found: RunChanges) -> Html:
 
 
 def _ended(found: Ending) -> Html:
-    """Cases that end otherwise, and why."""
+    """Cases with another ending, and the causes."""
     rows = [
         el("li", case_link(each.case), " ", el("code", each.case_id[:8]), "  ", el("span", cause(each)))
         for each in found.each[:MOST_ENDED]
@@ -142,7 +142,7 @@ def _samples(found: RunChanges) -> Html | None:
 
 
 def _number(text: str) -> str:
-    """A number as other tables of the page have it where there is none."""
+    """A number, or the dash of other tables of the page."""
     return page_number(math.nan) if text == "nan" else text
 
 

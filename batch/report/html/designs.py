@@ -11,10 +11,10 @@ from batch.report.html.markup import Child, Html, el, join
 from batch.report.html.tables import command, table
 
 SIDE = 320
-"""Units of a map's longer side in its drawing."""
+"""Length of a map's longer side in its drawing's units."""
 
 SHADES = 4
-"""Shades of designs that meet all: deeper the farther from the border."""
+"""Number of shades of designs that meet all requirements: deeper the farther from the border."""
 
 
 def designs(found: DesignAnswer) -> Html:
@@ -30,12 +30,12 @@ def designs(found: DesignAnswer) -> Html:
 
 
 WIDE, HIGH = 640, 120
-"""Units of the drawing of a search's progress."""
+"""Size of the drawing of a search's progress, in its units."""
 
 
 def _progress(found: DesignAnswer) -> Html | None:
-    """The best value by then over the cases, as steps, with a gap where it has none, or is of more cases of a sweep
-    than before; None where it never changed."""
+    """The best value so far over the cases, as steps, with a gap where there is none, or where it was tried with more
+    plants than before; None where it never changed."""
     values = [value for _, value, _ in found.progress if math.isfinite(value)]
     if len(set(values)) < 2:
         return None
@@ -57,7 +57,8 @@ def _progress(found: DesignAnswer) -> Html | None:
 
 
 def _map(found: DesignMap) -> Html:
-    """A cell a design: meets all, deeper the farther from the border; does not; was not run."""
+    """A cell for each design: one that meets all requirements, deeper the farther from the border; one that does not;
+    one that was not run."""
     rows, columns = found.steps.shape
     side = SIDE / max(rows, columns)
     deepest = max(1, int(found.steps.max(initial=1)))

@@ -1,4 +1,4 @@
-"""The head of a page that is opened from a file: it names what it may run by digests, and asks nothing of a network."""
+"""The head of a page that is opened from a file: it lists the digests of its scripts, and needs no network."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The files that a page brings with it: style and scripts, and uPlot as it was fetched, held by its digest."""
+"""The files that a page includes: style and scripts, and an unmodified uPlot, checked by its digest."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ SCRIPTS = (
     "stability.js",
 )
 SIMULATING = ("simulation.js", "posing.js")
-"""Those of a page that runs cases again."""
+"""Scripts of a page that runs cases again."""
 
 LAST = "report.js"
-"""In the order in which they stand in a page; each builds on those before."""
+"""The last script of a page; the scripts are in an order in which each builds on those before."""
 
 
 @cache
@@ -36,7 +36,8 @@ def style() -> str:
 
 
 def script(modules: str = "") -> str:
-    """All scripts, in their order. modules: what a page runs cases again with (`payload.modules_script`)."""
+    """All scripts, in their order. modules: the script with the modules for running cases again
+    (`payload.modules_script`)"""
     if not modules:
         return licensed(*SCRIPTS, LAST)
     from met.backends.wasm.module import KERNEL_JS
@@ -47,7 +48,7 @@ def script(modules: str = "") -> str:
 
 @cache
 def licensed(*names: str) -> str:
-    """Scripts of these names, after the licence that uPlot's wants to go with it."""
+    """Scripts of these names, after the licence of uPlot, which requires that."""
     licence = (FOLDER / "uPlot.LICENSE").read_text(encoding="utf-8").strip()
     parts = (_read(name) for name in names)
     return "\n".join([f"/*! uPlot:\n{licence}\n*/", *parts])

@@ -1,4 +1,4 @@
-"""HTML made of texts that may hold anything: what is no markup of ours is escaped, what cannot be seen is shown."""
+"""HTML from arbitrary texts: foreign markup is escaped, and invisible characters are shown."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ class Html(str):
 Child = str | Html | None | Iterable["Child"]
 
 RAW = frozenset({"code", "title", "option"})
-"""Elements whose texts are set as they are; in all others backticks set what a program reads."""
+"""Elements whose texts are set unchanged; in all others backticks mark code."""
 
 QUOTED = re.compile(r"`([^`\n]+)`")
 
 LONG = 24
-"""Letters of a name, from which on it may break after a dot or a `_`."""
+"""Length of a name in letters from which on it may break after a dot or a `_`."""
 
 DRAWN = frozenset({"rect", "line", "path"})
 VOID = frozenset({"meta", "link", "input", "br", "wbr"}) | DRAWN
@@ -48,7 +48,7 @@ def el(tag: str, *children: Child, **attributes: str | float | bool | None) -> H
 
 
 def join(children: Child) -> Html:
-    """Children one after the other."""
+    """The children, concatenated."""
     return _inner(children, raw=False)
 
 
@@ -61,7 +61,7 @@ def _inner(children: Child, *, raw: bool) -> Html:
 
 
 def prose(raw: str) -> Html:
-    """A sentence as HTML: what stands between backticks in it is set as a program's text."""
+    """A sentence as HTML, with the parts between backticks set as code."""
     if isinstance(raw, Html):
         return raw
     parts = QUOTED.split(raw)
@@ -75,5 +75,5 @@ def breaking(raw: str) -> Html:
 
 
 def lines(children: Iterable[Child]) -> Html:
-    """Children a line each."""
+    """The children, one a line."""
     return Html("\n".join(join(child) for child in children if child is not None))

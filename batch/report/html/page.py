@@ -1,4 +1,4 @@
-"""A report as one HTML file. It asks for nothing: style, scripts and data are in it, and it forbids all else itself."""
+"""A report as one HTML file. It includes style, scripts and data, and its policy forbids everything else."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from batch.report.html.markup import Child, Html, el, join, lines
 from batch.report.html.payload import modules_script, script_json, section_data
 
 GENERATOR = "MET report"
-"""The name in a page's `generator`, by which it is known as one of ours, which may be written over."""
+"""The name in a page's `generator` that marks it as MET's, so that it may be overwritten."""
 
 
 CODE = "'wasm-unsafe-eval'"
-"""A further source of code of a page that runs cases again: modules of WebAssembly, which stand in its script."""
+"""A further source of code for a page that runs cases again: WebAssembly modules, which are in its script."""
 
 
 def page(report: Report) -> str:
-    """The whole file. The same report gives the same text."""
+    """The whole file; equal reports give equal text."""
     anchors = {file.name: (n, file.text.count("\n") + 1) for n, file in enumerate(report.sources)}
     running = any(section.simulation for section in report.sections)
     style = f"{inlined.style()}\n{arm_style()}" if running else inlined.style()

@@ -1,4 +1,4 @@
-"""What the plots of a page are drawn from: JSON, and in it numbers as base64 of their bytes."""
+"""The data of a page's plots: JSON with numbers as base64 of their bytes."""
 
 from __future__ import annotations
 
@@ -20,19 +20,20 @@ from batch.report.html.markup import Html
 from met.messages.visible import visible
 
 PRECISE = 1e-6
-"""Numbers are kept in four bytes where the error of that is smaller than this share of their range."""
+"""Numbers are kept in four bytes where the resulting error is smaller than this share of their range."""
 
 LEGIBLE = str.maketrans({c: f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"})
-"""Escapes, which JSON allows too, for letters that might end a script or be markup in it."""
+"""JSON escapes of characters that might end a script or act as markup in it."""
 
 
 def script_json(data: Any) -> Html:
-    """Data as JSON that can stand in a script element, whatever its texts are."""
+    """Data as JSON that is safe in a script element, whatever its texts are."""
     return Html(json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).translate(LEGIBLE))
 
 
 def section_data(section: ReportSection, replay: str, changes: ArchiveChanges | None = None) -> dict[str, Any]:
-    """The data that the plots of a section need. replay: the command that runs a case again, with `#CASE` for which."""
+    """The data for the plots of a section. replay: the command that runs a case again, with `#CASE` in place of its
+    number"""
     return {
         "name": visible(section.name),
         "against": None if changes is None else [visible(changes.before), visible(changes.now)],
@@ -46,7 +47,7 @@ def section_data(section: ReportSection, replay: str, changes: ArchiveChanges | 
 
 
 def packed(values: np.ndarray) -> dict[str, Any]:
-    """Numbers as base64: of whole ones `i4`, of others `f4`, with an offset or `f8` where that is not exact enough.
+    """Numbers as base64: whole ones as `i4`, others as `f4`, with an offset or `f8` where that is not exact enough.
 
     Little-endian. Infinite ones and not-a-numbers are kept.
     """
@@ -60,7 +61,7 @@ def packed(values: np.ndarray) -> dict[str, Any]:
         return {"t": "c", "v": float(low), "n": len(values)}
     with np.errstate(all="ignore"):
         middle = float(low + 0.5 * (high - low)) if len(finite) and np.isfinite(high - low) else 0.0
-        for offset in (0.0, middle):  # without one 0 stays 0, and what is small is as exact as what is large
+        for offset in (0.0, middle):  # without one 0 stays 0, and small values are as exact as large ones
             small = (values - offset).astype("<f4")
             error = np.abs(small[np.isfinite(values)].astype("<f8") + offset - finite).max(initial=0.0)
             if np.isfinite(error) and error <= PRECISE * (high - low):
@@ -73,7 +74,7 @@ def _base64(values: np.ndarray) -> str:
 
 
 def exact(values: np.ndarray) -> dict[str, Any]:
-    """Doubles to the bit, as base64: all of them, or each that there is once and which of these it is."""
+    """Doubles to the bit, as base64: all of them, or the distinct ones with the index of each."""
     bits = np.ascontiguousarray(values, "<f8").ravel().view("<i8")
     each, which = np.unique(bits, return_inverse=True)
     if len(each) > min(0x10000, len(bits) // 2):
@@ -82,8 +83,7 @@ def exact(values: np.ndarray) -> dict[str, Any]:
 
 
 def modules_script(sections: Sequence[ReportSection]) -> str:
-    """The modules of WebAssembly of all sections by their digests, as a page's script has them: what it runs is of the
-    script's own digest."""
+    """The WebAssembly modules of all sections by their digests, for the page's script, whose own digest covers them."""
     here = [each for section in sections if section.simulation for each in section.simulation.structures]
     all_ = [each for one in here for each in (one, one.before) if each is not None]
     found = {each.told["kernel"]["module"]: base64.b64encode(each.code).decode("ascii") for each in all_}
@@ -156,7 +156,7 @@ def _ruler(found: Ruler) -> dict[str, Any]:
 
 
 def _reach(found: Reach | None) -> dict[str, Any] | None:
-    """The range of the colours, and how many values lie beyond, for the page's scripts."""
+    """The range of the colours, and the number of values beyond it, for the page's scripts."""
     if found is None:
         return None
     return {
@@ -198,7 +198,7 @@ def _signals(signals: Signals) -> dict[str, Any]:
 
 
 def _history(each: History | None) -> dict[str, Any]:
-    """Empty where there is none."""
+    """The data of a history; empty where there is none."""
     if each is None:
         return {}
     lines = {str(place): [packed(line) for line in values.T] for place, values in each.values.items()}

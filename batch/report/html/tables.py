@@ -19,7 +19,7 @@ from batch.report.html.markup import Child, Html, breaking, el, join, lines
 from batch.terminal.margin import stable_head
 
 SHOWN_CASES = 8
-"""Rows of the best and of the worst cases that are open; the others are folded away."""
+"""Number of visible rows of the best and of the worst cases; the others are folded away."""
 
 
 def table(found: TextTable, label: str, cells: Sequence[Sequence[Child]] = (), more: Sequence[str] = ()) -> Html:
@@ -94,8 +94,8 @@ EVIDENCE_HEADS = ("verdict", "missed", "of all cases", "percentile", "worst", "m
 
 
 def evidence(found: EvidencePart) -> Html:
-    """The table of evidence: over each row what is required and what runs its worst case again, beneath each number
-    what it is held against; notes."""
+    """The table of evidence: over each row the requirement and the command that runs its worst case again, beneath each
+    number its limit; notes."""
 
     def cell(text: Child, under: str = "", cls: str | None = "right") -> Html:
         return el("td", el("span", text), el("span", under, cls="under") if under else None, cls=cls)
@@ -154,7 +154,7 @@ def influence(found: InfluencePart) -> Html:
 
 
 def _tornado(row: InfluenceRow, mean: float, low: float, high: float) -> Html:
-    """Two bars from the metric's mean, to what it is at both ends of a parameter. low, high: ends of the axis."""
+    """Two bars from the metric's mean to its values at both ends of a parameter. low, high: ends of the axis"""
 
     def at(value: float) -> float:
         return 160.0 * (value - low) / (high - low) if high > low else 80.0
@@ -218,7 +218,7 @@ def _overrides(row: ParameterRow, anchors: Anchors) -> Html | None:
 
 
 def source(number: int, file: SourceListing) -> Html:
-    """A file of the deck, each line with its number, to which others lead."""
+    """A deck file with line numbers, as targets of links."""
     texts = file.text.split("\n")
     rows = [el("li", el("code", line), id=f"f{number}-{n}") for n, line in enumerate(texts, start=1)]
     left = el("p", f"{file.left:,} more lines are in the archive.", cls="said") if file.left else None
