@@ -1,1 +1,1 @@
-"""Questions to an archive: its cases, requirements and signals, as what shows them needs them."""
+"""Questions to an archive: its cases, requirements and signals, in a form for display."""

@@ -1,5 +1,5 @@
-"""The requirements of a search, judged in the cases of its answer alone: an optimiser chose all others, so that shares
-of them say nothing."""
+"""The requirements of a search, judged only in the cases of its answer: an optimiser chose all others, so that shares
+of them mean nothing."""
 
 from __future__ import annotations
 
@@ -84,7 +84,8 @@ def _required(answer: SearchAnswer, each: GroupRequirement) -> AnswerRequirement
 
 
 def _came_out(answer: SearchAnswer, missed: int, unknown: int) -> str:
-    """`met in all 32 cases of spread`; `missed in 3 of 32 cases of spread, not known in 1 of 32 cases of spread`."""
+    """The outcome in words: `met in all 32 cases of spread`; `missed in 3 of 32 cases of spread, not known in 1 of 32
+    cases of spread`."""
     if not missed and not unknown:
         return f"met{(of := _cases(answer)) and f' in {of}'}"
     of = _cases(answer, every=False)
@@ -93,7 +94,7 @@ def _came_out(answer: SearchAnswer, missed: int, unknown: int) -> str:
 
 
 def _cases(answer: SearchAnswer, *, every: bool = True) -> str:
-    """The cases of a tuning's answer: `all 32 cases of spread`; empty where it is held against no sweep."""
+    """The cases of a tuning's answer: `all 32 cases of spread`; empty where it is judged against no sweep."""
     found, sweep = answer.found, answer.search.against
     if found.all == 1:
         return ""
@@ -107,7 +108,8 @@ def _all(answer: SearchAnswer) -> str:
 
 
 def _misses(found: tuple[AnswerRequirement, ...], *, named: bool) -> str:
-    """`misses settle < 5 s in case #2521, over < 10 % in 3 cases`. named: False where the case is known."""
+    """The missed requirements in words: `misses settle < 5 s in case #2521, over < 10 % in 3 cases`. named: False where
+    the case is known"""
 
     def where(each: AnswerRequirement) -> str:
         count = each.missed + each.unknown

@@ -1,4 +1,5 @@
-"""What is drawn where in a picture of histories: a row a quantity, a column a joint, commands over what follows."""
+"""The layout of a picture of histories: a row for each quantity, a column for each joint, commands over the signals
+that follow them."""
 
 from __future__ import annotations
 
@@ -12,12 +13,12 @@ from met.frozen import frozen
 from met.plan.channel import joint_of
 
 SPREAD = 2000
-"""So many cases at most are looked at for a fan, spread over all."""
+"""Largest number of cases in a fan, spread over all."""
 
 
 @frozen
 class Cell:
-    """One plot of the grid: lines of a panel, what to write on its axis, and what above it."""
+    """One plot of the grid: lines of a panel, the label of its axis, and its heading."""
 
     panel: Panel
     lines: tuple[int, ...]
@@ -26,9 +27,9 @@ class Cell:
 
 
 def panel_grid(group: ArchiveGroup, found: Sequence[Panel]) -> list[list[Cell | None]]:
-    """A row a quantity, a column a joint: `q` of metres and of radians stand beside one another, each with its axis,
-    and `elbow.servo.voltage` under the elbow. None where a joint has no such quantity. What is no joint's fills rows of
-    its own, components side by side."""
+    """The grid of plots: a row for each quantity, a column for each joint; `q` in metres and in radians stand side by
+    side, each with its axis, and `elbow.servo.voltage` under the elbow. None where a joint lacks a quantity. Other
+    signals fill rows of their own, components side by side."""
     joints = joints_of(group)
     placed: list[tuple[str, str, Cell]] = []
     for panel in found:
@@ -53,7 +54,7 @@ def panel_grid(group: ArchiveGroup, found: Sequence[Panel]) -> list[list[Cell | 
 
 
 def joints_of(group: ArchiveGroup) -> list[str]:
-    """All joints whose signals are here, in the arm's order where one signal has them all."""
+    """All joints with signals here, in the arm's order where one signal has them all."""
     signals = group.role("signal")
     together = sorted((v for v in signals if group.joints(v)), key=lambda v: v.dims[2] != "joint")
     names = [joint for variable in together for joint in group.joints(variable)]
@@ -63,8 +64,8 @@ def joints_of(group: ArchiveGroup) -> list[str]:
 
 @frozen
 class CommandCurve:
-    """A servo's command that belongs over a line, in that line's unit; whether the cases share it, and which of them
-    reaches furthest."""
+    """A servo's command that is drawn over a line, in that line's unit; whether the cases share it, and which of them
+    lasts longest."""
 
     variable: str
     column: int
@@ -80,7 +81,7 @@ class CommandCurve:
 def command_curves(
     group: ArchiveGroup, found: Sequence[Panel], positions: Sequence[int], *, apart: bool
 ) -> dict[tuple[str, str, int], CommandCurve]:
-    """The recorded commands that are of the same kind as a line of q, qd or tau, by panel (name, unit) and line.
+    """The recorded commands of the same kind as a line of q, qd or tau, by panel (name, unit) and line.
 
     apart: whether commands that differ between cases can be told apart; else only those that all cases share count.
     """
@@ -107,7 +108,7 @@ def command_curves(
 
 
 def _shared(group: ArchiveGroup, command: CommandCurve, positions: Sequence[int]) -> tuple[bool, int]:
-    """True if all cases have the same command, as far as they come, and the case that comes furthest."""
+    """True if all cases have the same command for as long as they last, and the case that lasts longest."""
     longest, best = positions[0], command.values(group, positions[0])
     for position in positions[1:]:
         values = command.values(group, position)

@@ -1,4 +1,4 @@
-"""Limits in an archive: how long cases were at them, which requirements are judged there, and which joints passed."""
+"""Limits in an archive: the time that cases spent at them, requirements that they affect, and joints beyond them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class LimitSummary:
 
 
 def limit_summaries(group: ArchiveGroup, here: slice = slice(None)) -> tuple[LimitSummary, ...]:
-    """The limits of an experiment, or of some of its cases, in the archive's order; none of an older archive."""
+    """The limits of an experiment, or of some of its cases, in the archive's order; empty for an older archive."""
     first, last, _ = here.indices(group.count)
     found = []
     for variable in group.role("limit"):
@@ -53,7 +53,7 @@ def limit_summaries(group: ArchiveGroup, here: slice = slice(None)) -> tuple[Lim
 
 
 def reached_texts(found: tuple[LimitSummary, ...], cases: int) -> list[str]:
-    """`share of the time at elbow.servo.v_max: 12 %`, of each limit that a case came to."""
+    """The limits that a case reached, in words: `share of the time at elbow.servo.v_max: 12 %`."""
     out = []
     for each in found:
         if each.cases:
@@ -65,7 +65,7 @@ def reached_texts(found: tuple[LimitSummary, ...], cases: int) -> list[str]:
 
 
 def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
-    """The warnings of limits of an experiment, one a kind, but for what its run allows.
+    """The warnings about limits of an experiment, one of each kind, except those that its run allows.
 
     experiment  of the plan, for places
     """
@@ -74,7 +74,8 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
 
 
 def _judged_at_a_limit(group: ArchiveGroup, experiment: Experiment | None) -> Diagnostic | None:
-    """Requirements on extremes that fell at a limit of a machine: the one of which most did, and the others by name."""
+    """Requirements on extremes that fell at a limit of a machine: the one with most such cases, and the others by
+    name."""
     at_extremes = {_of(variable): variable for variable in group.role("extreme")}
     judged = []
     for each in group_requirements(group):
@@ -104,7 +105,8 @@ def _judged_at_a_limit(group: ArchiveGroup, experiment: Experiment | None) -> Di
 
 
 def _passed(group: ArchiveGroup, experiment: Experiment | None) -> Diagnostic | None:
-    """Limits of joints that cases pass and no requirement judges: the one that most do, and the others by name."""
+    """Limits of joints that cases exceed and no requirement judges: the one with most such cases, and the others by
+    name."""
     shares = {_of(variable): variable.name for variable in group.role("limit")}
     judged = {str(group.variables[each.metric].attributes.get("of")) for each in group_requirements(group)}
     passed = []
@@ -133,7 +135,7 @@ def _passed(group: ArchiveGroup, experiment: Experiment | None) -> Diagnostic | 
 
 
 def _place(experiment: Experiment | None, path: str) -> Place | None:
-    """Where the deck has a limit."""
+    """The place of a limit in the deck."""
     found = None if experiment is None else experiment.parameters.get(path)
     return None if found is None else found.origin.place
 

@@ -1,9 +1,9 @@
-"""Which of the designs of a sweep to use: all that was chosen in it, held against all that was not.
+"""The choice among the designs of a sweep: the chosen parameters, judged under all others.
 
-A design is a combination of the values of what a sweep chooses: `vary`, `zip`, `from`. Its cases differ in what it
-must stand: what is drawn, repeats, and what the asker names besides. It is good if it meets all requirements in them: a
-requirement over a share of cases in that share of its own. How far a good design is from trouble is counted in steps of
-the sweep's grid: the border is where a design is not good, or where the sweep ends, behind which nothing is known.
+A design is a combination of the values of what a sweep chooses: `vary`, `zip`, `from`. Its cases differ in what it must
+withstand: drawn parameters, repeats, and those that the user names. It is good if it meets all requirements in them: a
+requirement over a share of cases in that share of its own. The robustness of a good design is counted in steps of the
+sweep's grid to the border, where a design is not good or the sweep ends.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from met.statistics.in_step import in_step
 from met.units import Dimension
 
 MOST_CELLS = 1 << 26
-"""Cells of a grid of designs, at most; with more the border is not looked for."""
+"""Largest number of cells of a grid of designs; with more the border is not computed."""
 
 BORNE = ("links.", "payloads.", "environment.", "initial.")
-"""Beginnings of the paths of what servos must bear, and who tunes them does not choose: unless it is said."""
+"""Prefixes of the paths of loads that servos must withstand, and a tuner does not choose, unless the user says so."""
 
 FULL = 0.5
-"""A grid has designs in more than this share of its cells."""
+"""Smallest share of its cells in which a grid must have designs."""
 
 ENDS, FAILS, UNKNOWN = "the sweep ends", "a case fails", "it was not run"
 
@@ -58,8 +58,8 @@ class DesignAxis:
 
 @frozen
 class Stretch:
-    """How far a design may go along an axis, all else as it is: the levels of the first and the last good design, and
-    what is on either side behind these, in words."""
+    """The range of a design along an axis, all else unchanged: the levels of the first and the last good design, and
+    the obstacles on either side, in words."""
 
     first: int
     last: int
@@ -98,11 +98,11 @@ class Designs:
         borne = {each.path for each in pool.variables("coordinate") if each.attributes.get("design")}
         _check_chosen([column.label for column in varied if column.label in borne], choose)
         self.draws = bool(borne - {*choose})
-        """Whether something is drawn that a design must bear."""
+        """True if a parameter is drawn that a design must withstand."""
         borne = ({*borne, *(column.label for column in varied if column.label.startswith(BORNE))} - {*choose}) | {*over}
         chosen = [column for column in varied if column.label not in borne]
         self.against = tuple(column for column in varied if column.label in borne)
-        """What the designs are held against."""
+        """The parameters under which designs are judged."""
         if not chosen:
             names = ", ".join(column.label for column in varied)
             why = f"it must bear {names}" if names else "nothing varies"
@@ -111,11 +111,11 @@ class Designs:
             helps += ["`--choose PATH` says that one of these is chosen"] if names else []
             raise Problem(error("E395", message, help=helps))
         self.of_case = design_points([column.values for column in chosen], pool.count)
-        """[case] its design."""
+        """[case] the case's design."""
         self.first = np.unique(self.of_case, return_index=True)[1]
-        """[design] its first case."""
+        """[design] the design's first case."""
         self.cases = np.bincount(self.of_case)
-        """[design] how many cases it has."""
+        """[design] the number of its cases."""
         self.axes = tuple(self._axis([chosen[i] for i in part]) for part in in_step([c.values for c in chosen]))
 
     @property
@@ -134,7 +134,7 @@ class Designs:
 
     @cached_property
     def shares(self) -> np.ndarray:
-        """[demand] the share of a design's cases that is to meet it."""
+        """[demand] the share of a design's cases that must meet it."""
         known = {each.text: each.share for group in self.pool.groups for each in requirements.group_requirements(group)}
         return np.array([known.get(text) or 1.0 for text in self.demands])
 
@@ -151,11 +151,11 @@ class Designs:
 
     @cached_property
     def failing(self) -> np.ndarray:
-        """[design] how many of its cases did not reach their end."""
+        """[design] the number of its cases that did not reach their end."""
         return np.bincount(self.of_case, weights=self.pool.status != DONE, minlength=self.count).astype(np.int64)
 
     def missed(self, design: int) -> list[str]:
-        """The demands that a design does not meet, without those that it misses by cases that failed alone."""
+        """The demands that a design does not meet, without those missed only by failed cases."""
         ended = (self.of_case == design) & (self.pool.status == DONE)
         outcomes = self.pool.outcomes[ended] if self.pool.requirements else np.ones((int(ended.sum()), 1))
         short = ~self.meets[design] & (outcomes != 1).any(axis=0)
@@ -173,7 +173,7 @@ class Designs:
 
     @cached_property
     def room(self) -> np.ndarray:
-        """[design] how far it stays from the nearest limit of what all of its cases must meet, as a share of the limit;
+        """[design] the smallest distance of its cases from the limit of a demand on all cases, as a share of the limit;
         infinite where there is none."""
         far = np.full(self.pool.count, -np.inf)
         for group_number, group in enumerate(self.pool.groups):
@@ -186,15 +186,15 @@ class Designs:
         return -self.worst(far, largest=True)
 
     def worst(self, values: np.ndarray, *, largest: bool) -> np.ndarray:
-        """[design] the largest, or smallest, of a number of its cases; not a number where a case has none."""
+        """[design] the largest, or smallest, value of its cases; not-a-number where a case has none."""
         out = np.full(self.count, -np.inf if largest else np.inf)
         with np.errstate(invalid="ignore"):
             (np.maximum if largest else np.minimum).at(out, self.of_case, values)
         return out
 
     def goal(self, text: str) -> Goal:
-        """The goal that `METRIC`, `EXPRESSION` or `METRIC:largest` asks for: of a margin the largest, of what else the
-        least, where the text does not say. Raises Problem."""
+        """The goal of the text `METRIC`, `EXPRESSION` or `METRIC:largest`: by default the largest for a margin, and
+        else the least. Raises Problem."""
         name, colon, way = text.rpartition(":")
         expressions, said = CaseExpressions(self.pool), bool(colon) and way.strip() in ("largest", "smallest")
         if not said:
@@ -207,8 +207,8 @@ class Designs:
 
     @cached_property
     def steps(self) -> np.ndarray | None:
-        """[design] how many steps of the grid it is from the border, in any direction: 0 where it is not good. None
-        where the designs are no grid."""
+        """[design] the number of grid steps to the border, in any direction: 0 where it is not good. None where the
+        designs do not form a grid."""
         from scipy.ndimage import distance_transform_cdt
 
         there = self._grid
@@ -235,7 +235,8 @@ class Designs:
 
     @cached_property
     def _grid(self) -> np.ndarray | None:
-        """The design in each cell of the grid of all axes' levels, -1 where there is none; None: they are no grid."""
+        """The design in each cell of the grid of all axes' levels, -1 where there is none; None where they do not form
+        a grid."""
         sizes = [len(axis.values) for axis in self.axes]
         cells = int(np.prod([float(size) for size in sizes]))
         if any(np.isnan(column.values[self.first]).any() for axis in self.axes for column in axis.columns):
@@ -247,7 +248,7 @@ class Designs:
         return out
 
     def stretch(self, design: int, axis: int) -> Stretch | None:
-        """How far a good design may go along an axis; None where that has no order, or the designs are no grid."""
+        """The range of a good design along an axis; None where that has no order, or the designs do not form a grid."""
         if self._grid is None or not self.axes[axis].ordered:
             return None
         at: list[int | slice] = [int(each.level[design]) for each in self.axes]
@@ -272,12 +273,12 @@ class Designs:
             return FAILS
         return f"`{missed[0]}`" + (f" and {len(missed) - 1} more" if len(missed) > 1 else "")
 
-    # Which to use
+    # The ranking
 
     def order(self, goals: Sequence[Goal] = ()) -> np.ndarray:
-        """The good designs, the best first: by the goals in the worst of their cases, one after the other; then, and
-        without any, by the steps to the border, by the share of cases that meet each demand, and by the room to the
-        nearest limit."""
+        """The good designs, the best first: by the goals in the worst of their cases, one after the other; then, or
+        without goals, by the steps to the border, by the share of cases that meet each demand, and by the distance to
+        the nearest limit."""
         good = np.flatnonzero(self.good)
         keys = [self._wanted(goal)[good] for goal in goals]
         if self.steps is not None:
@@ -286,12 +287,12 @@ class Designs:
         return good[np.lexsort(keys[::-1])]
 
     def _wanted(self, goal: Goal) -> np.ndarray:
-        """[design] a goal in the worst of its cases, as a number that is to be small; what has none comes last."""
+        """[design] a goal in the worst of its cases, as a number to minimise; designs without one come last."""
         found = self.worst(-goal.values if goal.largest else goal.values, largest=True)
         return np.where(np.isnan(found), np.inf, found)
 
     def front(self, goals: Sequence[Goal]) -> np.ndarray:
-        """The good designs of which no other is at least as near to all goals and nearer to one, by the first goal."""
+        """The Pareto front: good designs that no other dominates in all goals, by the first goal."""
         good = np.flatnonzero(self.good)
         numbers = np.stack([self._wanted(goal)[good] for goal in goals], axis=1)
         order = np.lexsort(numbers.T[::-1])
@@ -309,7 +310,7 @@ def varied_columns(pool: Pool) -> list[CaseColumn]:
 
 
 def _check_chosen(drawn: Sequence[str], choose: Sequence[str]) -> None:
-    """Raises Problem E394 where some of what is drawn is chosen: each value of it comes with others of its own."""
+    """Raise Problem E394 where a chosen parameter is drawn: each of its values comes with other values of its own."""
     chosen = [path for path in drawn if path in choose]
     others = [path for path in drawn if path not in choose]
     if chosen and others:

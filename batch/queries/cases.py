@@ -1,4 +1,4 @@
-"""The cases of an archive one by one: which failed, which missed a requirement and by how much."""
+"""The cases of an archive one by one: failed ones, and those that missed a requirement, with the amount."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from met.diagnostic import Problem
 from met.distinct import distinct
 
 SHOWN_CASES = 20
-"""Rows of the table unless all are asked for."""
+"""Number of rows of the table unless all are asked for."""
 
 MISSES = "\N{BALLOT X}"
 
@@ -33,8 +33,8 @@ def table(
     among: np.ndarray | None = None,
     hint: bool = True,
 ) -> list[str]:
-    """The cases as lines, worst first or `by` what is asked for, in the deck's units; a metric that misses a
-    requirement bears a cross.
+    """The cases as lines, worst first or in the order `by`, in the deck's units; a metric that misses a requirement
+    bears a cross.
 
     most: how many, None for all; among: positions, None for all; hint: whether to say how many are left out.
     """
@@ -71,8 +71,8 @@ def table(
 def table_across(
     pool: Pool, by: CaseOrder, most: int | None = SHOWN_CASES, *, among: np.ndarray | None = None
 ) -> list[str]:
-    """The cases of all structures of a sweep as lines, `by` what is asked for, with what tells the structures apart.
-    among: places, None for all."""
+    """The cases of all structures of a sweep as lines, in the order `by`, with the values that distinguish the
+    structures. among: places, None for all"""
     from ic.printing.columns import columns
 
     places = _among(ordering.positions_in_pool(pool, by), among)
@@ -106,8 +106,8 @@ def _among(order: np.ndarray, some: np.ndarray | None) -> np.ndarray:
 
 
 def title(group: ArchiveGroup, most: int | None = None, *, by: CaseOrder | None = None, every: bool = False) -> str:
-    """The title of the table, which says how it is ordered, and of which cases it is where not all have rows. every:
-    whether all cases are listed."""
+    """The title of the table, with its order, and the choice of cases where not all have rows. every: whether all cases
+    are listed"""
     if is_streamed(group) and by is None and not every:
         return f"of {group.count:,} cases those that stand out:"
     found = _title(group, most, by)
@@ -115,8 +115,8 @@ def title(group: ArchiveGroup, most: int | None = None, *, by: CaseOrder | None 
 
 
 def _listed(group: ArchiveGroup, by: CaseOrder | None, among: np.ndarray | None, most: int | None) -> np.ndarray:
-    """Positions of the cases of the table, in order. Of very many, unless all are asked for: those that stand out, in
-    the order of the case table."""
+    """Positions of the cases of the table, in order. If there are very many, and not all are asked for: those that
+    stand out, in the order of the case table."""
     if (
         most is not None
         and by is None
@@ -133,7 +133,7 @@ CASES = ("judged_worst_case", "least_case", "most_case", "cause_first")
 """Variables of a summary that name cases."""
 
 MOST_STANDING_OUT = 100
-"""Cases that stand out among very many, of which so many are listed."""
+"""Largest number of cases that stand out and are listed among very many."""
 
 
 def _title(group: ArchiveGroup, most: int | None, by: CaseOrder | None) -> str:
@@ -159,8 +159,8 @@ def rows_json(
     among: np.ndarray | None = None,
     positions: Sequence[int] | np.ndarray | None = None,
 ) -> list[dict[str, Any]]:
-    """The table of cases for programs, in SI, of these cases or of the worst among some: what a case is, how it ended,
-    its metrics (null where not finite), and whether it meets each requirement."""
+    """The table of cases for programs, in SI, of these cases or of the worst among some: each case's name, its end, its
+    metrics (null where not finite), and whether it meets each requirement."""
     if positions is None:
         positions = _listed(group, by, among, most)[:most]
     positions = np.asarray(positions)
@@ -185,7 +185,7 @@ def rows_json(
 
 
 def parameters(archive: ArchiveFile, group: ArchiveGroup, position: int) -> dict[str, dict[str, Any]]:
-    """All parameters of a case by path: SI value, unit, and whether it follows from what is varied."""
+    """All parameters of a case by path: SI value, unit, and whether it depends on varied ones."""
     from met.plan import Formula
 
     experiment = next(e for e in archive.plan().experiments if e.name == group.name)
@@ -200,7 +200,7 @@ def parameters(archive: ArchiveFile, group: ArchiveGroup, position: int) -> dict
 
 
 def varied_lines(archive: ArchiveFile, group: ArchiveGroup, position: int) -> list[str]:
-    """Lines about a case: what is varied in it, and every parameter that follows from it."""
+    """Lines about a case: its varied values, and every parameter that depends on them."""
     from ic.printing.columns import columns
 
     coordinates = group.role("coordinate")
@@ -209,7 +209,7 @@ def varied_lines(archive: ArchiveFile, group: ArchiveGroup, position: int) -> li
     rows = [[v.path, value_text(group.at(v.name, [position])[0], v)] for v in coordinates]
     try:
         followers = parameters(archive, group, position)
-    except Problem:  # a model of the plan's is not installed here; what was varied is known all the same
+    except Problem:  # a model of the plan is not installed here; the varied values are known all the same
         followers = {}
     for path, given in followers.items():
         if given["varies"] and path not in group.variables:
@@ -231,7 +231,7 @@ def _outcome(status: int, outcomes: np.ndarray) -> str:
 
 
 def _marks(group: ArchiveGroup, outcomes: np.ndarray) -> dict[str, np.ndarray]:
-    """For each metric that has requirements, which of the cases miss one."""
+    """For each metric with requirements, the cases that miss one."""
     out: dict[str, np.ndarray] = {}
     for each in requirements.group_requirements(group):
         out[each.metric] = out.get(each.metric, False) | (outcomes[:, each.place] == 0)

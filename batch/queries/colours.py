@@ -1,4 +1,4 @@
-"""How far the colours of a metric reach, so that a few values that stray far do not leave one colour to all others.
+"""The range of a metric's colours, chosen so that a few outliers do not leave one colour to all others.
 
 Pictures and reports take it from here, and say how many values lie beyond either end.
 """
@@ -13,37 +13,37 @@ from batch.queries.signals import number_text
 from met.frozen import frozen
 
 TENTH = 0.1
-"""Values are told apart by their colours if more than this share lies outside of the densest tenth of their range."""
+"""Values can be distinguished by colours if more than this share lies outside of the densest tenth of their range."""
 
 TOLD = 0.25
-"""The share that must be told apart when values are left out for it."""
+"""The share that must be distinguishable when values are left out for that."""
 
 MOST_OUT = 0.45
-"""At most this share of the values is left out: those that stay are the most."""
+"""Largest share of the values that is left out."""
 
 APART = ((0.1, 10.0), (1.0, 100.0))
 SINGLE_APART = 30.0
-"""Width of the gap, in ranges of all other values, from which the values beyond it are left out: by their share of all
+"""Width of the gap, relative to the range of all other values, beyond which values are left out: by their share of all
 values, and for a single one."""
 
 NOISE = 1e-6
-"""Differences below this share of the values are no range to show in colours."""
+"""Relative differences below this one do not make a range of colours."""
 
 LIMIT_APART = 20.0
-"""A limit that lies nearer than this, against the range of the colours, is within them."""
+"""A limit nearer than this, relative to the range of the colours, is included in it."""
 
 DECADES = 1000.0
-"""Largest value against the smallest, from which on colours may be logarithmic."""
+"""Ratio of the largest to the smallest value from which on colours may be logarithmic."""
 
 LOOKED_AT = 4096
-"""Most values from which the range is found; of more, one that lies within the share `NEAR` of it is in it too."""
+"""Largest number of values from which the range is computed; of more, a sample within the share `NEAR` is used."""
 
 NEAR = 0.02
 
 
 @frozen
 class Reach:
-    """The range of the colours. below, above: how many values lie beyond, and which is the furthest of them."""
+    """The range of the colours. below, above: the number of values beyond, and the furthest of them"""
 
     low: float
     high: float
@@ -55,7 +55,7 @@ class Reach:
 
     @property
     def said(self) -> tuple[str, str]:
-        """Say what lies below and above; "" where nothing does."""
+        """The values below and above, in words; "" where there are none."""
         return (
             f"{self.below:,} below, down to {number_text(self.least)}" if self.below else "",
             f"{self.above:,} above, up to {number_text(self.most)}" if self.above else "",
@@ -105,14 +105,14 @@ def _reach(finite: np.ndarray, limits: Sequence[float], *, parting: bool) -> tup
 
 
 def _thinned(finite: np.ndarray) -> np.ndarray:
-    """Some of many sorted values, the extremes among them."""
+    """A sample of many sorted values, including the extremes."""
     if len(finite) <= LOOKED_AT:
         return finite
     return np.asarray(finite[np.linspace(0, len(finite) - 1, LOOKED_AT).round().astype(int)])
 
 
 def _inner(finite: np.ndarray) -> tuple[float, float, bool]:
-    """The range of sorted values in which they are told apart, and whether by their logarithms."""
+    """The range of sorted values in which they are distinguishable, and whether by their logarithms."""
     part = _without_far(finite)
     if _told(part) < TENTH:
         found = _shortest(part)
@@ -141,7 +141,7 @@ def _without_far(part: np.ndarray) -> np.ndarray:
 
 
 def _shortest(part: np.ndarray) -> np.ndarray | None:
-    """The shortest range that holds all but the fewest values, in which the values are told apart."""
+    """The shortest range that holds all but the fewest values, in which the values are distinguishable."""
     for out in np.unique(np.geomspace(1, max(1.0, MOST_OUT * len(part)), 40).astype(int)):
         kept = len(part) - int(out)
         if kept < 2:
@@ -149,7 +149,7 @@ def _shortest(part: np.ndarray) -> np.ndarray | None:
         first = int((part[kept - 1 :] - part[: len(part) - kept + 1]).argmin())
         found = part[first : first + kept]
         if _shows(found) and _told(found) >= TOLD:
-            beside = np.ptp(found) / 2  # what is as near as that tells the others apart as well
+            beside = np.ptp(found) / 2  # a range as near as that distinguishes the others as well
             return part[(part >= found[0] - beside) & (part <= found[-1] + beside)]
     return None
 

@@ -1,4 +1,4 @@
-"""In which units a deck's author thinks of a signal: `deg` where the deck wrote `deg`. Archives hold SI."""
+"""The units that a deck's author uses for a signal: `deg` where the deck wrote `deg`. Archives hold SI."""
 
 from __future__ import annotations
 
@@ -15,15 +15,14 @@ from met.unit_parser import parse_unit
 from met.units import Measure
 
 MOTION = re.compile(r"initial\.|metrics\.|guides?\.|environment\.|(.*\.)?servo\.command\.")
-"""Parameters in whose units a motion is thought of; lengths of links and torques of friction say nothing of it."""
+"""Parameters whose units are those of a motion; lengths of links and torques of friction do not count."""
 
 WRITTEN = re.compile(r"[\d.\])]\s*([A-Za-z%][\w*/^()]*)\s*$")
-"""A value's unit, at its end: `30 deg`, `[0, 0, 90] deg`."""
+"""The unit at the end of a value: `30 deg`, `[0, 0, 90] deg`."""
 
 
 class DeckUnits:
-    """The deck's unit for each SI unit: of a signal what a requirement of it is in, else what most of its values are
-    in.
+    """The deck's unit for each SI unit: for a signal, that of a requirement on it, else that of most of its values.
 
     archive     the group's, or the plan that was run (`written_plan`, where a caller has several groups); None where
                 that cannot be read
@@ -64,7 +63,7 @@ class DeckUnits:
 
 
 def written_plan(archive: ArchiveFile) -> Plan | None:
-    """The archive's plan, to be looked at; None where it cannot be read here."""
+    """The archive's plan, for display; None where it cannot be read here."""
     try:
         return archive.plan(as_written=True)
     except Problem:
@@ -72,7 +71,7 @@ def written_plan(archive: ArchiveFile) -> Plan | None:
 
 
 def _votes(experiment: Experiment, plan: Plan) -> dict[str, tuple[str, ...]]:
-    """By SI unit those that the deck wrote values in, the most frequent first; what is zero says nothing."""
+    """By SI unit, the units of the deck's values, the most frequent first; zeros do not count."""
     texts = {source.name: source.text.split("\n") for source in plan.sources}
     counts: dict[str, Counter[str]] = {}
     seen: set[tuple[str, Place | None]] = set()
@@ -94,7 +93,7 @@ def _text(place: Place, texts: Mapping[str, list[str]]) -> str:
 
 
 def _scale(unit: str, si: str) -> float:
-    """One of this unit in an SI unit; 0 where they are of different kinds."""
+    """The size of a unit in an SI unit; 0 where they are of different kinds."""
     mine, theirs = _measure(unit), _measure(si)
     if mine is None or theirs is None or mine.dimension != theirs.dimension:
         return 0.0

@@ -29,10 +29,11 @@ from met.statistics import sequential
 from met.statistics.design_points import design_points
 
 Verdict = Literal["met", "missed", "demonstrated", "not shown", "refuted"]
-"""`met` and `missed` are of the cases that were run; the others are of all cases that may be drawn."""
+"""`met` and `missed` refer to the cases that were run; the others to all cases that may be drawn."""
 
 ROUNDING = 1e-12
-"""Of a share: 7 % of 100 cases are 7.000000000000001 cases in floating point, and 7 of them are enough."""
+"""Allowance for rounding of a share: 7 % of 100 cases are 7.000000000000001 cases in floating point, and 7 of them are
+enough."""
 
 NOTHING_DRAWN = "no case was drawn at random: without a confidence"
 SEARCHED = "in the cases of the answer alone, as an optimiser chose all others"
@@ -41,8 +42,8 @@ SOME_OF_THE_TABLE = "only some cases of the table were run: without a confidence
 
 @frozen(kw_only=True)
 class EvidenceRow:
-    """A requirement, and the evidence that the cases of one design point give for it; of one that every case is to
-    meet, that all cases give.
+    """A requirement with its evidence from the cases of one design point, or from all cases where every case has to
+    meet it.
 
     requirement  with its limit in SI;  unit, scale: in which its deck writes the metric, shown = SI / scale
     chosen       what was chosen at the design point: path -> text with its unit; empty where nothing was
@@ -84,20 +85,20 @@ class EvidenceRow:
 
 
 def evidence(group: ArchiveGroup) -> list[EvidenceRow]:
-    """The rows of an experiment's requirements over a share of cases, at each of its design points; none, and no values
-    are read, where it has no such requirement, or is a search, whose cases an optimiser chose."""
+    """The rows of an experiment's requirements over a share of cases, at each of its design points; none, without
+    reading values, where it has no such requirement, or is a search, whose cases an optimiser chose."""
     if is_search(group):
         return []
     return evidence_for(group, [each for each in requirements.group_requirements(group) if each.share is not None])
 
 
 def evidence_for(group: ArchiveGroup, found: Sequence[GroupRequirement]) -> list[EvidenceRow]:
-    """The rows of these requirements: a row a design point, and one alone for what every case is to meet."""
+    """The rows of these requirements: one for each design point, and a single one where every case has to meet it."""
     if not found:
         return []
     if (answer := SearchAnswer.of(group)) is not None:
         return _of_answer(answer)
-    if is_search(group):  # some of its cases: an optimiser chose them, so that each is held against every requirement
+    if is_search(group):  # a part of its cases: an optimiser chose them, so that each is judged by every requirement
         found = [replace(each, share=None, confidence=None) for each in found]
     if (summed := summed_up(group)) is not None:
         return _of_summary(group, summed, found)
@@ -130,7 +131,7 @@ def _of_answer(answer: SearchAnswer) -> list[EvidenceRow]:
 
 
 def _of_summary(group: ArchiveGroup, summary: CaseSummary, found: Sequence[GroupRequirement]) -> list[EvidenceRow]:
-    """The rows of requirements of all cases, of which the archive keeps what they came to."""
+    """The rows of requirements on all cases, from the summary that the archive keeps."""
     chosen = [group.variables[str(name)] for name in summary.values["chosen"]]
     why = _why_without_confidence(group, group.role("coordinate"))
     out = []
@@ -159,15 +160,14 @@ def _of_summary(group: ArchiveGroup, summary: CaseSummary, found: Sequence[Group
 
 @frozen
 class DesignPoint:
-    """A point of the design: what was chosen, path -> text with its unit, and the positions of the cases that share
-    it."""
+    """A point of the design: its chosen values, path -> text with its unit, and the positions of its cases."""
 
     chosen: dict[str, str]
     cases: np.ndarray
 
 
 def _design_points(group: ArchiveGroup) -> tuple[list[DesignPoint], str]:
-    """The design points of a group, and why no confidence can be had from them; "" where one can.
+    """The design points of a group, and the reason why they give no confidence; "" where they do.
 
     Where nothing was drawn there is one design point of all cases.
     """
@@ -186,7 +186,7 @@ def _design_points(group: ArchiveGroup) -> tuple[list[DesignPoint], str]:
 
 
 def _why_without_confidence(group: ArchiveGroup, coordinates: Sequence[Stored]) -> str:
-    """Why the cases of a group give no confidence; "" where they do."""
+    """The reason why the cases of a group give no confidence; "" where they do."""
     if (summed := summed_up(group)) is not None:
         drawn = summed.drawn
     else:
@@ -229,26 +229,26 @@ def _judged(each: GroupRequirement, values: np.ndarray, outcomes: np.ndarray, wh
 
 
 def _without_confidence(each: GroupRequirement, why: str) -> bool:
-    """True where the cases that were run decide it, and nothing is said of others."""
+    """True where the finished cases decide the requirement, without a statement about others."""
     return each.share is None or each.confidence is None or bool(why)
 
 
 def _counted(each: GroupRequirement, cases: int, missed: int, why: str) -> dict[str, Any]:
-    """The verdict of the cases that were run. why: no confidence can be had."""
+    """The verdict of the cases that were run. why: the reason why there is no confidence"""
     share = each.share if each.share is not None and each.confidence is None else 1.0
     verdict = "met" if cases - missed >= share * cases * (1.0 - ROUNDING) else "missed"
     return {"verdict": verdict, "why": why if each.confidence is not None else ""}
 
 
 def _judged_once(each: GroupRequirement, values: np.ndarray, missed: np.ndarray, unknown: np.ndarray) -> dict[str, Any]:
-    """The verdict of cases whose number was fixed before they were looked at, and its bounds."""
+    """The verdict of cases whose number was fixed beforehand, and its bounds."""
     assert each.share is not None and each.confidence is not None
     rank = fixed.percentile_rank(len(values), each.share, each.confidence)
     return _judged_by_counts(each, len(values), int(missed.sum()), _order_statistic(each, values, unknown, rank))
 
 
 def _judged_by_counts(each: GroupRequirement, cases: int, misses: int, bound: float | None) -> dict[str, Any]:
-    """The same, by the number of cases, how many of them miss it, and the order statistic that bounds the
+    """The verdict from the number of cases, the number of misses, and the order statistic that bounds the
     percentile."""
     assert each.share is not None and each.confidence is not None
     verdict = fixed.verdict(cases, misses, each.share, each.confidence)
@@ -290,8 +290,8 @@ def _judged_early(
 
 
 def _order_statistic(each: GroupRequirement, values: np.ndarray, unknown: np.ndarray, rank: int) -> float | None:
-    """The value of a rank, from the side of the limit, which bounds the percentile; None where there are too few cases,
-    or it lies among those that have no value."""
+    """The value of a rank, counted from the limit's side, which bounds the percentile; None where there are too few
+    cases, or it falls among those without a value."""
     if not rank:
         return None
     below = each.comparison.startswith("<")
@@ -301,7 +301,7 @@ def _order_statistic(each: GroupRequirement, values: np.ndarray, unknown: np.nda
 
 
 def percent_below(share: float) -> str:
-    """A share in percent, rounded down, with two digits at least of what is missing from all: `99.9962 %`."""
+    """A share in percent, rounded down, with at least two digits of its difference from 100 %: `99.9962 %`."""
     return _percent(share, math.floor)
 
 

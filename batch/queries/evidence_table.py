@@ -1,8 +1,8 @@
-"""The table of evidence: a row for each requirement at each design point, with all that a review asks about it.
+"""The table of evidence: a row for each requirement at each design point, with the numbers that a review needs.
 
 One set of rows for the terminal, reports, comparisons, tables for other programs and notebooks. Requirements over a
-share of cases have a row a design point, those that every case is to meet have one, and so have those on an error by
-the step, whose cases are the verified ones.
+share of cases have a row for each design point, those on every case have one, and so have those on an error due to the
+step, whose cases are the verified ones.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from met.frozen import frozen
 from met.outputs import quoted
 
 NONE = "-"
-"""In the place of what a row does not have."""
+"""Text in place of a missing value."""
 
 
 @frozen(kw_only=True)
@@ -85,7 +85,7 @@ class RequirementEvidence:
 
     @property
     def blurred(self) -> bool:
-        """True if the error by the step is as large as the margin, so that shorter steps may change it."""
+        """True if the error due to the step is as large as the margin, so that shorter steps may change the verdict."""
         return self.step_error is not None and self.margin is not None and self.step_error >= abs(self.margin) > 0.0
 
 
@@ -93,7 +93,7 @@ def requirement_evidence(
     groups: Sequence[ArchiveGroup], archive: str, *, several: bool = False
 ) -> list[RequirementEvidence]:
     """The rows of the requirements of these groups. archive: its name in commands; several: whether it holds other runs
-    or sweeps, so that commands have to name this one. Those of a requirement stand together."""
+    or sweeps, so that commands must name this one. Rows of one requirement are adjacent."""
     out = []
     for group in groups:
         structure = [f"{choice.path} = {group.at(choice.name, [0])[0]}" for choice in group.role("choice")]
@@ -115,7 +115,7 @@ def requirement_evidence(
 
 
 def _designs(group: ArchiveGroup) -> tuple[bool, bool]:
-    """Whether anything was drawn at random in a group's cases, and whether anything was chosen."""
+    """Two truths: values were drawn at random in a group's cases, and values were chosen."""
     designs = [bool(variable.attributes.get("design")) for variable in group.role("coordinate")]
     if (summed := summed_up(group)) is not None:
         return summed.drawn, not all(designs)
@@ -257,8 +257,8 @@ def texts_of(row: RequirementEvidence, number: Callable[[float], str] = number_t
 
 
 def notes_of(rows: Sequence[RequirementEvidence]) -> list[str]:
-    """Sentences about the table: why a row was not judged as it asks for, where the error by the step is as large as
-    the margin, what more cases would do, and of what the confidence is."""
+    """Sentences about the table: why a row was not judged as the deck asks, where the error due to the step is as large
+    as the margin, the use of more cases, and the meaning of the confidence."""
     out = []
     for row in rows:
         where = f"{row.requirement}{f', {row.at}' if row.at else ''}"

@@ -43,7 +43,8 @@ class CaseExpressions:
         return {each.path: each for role in roles for each in self.pool.variables(role)}
 
     def holds(self, condition: str) -> np.ndarray:
-        """The cases in which a condition holds, [case]: none in which it compares what has no value. Raises Problem."""
+        """The cases in which a condition holds, [case]: not those in which it compares a missing value. Raises
+        Problem."""
         choices = {each.label: each for each in self.pool.columns if each.role == "choice"}
         words = {
             name: np.array([*each.words, ""])[np.nan_to_num(each.values, nan=len(each.words)).astype(int)]
@@ -51,7 +52,7 @@ class CaseExpressions:
         }
         options = {name: each.words for name, each in choices.items()}
         truths = Truths(self._find, self._graph, words, options)
-        truths.numeric = False  # an archive has the words of a choice alone
+        truths.numeric = False  # an archive has only the words of a choice
         truths.take(self._columns, self.pool.count)
         with _shown(condition):
             return truths.of(read_expression(condition), np.ones(self.pool.count, bool))
@@ -64,7 +65,7 @@ class CaseExpressions:
         return np.array(np.broadcast_to(np.asarray(numbers, float), self.pool.count)), found.dimension
 
     def is_margin(self, expression: str) -> bool:
-        """True for the name of a metric that is a margin, of which more is better, as its model declares it."""
+        """True for the name of a metric that is a margin, which should be large, by its model's declaration."""
         named = [each for each in self.pool.variables("metric") if each.path == expression.strip()]
         model = str(named[0].attributes.get("model", "")) if named else ""
         figure, metric = FIGURES.get(model), models.available("metric").get(model)
@@ -88,7 +89,7 @@ class CaseExpressions:
 
 @contextmanager
 def _shown(expression: str) -> Iterator[None]:
-    """Lets a Problem show the expression that it is about."""
+    """Add the expression to a Problem about it."""
     try:
         yield
     except Problem as problem:

@@ -1,4 +1,4 @@
-"""The cases of an archive that did not reach their end: by cause, all of them, with what they have in common once."""
+"""The cases of an archive that did not reach their end, grouped by cause."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ STATUS = {DONE: "done", FAILED: "failed", TIMED_OUT: "timed out", LOST: "lost"}
 """Words for how a case ended."""
 
 MOST_RANGES, FEW = 120, 20
-"""Stretches of cases that are listed of one cause; of more, so few."""
+"""Largest number of stretches of cases that are listed for one cause, and the number listed if there are more."""
 
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(e[-+]?\d+)?")
 
 
 @frozen
 class FailureGroup:
-    """Cases that failed alike: how they ended, the cause of the first, whose id this is, and all their positions; where
-    an archive keeps a summary, the position of the first alone, and how many they are, `of`."""
+    """Cases that failed alike: their status, the cause and id of the first, and all their positions; where an archive
+    keeps a summary, only the position of the first, and their number, `of`."""
 
     status: str
     cause: str
@@ -38,12 +38,12 @@ class FailureGroup:
 
     @property
     def row(self) -> int:
-        """Position of the first."""
+        """The position of the first case."""
         return self.cases[0]
 
 
 def failures(status: np.ndarray, cause: np.ndarray, case: np.ndarray, case_id: np.ndarray) -> tuple[FailureGroup, ...]:
-    """Group failed cases by cause, in the order of their first cases. Causes are alike that differ in numbers alone.
+    """Group failed cases by cause, in the order of their first cases. Causes that differ only in numbers are grouped.
 
     status, cause, case, case_id   of failed cases, in order
     """
@@ -81,7 +81,7 @@ def failure_lines(found: Sequence[FailureGroup], width: int) -> list[str]:
 
 
 def ranges(cases: Sequence[int]) -> str:
-    """Rising positions in words: `#3, #7-#12`."""
+    """Ascending positions in words: `#3, #7-#12`."""
     stretches: list[list[int]] = []
     for case in cases:
         if stretches and case == stretches[-1][1] + 1:

@@ -1,4 +1,4 @@
-"""Grapples in an archive that no gripper makes: of what is not at its place, or moves or turns fast by its link."""
+"""Grapples in an archive that a gripper could not make: the payload is not at its place, or moves or turns too fast."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ if TYPE_CHECKING:
     from met.plan import Experiment
 
 FAST, TURNING = 1.0, 10.0
-"""m/s and rad/s: in the tenth of a second that a gripper needs to close, it is 0.1 m further, or a radian."""
+"""m/s and rad/s: at these rates a payload moves 0.1 m, or turns by a radian, in the tenth of a second that a gripper
+needs to close."""
 
 
 def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
-    """The warning of grapples of an experiment, if there is one: of the worst, with the other payloads by name.
+    """The warning about grapples of an experiment, if there is one: about the worst, with the other payloads by name.
 
     experiment  of the plan, for places; what the check tells of it is not told again
     """

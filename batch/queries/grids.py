@@ -1,5 +1,5 @@
-"""Two numbers that cases differ in, as a grid: how their values are spaced, its levels, whether cases fill it,
-and which case stands for a cell. Pictures and reports take the same from here."""
+"""Grids of two numbers that vary between cases: the spacing of values, levels, whether cases fill the grid, and the
+case shown in a cell. Pictures and reports share this module."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from met.distinct import distinct
 from met.frozen import frozen
 
 MOST_LEVELS = 48
-"""Rows and columns of a map; more values share them, in stretches."""
+"""Largest number of rows and columns of a map; more values share them, in stretches."""
 
 FULL = 0.5
-"""A grid has cases in more than this share of its cells: two parameters that go in step make none."""
+"""Smallest share of its cells in which a grid has cases: two parameters in step make no grid."""
 
 
 Scale = Literal["linear", "log", "place"]
 
 EVEN, EVEN_LOG = 0.05, 0.15
-"""How much steps may differ, against their mean, if values are to count as evenly spaced: 0.33, 0.67, 1 do; and steps
-of their logarithms: 1, 3, 10 do, 1, 2, 5, 10 do not."""
+"""Largest relative difference of steps that count as even: 0.33, 0.67, 1 do; and of steps of logarithms: 1, 3, 10 do,
+1, 2, 5, 10 do not."""
 
 SPAN, METRIC_SPAN = 100.0, 1000.0
-"""Largest value against the smallest, from which on an axis of points is logarithmic: of a parameter, of a metric."""
+"""Ratio of the largest to the smallest value from which on an axis of points is logarithmic: of a parameter, of a
+metric."""
 
 
 ROUND = ((1, 2, 5), (1, 3), (1,))
@@ -57,12 +58,12 @@ class Levels:
 
 
 def levels(values: np.ndarray) -> np.ndarray:
-    """The different values that are numbers, rising."""
+    """The distinct values that are numbers, ascending."""
     return distinct(values[np.isfinite(values)])
 
 
 def spacing(found: np.ndarray) -> Scale:
-    """The spacing of different, rising values: by equal steps, by equal factors, or neither."""
+    """The spacing of distinct ascending values: by equal steps, by equal factors, or neither."""
     if len(found) < 2:
         return "place"
     if _even(found, EVEN):
@@ -71,8 +72,8 @@ def spacing(found: np.ndarray) -> Scale:
 
 
 def is_log(found: np.ndarray) -> bool:
-    """True if points at these different, rising values lie on a logarithmic axis: they rise by factors, or span so many
-    that the small ones would be one on another."""
+    """True if points at these distinct ascending values lie on a logarithmic axis: they rise by factors, or span so
+    many that the small ones would coincide."""
     if len(found) < 3 or found[0] <= 0.0:
         return False
     scale = spacing(found)
@@ -80,7 +81,7 @@ def is_log(found: np.ndarray) -> bool:
 
 
 def spans(values: np.ndarray, ratio: float) -> bool:
-    """True if values are all above zero and the largest is so many times the smallest."""
+    """True if values are all positive and the largest is at least `ratio` times the smallest."""
     finite = values[np.isfinite(values)]
     low, high = finite.min(initial=np.inf), finite.max(initial=-np.inf)
     return bool(0.0 < low < np.inf and high / ratio >= low)
@@ -113,7 +114,8 @@ def column_levels(values: np.ndarray, words: Sequence[str] = (), most: int = MOS
 
 
 def _neighbours(found: np.ndarray, values: np.ndarray, most: int, scale: Scale) -> Levels:
-    """Stretches of neighbouring values, as many in each, so that none is empty; they meet half way between values."""
+    """Stretches of neighbouring values, with equal numbers in each, so that none is empty; they meet half way between
+    values."""
     stretch = np.arange(len(found)) * most // len(found)
     first = np.searchsorted(stretch, np.arange(most))
     last = np.append(first[1:], len(found)) - 1
@@ -129,7 +131,7 @@ def _neighbours(found: np.ndarray, values: np.ndarray, most: int, scale: Scale) 
 
 
 def edges_of(found: np.ndarray, scale: Scale) -> np.ndarray:
-    """Half way between values, and as far beyond the first and the last; of a logarithmic scale by factors."""
+    """Edges half way between values, and as far beyond the first and the last; by factors on a logarithmic scale."""
     if scale == "log":
         return np.asarray(np.exp(edges_of(np.log(found), "linear")))
     middles = (found[1:] + found[:-1]) / 2
@@ -149,7 +151,7 @@ def _even(values: np.ndarray, share: float) -> bool:
 
 
 def is_grid(x: np.ndarray, y: np.ndarray) -> bool:
-    """True if most of the combinations of two parameters' values are among the cases."""
+    """True if most of the combinations of two parameters' values occur among the cases."""
     good = np.isfinite(x) & np.isfinite(y)
     x_levels, y_levels = levels(x), levels(y)
     if len(x_levels) < 2 or len(y_levels) < 2 or len(x_levels) * len(y_levels) > 2 * good.sum():
@@ -165,7 +167,7 @@ def cells_of(across: Levels, up: Levels) -> np.ndarray:
 
 
 def cell_cases(values: np.ndarray, cells: np.ndarray, count: int, worse: str) -> np.ndarray:
-    """The case that stands for each of `count` cells; -1 where no case of it has a value.
+    """The case that is shown in each of `count` cells; -1 where no case of it has a value.
 
     worse  `<`: a limit is above, and the largest value is the worst; `>`: the smallest is; "": there is no limit, and
            the middle one stands for them

@@ -9,7 +9,7 @@ from met.diagnostic import Problem, error
 
 
 def groups_named(archive: ArchiveFile, names: Sequence[str]) -> tuple[ArchiveGroup, ...]:
-    """The experiments of these names, all where none is given."""
+    """The experiments of these names, or all where none is given."""
     known = [*dict.fromkeys(group.sweep or group.name for group in archive.groups)]
     for name in names:
         if all(name not in (group.name, group.sweep) for group in archive.groups):
@@ -20,7 +20,7 @@ def groups_named(archive: ArchiveFile, names: Sequence[str]) -> tuple[ArchiveGro
 
 
 def cases_named(archive: ArchiveFile, names: Sequence[str], case: str | None) -> list[tuple[ArchiveGroup, int | None]]:
-    """The experiments of these names; where a case is asked for, those that have it, and its position in each."""
+    """The experiments of these names; where a case is given, those that have it, with its position in each."""
     groups = groups_named(archive, names)
     if case is None:
         return [(group, None) for group in groups]

@@ -13,7 +13,7 @@ from ic.editor.lenses import LastRun
 from met.diagnostic import Problem
 
 MOST_ARCHIVES = 20
-"""Archives beside a deck that are looked into, the newest first."""
+"""Largest number of archives beside a deck that are read, the newest first."""
 
 
 def last_runs(deck: str) -> dict[str, LastRun]:
@@ -55,7 +55,7 @@ def _last_run(archive: Path, group: ArchiveGroup, seconds: float | None) -> Last
 
 
 def _seconds(archive: Path) -> dict[str, float]:
-    """Seconds of computing by experiment, as the file beside the archive says; none where it does not."""
+    """Seconds of computing by experiment, from the file beside the archive; empty where it lacks them."""
     try:
         return dict(_numbers(json.loads(archive.with_name(archive.name + ".run.json").read_text())))
     except (OSError, ValueError):

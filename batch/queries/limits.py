@@ -1,4 +1,4 @@
-"""What a signal is held against: requirements, stops of its joint, limits of its servo, as lines of a picture."""
+"""Limits of a signal: requirements, stops of its joint, limits of its servo, as lines of a picture."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from met.frozen import frozen
 from met.plan import Experiment
 
 POINTWISE = {"max": (1.0,), "min": (1.0,), "final": (1.0,), "peak": (1.0, -1.0)}
-"""Metrics in whose unit a signal is, with the signs at which their limit stands; `peak` is of the size."""
+"""Metrics with the unit of their signal, and the signs at which their limit is drawn; `peak` limits the size."""
 
 LIMITED = {
     "voltage": "v_max",
@@ -25,7 +25,7 @@ LIMITED = {
 
 @frozen
 class LimitMark:
-    """A limit: what it is called, and where it stands. time: it is an instant, and no value."""
+    """A limit: its name and value. time: True where the value is an instant"""
 
     text: str
     value: float
@@ -74,7 +74,7 @@ def _servo(experiment: Experiment, channel: str, panel: Panel) -> Iterator[Limit
 
 
 def _number(experiment: Experiment, path: str) -> float | str | None:
-    """A parameter that no case varies."""
+    """The value of a parameter that no case varies; None for a varied one."""
     found = experiment.parameters.get(path)
     if found is None:
         return None

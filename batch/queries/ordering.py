@@ -1,4 +1,4 @@
-"""In which order cases are listed: worst first, or by metrics and what is varied, one after the other."""
+"""The order in which cases are listed: worst first, or by metrics and varied parameters, one after the other."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from met.frozen import frozen
 
 REPEAT = "repeat"
 ROLES: tuple[Role, ...] = ("metric", "parameter", "repeat")
-"""Roles of variables that cases may be listed by."""
+"""Roles of variables by which cases may be listed."""
 
 
 WAYS = {"smallest": False, "largest": True}
-"""Words behind a name, `settle:largest`; True where the largest comes first."""
+"""Words after a name, `settle:largest`; True where the largest comes first."""
 
 
 @frozen
 class CaseOrder:
-    """A metric's name, a varied parameter's path, or `repeat`; smallest first, unless `largest`. then: by what those
-    are listed that are equal in this."""
+    """An order by a metric's name, a varied parameter's path, or `repeat`; smallest first, unless `largest`. then: the
+    order among equal cases"""
 
     name: str
     largest: bool = False
@@ -45,7 +45,7 @@ def by_names(names: Sequence[str], *, reverse: bool = False) -> CaseOrder | None
     largest first of all that do not say it themselves. Raises Problem E329."""
     keys: list[CaseOrder] = []
     for each in names:
-        name, colon, way = (each, "", "") if "," in each else each.partition(":")  # `check` tells of several in one
+        name, colon, way = (each, "", "") if "," in each else each.partition(":")  # `check` reports several in one
         if colon and way not in WAYS:
             helps = f"`--sort {name}:largest`, or `--sort {name}:smallest`"
             raise Problem(
@@ -62,7 +62,7 @@ def _joined(keys: Sequence[CaseOrder]) -> CaseOrder | None:
 
 
 def check(groups: Sequence[ArchiveGroup], by: CaseOrder | None) -> None:
-    """Raises Problem E329 where none of the groups has what cases are to be listed by, or each is of one case."""
+    """Raise Problem E329 where no group has the quantity of the order, or each has only one case."""
     if by is None:
         return
     known = list(dict.fromkeys(name for group in groups for name in _names(group)))
@@ -85,8 +85,8 @@ def check(groups: Sequence[ArchiveGroup], by: CaseOrder | None) -> None:
 
 
 def positions(group: ArchiveGroup, by: CaseOrder | None = None) -> np.ndarray:
-    """Positions of the cases, by what is asked for, equal ones and those that have no value, which are last, in the
-    order of the case table; worst first where nothing is asked for, or the group does not have it."""
+    """Positions of the cases in this order, equal ones in the order of the case table and cases without a value last;
+    worst first where there is no order, or the group lacks the quantity."""
     by = order_of_group(group, by)
     if by is None:
         return worst_first(group)
@@ -95,32 +95,33 @@ def positions(group: ArchiveGroup, by: CaseOrder | None = None) -> np.ndarray:
 
 
 def positions_in_pool(pool: Pool, by: CaseOrder) -> np.ndarray:
-    """The order of the cases of all structures of a sweep, one of which has the name: those of others are last."""
+    """The order of the cases of all structures of a sweep, of which some have the quantity: those of others are
+    last."""
     columns = {column.label: column for column in pool.columns if column.role in ROLES}
     return _order(by, [columns[key.name].values for key in by.keys])
 
 
 def _order(by: CaseOrder, values: Sequence[np.ndarray]) -> np.ndarray:
-    """Places by the first of the values, equal ones by the next; not-a-number last in each."""
+    """Places ordered by the first of the values, equal ones by the next; not-a-number last in each."""
     keys = [-each if key.largest else each for key, each in zip(by.keys, values, strict=True)]
     return np.lexsort(keys[::-1])
 
 
 def order_of_group(group: ArchiveGroup, by: CaseOrder | None) -> CaseOrder | None:
-    """Keep of an order the names that the group has; None where it has none of them."""
+    """The part of an order whose names the group has; None where it has none of them."""
     names = _names(group) if by is not None else {}
     return _joined([key for key in by.keys if key.name in names]) if by is not None else None
 
 
 def worst_first(group: ArchiveGroup) -> np.ndarray:
-    """Positions of the cases as `ranking` has them."""
+    """Positions of the cases, worst first (`ranking`)."""
     return ranking(group).order
 
 
 def ranking(group: ArchiveGroup) -> requirements.Ranking:
     """The cases: failed ones, then those that miss most requirements, then by how far they miss.
 
-    How far is relative to the limit (to the largest value where the limit is 0); a case that meets all requirements
+    The amount is relative to the limit (to the largest value where the limit is 0); a case that meets all requirements
     stands by how close it comes to one. Without requirements the order is the case table's. Of equal ones those that
     are far from one another in what is varied come first.
     """
@@ -143,7 +144,7 @@ def _far(group: ArchiveGroup) -> np.ndarray:
 
 
 def _names(group: ArchiveGroup) -> dict[str, str]:
-    """Names that cases may be listed by, as users write them: the variable of each."""
+    """Names by which cases may be listed, in users' notation, with the variable of each."""
     found = {variable.path: variable.name for variable in (*group.role("metric"), *group.role("coordinate"))}
     if REPEAT in group.variables and group.values(REPEAT).any():
         found.setdefault(REPEAT, REPEAT)

@@ -1,4 +1,4 @@
-"""The cases of a run or sweep in one table, those of all its structures: what they are, and how they came out."""
+"""The cases of a run or sweep in one table, over all its structures, with their names and outcomes."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ Role = Literal["case", "choice", "parameter", "repeat", "metric", "change"]
 Ended = Literal["met", "missed", "unknown", "done", "failed", "timed out", "lost"]
 
 ENDED: tuple[Ended, ...] = ("met", "missed", "unknown", "done", "failed", "timed out", "lost")
-"""The ways in which a case may come out; arrays hold places in this tuple. `done`: it reached its end and nothing was
-required."""
+"""Possible outcomes of a case; arrays hold places in this tuple. `done`: it reached its end and there were no
+requirements."""
 
 
 @frozen
@@ -38,7 +38,8 @@ class RequirementLimit:
 
 @frozen
 class CaseColumn:
-    """A number a case: a metric, or what it may be drawn against. words: of a choice, what its numbers stand for.
+    """A number for each case: a metric, or a quantity against which it may be drawn. words: for a choice, those that
+    its numbers stand for.
 
     before  of a metric, what it is in the other archive, where one is compared with; not a number where it has no such
             case. A column of role "change" holds values less before; its key is that of the metric after "change:"
@@ -74,7 +75,7 @@ class Pool:
         return len(self.cases)
 
     def gathered(self, name: str, otherwise: float = np.nan) -> np.ndarray:
-        """A variable along `case`, of all groups; `otherwise` where a group lacks it."""
+        """A variable along `case`, over all groups; `otherwise` where a group lacks it."""
         out = np.full(self.count, otherwise, np.float64)
         for number, group in enumerate(self.groups):
             if name in group.variables:
@@ -117,7 +118,7 @@ class Pool:
 
     @cached_property
     def ended(self) -> np.ndarray:
-        """[case] how it came out: its place in `ENDED`."""
+        """[case] its outcome, as its place in `ENDED`."""
         out = np.full(self.count, ENDED.index("met" if self.requirements else "done"))
         out[(self.outcomes < 0).any(axis=1)] = ENDED.index("unknown")
         out[(self.outcomes == 0).any(axis=1)] = ENDED.index("missed")
@@ -147,8 +148,8 @@ class Pool:
 
     @cached_property
     def ranking(self) -> Ranking:
-        """The cases: failed ones, then those that miss most requirements, then by how far they miss, relative to the
-        limit; as `batch.queries.ordering.ranking` has it of one group."""
+        """The cases: failed ones, then those that miss most requirements, then by the amount relative to the limit; as
+        `batch.queries.ordering.ranking` for one group."""
         varied = [column.values for column in self.columns if column.role in ("choice", "parameter")]
         return requirements.ranking(self.status, self.outcomes, self._far(), lambda at: [each[at] for each in varied])
 
@@ -181,7 +182,7 @@ class Pool:
         return tuple(column for column in self.columns if column.role == "metric")
 
     def varied(self) -> tuple[CaseColumn, ...]:
-        """The columns that tell the cases apart, that with most values first."""
+        """The columns that distinguish the cases, the one with most values first."""
         return tuple(
             sorted(
                 (c for c in self.columns if c.role != "metric" and len(levels(c.values)) > 1),
@@ -212,7 +213,7 @@ class Pool:
         )
 
     def _choice(self, variable: Stored) -> CaseColumn:
-        """The column of a choice: its values number the words, in the order in which groups have them."""
+        """The column of a choice, whose values number the words in the order in which groups have them."""
         words: dict[str, int] = {}
         values = np.full(self.count, np.nan)
         for number, group in enumerate(self.groups):

@@ -1,5 +1,4 @@
-"""What is required of an archive's cases: which requirements there are, which cases meet them, and by how far others
-miss them."""
+"""The requirements of an archive, the cases that meet them, and the amounts by which others miss them."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ from met.run import DONE
 @frozen
 class GroupRequirement:
     """A requirement: its text and place among the group's, the metric's variable, `<` or `>` with or without `=`, and
-    the limit in SI; of one over cases the share that is to meet it, and the confidence."""
+    the limit in SI; for one over cases the share that must meet it, and the confidence."""
 
     text: str
     place: int
@@ -34,7 +33,7 @@ def requirement_texts(group: ArchiveGroup) -> list[str]:
 
 
 def group_requirements(group: ArchiveGroup) -> list[GroupRequirement]:
-    """The requirements of which the archive says all of this; none in an archive that does not say."""
+    """The requirements whose parts the archive stores; none in an older archive that does not."""
     known = requirement_texts(group)
     if not known:
         return []
@@ -57,20 +56,20 @@ def group_requirements(group: ArchiveGroup) -> list[GroupRequirement]:
 
 
 def _number(value: float) -> float | None:
-    """None in place of not-a-number, which stands in an archive where there is no value."""
+    """A number; None for not-a-number, which an archive has where there is no value."""
     return None if math.isnan(value) else value
 
 
 def outcomes(group: ArchiveGroup, positions: np.ndarray | None = None) -> np.ndarray:
-    """(case, requirement): 1 met, 0 missed, -1 unknown; of all cases or of some."""
+    """(case, requirement): 1 met, 0 missed, -1 unknown; for all cases or for some."""
     if "met" not in group.variables:
         return np.zeros((group.count if positions is None else len(positions), 0), np.int8)
     return group.values("met") if positions is None else group.at("met", positions)
 
 
 def beyond(values: np.ndarray, comparison: str, limit: float) -> np.ndarray:
-    """How far a metric's values are beyond a limit, relative to it (to the largest value where it is 0); infinitely for
-    what is not a number."""
+    """The distance of a metric's values beyond a limit, relative to it (to the largest value where it is 0); infinite
+    for not-a-number."""
     finite = values[np.isfinite(values)]
     scale = abs(limit) or float(np.abs(finite).max(initial=0.0)) or 1.0
     far = (values - limit if comparison.startswith("<") else limit - values) / scale
@@ -78,20 +77,20 @@ def beyond(values: np.ndarray, comparison: str, limit: float) -> np.ndarray:
 
 
 SPREAD = 20
-"""Places at the head of an order in which cases that are equally bad are spread over what is varied: as many as a table
-shows."""
+"""Number of places at the head of an order in which equally bad cases are spread over the varied values: as many as a
+table shows."""
 
 
 @frozen
 class Ranking:
-    """Cases, the worst first. order: their places; tie: of each place of the order, which tie it is of, rising."""
+    """Cases, the worst first. order: their places; tie: the ascending number of each place's tie"""
 
     order: np.ndarray
     tie: np.ndarray
 
     def equal(self, most: int) -> int:
-        """The number of cases that are as bad as the last of the first `most`, if not all of them are among these; else
-        0."""
+        """The number of cases that are as bad as the last of the first `most`, if some of them are not among these;
+        else 0."""
         if not 0 < most < len(self.tie) or self.tie[most - 1] != self.tie[most]:
             return 0
         return int((self.tie == self.tie[most - 1]).sum())
@@ -128,8 +127,8 @@ def ranking(
 
 
 def _spread(varied: Sequence[np.ndarray], cases: int, count: int) -> np.ndarray:
-    """Places of so many cases, the first one and then always one that is furthest from those before, by the ranks of
-    what is varied."""
+    """Places of `count` cases, the first one and then always one that is furthest from those before, by the ranks of
+    the varied values."""
     ranks = np.zeros((cases, len(varied)))
     for column, values in enumerate(varied):
         _, place = np.unique(values, return_inverse=True)

@@ -1,4 +1,4 @@
-"""The answer of a search in an archive: read from its cases alone, and put into words."""
+"""The answer of a search in an archive: found from its cases alone, and put into words."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ OVER_CASES = re.compile(r" in [^<>]* of cases\b[^<>]*$")
 """The words by which a requirement is one over a share of cases."""
 
 WIDTH = 100
-"""Characters of a line."""
+"""Largest length of a line in characters."""
 
 KEPT = "\N{NO-BREAK SPACE}"
-"""A space at which no line is broken, while lines are made."""
+"""A space at which no line is broken."""
 
 NEAREST = 1
-"""Requirements that are named of those that are nearest to their limits."""
+"""Number of requirements that are named as nearest to their limits."""
 
 
 class SearchAnswer:
@@ -44,7 +44,7 @@ class SearchAnswer:
 
     @staticmethod
     def of(group: ArchiveGroup) -> SearchAnswer | None:
-        """The answer of a group; None where it is no search, or some of its cases alone."""
+        """The answer of a group; None where it is not a search, or has only some of its cases."""
         search = search_of(group)
         return None if search is None else SearchAnswer(group, search)
 
@@ -55,7 +55,8 @@ class SearchAnswer:
 
     @cached_property
     def _given(self) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], list[_Required]]:
-        """Coordinates of the cases, which of them reached their end, their metrics, and what is required of these."""
+        """Coordinates of the cases, a truth for each that reached its end, their metrics, and the requirements on
+        these."""
         group = self.group
         columns = [group.values(variable.name) for variable in group.role("coordinate")]
         metrics = {variable.path: group.values(variable.name) for variable in group.role("metric")}
@@ -81,13 +82,13 @@ class SearchAnswer:
 
     @property
     def position(self) -> int:
-        """The position in the case table of the case that stands for the answer."""
+        """The position in the case table of the answer's representative case."""
         return int(self.group.values("case")[self.found.case])
 
     @cached_property
     def required(self) -> list[GroupRequirement]:
-        """The requirements as each case is held against them: one over a share of cases is asked of every case, and
-        none is there twice."""
+        """The requirements by which each case is judged: one over a share of cases applies to every case, and each
+        occurs once."""
         found: dict[tuple[str, str, float], GroupRequirement] = {}
         for each in group_requirements(self.group):
             one = replace(each, text=OVER_CASES.sub("", each.text), share=None, confidence=None)
@@ -96,14 +97,14 @@ class SearchAnswer:
 
     @cached_property
     def ok(self) -> bool:
-        """True if what a tuning found meets all that is required; of a search, if it found nothing that fails or misses
-        something."""
+        """True if a tuning's result meets all requirements; for a search, if it found no case that fails or misses
+        one."""
         if self.search.kind == "tune":
             return self.found.serves
         return bool((self.group.values("status") == DONE).all() and (outcomes(self.group) == 1).all())
 
     def values(self, case: int | None = None) -> list[WrittenValue]:
-        """The chosen values, for a deck's text or `--set`; of another case, by its place, where one is named."""
+        """The chosen values, for a deck's text or `--set`; those of another case, by its place, where one is given."""
         found = []
         for each, variable in zip(self.search.parameters, self.group.role("coordinate"), strict=False):
             value = float(self.group.at(variable.name, [self.found.case if case is None else case])[0])
@@ -121,18 +122,18 @@ class SearchAnswer:
 
     @property
     def draws(self) -> bool:
-        """True if what a tuning is held against was drawn, so that other draws confirm it or not."""
+        """True if a tuning was judged against drawn cases, so that other draws may confirm it or not."""
         return any(variable.attributes.get("design") for variable in self.group.role("coordinate"))
 
     def value(self, found: Answer | None = None) -> str:
-        """The goal's value in the deck's unit, of the best or of what was best before."""
+        """The goal's value in the deck's unit, of the best, or of an earlier best."""
         variable = next(each for each in self.group.role("metric") if each.path == self.search.metric)
         scale = float(variable.attributes.get("deck_scale", 1.0))
         unit = str(variable.attributes.get("deck_unit", variable.unit))
         return goal_text((found or self.found).value, unit, scale)
 
     def lines(self) -> list[str]:
-        """The answer in lines, without the commands that follow from it."""
+        """The answer in lines, without the commands for further steps."""
         found, search = self.found, self.search
         out = [*self._tuned(), *self._by_slopes()] if search.kind == "tune" else self._worst()
         if found.missed:
@@ -144,7 +145,7 @@ class SearchAnswer:
         return out + (self._border() if found.serves and search.kind == "tune" else [])
 
     def _by_slopes(self) -> list[str]:
-        """Lines about a tuning along exact slopes: the steps it took, and why no more."""
+        """Lines about a tuning along exact slopes: its steps, and why there were no more."""
         search = self.search
         count, why_not = search.along_slopes, search.without_slopes
         out = [f"  {count:,} of them along exact slopes of the metrics"] if count else []
@@ -154,7 +155,7 @@ class SearchAnswer:
         return out
 
     def _border(self) -> list[str]:
-        """The nearest candidate that was tried and does not serve, in lines."""
+        """The nearest tried candidate that does not meet the requirements, in lines."""
         miss = self.found.miss
         if miss is None:
             return ["  none of the candidates that were tried misses a requirement"] if self.required else []
@@ -182,7 +183,7 @@ class SearchAnswer:
 
     @property
     def _cause(self) -> list[str]:
-        """Why the case fails that stands for the answer, in lines."""
+        """The cause of failure of the answer's representative case, in lines."""
         cause = str(self.group.at("cause", [self.found.case])[0])
         return textwrap.wrap(cause, WIDTH, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
 
@@ -251,7 +252,7 @@ class SearchAnswer:
 
 
 def cut(metrics: dict[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
-    """The metrics of the first cases alone."""
+    """The metrics of the first cases only."""
     return {name: values[:count] for name, values in metrics.items()}
 
 
@@ -263,13 +264,13 @@ class _Required:
 
 
 def goal_text(value: float, unit: str, scale: float) -> str:
-    """A goal's value, SI, in a unit of so many SI units."""
+    """A goal's value, SI, in a unit of `scale` SI units."""
     shown = "" if unit == "1" else f" {pretty_unit(unit)}"
     return "no value" if np.isnan(value) else f"{number_text(value / scale)}{shown}"
 
 
 def progress(found: Answer, experiment: Experiment) -> str:
-    """The best so far in a few words, for who waits: `best settle 4.81 s, over < 10 % binds`."""
+    """The best so far in a few words, for the progress display: `best settle 4.81 s, over < 10 % binds`."""
     search = found.search
     if found.failed:
         best = "a case fails" if search.kind == "search" else "every candidate fails so far"

@@ -1,4 +1,5 @@
-"""Some of the cases of a run or sweep: those in which a condition holds, the worst over what varies, that meet all."""
+"""Some of the cases of a run or sweep: those in which a condition holds, the worst over varied parameters, those that
+meet all requirements."""
 
 from __future__ import annotations
 
@@ -30,7 +31,7 @@ class CaseSelection:
         return not (self.where or self.met or self.over)
 
     def places(self, pool: Pool) -> np.ndarray:
-        """Places of these cases, in the pool's order. Raises Problem for a condition that is none, or another path."""
+        """Places of these cases, in the pool's order. Raises Problem for an invalid condition, or an unknown path."""
         keep = np.ones(pool.count, bool)
         if self.where:
             keep &= CaseExpressions(pool).holds(self.where)
@@ -45,7 +46,7 @@ class CaseSelection:
         return np.flatnonzero(keep)
 
     def words(self, chosen: int, count: int) -> str:
-        """How many cases these are, and which, in words."""
+        """The number of these cases, and their choice, in words."""
         over = f"the worst over {', '.join(self.over)}" if self.over else ""
         parts = [f"where {self.where}" if self.where else "", over, "those that meet all" if self.met else ""]
         return f"{chosen:,} of {count:,} cases: {', '.join(part for part in parts if part)}"

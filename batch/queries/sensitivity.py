@@ -1,4 +1,4 @@
-"""Which varied parameters explain a metric, a failure, or the change of a metric between two archives."""
+"""The varied parameters that explain a metric, failures, or the change of a metric between two archives."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from met.statistics.saltelli import FEWEST_PAIRS, is_saltelli, saltelli_shares
 from met.statistics.sensitivity import FEWEST, InputShare, dependent, shares
 
 UNCLEAR = 0.1
-"""Half a width of an interval from which on more cases are asked for, and a rest from which on it is told."""
+"""Half width of an interval from which on more cases are recommended, and a rest from which on it is mentioned."""
 
 FAILURE = "failure"
-"""The name under which failing is asked about: 1 in a case that failed, else 0."""
+"""The name of failing as an output: 1 in a case that failed, else 0."""
 
 
 @frozen
@@ -74,7 +74,7 @@ class Sensitivity:
 
     @property
     def fewest(self) -> int:
-        """Cases of this kind below which nothing can be said."""
+        """The fewest cases of this kind for a result."""
         return FEWEST if not self.design else FEWEST_PAIRS * (len(self.inputs) + 2)
 
 
@@ -110,8 +110,8 @@ def sensitivities(
 
 
 def _designed(group: ArchiveGroup) -> tuple[list[np.ndarray], str]:
-    """The varied parameters, of each case, where the cases were made by Saltelli's scheme and all of them are there;
-    else none, and why not where a part of what varies was drawn so."""
+    """The varied parameters of each case, where the cases were made by Saltelli's scheme and are complete; else none,
+    and the reason where a part of the parameters was drawn so."""
     coordinates = group.role("coordinate")
     designs = {str(variable.attributes.get("design", "")) for variable in coordinates}
     if "saltelli" not in designs:
@@ -125,15 +125,16 @@ def _designed(group: ArchiveGroup) -> tuple[list[np.ndarray], str]:
 
 
 def _whole_pairs(finite: np.ndarray, positions: np.ndarray, count: int, width: int) -> np.ndarray:
-    """Places among all cases, [pair, width], of the pairs of points of which each case counts. finite: of the cases at
-    these positions."""
+    """Places among all cases, [pair, width], of the pairs of points whose cases all count. finite: of the cases at
+    these positions"""
     counts = np.zeros(count, bool)
     counts[positions[finite]] = True
     return np.arange(count).reshape(-1, width)[counts.reshape(-1, width).all(axis=1)]
 
 
 def _inputs(group: ArchiveGroup, positions: np.ndarray) -> list[VariedInput]:
-    """The inputs that vary in these cases, each once. Raises Problem E361 where nothing does, or in too few cases."""
+    """The inputs that vary in these cases, each once. Raises Problem E361 where nothing varies, or there are too few
+    cases."""
     variables = group.role("coordinate")
     values = [np.asarray(group.values(each.name), float)[positions] for each in variables]
     found = [VariedInput(tuple(variables[i].path for i in part), values[part[0]]) for part in in_step(values)]
@@ -200,7 +201,7 @@ def share_text(share: float, by: float) -> str:
 
 
 def notes_of(found: Sensitivity) -> list[str]:
-    """Sentences on how the shares were estimated, and what to mind of them."""
+    """Sentences on the estimation of the shares, with its caveats."""
     notes = []
     if found.design:
         notes.append("by the estimators of `saltelli`; with others: with any number of them, and with noise")

@@ -1,4 +1,5 @@
-"""Choosing what to draw: a panel is one signal in one unit, a line in it one joint, or one component of a vector."""
+"""The choice of signals to draw: a panel is one signal in one unit, a line in it one joint, or one component of a
+vector."""
 
 from __future__ import annotations
 
@@ -73,7 +74,7 @@ def panels(group: ArchiveGroup, names: Sequence[str] = ()) -> list[Panel]:
 
 @frozen
 class SignalSelection:
-    """Some of a signal's columns, and the name by which they are asked for."""
+    """Some of a signal's columns, under the name by which they were asked for."""
 
     name: str
     variable: Stored
@@ -81,7 +82,7 @@ class SignalSelection:
 
 
 def _choices(group: ArchiveGroup, signals: dict[str, Stored]) -> dict[str, tuple[SignalSelection, ...]]:
-    """The selections that each name stands for: whole signals, one joint's, one component's, a family's."""
+    """The selections of each name: whole signals, one joint's, one component's, a family's."""
     found: dict[str, tuple[SignalSelection, ...]] = {}
     for variable in signals.values():
         joints, components = group.joints(variable), group.components(variable)
@@ -107,7 +108,7 @@ def _choices(group: ArchiveGroup, signals: dict[str, Stored]) -> dict[str, tuple
 
 
 def _panels(group: ArchiveGroup, choice: SignalSelection) -> list[Panel]:
-    """The panels of a choice: of several joints' vectors one a component, of unlike units one a unit."""
+    """The panels of a choice: for several joints' vectors one a component, for several units one a unit."""
     variable = choice.variable
     joints, components = group.joints(variable), group.components(variable)
     units = variable.units_by_joint or (variable.unit,) * max(1, len(joints))
@@ -151,7 +152,7 @@ def pretty_unit(unit: str) -> str:
 
 
 def number_text(value: float) -> str:
-    """Four digits that mean something, without an exponent where it reads well without: `20100`, `0.0025`."""
+    """A number in four significant digits, without an exponent where it reads well without: `20100`, `0.0025`."""
     if not math.isfinite(value) or value == 0.0:
         return f"{value + 0.0:g}"
     size = math.floor(math.log10(abs(value)) + 1e-12)
@@ -162,8 +163,7 @@ def number_text(value: float) -> str:
 
 
 def deck_unit(variable: Stored) -> tuple[float, str]:
-    """The number that a variable's SI values are divided by, and the unit they are then in, typeset; "" for a pure
-    number."""
+    """The divisor of a variable's SI values, and the resulting unit, typeset; "" for a pure number."""
     unit = str(variable.attributes.get("deck_unit", variable.unit))
     return float(variable.attributes.get("deck_scale", 1.0)), "" if unit == "1" else pretty_unit(unit)
 
@@ -189,6 +189,6 @@ def case_text(group: ArchiveGroup, position: int, *, varied: bool = True) -> str
 
 
 def repeat_text(group: ArchiveGroup, position: int) -> list[str]:
-    """Say which repeat a case is, where cases are repeated."""
+    """The repeat of a case in words, where cases are repeated."""
     repeats = group.values("repeat") if "repeat" in group.variables else np.zeros(0)
     return [f"repeat {int(repeats[position])}"] if repeats.any() else []

@@ -1,5 +1,5 @@
-"""The summary of all cases of a run or sweep: as its archive keeps it, or made from its rows, some at a time, where
-these are too many to be held in memory."""
+"""The summary of all cases of a run or sweep: the one in its archive, or one made from its rows block by block, where
+they are too many for memory."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from batch.queries.tallies import MOST_POINTS, CaseBlock, CaseTallies, PointNumb
 from met.plan.swept import blocks
 
 MANY = 4_000_000
-"""Rows of a run or sweep from which they are gone through some at a time: of fewer, medians and an order of all are
+"""Number of rows of a run or sweep from which they are processed in blocks: with fewer, medians and an order of all are
 worth half a gigabyte of memory."""
 
 STREAMED = "streamed"
-"""The word of a summary that no archive keeps."""
+"""The word of a summary that is not stored in an archive."""
 
 
 def is_streamed(group: ArchiveGroup) -> bool:
-    """True where a group has a row a case, and more of them than are held at once."""
+    """True where a group has a row for each case, and too many for memory."""
     return group.summary is None and group.count > MANY and not group.attributes.get("until_shown")
 
 
 def summed_up(group: ArchiveGroup) -> CaseSummary | None:
-    """The summary of all cases; None where each has a row, and they are few enough to be held, or are not to be told by
-    counts alone: those that stop by their results, and those of very many design points."""
+    """The summary of all cases; None where their rows fit in memory, or counts alone do not suffice: for cases that
+    stop by their results, and with very many design points."""
     if group.summary is None and group.summed is None and is_streamed(group):
         group.summed = _of_rows(group)
     return group.summary or group.summed
@@ -35,7 +35,7 @@ def summed_up(group: ArchiveGroup) -> CaseSummary | None:
 
 def _of_rows(group: ArchiveGroup) -> CaseSummary | None:
     required = group_requirements(group)
-    if len(required) < len(requirement_texts(group)):  # an older archive, which does not say all of them
+    if len(required) < len(requirement_texts(group)):  # an older archive, which lacks parts of some
         return None
     coordinates = group.role("coordinate")
     repeats = any(group.stretch("repeat", p.start, p.stop).any() for p in blocks(group.count) if _repeats(group))

@@ -1,4 +1,4 @@
-"""A sweep of several structures in one table: what each is, how its cases went, its metrics side by side."""
+"""A sweep of several structures in one table: each structure, the outcomes of its cases, its metrics side by side."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from batch.queries.summary import Summary, median_text, summary_of
 
 
 def structures(archive: ArchiveFile) -> Iterator[list[str]]:
-    """The table of each sweep that has several structures, under its name and how all of its cases went."""
+    """The table of each sweep with several structures, under its name and the outcomes of all its cases."""
     for sweep in dict.fromkeys(group.sweep for group in archive.groups if group.sweep):
         groups = [group for group in archive.groups if group.sweep == sweep]
         if len(groups) > 1:
@@ -21,7 +21,7 @@ def structures(archive: ArchiveFile) -> Iterator[list[str]]:
 
 
 def _all_of(sweep: str, summaries: Sequence[Summary]) -> list[str]:
-    """Lines about the sweep as a whole: how many cases reached their end, and met each requirement."""
+    """Lines about the sweep as a whole: the number of cases that reached their end, and that met each requirement."""
     cases, failed = (sum(getattr(each, name) for each in summaries) for name in ("cases", "failed"))
     out = [f"{sweep}: {cases - failed:,} of {cases:,} cases reached their end, of {len(summaries)} structures"]
     texts = list(dict.fromkeys(r.text for each in summaries for r in each.requirements))
@@ -34,7 +34,8 @@ def _all_of(sweep: str, summaries: Sequence[Summary]) -> list[str]:
 
 
 def _table(groups: Sequence[ArchiveGroup]) -> list[str]:
-    """A row a structure: its name, cases, how many meet all, and the median of each metric, in the deck's unit."""
+    """A row for each structure: its name, its cases, the number that meet all requirements, and the median of each
+    metric, in the deck's unit."""
     from ic.printing.columns import columns
 
     metrics = list(dict.fromkeys(variable.name for group in groups for variable in group.role("metric")))

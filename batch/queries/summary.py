@@ -1,4 +1,4 @@
-"""What came of an archive's cases, in numbers: the verdict that `met run` prints and `met show` repeats."""
+"""The outcomes of an archive's cases in numbers: the verdict that `met run` prints and `met show` repeats."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class MetricSpread:
 
 @frozen
 class SpreadColumn:
-    """A column of the table of metrics: a number of `MetricSpread`, and its head in `met show` and in a report."""
+    """A column of the table of metrics: a number of `MetricSpread`, with its heads in `met show` and in a report."""
 
     field: str
     head: str
@@ -57,7 +57,7 @@ SUMMED_COLUMNS = (
     SpreadColumn("maximum", "max", "largest"),
     SpreadColumn("deviation", "sigma", "standard deviation"),
 )
-"""The same of a metric of which an archive keeps a summary, `SummedMetric`."""
+"""The columns of the table of metrics for `SummedMetric`, where an archive keeps a summary."""
 
 SPREAD_COLUMNS = (
     SpreadColumn("minimum", "min", "smallest"),
@@ -108,7 +108,7 @@ class RequirementSummary:
 
     @property
     def ok(self) -> bool:
-        """True if every case meets it, or of one over a share of cases if it is so at every design point."""
+        """True if every case meets it, or, for one over a share of cases, if every design point does."""
         return all(row.ok for row in self.evidence) if self.evidence else not self.missed and not self.unknown
 
 
@@ -161,15 +161,15 @@ class Summary:
 
     @property
     def ok(self) -> bool:
-        """True if every case reached its end and met every requirement, and errors by the step are as required; of a
-        search if its answer serves, whatever else was tried on the way."""
+        """True if every case reached its end and met every requirement, and errors due to the step are within their
+        limits; for a search, if its answer meets the requirements, whatever else was tried."""
         if self.answer is not None:
             return self.answer.ok and not self.untrue
         return self.failed == 0 and all(r.ok for r in self.requirements) and not self.untrue
 
     @property
     def untrue(self) -> tuple[StepErrorVerdict, ...]:
-        """Requirements on errors by the step that are missed, or not known to be met."""
+        """Requirements on errors due to the step that are missed, or not known to be met."""
         return tuple(each for each in self.step_errors if not each.met)
 
 
@@ -232,7 +232,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
 
 
 def _of_summary(group: ArchiveGroup, kept: CaseSummary) -> Summary:
-    """The outcome of an experiment of which the archive keeps a summary."""
+    """The outcome of an experiment whose archive keeps a summary."""
     values = kept.values
     causes: dict[bool, list[FailureGroup]] = {True: [], False: []}
     for cause, status, cases, first in zip(
@@ -296,12 +296,11 @@ def _summed(variable: Stored, kept: CaseSummary, place: int) -> SummedMetric:
 
 
 SUMMED = ("least", "most", "finite", "infinite", "unknown", "mean", "variance", "least_case", "most_case")
-"""Variables of a summary that a metric's row is made of."""
+"""Variables of a summary from which a metric's row is made."""
 
 
 def _doubts(group: ArchiveGroup, position: int | None) -> tuple[FailureGroup, ...]:
-    """The doubts about cases, or the one at a position, by what causes them; nothing of an archive of before there were
-    warnings."""
+    """The doubts about cases, or about the one at a position, by cause; none in an archive older than warnings."""
     if "warning" not in group.variables:
         return ()
     doubtful, causes = [], []
@@ -332,7 +331,7 @@ def _metric(variable: Stored, values: np.ndarray) -> MetricSummary:
 
 
 def spread(values: np.ndarray) -> MetricSpread:
-    """The spread of a metric's values: the one rule of tables, reports and comparisons."""
+    """The spread of a metric's values, by the one rule for tables, reports and comparisons."""
     rising = np.sort(values[np.isfinite(values)])
     infinite, unknown = int(np.isinf(values).sum()), int(np.isnan(values).sum())
     if not len(rising):
@@ -343,7 +342,7 @@ def spread(values: np.ndarray) -> MetricSpread:
 
 
 def median_text(values: np.ndarray, *, infinite: str = "inf", none: str = "-") -> str:
-    """The median in a table that has no other word of the values, and how many are infinite: `2.44, 2 inf`."""
+    """The median in a table, with the number of infinite values: `2.44, 2 inf`."""
     found = spread(values)
     if np.isnan(found.median):
         return infinite if found.infinite else none
@@ -353,7 +352,7 @@ def median_text(values: np.ndarray, *, infinite: str = "inf", none: str = "-") -
 def as_json(summary: Summary) -> dict[str, Any]:
     """Plain data for `--format json`; a number that is not finite is null."""
     plain = asdict(replace(summary, verified=None, warnings=(), step_errors=(), answer=None))
-    del plain["answer"]  # `met show` and `met run` say all of it
+    del plain["answer"]  # `met show` and `met run` print all of it
     warned = [{"code": each.code, "message": each.message, "help": each.help} for each in summary.warnings]
     limits = [{"text": each.text, "met": each.met, "said": each.said} for each in summary.step_errors]
     told = {"verified": figures.as_json(summary.verified), "step_errors": limits, "warnings": warned}
@@ -362,12 +361,12 @@ def as_json(summary: Summary) -> dict[str, Any]:
 
 
 def _named_first(metric: dict[str, Any]) -> dict[str, Any]:
-    """A metric's numbers after what it is."""
+    """A metric's data, with its description first and its numbers after it."""
     return {**{key: metric[key] for key in ("name", "unit", "about")}, **metric}
 
 
 def finite(value: Any) -> Any:
-    """Plain data with null for every number that JSON has no word for."""
+    """Plain data with null for every non-finite number."""
     if isinstance(value, Mapping):
         return {key: finite(part) for key, part in value.items()}
     if isinstance(value, list | tuple):

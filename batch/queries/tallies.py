@@ -1,8 +1,8 @@
-"""Very many cases told by counts, moments, extremes and order statistics, as they come, a block of them at a time: for
-archives that keep a summary of them, and for those that have more rows than memory has room for.
+"""Statistics of very many cases, block by block: counts, moments, extremes and order statistics, for archives that keep
+a summary, and for those with more rows than fit in memory.
 
-Blocks are of one size and come in order, and sums are exact: so nothing depends on who ran the cases, in which tasks.
-What is held grows with the design points, and with the cases beyond a percentile that is bounded.
+Blocks are of one size and come in order, and sums are exact: so results do not depend on how the cases were run. Memory
+grows with the design points, and with the cases beyond a bounded percentile.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ from met.statistics.confidence import percentile_rank
 from met.statistics.moments import Furthest, Moments
 
 MOST_POINTS = 10_000
-"""Design points that are told apart, at most: each has rows of its own."""
+"""Largest number of design points, since each has rows of its own."""
 
 MOST_CAUSES = 1000
-"""Causes of failures that are told apart; those after them are counted together."""
+"""Largest number of distinguished causes of failures; further ones are counted together."""
 
 OTHERS = "other causes"
 
 
 class TooManyPoints(Exception):
-    """There are more than `MOST_POINTS` design points."""
+    """Raised where there are more than `MOST_POINTS` design points."""
 
 
 class PointNumbers:
-    """Design points, numbered in the order in which they first appear. values: what was chosen at each."""
+    """Design points, numbered in the order in which they first appear. values: the chosen values at each"""
 
     def __init__(self) -> None:
         self.values: list[tuple[float, ...]] = []
         self._numbers: dict[tuple[float, ...], int] = {}
 
     def of(self, chosen: Sequence[np.ndarray], cases: int) -> np.ndarray:
-        """The design point of each of so many cases. chosen: arrays of a value a case; with none there is one design
+        """The design point of each of `cases` cases. chosen: arrays of a value a case; with none there is one design
         point. Raises TooManyPoints."""
         if not chosen:
             return np.full(cases, self._number(()))
@@ -94,8 +94,8 @@ class CaseBlock:
 
 
 class Judged:
-    """A requirement's row: counts, the worst case, moments and the bound. most: of the values nearest to the limit or
-    beyond it, of which the last bounds the percentile; 0 where none does."""
+    """A requirement's row: counts, the worst case, moments and the bound. most: number of values nearest to the limit
+    or beyond it, of which the last bounds the percentile; 0 where there is no bound"""
 
     def __init__(self, requirement: RequiredOfCases, most: int) -> None:
         self.requirement = requirement
@@ -105,7 +105,8 @@ class Judged:
         self.moments, self.furthest = Moments(), Furthest(most)
 
     def add(self, places: np.ndarray, values: np.ndarray, outcomes: np.ndarray, done: np.ndarray) -> None:
-        """Take cases at these places. outcomes: 1 met, 0 missed, -1 unknown; done: of those that reached their end."""
+        """Add cases at these places. outcomes: 1 met, 0 missed, -1 unknown; done: a truth for each that reached its
+        end"""
         unknown = outcomes == -1
         self.cases += len(places)
         self.missed += int(np.count_nonzero(outcomes == 0))
@@ -121,7 +122,7 @@ class Judged:
         self.furthest.add(np.where(unknown, np.inf, values if self.below else -values))
 
     def row(self, number: int, point: int) -> dict[str, Any]:
-        """By the variables of the archive, without `judged_`; the worst case by its place."""
+        """The row by the variables of the archive, without `judged_`; the worst case by its place."""
         bound = self.furthest.least
         return {
             "requirement": number, "point": point, "cases": self.cases, "missed": self.missed, "unknown": self.unknown,
@@ -139,7 +140,7 @@ class MetricTally:
     ends: dict[str, tuple[int, float]] = field(default_factory=dict)
 
     def add(self, places: np.ndarray, values: np.ndarray) -> None:
-        """Take the values of cases at these places."""
+        """Add the values of cases at these places."""
         self.moments.add(values)
         self.counts["infinite"] += int(np.count_nonzero(np.isinf(values)))
         self.counts["unknown"] += int(np.count_nonzero(np.isnan(values)))
@@ -152,7 +153,7 @@ class MetricTally:
 
 
 class CaseTallies:
-    """Counts, moments and extremes of all cases. metrics: by name; sizes: how many cases each design point has."""
+    """Counts, moments and extremes of all cases. metrics: by name; sizes: number of cases of each design point"""
 
     def __init__(
         self, metrics: Sequence[str], requirements: Sequence[RequiredOfCases], sizes: Sequence[int] | np.ndarray
@@ -169,7 +170,7 @@ class CaseTallies:
         self.limited = 0
 
     def add(self, block: CaseBlock) -> None:
-        """Take the next cases."""
+        """Add the next cases."""
         self.limited += block.limited
         done = block.status == DONE
         for name, tally in self.metrics.items():
@@ -236,7 +237,8 @@ class CaseTallies:
 
 
 def _most(requirement: RequiredOfCases, cases: int) -> int:
-    """The values nearest to the limit, or beyond it, of so many cases, of which the last bounds the percentile."""
+    """The number of values nearest to the limit, or beyond it, among this many cases, of which the last bounds the
+    percentile."""
     if requirement.share is None or requirement.confidence is None:
         return 0
     rank = percentile_rank(cases, requirement.share, requirement.confidence)

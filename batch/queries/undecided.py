@@ -1,4 +1,4 @@
-"""Requirements whose limit is a time after a run's end, of cases that do not come to it by then: neither met nor
+"""Requirements on a time whose limit is after a run's end, in cases that have not reached it by then: neither met nor
 missed."""
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 
 def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
-    """The warning of times that a run is too short to show, if there is one: of the first requirement, with the others
-    by name.
+    """The warning about times that a run is too short to show, if there is one: about the first requirement, with the
+    others by name.
 
     experiment  of the plan, for places
     """
@@ -49,7 +49,7 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
 
 
 def _is_time(model: str) -> bool:
-    """True for a metric that is a time of its run; False where its package is not there."""
+    """True for a metric that is a time of its run; False where its package is missing."""
     try:
         return models.find("metric", model).times
     except Problem:

@@ -1,5 +1,5 @@
-"""What an archive warns of once its cases are run: errors by the step, limits of machines and joints, grapples,
-times that are not seen."""
+"""Warnings about an archive's finished cases: errors due to the step, limits of machines and joints, grapples, and
+times beyond the run's end."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 
 def campaign_warnings(groups: Iterable[ArchiveGroup], experiments: Mapping[str, Experiment]) -> list[Diagnostic]:
-    """The warnings of all experiments of an archive, with the places in the deck; alike ones of structures once."""
+    """The warnings about all experiments of an archive, with the places in the deck; equal ones of several structures
+    once."""
     first: dict[object, Diagnostic] = {}
     more: dict[object, int] = {}
     for group in groups:
@@ -35,10 +36,10 @@ def campaign_warnings(groups: Iterable[ArchiveGroup], experiments: Mapping[str, 
 
 
 def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
-    """The warnings of one experiment of an archive, but for what its run allows.
+    """The warnings about one experiment of an archive, except those that its run allows.
 
     experiment  of the plan, for places
     """
-    # told by counts; rows beside a summary are few, and say nothing of all cases
+    # found from counts; rows beside a summary are few, and say nothing about all cases
     about = (step_errors,) if summed_up(group) is not None else (step_errors, at_limits, grapples, undecided)
     return [warning for each in about for warning in each.warnings(group, experiment)]

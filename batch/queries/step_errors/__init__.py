@@ -1,5 +1,5 @@
-"""How true an archive's numbers are: errors by the step, from what it keeps of cases with shorter steps.
+"""The accuracy of an archive's numbers: errors due to the step, from its cases with shorter steps.
 
-`figures` makes errors of them, `words` says them, `limits` holds them against what the deck requires, and `warning`
-says what they call in question.
+`figures` computes the errors, `words` puts them in words, `limits` compares them with the deck's limits, and `warning`
+makes warnings about doubtful results.
 """

@@ -1,4 +1,4 @@
-"""Errors by the step, from a metric's values at the step, half and a quarter of it."""
+"""Errors due to the step, from a metric's values at the step, half and a quarter of it."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ class MetricError:
 
 @frozen
 class Verification:
-    """How true an experiment's numbers are. cases: verified ones; order: the integrator's; step: s; metrics: by the
-    names of their variables."""
+    """The accuracy of an experiment's numbers. cases: verified ones; order: the integrator's; step: s; metrics: by the
+    names of their variables"""
 
     cases: int
     order: int
@@ -63,7 +63,7 @@ class Verification:
 
 
 def figures(group: ArchiveGroup, position: int | None = None) -> Verification | None:
-    """How true the numbers of an archive's experiment are, or of its case at this position; None where it was not
+    """The accuracy of the numbers of an archive's experiment, or of its case at this position; None where it was not
     verified."""
     found = group.verified
     if found is None:
@@ -119,7 +119,7 @@ def case_error(case: int, values: tuple[float, float, float], order: int, instan
 
 
 def together(found: Iterable[Verification | None]) -> Verification | None:
-    """The figures of several structures as those of one experiment: of each metric that of its worst case."""
+    """The figures of several structures as those of one experiment: for each metric that of its worst case."""
     those = [each for each in found if each is not None]
     if len(those) < 2:
         return those[0] if those else None
@@ -143,7 +143,7 @@ def _worse(one: MetricError, other: MetricError) -> MetricError:
 
 
 def of_difference(a: Verification | None, b: Verification | None) -> dict[str, float]:
-    """The errors by the step of differences between two archives' metrics, SI: the sum of those that are known."""
+    """The errors due to the step of differences between two archives' metrics, SI: the sums of those that are known."""
     known: dict[str, float] = {}
     for found in (a, b):
         for name, each in found.metrics.items() if found is not None else ():
@@ -153,7 +153,7 @@ def of_difference(a: Verification | None, b: Verification | None) -> dict[str, f
 
 
 def as_json(found: Verification | None) -> dict[str, Any] | None:
-    """Plain data of a verification; numbers that are none are not-a-number."""
+    """Plain data of a verification; missing numbers are not-a-number."""
     if found is None:
         return None
     metrics = {

@@ -1,4 +1,4 @@
-"""How requirements on errors by the step, `require step_error(settle) < 1 %;`, are met by verified cases."""
+"""Judging of requirements on errors due to the step, `require step_error(settle) < 1 %;`, by verified cases."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @frozen
 class StepErrorVerdict:
-    """Whether all verified cases meet a requirement on an error by the step; None where that is not known.
+    """The verdict of all verified cases on a requirement on an error due to the step; None where it is not known.
 
     said   the worst of them, or why it is not known
     limit  that is required
@@ -37,12 +37,12 @@ class StepErrorVerdict:
 
     @property
     def word(self) -> str:
-        """Whether it is met, in a word or two."""
+        """The verdict in a word or two."""
         return {True: "met", False: "missed", None: "not known"}[self.met]
 
 
 def verdicts(group: ArchiveGroup, found: Verification | None) -> tuple[StepErrorVerdict, ...]:
-    """How an experiment's requirements on errors by the step are met."""
+    """The verdicts on an experiment's requirements on errors due to the step."""
     return tuple(_verdict(group, each, found) for each in group.step_errors)
 
 
@@ -73,7 +73,7 @@ def _is_within(size: float, limit: StepErrorLimit) -> bool:
 
 
 def _has_none(case: CaseError) -> bool:
-    """True where nothing can be wrong by the step: no value, or the same infinite one whatever the step."""
+    """True where the step cannot cause an error: no value, or the same infinite one for all steps."""
     return math.isnan(case.value) or (math.isinf(case.value) and case.value == case.half == case.quarter)
 
 

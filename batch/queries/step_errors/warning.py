@@ -1,4 +1,4 @@
-"""What errors by the step mean for a campaign: warnings, each with the case, the metric and the step that would do."""
+"""Warnings about errors due to the step, each with the case, the metric and a sufficient step."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from met.plan import Experiment
 
 MATTERS, LARGE = 0.01, 0.1
-"""Of a metric's largest value: an error that nothing explains is worth a word above the first, any above the second."""
+"""Shares of a metric's largest value above which an unexplained error, and any error, causes a warning."""
 
 MOST_HALVINGS = 10
-"""Times a step is halved to make an error small; more is no remedy."""
+"""Largest number of halvings of a step that are proposed as a remedy."""
 
 COMPARISONS = MappingProxyType({"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge})
 
 
 def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
-    """Warnings of results that the errors by the step of an archive's experiment call in question, but for what its
-    run allows.
+    """Warnings about results of an experiment that are doubtful because of errors due to the step, except those that
+    its run allows.
 
     experiment  of the plan, for places
     """
@@ -49,7 +49,7 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
 def _undecided(
     group: ArchiveGroup, found: Verification, required: GroupRequirement, experiment: Experiment | None
 ) -> Diagnostic | None:
-    """The outcome of a requirement that another step may turn round."""
+    """The warning about a requirement whose outcome another step may change."""
     metric = found.metrics[required.metric]
     those = [(each, turned) for each in metric.cases if (turned := _turned(each, required))]
     if not those:
@@ -72,7 +72,8 @@ def _undecided(
 
 
 def _turned(case: CaseError, required: GroupRequirement) -> str:
-    """How a shorter step, or an error as large as it may be, turns the outcome round; "" where none does."""
+    """The change of the outcome by a shorter step, or by an error as large as it may be, in words; "" where there is
+    none."""
     if math.isnan(case.value):
         return ""
     meets = COMPARISONS[required.comparison]
@@ -86,13 +87,13 @@ def _turned(case: CaseError, required: GroupRequirement) -> str:
 
 
 def _excess(case: CaseError, required: GroupRequirement) -> float:
-    """How much larger the error is than the margin."""
+    """The ratio of the error to the margin."""
     margin = abs(case.value - required.limit)
     return math.inf if case.error is None or not margin else case.error.error / margin
 
 
 def _unclear(group: ArchiveGroup, found: Verification, name: str, experiment: Experiment | None) -> Diagnostic | None:
-    """A metric that changes much with the step, or not as the integrator does."""
+    """The warning about a metric that changes much with the step, or not in the integrator's order."""
     values = group.values(name)
     size = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
     those = [
@@ -120,7 +121,7 @@ def _unclear(group: ArchiveGroup, found: Verification, name: str, experiment: Ex
 
 
 def _lost(found: Verification, experiment: Experiment | None) -> list[Diagnostic]:
-    """Cases that have metrics at the step, and none with a shorter one."""
+    """The warning about cases that have metrics at the step, and none with a shorter one."""
     metrics = list(found.metrics.values())
     those = []
     for row, case in enumerate(metrics[0].cases):
@@ -141,7 +142,7 @@ def _lost(found: Verification, experiment: Experiment | None) -> list[Diagnostic
 
 
 def _remedy(found: Verification, case: CaseError, tolerance: float, wanted: str) -> str:
-    """The rate of the dynamics at which the error would be so small."""
+    """The remedy: the rate of the dynamics at which the error would be so small."""
     if case.error is not None and math.isfinite(case.error.error) and tolerance > 0.0 and _falls(case.error):
         step = case.error.step_for(found.step, tolerance)
         halvings = max(1, math.ceil(math.log2(found.step / step))) if step > 0.0 else MOST_HALVINGS + 1
@@ -156,7 +157,7 @@ def _falls(error: StepError) -> bool:
 
 
 def _rate(found: Verification, factor: int) -> str:
-    """So many times the rate of the dynamics."""
+    """A multiple of the rate of the dynamics."""
     return f"{float(f'{factor / found.step:.12g}'):.12g} Hz"
 
 

@@ -1,4 +1,4 @@
-"""What is said of errors by the step: beside a metric's numbers, and in one line beneath them."""
+"""Errors due to the step in words: beside a metric's numbers, and in one line beneath them."""
 
 from __future__ import annotations
 
@@ -11,23 +11,24 @@ from batch.queries.step_errors.figures import MetricError, Verification
 HINT = "not verified: `--verify some` runs some cases at half and a quarter of the step"
 
 NONE = "-"
-"""In the place of an error that is not known."""
+"""Text in place of an unknown error."""
 
 
 def error_text(found: MetricError | None, scale: float = 1.0) -> str:
-    """An error in two digits, in the unit of which `scale` is the size; NONE where it is not known."""
+    """An error in two digits, in the unit of size `scale`; NONE where it is not known."""
     if found is None or not math.isfinite(found.error):
         return NONE
     return rounded(found.error / abs(scale))
 
 
 def rounded(error: float) -> str:
-    """An error in two digits: no more of it is known."""
+    """An error rounded to two digits."""
     return number_text(float(f"{error:.2g}"))
 
 
 def about(found: Verification) -> str:
-    """`± by the step: 5 cases at half and a quarter of the step, order 2.0`, with what is to be known besides."""
+    """A line about the verification, `± by the step: 5 cases at half and a quarter of the step, order 2.0`, with
+    remarks."""
     cases = "1 case" if found.cases == 1 else f"{found.cases:,} cases"
     said = f"± by the step: {cases} at half and a quarter of the step"
     orders = sorted(
