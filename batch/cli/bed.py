@@ -48,7 +48,7 @@ class Amount(click.ParamType):
 
 
 class FiniteRange(click.FloatRange):
-    """A number of a closed range; `nan`, which no comparison refuses, is none."""
+    """A number of a closed range, which excludes `nan`, although no comparison refuses it."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Read the number, as `click.FloatRange` does. Raises a usage error for one that is not in the range."""
@@ -158,7 +158,7 @@ def jitter(word: str, source: str | None, names: tuple[str, ...], **options: Any
 
 
 def _check(source: str | None, names: tuple[str, ...], options: dict[str, Any]) -> None:
-    """Refuse options that would do nothing, and more than one bed."""
+    """Refuse options without effect, and more than one bed."""
     if len(names) > 1:
         raise click.UsageError(f"one bed at a time: `{names[0]}` or `{names[1]}`")
     if source is not None:

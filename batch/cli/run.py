@@ -12,7 +12,7 @@ from met.cli import NO, YES, check_options, deck_options, format_option, loudnes
 from met.messages.visible import line, say
 
 MOST_NAMED = 5
-"""Archives that are named where none was meant."""
+"""Largest number of archives that are named where the given name is unknown."""
 
 
 class Seconds(click.ParamType):
@@ -52,7 +52,7 @@ VERIFY = click.option(
 
 
 def measured(value: Any, si: str) -> float:
-    """A number with or without a unit, in SI. si: the unit that is meant without one. Raises ValueError."""
+    """A number with or without a unit, in SI. si: the unit to assume without one. Raises ValueError."""
     import re
 
     from met import units
@@ -223,4 +223,4 @@ def status(where: str, form: str) -> int:
         return YES
     data = report(folder, time.time())
     say(json.dumps(data, indent=1) if form == "json" else "\n".join(map(line, lines(data))))
-    return NO  # its folder is there, and so its archive is not, whatever is done of it
+    return NO  # its folder exists, so its archive is not whole, whatever is done

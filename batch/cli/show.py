@@ -169,7 +169,7 @@ def _asked_for(
     settings: tuple[str, ...],
     form: str,
 ) -> Sequence[Experiment]:
-    """The runs and sweeps of a deck or plan that a command is asked about; what the compiler says goes to people."""
+    """The runs and sweeps of a deck or plan for a command; the compiler's messages go to people."""
     from batch.campaigns.choosing import experiments_named
     from batch.campaigns.plans import read_plan
 
@@ -179,7 +179,7 @@ def _asked_for(
 
 
 def _say(form: str, data: Sequence[Any], texts: Sequence[Iterable[str]]) -> None:
-    """Prints data for programs, or texts for people with a line between each two."""
+    """Print data for programs, or texts for people with a blank line between them."""
     import json
 
     say(json.dumps(data, indent=1) if form == "json" else "\n\n".join("\n".join(lines) for lines in texts))

@@ -1,1 +1,1 @@
-"""What `met run`, `show`, `profile` and `margin` say in a terminal."""
+"""Text output of `met run`, `show`, `profile` and `margin` in a terminal."""

@@ -1,4 +1,4 @@
-"""`met best`: which design of a sweep to use, in a terminal and as data."""
+"""`met best`: the design of a sweep to use, in a terminal and as data."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ from met.unit_parser import written
 from met.units import text as unit_text
 
 MACRO = "macro "
-"""Beginning of the path of a choice among values of a macro."""
+"""Prefix of the path of a choice among values of a macro."""
 
 RUNNERS_UP = 3
-"""Designs that are shown behind the best."""
+"""Number of designs that are shown after the best."""
 
 MOST_ON_FRONT = 15
-"""Rows of a trade-off, evenly chosen of more."""
+"""Largest number of rows of a trade-off, evenly chosen if there are more."""
 
 NEAREST = 3
-"""Designs that are shown where none is good."""
+"""Number of designs that are shown where none is good."""
 
 
 @frozen
 class BestRow:
-    """A design in a table: its number, and why it is there, in words."""
+    """A design in a table: its number, and the reason for its row, in words."""
 
     design: int
     label: str
@@ -79,7 +79,7 @@ class BestAnswer:
             for goal in [designs.goal(f"{column.label}:{'smallest' if column.limits[0].sense == '<' else 'largest'}")]
         ]
         self.shown = tuple({goal.text: goal for goal in (*self.goals, *self.front, *required)}.values())
-        """Goals that have a column."""
+        """Goals with a column of their own."""
 
     @property
     def best(self) -> int | None:
@@ -87,7 +87,7 @@ class BestAnswer:
         return int(self.order[0]) if len(self.order) else None
 
     def rows(self) -> list[BestRow]:
-        """The best, those that are best in one number alone, and the runners-up."""
+        """The rows: the best, those that are best in only one number, and the runners-up."""
         designs = self.designs
         first = f"{_least(self.goals[0])}" if self.goals else "farthest from the border"
         if not self.goals and designs.steps is None:
@@ -119,13 +119,14 @@ class BestAnswer:
 
     @property
     def headline(self) -> str:
-        """`use drive.kp = 0.33 V*s/rad`, or that none is good."""
+        """The headline, `use drive.kp = 0.33 V*s/rad`, or that no design is good."""
         if self.best is None:
             return f"none of {self.designs.count:,} designs meets all requirements"
         return f"use {', '.join(f'{path} = {value}' for path, value in self.settings(self.best, exact=False))}"
 
     def stretches(self) -> list[list[str]]:
-        """How far the best may go along each axis by itself: the parameter, from where to where, and what ends it."""
+        """The range of the best along each axis, all else unchanged: the parameter, its ends, and the obstacles
+        there."""
         assert self.best is not None
         return [
             [axis.columns[0].label, _at(axis.columns[0], axis.values, found), _ends(found)]
@@ -134,7 +135,7 @@ class BestAnswer:
         ]
 
     def notes(self) -> list[str]:
-        """Notes besides: that better ones may lie beyond the sweep, that all is taken for chosen."""
+        """Further notes: that better designs may lie beyond the sweep, or that all parameters count as chosen."""
         assert self.best is not None
         designs = self.designs
         at = [
@@ -152,7 +153,7 @@ class BestAnswer:
 
     @property
     def why(self) -> str:
-        """The reasons for the best, and how many designs meet all."""
+        """The reasons for the best, and the number of designs that meet all requirements."""
         assert self.best is not None
         designs, best = self.designs, self.best
         cases, good = int(designs.cases[best]), int(designs.good.sum())
@@ -174,7 +175,7 @@ class BestAnswer:
         return f"{what}{where}{steps}{room_said}. {so}"
 
     def _none(self, width: int) -> list[str]:
-        """Where no design is good: those that are nearest."""
+        """The text where no design is good: the nearest ones."""
         designs = self.designs
         out = [self.headline]
         for text, met in zip(designs.demands, designs.meets.T, strict=True):
@@ -190,7 +191,7 @@ class BestAnswer:
         return out
 
     def nearest(self) -> list[BestRow]:
-        """The designs that miss least, with what they miss."""
+        """The designs that miss least, with their misses."""
         designs = self.designs
         order = np.lexsort((-designs.room, (~designs.meets).sum(axis=1)))[:NEAREST].tolist()
         return [BestRow(design, self._short(design)) for design in order]
@@ -228,8 +229,8 @@ class BestAnswer:
         return [i for i in range(1, len(self.cells([])[0])) if i not in words]
 
     def cells(self, rows: Sequence[BestRow]) -> list[list[str]]:
-        """Designs as a table whose first lines are heads and units: why it is there, what is chosen, how far from the
-        border, and each number in the worst case."""
+        """Designs as a table whose first lines are heads and units: the reason for the row, chosen values, distance to
+        the border, and each number in the worst case."""
         designs = self.designs
         chosen = [column for axis in designs.axes for column in axis.columns]
         numbers = [row.design for row in rows]
@@ -275,7 +276,7 @@ class BestAnswer:
         return out
 
     def values(self, design: int) -> list[WrittenValue]:
-        """The same for a deck's text. Raises Problem E397 for a choice among words."""
+        """The choices that make a design, as texts for a deck. Raises Problem E397 for a choice among words."""
         out = []
         for column, si, unit in self._chosen(design):
             if column.role == "choice":
@@ -293,7 +294,7 @@ class BestAnswer:
         for axis in self.designs.axes:
             for column in axis.columns:
                 if np.isnan(column.values[place]):
-                    continue  # of a sum of sweeps, of which another part chooses it
+                    continue  # another part of a sum of sweeps chooses it
                 if column.role == "choice":
                     yield column, float(column.values[place]), ""
                     continue
@@ -314,7 +315,7 @@ class BestAnswer:
         return " ".join([f"met run {quoted(self.deck)} {quoted(self.name)}", *words])
 
     def confirmation(self) -> tuple[str, str]:
-        """The worth of the best, in words, and the command that runs it: with other draws where its cases were
+        """The value of confirming the best, in words, and the command for it: with other draws where its cases were
         drawn."""
         assert self.best is not None
         if not self.designs.draws:
@@ -325,7 +326,7 @@ class BestAnswer:
     # Data
 
     def as_data(self) -> dict[str, Any]:
-        """The same for programs: SI, null for what is not finite."""
+        """The answer for programs: SI, null for non-finite numbers."""
         designs = self.designs
         rows = self.rows() if self.best is not None else []
         data: dict[str, Any] = {
@@ -368,7 +369,7 @@ def _value(column: CaseColumn, place: int) -> str:
 
 
 def _range(column: CaseColumn) -> str:
-    """The range of what a design is held against, in words."""
+    """The range of a parameter under which designs are judged, in words."""
     if column.role == "choice":
         return f"{column.label} {', '.join(column.words)}"
     ends = column.values[np.isfinite(column.values)]
@@ -402,7 +403,7 @@ def _wrapped(text: str, width: int) -> list[str]:
 
 
 def context(archive: ArchiveFile, pool: Pool) -> dict[str, Any]:
-    """The arguments of `BestAnswer` that say how a campaign was run: deck, name, seed, options, and remarks."""
+    """The arguments of `BestAnswer` that describe a campaign: deck, name, seed, options, and remarks."""
     defines = str(archive.provenance.get("defines") or "").split()
     remarks = []
     if any(group.attributes.get("step_errors") for group in pool.groups):
@@ -410,7 +411,7 @@ def context(archive: ArchiveFile, pool: Pool) -> dict[str, Any]:
     given: tuple[str, ...] = ()
     try:
         given = archive.plan(as_written=True).settings
-    except Problem:  # such as: a model of the plan's is not installed here
+    except Problem:  # for instance, a model of the plan is not installed here
         remarks.append("the plan in this archive cannot be read: what `--set` set, if it did, is not in the command")
     seed = int(pool.groups[0].at("seed", [0])[0])
     name = varied_run(pool.name) if any(map(varies, given)) else pool.name

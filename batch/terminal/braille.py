@@ -13,13 +13,13 @@ DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 """Bit of each dot of a character, by row and column (Unicode, "Braille Patterns")."""
 
 LARGEST = 1e300
-"""The largest number that has a place on an axis: sums and ranges of larger ones are no numbers any more."""
+"""The largest number that has a place on an axis: sums and ranges of larger ones overflow."""
 
 SMALLEST = 1e-290
-"""Ranges that are smaller are none: a tenth of them may be 0."""
+"""Smallest nonzero range: a tenth of a smaller one may be 0."""
 
 COLOURS = (33, 208, 36, 170, 220, 74, 166)
-"""Terminal colours of the lines: blue, orange, green and so on, told apart by colour-blind eyes as well."""
+"""Terminal colours of the lines: blue, orange, green and so on, which colour-blind eyes can distinguish too."""
 
 
 def draw(
@@ -81,7 +81,7 @@ def draw(
 
 
 def _range(low: float, high: float) -> tuple[float, float]:
-    """Room around the values; a constant gets some too."""
+    """The range with room around the values; a constant gets some too."""
     spread = high - low
     if spread <= max(1e-12 * max(abs(low), abs(high)), SMALLEST):
         spread = abs(high) * 0.2 if abs(high) > SMALLEST else 1.0
@@ -99,7 +99,7 @@ def nice_ticks(low: float, high: float, count: int) -> list[float]:
 
 
 def tick_texts(ticks: Sequence[float]) -> list[str]:
-    """The ticks with the digits that their distance needs, and no more."""
+    """The ticks with as many digits as their distance needs."""
     if not ticks:
         return []
     step = abs(ticks[1] - ticks[0]) if len(ticks) > 1 else abs(ticks[0]) or 1.0
@@ -112,7 +112,7 @@ def tick_texts(ticks: Sequence[float]) -> list[str]:
 
 
 def _dot(value: float, low: float, high: float, count: int) -> int:
-    """Row of dots, from the top."""
+    """The row of a value's dot, from the top."""
     return min(count - 1, max(0, int((high - value) / (high - low) * count)))
 
 
@@ -166,7 +166,7 @@ def _paint(text: str, index: int) -> str:
 
 
 def _time_axis(first: float, last: float, left: int, across: int, unit: str) -> list[str]:
-    """The axis below: marks at round times, their numbers, the unit behind the last."""
+    """The axis below: marks at round times, their numbers, and the unit after the last."""
     if last <= first:
         last = first + 1.0
     ticks = nice_ticks(first, last, max(2, across // 14))

@@ -1,4 +1,4 @@
-"""`met best --write`: what was chosen, written into the text of the deck that was swept or tuned."""
+"""`met best --write`: the chosen values, written into the text of the deck that was swept or tuned."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class ChosenDeck:
         return f"changes {self.run}{others}"
 
     def write(self) -> None:
-        """Raises Problem E338 where the system refuses; the file is then as it was."""
+        """Write the file. Raises Problem E338 where the system refuses; the file is then unchanged."""
         text = self.after.replace("\n", self.newline)
         if self.there:
             write(str(self.target), text)
@@ -102,7 +102,7 @@ def chosen_deck(
 
 
 def _is_there(name: str, text: str) -> bool:
-    """True if a file that the sweep alone is made of, such as a table, is as it was."""
+    """True if an additional file of the sweep, such as a table, is unchanged."""
     try:
         return decode(read_regular(name, len(text.encode()) * 2), name, "file")[0] == text
     except OSError:
@@ -110,7 +110,7 @@ def _is_there(name: str, text: str) -> bool:
 
 
 def _newline_as_archived(deck: str, archived: str) -> str:
-    """The ends of the lines of a deck's file, which has the text that the archive holds; else Problem E398."""
+    """The line ends of a deck's file, whose text must be that of the archive; else Problem E398."""
     copy = "`-o FILE` writes a copy, of the text that the archive holds"
     if deck.startswith("<"):
         raise _other(f"{deck} comes with MET, and is not written to", copy)

@@ -1,4 +1,4 @@
-"""The stages of `met dump` behind the plan: the recorded program, its code, and the processor's."""
+"""The stages of `met dump` after the plan: the recorded program, its code, and the processor's code."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def kernel(asked: DumpRequest) -> Iterator[str]:
 
 
 def assembly(asked: DumpRequest) -> Iterator[str]:
-    """The machine code of the program, as this processor's assembler would read it."""
+    """The machine code of the program as assembly for this processor."""
     from met import backends
 
     for _, recording in _recorded(asked):
@@ -38,7 +38,7 @@ def assembly(asked: DumpRequest) -> Iterator[str]:
 
 
 def _recorded(asked: DumpRequest) -> Iterator[tuple[Experiment, Recording]]:
-    """Record each run of the plan, and give it with its program."""
+    """Record each run of the plan; returns it with its program."""
     from met.program.build import build
     from met.trace.recorder import record
 

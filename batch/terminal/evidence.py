@@ -1,4 +1,4 @@
-"""What the cases show of requirements over a share of cases, as lines of the terminal."""
+"""Evidence for requirements over a share of cases, as lines of the terminal."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from batch.queries.evidence import EvidenceRow, percent_above, percent_below
 from batch.queries.signals import number_text
 
 MOST_POINTS = 12
-"""Design points of a requirement that are listed; of more, those that are not met come first."""
+"""Largest number of listed design points of a requirement; of more, unmet ones come first."""
 
 
 def evidence_lines(rows: Sequence[EvidenceRow]) -> list[str]:
-    """Lines for each design point: the verdict, what it rests on, and what it would take."""
+    """Lines for each design point: the verdict, its grounds, and the missing cases."""
     listed = list(rows) if len(rows) <= MOST_POINTS else sorted(rows, key=lambda row: row.ok)[:MOST_POINTS]
     wide = max((len(row.verdict) for row in listed), default=0)
     heads = [", ".join(f"{path} = {text}" for path, text in row.chosen.items()) for row in listed]
@@ -29,7 +29,8 @@ def evidence_lines(rows: Sequence[EvidenceRow]) -> list[str]:
 
 
 def _grounds(row: EvidenceRow) -> list[str]:
-    """The grounds of a verdict: how many cases meet it, the bound that follows, and how many more cases it takes."""
+    """The grounds of a verdict: the number of cases that meet the requirement, the resulting bound, and the number of
+    further cases needed."""
     text = f"{row.cases - row.missed:,} of {row.cases:,} cases meet it"
     if row.why:
         return [f"{text}; {row.why}"]
@@ -50,7 +51,7 @@ def _grounds(row: EvidenceRow) -> list[str]:
 
 
 def _test(row: EvidenceRow) -> str:
-    """Words on a test that was looked at after every case, behind what it shows."""
+    """Words on a sequential test, after its result."""
     if not row.sequential:
         return ""
     early = row.decided is not None and row.decided < row.cases

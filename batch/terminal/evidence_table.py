@@ -17,8 +17,8 @@ OF_VALUES = (("limit", "limit"), ("worst", "worst"), ("margin", "margin"), ("in 
 
 
 def evidence_table_lines(rows: Sequence[RequirementEvidence], width: int) -> list[str]:
-    """The table of evidence: the requirements, numbered; what the cases show of each, and how near they come to its
-    limit; what runs the worst case again; notes."""
+    """The table of evidence: the requirements, numbered; the evidence for each, and the distance to its limit; the
+    command that runs the worst case again; notes."""
     if not rows:
         return ["nothing is required"]
     required = list(dict.fromkeys(row.requirement for row in rows))
@@ -52,7 +52,7 @@ def _half(
     *,
     right: Iterable[int],
 ) -> list[str]:
-    """Some columns of the table, behind the numbers of its rows; with signs in place of words where they are too
+    """Some columns of the table, after the numbers of its rows; with signs in place of words where they are too
     wide."""
     cells = [[getattr(each, field) for _, field in which] for each in texts]
     rows = [["", *(head for head, _ in which)], *([number, *row] for number, row in zip(numbers, cells, strict=True))]
@@ -63,7 +63,7 @@ def _half(
 
 
 def _short(cell: str) -> str:
-    """`at least 99.42 %` as `≥ 99.42 %`, `99 % with 90 %` as `99 %, 90 %`."""
+    """A shortened cell: `at least 99.42 %` as `≥ 99.42 %`, `99 % with 90 %` as `99 %, 90 %`."""
     for words, sign in (
         ("at least", "\N{GREATER-THAN OR EQUAL TO}"),
         ("at most", "\N{LESS-THAN OR EQUAL TO}"),
@@ -74,8 +74,8 @@ def _short(cell: str) -> str:
 
 
 def _numbers(rows: Sequence[RequirementEvidence], required: Sequence[str]) -> list[str]:
-    """The numbers of the rows: those of their requirements, `1`; with that of the design point where one has several,
-    `2.1`, `2.2`."""
+    """The numbers of the rows: those of their requirements, `1`; with the number of the design point where there are
+    several, `2.1`, `2.2`."""
     many, seen = Counter(row.requirement for row in rows), Counter[str]()
     out = []
     for row in rows:

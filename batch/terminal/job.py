@@ -96,7 +96,7 @@ def cores() -> int:
 
 
 def _left(wanted: Sequence[Task], there: Sequence[Task]) -> list[tuple[int, int]]:
-    """Stretches of the wanted tasks that no shard covers, by its name: what it holds is proved when all is merged."""
+    """Stretches of the wanted tasks without a shard, judged by names: contents are checked when all is merged."""
     out = []
     for task in wanted:
         inside = [
@@ -111,7 +111,7 @@ def _left(wanted: Sequence[Task], there: Sequence[Task]) -> list[tuple[int, int]
 def merge_campaign(path: Path) -> int:
     """Merge a campaign whose cases are all done. Exit status 1 where cases failed or are missing."""
     if not Folder(path).exists():
-        return _say_result(path.with_name(path.name.removesuffix(".campaign")))  # somebody else was first
+        return _say_result(path.with_name(path.name.removesuffix(".campaign")))  # another job was first
     campaign = described(Folder(path))
     performed = perform(campaign, executor=Threads(cores()), together=True, say=say)
     if performed.warned:
@@ -122,7 +122,7 @@ def merge_campaign(path: Path) -> int:
 
 
 def _say_result(path: Path) -> int:
-    """Say what an archive holds. Exit status 1 where cases failed, or do not meet what is required."""
+    """Print the results in an archive. Exit status 1 where cases failed, or do not meet requirements."""
     from batch.archive.read import ArchiveFile
     from batch.queries.summary import summarise
     from batch.terminal.verdict import short_result_lines

@@ -1,4 +1,4 @@
-"""What `met linear` prints: poles, natural modes, and margins of loops, of one case at an instant."""
+"""Output of `met linear`: poles, natural modes, and margins of loops, of one case at an instant."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from met.analysis.linear.answers import Linearized, OpenLoop, Pole
 from met.analysis.linear.margins import LoopMargins
 
 MOST_POLES = 40
-"""Rows of a table of poles."""
+"""Largest number of rows of a table of poles."""
 
 LEAST_SHARE = 0.05
-"""Share of a mode from which on who takes part is named."""
+"""Share of a mode from which on a participant is named."""
 
 
 def linear_lines(found: Linearized, cases: int = 1) -> Iterator[str]:
-    """The answers in lines. cases: so many the experiment has, of which this is one."""
+    """The answers in lines. cases: the number of the experiment's cases, of which this is one"""
     case = f", case #{found.case} of {cases}" if cases > 1 else ""
     states = count(len(found.states), "state")
     yield f"{found.experiment}{case}: linear {found.where}, a period of {_time(found.seconds)}, {states}"
@@ -58,7 +58,7 @@ def _row(found: Linearized, pole: Pole) -> tuple[str, ...]:
 
 
 def _parts(found: Linearized, pole: Pole) -> str:
-    """Joints by their shares, each with the state that takes the largest part."""
+    """Joints by their shares, each with its state of the largest share."""
     told: list[str] = []
     for joint, share in found.by_joint(pole):
         if share < LEAST_SHARE and told:
@@ -117,7 +117,7 @@ def _loop_lines(loop: OpenLoop, answers: Linearized) -> Iterator[str]:
 
 
 def no_limit(loop: OpenLoop) -> str:
-    """The words about a loop whose gain has no limit above, or none so near that it was looked at."""
+    """The words about a loop whose gain has no upper limit, or none within the searched range."""
     return "no limit" if loop.searched is None else f"more than {loop.searched:,.0f} times"
 
 

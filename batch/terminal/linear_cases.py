@@ -1,4 +1,4 @@
-"""What `met linear --all-cases` prints: a row for each case of a sweep, and of each loop the tightest."""
+"""Output of `met linear --all-cases`: a row for each case of a sweep, and the tightest one for each loop."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from met.analysis.linear.answers import Linearized, LinearQuestion, OpenLoop
 from met.diagnostic import Problem
 
 MOST_ROWS = 40
-"""Cases that are listed, the first ones."""
+"""Number of cases that are listed, the first ones."""
 
 Answer = Linearized | str
-"""Of a case: its answers, or why it has none."""
+"""The answers of a case, or the reason why it has none."""
 
 
 def answered(question: LinearQuestion) -> list[Answer]:
@@ -30,7 +30,7 @@ def _why_not(refused: Problem) -> str:
 
 
 def case_lines(question: LinearQuestion, found: Sequence[Answer]) -> Iterator[str]:
-    """The rows in lines: of each opened loop a table; of none, the least damped pole of each case."""
+    """The rows in lines: a table for each opened loop; without loops, the least damped pole of each case."""
     name, cases = question.experiment.name, count(len(found), "case")
     where = "where it stands still" if question.stands else f"at t = {question.at:.6g} s"
     yield f"{name}: linear {where}, {cases}"
@@ -75,7 +75,7 @@ def _table(
 
 
 def _of_loop(place: int, found: Linearized) -> tuple[str, ...]:
-    """The cells of a case's loop at this place among those that are asked for."""
+    """The cells of a case's loop at this place among the requested ones."""
     loop = found.loops[place]
     if not loop.returns:
         return ("nothing comes back",)
@@ -91,7 +91,7 @@ def _of_loop(place: int, found: Linearized) -> tuple[str, ...]:
 
 
 def _tightest(loops: dict[int, OpenLoop]) -> Iterator[str]:
-    """The cases with the least of each margin."""
+    """The cases with the smallest value of each margin."""
     unstable = [case for case, loop in loops.items() if loop.unstable]
     if unstable:
         some = ", ".join(f"#{case}" for case in unstable[:5]) + (" ..." if len(unstable) > 5 else "")

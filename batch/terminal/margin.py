@@ -1,4 +1,4 @@
-"""What `met margin` prints: of each joint whose motor is on a bed, how heavy the arm is and may be."""
+"""Output of `met margin`: for each joint with its motor on a bed, how heavy the arm is and may be."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from met.plan import Experiment
 
 
 def margin_lines(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> Iterator[str]:
-    """The margins in lines: of one case each joint, of several the tightest of each joint."""
+    """The margins in lines: every joint of a single case, or the tightest case of each joint."""
     cases = f", {count(len(found), 'case')}" if len(found) > 1 else ""
     yield f"{experiment.name}: {count(len(found[0]), 'joint')} on a bed{cases}"
     yield ""
@@ -60,12 +60,12 @@ def as_data(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> dict[s
 
 
 def stable_head(spans: bool) -> str:
-    """Above what `stable_at` gives. spans: whether one of several has a lower end."""
+    """The heading above `stable_at`. spans: True where one of several has a lower end"""
     return "stable at r" if spans else "stable to r"
 
 
 def stable_at(one: Margin, spans: bool) -> str:
-    """The r at which the loop is stable: up to which, or from which to which."""
+    """The range of r in which the loop is stable, in words."""
     if one.limit == 0.0:
         return "nothing"
     limit = f"more than {one.searched:.4g}" if one.limit is None else f"{one.limit:.3g}"
@@ -73,7 +73,7 @@ def stable_at(one: Margin, spans: bool) -> str:
 
 
 def verdict(one: Margin, none: str = "NONE") -> str:
-    """The margin in words; that there is none begins with `none`."""
+    """The margin in words; the text begins with `none` where there is no margin."""
     if one.together != one.together:
         return f"{none}: r is no number"
     if not one.stable:
@@ -85,7 +85,7 @@ def verdict(one: Margin, none: str = "NONE") -> str:
 
 
 def in_words(one: Margin) -> str:
-    """A joint's r, and at which r it is stable, in a line."""
+    """A joint's r, and its stable range, in a line."""
     limit = f"more than {one.searched:.3g}" if one.limit is None else f"{one.limit:.3g}"
     ends = f"from {one.lower:.3g} to {limit}" if one.lower > 0.0 else f"to {limit}"
     r = one.least if one.too_light else one.together

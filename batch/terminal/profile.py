@@ -1,4 +1,4 @@
-"""What `met profile` prints: where the time of a run's step goes, part by part, and what its kernel is like."""
+"""Output of `met profile`: the time of a run's step, part by part, and properties of its kernel."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def profile_lines(found: RunProfile, experiment: Experiment) -> Iterator[str]:
 
 
 def _table(found: RunProfile) -> Iterator[tuple[str, ...]]:
-    """A row a kind of work, its parts under it; what is done seldom in one row."""
+    """A row for each kind of work, with its parts under it; rare work in one row."""
     yield "a step of a case", "times", "operations", "flops", "ns", "share"
     steady = [part for part in found.parts if not part.event]
     for work, group in groupby(steady, key=lambda part: part.work):
@@ -68,7 +68,7 @@ def _row(name: str, parts: Sequence[WorkCost], whole: float, *, times: bool = Tr
 
 
 def _events(parts: Sequence[WorkCost]) -> str:
-    """Say how often friction made a block decide anew, and go back."""
+    """A sentence on how often friction made a block decide again, or go back."""
     rate = {part.work: part.calls for part in parts if part.event}
     decided, split = rate.get("friction decisions", 0.0), rate.get("friction splits", 0.0)
     if "friction decisions" not in rate:
@@ -86,8 +86,7 @@ def _kernel(found: RunProfile) -> Iterator[tuple[str, str]]:
 
 
 def _inputs(found: RunProfile) -> Iterator[tuple[str, ...]]:
-    """Lines about what a sweep varies, how much of its work is done before the first step, and how much each step has
-    of it."""
+    """Lines about varied parameters: the work done before the first step, and the work left to each step."""
     yield "varied", "sets", "once", "kept", "taken by"
     for each in found.inputs:
         yield each.path, *(f"{number:,}" for number in (each.sets, each.hoisted, each.kept, each.read_by))
@@ -98,7 +97,7 @@ def _percent(share: float) -> str:
 
 
 def _number(value: float) -> str:
-    """Two digits, all of those before the point."""
+    """A number in two digits, or with all digits before the point."""
     if value < 5e-4:
         return "0"
     return f"{value:,.0f}" if value >= 9.95 else f"{value:.2g}"

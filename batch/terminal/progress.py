@@ -1,4 +1,5 @@
-"""How far a campaign is: a bar on a terminal, a plain line now and then elsewhere; nothing for what is done at once."""
+"""Display of a campaign's progress: a bar on a terminal, a plain line now and then elsewhere, nothing for short
+work."""
 
 from __future__ import annotations
 
@@ -13,18 +14,18 @@ from batch.campaigns.status import duration
 from met.messages.visible import line
 
 FIRST_SECONDS = 0.3
-"""Time, s, before the bar is first drawn: what is over sooner needs none."""
+"""Time, s, before the bar is first drawn: shorter work needs none."""
 
 BAR_SECONDS = 0.1
 LINE_SECONDS, SELDOM = 5.0, 60.0
-"""Between two plain lines, at first and after a while: a log of a night's run should still be read."""
+"""Seconds between two plain lines, at first and after a while: the log of a night's run should be readable."""
 
 WIDTH = 24
 
 
 @dataclass
 class Bar:
-    """Told of cases done, it draws ten times a second on a terminal; elsewhere it prints a line, at first every five
+    """Progress display: on a terminal it is drawn ten times a second; elsewhere a line is printed, at first every five
     seconds, after some minutes one a minute."""
 
     stream: TextIO = field(default_factory=lambda: sys.stderr)
@@ -37,14 +38,14 @@ class Bar:
         self._began, self._next, self._drawn = 0.0, 0.0, False
 
     def begin(self, name: str, cases: int, done: int = 0, failed: int = 0, workers: str = "") -> None:
-        """A new experiment starts, of which some cases are done already. cases: 0 where their number is not known."""
+        """Begin a new experiment, some of whose cases may be done already. cases: 0 where their number is not known"""
         self._name, self._cases, self._first, self._workers = line(name), cases, done, line(workers)
         self._began = self._now()
         self._next = self._began + (FIRST_SECONDS if self._live else LINE_SECONDS)
         self._drawn = False
 
     def advance(self, done: float, failed: int = 0, more: str = "") -> None:
-        """So many of its cases are done, parts of one counted, and so many of these failed. more: what else is told."""
+        """Update the number of its cases that are done, parts of one counted, and of failed ones. more: further text"""
         now = self._now()
         if now < self._next or 0 < self._cases <= done:
             return
@@ -70,7 +71,7 @@ class Bar:
         self._drawn = True
 
     def end(self) -> None:
-        """The experiment is over; a bar is wiped away."""
+        """End the experiment; a bar is wiped away."""
         if self._live and self._drawn:
             self.stream.write("\r\x1b[K")
             self.stream.flush()
@@ -88,8 +89,8 @@ def status(
     workers: str = "",
     more: str = "",
 ) -> str:
-    """One line: share, cases, failed ones, what else is told, rate, time left, workers. first: cases that were done
-    when it began; cases: 0 where their number is not known."""
+    """One line: share, cases, failed ones, further text, rate, time left, workers. first: cases that were done when it
+    began; cases: 0 where their number is not known."""
     share = done / cases if cases else 0.0
     drawn = ""
     if bar and cases:

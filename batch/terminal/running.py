@@ -1,4 +1,4 @@
-"""`met run` from end to end: read, say what will run, run it, say what came of it and where it is."""
+"""`met run` from end to end: read the input, announce the run, run it, and print results and places."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ from met.outputs import quoted
 
 @frozen
 class RunRequest:
-    """Runs of a deck, a plan or an archive, and how a deck is read, as `batch.campaigns.plans.read_plan` takes them."""
+    """Runs of a deck, a plan or an archive, with the options for reading a deck, as for
+    `batch.campaigns.plans.read_plan`."""
 
     source: str
     names: tuple[str, ...]
@@ -69,7 +70,7 @@ class RunResult:
 
     @property
     def ok(self) -> bool:
-        """True if every case reached its end and met its requirements; of a tuning, if those of its answer did."""
+        """True if every case reached its end and met its requirements; for a tuning, if those of its answer did."""
         return all(summary.ok for summary in self.summaries)
 
 
@@ -151,7 +152,7 @@ def _of_archive(
 ) -> Campaign:
     """The campaign that runs cases of an archive again. Raises Problem E305 where it would be written over that one."""
     archive = output or again.output
-    if os.path.realpath(archive) == os.path.realpath(source):  # Path.resolve has an error for a link to itself
+    if os.path.realpath(archive) == os.path.realpath(source):  # Path.resolve fails for a link to itself
         helps = "`-o FILE` names another place"
         raise Problem(error("E305", f"cannot write {archive}: it is what is run again", help=helps))
     return prepare(
@@ -176,7 +177,7 @@ def _performed(
     json: bool,
     say: Callable[[str], None],
 ) -> Performed | None:
-    """Run a campaign's cases; None where it stopped because more cases failed than may, which is said."""
+    """Run a campaign's cases; None where it stopped, with a message, because more cases failed than may."""
     try:
         performed = perform(
             campaign,
@@ -200,7 +201,7 @@ def _performed(
 
 
 def _result(campaign: Campaign, performed: Performed, no_picture: bool, say: Callable[[str], None]) -> RunResult:
-    """Read what came of a campaign, and draw the picture beside its archive."""
+    """Read the results of a campaign, and draw the picture beside its archive."""
     if campaign.kept_rows.all and campaign.cases > MOST_READ and _is_counted(campaign, performed):
         return _counted_result(campaign, performed)
     with ArchiveFile(campaign.output) as file:
@@ -224,13 +225,13 @@ def _result(campaign: Campaign, performed: Performed, no_picture: bool, say: Cal
 
 
 MOST_READ = MANY
-"""Cases of a campaign up to which its picture is drawn: a million take 150 MB of memory."""
+"""Largest number of cases of a campaign for which its picture is drawn: a million take 150 MB of memory."""
 
 NOT_DRAWN = "of more than {:,} cases `met show` says more and `met plot` draws: 150 MB of memory a million"
 
 
 def _is_counted(campaign: Campaign, performed: Performed) -> bool:
-    """True where numbers of cases say all that decides the verdict."""
+    """True where counts of cases alone decide the verdict."""
     names = {part.experiment.name for part in campaign.parts}
     shares = [r.share for part in campaign.parts for r in part.experiment.requirements if r.share is not None]
     return (
@@ -239,7 +240,8 @@ def _is_counted(campaign: Campaign, performed: Performed) -> bool:
 
 
 def _counted_result(campaign: Campaign, performed: Performed) -> RunResult:
-    """The result of very many cases without reading their archive: how many failed, and met what is required."""
+    """The result of very many cases without reading their archive: the numbers that failed, and that met
+    requirements."""
     summaries = []
     for part in campaign.parts:
         experiment, counted = part.experiment, performed.counted[part.experiment.name]
@@ -267,7 +269,7 @@ def _counted_result(campaign: Campaign, performed: Performed) -> RunResult:
 def _exported(
     campaign: Campaign, target: Path | None, histories: bool, json: bool, say: Callable[[str], None]
 ) -> tuple[Exported | None, list[str]]:
-    """Export what was run, where that is asked for; where it is refused, the reasons, which people are told at once."""
+    """Export the run, if requested; where that is refused, returns the reasons, which people see at once."""
     if target is None:
         return None, []
     try:
@@ -335,7 +337,7 @@ def submit_and_tell(
     verbose: bool = False,
     json: bool = False,
 ) -> None:
-    """Hand a deck's or a plan's cases to SLURM, and say which jobs have them."""
+    """Submit a deck's or a plan's cases to SLURM, and print the jobs."""
     import json as json_module
 
     from batch.executors.submitting import submit
@@ -369,7 +371,7 @@ def _of_deck(
     verify: Verify,
     rows: str,
 ) -> Campaign:
-    """The campaign that is asked of a deck or a plan."""
+    """The requested campaign of a deck or a plan."""
     return prepare(
         read_plan(**dataclasses.asdict(request), quiet=quiet),
         output=output,
@@ -406,7 +408,7 @@ def _compared(again: Replay | None, unlike: Sequence[str], output: Path) -> list
 
 
 def first_picture(archive: ArchiveFile) -> tuple[Path | None, str]:
-    """The picture beside an archive; where there can be none, why not, in words."""
+    """The picture beside an archive; or the reason, in words, why there is none."""
     from batch.plotting import draw
 
     try:

@@ -1,4 +1,5 @@
-"""The answer of a search as `met run` and `met show` say it: the best, what binds, and the commands that follow."""
+"""The answer of a search in the output of `met run` and `met show`: the best, binding requirements, and next
+commands."""
 
 from __future__ import annotations
 
@@ -35,7 +36,7 @@ class SearchResult:
 
 
 def search_result(archive: ArchiveFile, group: ArchiveGroup) -> SearchResult | None:
-    """The answer of a group of an archive; None where it is no search, or some of its cases alone."""
+    """The answer of a group of an archive; None where it is not a search, or has only some of its cases."""
     answer = SearchAnswer.of(group)
     if answer is None:
         return None
@@ -52,7 +53,7 @@ def _shown(said: str, command: str) -> Sequence[str]:
 
 
 def _commands(archive: ArchiveFile, group: ArchiveGroup, answer: SearchAnswer) -> list[tuple[str, str]]:
-    """Commands that follow from an answer, each with what it is for."""
+    """Commands for the next steps after an answer, each with its purpose."""
     again = f"met run {quoted(archive.path)} --case '#{answer.position}'"
     if answer.search.kind == "search":
         return [("run it again:", again)]

@@ -1,4 +1,4 @@
-"""What explains a metric, as lines of the terminal and as data."""
+"""The sensitivity of a metric, as lines of the terminal and as data."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from batch.queries.summary import finite
 from ic.printing.columns import columns
 
 BAR = 20
-"""Characters of a bar that stands for all of the variance."""
+"""Length in characters of a bar for all of the variance."""
 
 
 def as_data(found: Sensitivity) -> dict[str, Any]:
@@ -26,7 +26,7 @@ def as_data(found: Sensitivity) -> dict[str, Any]:
 
 
 def sensitivity_lines(found: Sensitivity) -> list[str]:
-    """The inputs of one output, those that explain most first, and what is to be known besides."""
+    """The inputs of one output, those that explain most first, and further notes."""
     head = {"": found.name, FAILURE: "failing", "change": f"the change of {found.name}"}[found.of]
     counted = f"{found.cases:,} case{'s' * (found.cases != 1)}"
     if found.left and found.design:

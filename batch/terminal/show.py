@@ -1,4 +1,4 @@
-"""`met show`: an archive in a terminal. What was run, how it went, and its signals."""
+"""`met show`: an archive in a terminal: its run, its outcome, and its signals."""
 
 from __future__ import annotations
 
@@ -48,15 +48,16 @@ from met.outputs import quoted
 from met.plan.swept import blocks
 
 MOST_GROUPS = 4
-"""So many structures of a sweep are shown in full unless they are named; of more, their table alone."""
+"""Largest number of structures of a sweep that are shown in full unless they are named; with more, only their table is
+shown."""
 
 NARROWEST = 40
-"""Characters of a line beside a name, however long that is."""
+"""Smallest width in characters of a line beside a name, however long that is."""
 
 EVERYTHING = CaseSelection()
 
 PLOTS = 4
-"""Signals that are drawn unless some are asked for."""
+"""Number of signals that are drawn by default."""
 
 
 def show(
@@ -72,7 +73,7 @@ def show(
     colour: bool = False,
     plots: bool = True,
 ) -> str:
-    """The whole text: of all cases with their table, worst first or `by` what is asked for, or all about one `case`.
+    """The whole text: of all cases with their table, worst first or in the order `by`, or all about one `case`.
 
     By something, the cases of all structures of a sweep are in one table. some: the cases that the table is of; all
     else is of all of them.
@@ -107,7 +108,7 @@ def show(
         if plots and (signals or position is not None or not all_cases):
             out.drawn(_plots(archive, group, signals, position, width, colour))
         elif signals:
-            panels(group, signals)  # a name that is none is told, drawn or not
+            panels(group, signals)  # an unknown name is reported, drawn or not
     return "\n".join(out.lines).rstrip() + "\n"
 
 
@@ -118,7 +119,7 @@ def check_asked(archive: ArchiveFile, by: CaseOrder | None, some: CaseSelection)
 
 
 def show_evidence(archive: ArchiveFile, experiments: Sequence[str] = (), *, width: int = 100) -> str:
-    """The table of evidence of each run and sweep, or of these: what is required, and what the cases show of it."""
+    """The table of evidence of each run and sweep, or of these: the requirements with their evidence."""
     out = _Lines()
     out += [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
     named = groups_named(archive, tuple(experiments))
@@ -139,7 +140,7 @@ def _evidence(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> list[Requ
 
 
 class _Lines:
-    """Lines of text, visible, among them drawings, which are so already and may have colours."""
+    """Lines of text, made visible, and drawings, which are visible already and may have colours."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -161,7 +162,7 @@ def _about(
     some: CaseSelection,
     width: int,
 ) -> list[str]:
-    """Lines about how the cases went, and which of them how; or about one case, with what was varied in it."""
+    """Lines about the outcomes of the cases, or about one case, with its varied values."""
     if position is not None:
         varied = cases.varied_lines(archive, group, position)
         name = [case_text(group, position, varied=False)] if group.count > 1 else []
@@ -183,7 +184,7 @@ def _about(
 
 
 def _positions(archive: ArchiveFile, group: ArchiveGroup, some: CaseSelection) -> np.ndarray:
-    """Positions in a group of the cases that are asked for, among those of all structures of its sweep."""
+    """Positions in a group of the selected cases among those of all structures of its sweep."""
     name = group.sweep or group.name
     pool = Pool(name, [each for each in archive.groups if (each.sweep or each.name) == name])
     places = some.places(pool)
@@ -242,7 +243,7 @@ def as_json(
 
 
 def heading(group: ArchiveGroup, width: int) -> list[str]:
-    """Lines that say what was run."""
+    """Lines that describe the run."""
     a = group.attributes
     count = f"{group.run:,} case{'s' if group.run != 1 else ''}"
     if group.run < a["cases_in_table"]:
@@ -286,7 +287,7 @@ def _again(group: ArchiveGroup) -> str:
 
 
 def verdict(summary: Summary, width: int) -> list[str]:
-    """Lines that say how it went: cases, metrics, requirements."""
+    """Lines about the outcome: cases, metrics, requirements."""
     out = [_counts(summary)]
     out += failure_lines((*summary.failures, *summary.doubts), width)
     if summary.limited:
@@ -328,7 +329,7 @@ def verdict(summary: Summary, width: int) -> list[str]:
 
 
 def warning_lines(summary: Summary, width: int) -> list[str]:
-    """Lines of the warnings that errors by the step give, with what to do."""
+    """Lines of the warnings due to errors by the step, with remedies."""
     out = []
     for each in summary.warnings:
         said = [f"warning[{each.code}]: {each.message}", *(f"  help: {text}" for text in each.help)]
@@ -371,7 +372,7 @@ def _metric_table(summary: Summary) -> list[str]:
 
 
 def _metric_numbers(metric: MetricSummary, single: bool, columns: Sequence[SpreadColumn]) -> tuple[str, ...]:
-    """The numbers of a metric's finite values, as texts; `_metric_words` says how many others there are."""
+    """The numbers of a metric's finite values, as texts; `_metric_words` counts the others."""
     if single:
         return ("inf" if metric.infinite else _text(metric.median, metric),)
     return tuple(_text(getattr(metric, column.field), metric) for column in columns)

@@ -1,4 +1,4 @@
-"""What `met run` says: what will be run and kept before, what came of it and where it is after."""
+"""Output of `met run`: the announcement before it, and results and places after it."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
     from batch.export import Exported
 
 WORST = 3
-"""Cases of a sweep that the verdict names."""
+"""Number of cases of a sweep that the verdict names."""
 
 MOST_GROUPS = 4
-"""Structures of a sweep that are told of in full; of more, the table alone, and what failed."""
+"""Largest number of structures of a sweep that are reported in full; with more, only the table, and failures."""
 
 
-# What is said before
+# Before the run
 
 
 def announcement(campaign: Campaign, verbose: bool = False, *, notes: bool = False) -> list[str]:
-    """Lines that say what will run, and what will be kept. notes: also those of the plan, which `met plan` prints."""
+    """Lines that announce the cases and records. notes: also those of the plan, which `met plan` prints"""
     out = []
     for part in campaign.parts:
         out += _part_lines(part, verbose)
@@ -48,7 +48,7 @@ def announcement(campaign: Campaign, verbose: bool = False, *, notes: bool = Fal
 
 
 def writing(campaign: Campaign) -> str:
-    """The line that says where the archive will be, and how large: printed once there is a kernel to fill it."""
+    """The line with the place and size of the archive: printed once there is a kernel to fill it."""
     instead = ", in place of the one that is there" if campaign.output.exists() else ""
     most = "at most " * campaign.open_ended
     return f"writing {campaign.output}, {most}about {size_text(campaign.bytes)}{instead}"
@@ -92,7 +92,7 @@ def _part_lines(part: CampaignPart, verbose: bool) -> list[str]:
     return out
 
 
-# What is said after
+# After the run
 
 
 @frozen
@@ -108,8 +108,7 @@ class WorstCaseLines:
 
 
 def worst_cases(archive: ArchiveFile) -> tuple[WorstCaseLines, ...]:
-    """The worst cases of every experiment; none where there is one case, or nothing by which one would be worse than
-    another."""
+    """The worst cases of every experiment; none where there is one case, or no order among them."""
     from batch.queries import cases
 
     out = []
@@ -133,8 +132,8 @@ def result_lines(
     tables: Sequence[Sequence[str]],
     answers: Sequence[SearchResult | None] = (),
 ) -> list[str]:
-    """The verdict, and where everything is. seconds: by experiment; tables: of sweeps of several structures; answers:
-    of searches, by summary; none where there are none."""
+    """The verdict, and the places of everything. seconds: by experiment; tables: of sweeps of several structures;
+    answers: of searches, by summary"""
     answers = answers or (None,) * len(summaries)
     out: list[str] = []
     many = {s.sweep for s in summaries if sum(s.sweep == other.sweep for other in summaries) > MOST_GROUPS} - {""}
@@ -173,7 +172,7 @@ def result_lines(
         first = worst[0].first if worst[0].rows else f"#{part.experiment.cases.table[part.rows[0]]}"
         out.append(f"         met run {quoted(path)}{name} --case '{first}'")
     if not ok:
-        judged = [  # the cases that a tuning tried on its way may fail and miss anything
+        judged = [  # cases that a tuning tried on its way may fail and miss requirements
             each if answer is None or not answer.tunes else replace(each, failed=0, requirements=())
             for each, answer in zip(summaries, answers, strict=True)
         ]
@@ -187,7 +186,7 @@ def result_lines(
 
 
 def _may_be_verified(campaign: Campaign, summary: Summary) -> bool:
-    """True where nothing is known of the step's error, and nobody has said that it is not wanted."""
+    """True where the step's error is not known, and verification was not declined."""
     there = summary.metrics and summary.failed < summary.cases
     return bool(there) and summary.verified is None and campaign.verify != "none"
 
@@ -204,7 +203,7 @@ def _why_not(summaries: tuple[Summary, ...]) -> str:
 
 
 def short_result_lines(path: Path, summaries: tuple[Summary, ...]) -> list[str]:
-    """The verdict of an archive alone: for the log of a job."""
+    """The verdict of an archive alone, for the log of a job."""
     out: list[str] = []
     for summary in summaries:
         name = f"{summary.name}: " if len(summaries) > 1 else ""

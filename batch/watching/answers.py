@@ -1,7 +1,7 @@
 """A deck that is watched: compiled, as the page of one of its runs, and its cases run.
 
-The page comes first, for it needs nothing but the module, and computes what it shows. The cases are run behind it by
-the machine's own code, as `met run` runs them; the page compares its numbers with theirs, bit by bit.
+The page comes first, since it needs only the module, and computes its own results. The cases are then run by machine
+code, as in `met run`, and the page compares its numbers with theirs, bit by bit.
 """
 
 from __future__ import annotations
@@ -43,20 +43,19 @@ NOT_YET = -1
 """Status of a case that has yet to be run."""
 
 FIRST, SHARE, TELLING = 32, 0.2, 1.0
-"""Cases that are run first; seconds that further ones take before it is looked whether they are still wanted; and
-seconds after which it is told what there is so far."""
+"""Number of cases that are run first; seconds that further ones take before it is checked whether they are still
+wanted; and seconds after which results so far are reported."""
 
 ENDING = ".ic"
-"""The name of a deck ends so. What is named otherwise is watched where it is a deck."""
+"""The ending of a deck's name. A file of another name is watched if it is a deck."""
 
 MOST_LETTERS = 200_000
-"""Letters of messages that are shown."""
+"""Largest number of letters of messages that are shown."""
 
 
 @frozen
 class WatchedDeck:
-    """A deck as it was asked for on the command line: its name, its file, and options; settings as `--set` and `--vary`
-    have them."""
+    """A deck with its options on the command line: its name, its file; settings as of `--set` and `--vary`."""
 
     name: str
     file: Path
@@ -84,8 +83,8 @@ class DeckAnswer:
 
 
 def check(deck: WatchedDeck, name: str | None = None) -> None:
-    """Refuse what is not worth watching: a file that is no deck, and a run or sweep that the deck does not have. A deck
-    with other mistakes is watched until they are mended. Raises Problem."""
+    """Refuse a file that is not a deck, and a run or sweep that the deck does not have. A deck with other mistakes is
+    watched until they are corrected. Raises Problem."""
     is_named_so = deck.file.suffix == ENDING
     try:
         tree = read(deck.name, [Path(each) for each in deck.include_dirs], deck.defines, despite_errors=is_named_so)
@@ -108,7 +107,7 @@ def check(deck: WatchedDeck, name: str | None = None) -> None:
 
 
 def _no_deck(deck: WatchedDeck, found: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
-    """Mistakes of a file that is not named like a deck, with a word on why it is read as one."""
+    """Mistakes of a file that is not named like a deck, with a remark on why it is read as one."""
     kinds = ", ".join(ARCHIVES)
     helps = f"{deck.name} is read as a deck: its name does not end like an archive's ({kinds})"
     return (*found[:-1], replace(found[-1], help=(*found[-1].help, helps)))
@@ -154,7 +153,7 @@ def _words(diagnostics: Any, sources: Mapping[str, str]) -> str:
 
 
 def page(answer: DeckAnswer, prepared: Prepared) -> str:
-    """What the page of the run that is shown is given, before its cases are run: JSON."""
+    """The data of the shown run's page, before its cases are run: JSON."""
     experiment, plan = prepared.experiment, answer.plan
     assert plan is not None
     rows = shown_rows(experiment)
@@ -174,19 +173,19 @@ def kind_of(experiment: Experiment) -> str:
 
 
 def shown_rows(experiment: Experiment) -> np.ndarray:
-    """Rows of the case table that the page has and that are run."""
+    """Rows of the case table that are on the page and are run."""
     return np.arange(min(experiment.cases.count, MOST_CASES))
 
 
 class _GivenUp(Exception):
-    """The cases that are being run are no longer wanted."""
+    """Raised where the running cases are no longer wanted."""
 
 
 def run_cases(
     prepared: Prepared, stop: Callable[[], bool], progress: Callable[[int], None] = lambda _: None
 ) -> Iterator[Run]:
-    """Run the cases that the page has: what there is of them so far, now and then, and in the end; nothing more once
-    they are to stop, which ends a long case, too. Raises Problem, as `met run` does."""
+    """Run the page's cases, with intermediate results now and then and the final ones; nothing more once they are to
+    stop, which ends a long case, too. Raises Problem, as `met run` does."""
 
     def working(_: int) -> None:
         if stop():
@@ -213,7 +212,7 @@ def run_cases(
 
 
 def numbers(experiment: Experiment, run: Run) -> str:
-    """The outcome of the cases so far, as the page's script takes it: JSON."""
+    """The outcome of the cases so far, for the page's script: JSON."""
     count, done = len(shown_rows(experiment)), len(run.case)
     status = np.full(count, NOT_YET)
     status[:done] = run.status

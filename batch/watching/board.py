@@ -1,4 +1,4 @@
-"""What is shown now of a deck that is watched: written by the one who compiles, read by whoever serves pages."""
+"""The shown state of a watched deck: written by the compiling thread, read by the serving ones."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 KEPT = 4
-"""Pages, each as the data of its run, and numbers, that can still be fetched: the last ones."""
+"""Number of pages, each as the data of its run, and of numbers, that can still be fetched: the last ones."""
 
 
 class Board:
@@ -35,7 +35,7 @@ class Board:
         self._ended = False
 
     def tell(self, of: int | None = None, **changes: Any) -> None:
-        """Change entries of the state. of: the page that they are about, where they count only while it is shown."""
+        """Change entries of the state. of: the page that they concern, where they count only while it is shown"""
         with self._changed:
             if of in (None, self._state["page"]) and any(self._state[name] != value for name, value in changes.items()):
                 self._state.update(changes)
@@ -43,8 +43,8 @@ class Board:
                 self._changed.notify_all()
 
     def show(self, kind: str, text: str, of: int | None = None, **changes: Any) -> int:
-        """Put up a text, a `page` or `numbers`, and change other entries of the state with it; gives back its number.
-        of: as `tell` has it."""
+        """Store a text, a `page` or `numbers`, and change other entries of the state with it; returns its number. of:
+        as for `tell`"""
         with self._changed:
             texts = self._texts[kind]
             number = max(texts, default=0) + 1
@@ -55,18 +55,18 @@ class Board:
             return number
 
     def text(self, kind: str, number: int) -> bytes | None:
-        """A text that was put up; None where it is there no more."""
+        """A stored text; None where it has been dropped."""
         with self._changed:
             return self._texts[kind].get(number)
 
     def after(self, number: int, seconds: float) -> tuple[int, Mapping[str, Any] | None]:
-        """The state that follows that of this number, waited for so long at most; None where there is none yet."""
+        """The first state after that of this number, waiting at most this long; None where there is none yet."""
         with self._changed:
             self._changed.wait_for(lambda: self._number > number or self._ended, seconds)
             return self._number, dict(self._state) if self._number > number else None
 
     def choose(self, run: str, group: str | None) -> bool:
-        """Choose what is shown, for the one who compiles. False where there is no such run or group."""
+        """Choose the shown run, for the compiling thread. False where there is no such run or group."""
         with self._changed:
             if run not in self._state["names"] or (group is not None and group not in self._state["groups"]):
                 return False
@@ -74,17 +74,17 @@ class Board:
             return True
 
     def is_chosen(self) -> bool:
-        """True where something was chosen that nobody has taken."""
+        """True where a choice has not been taken yet."""
         return self._chosen is not None
 
     def take_chosen(self) -> tuple[str, str | None] | None:
-        """The choice that was made on the page since it was last asked for."""
+        """The choice that was made on the page since the last call."""
         with self._changed:
             chosen, self._chosen = self._chosen, None
             return chosen
 
     def end(self) -> None:
-        """Let everybody go who waits."""
+        """Release everybody who waits."""
         with self._changed:
             self._ended = True
             self._changed.notify_all()

@@ -1,7 +1,7 @@
-"""The files that a deck is made of, and when one of them has changed.
+"""The files of a deck, and detection of their changes.
 
 Editors write in many ways: over the file, or beside it and then by a rename; and some write a file that is as it was.
-So a file has changed when its bytes have, which are looked at only where its size, time or inode is another.
+So a file has changed when its bytes have, which are compared only where its size, time or inode differs.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from ic.text.lexer import COMMAND_LINE
 from met.host.files import read_regular
 
 PAUSE = 0.02
-"""Seconds between two looks, which take some 50 us."""
+"""Seconds between two checks, which take some 50 us."""
 
 SETTLED, LONGEST = 0.02, 0.5
-"""Seconds without a change after which a file counts as written; and the most that are waited for that."""
+"""Seconds without a change after which a file counts as written; and the longest wait for that."""
 
 NAMED, MOST_NAMED = re.compile(rb"""["<]([^"<>\x00-\x1f]{1,200})/[^"<>/\r\n]{1,200}[">]"""), 100
-"""A file in another folder, as decks name one, included or read; and how many of a file are heeded."""
+"""A file in another folder, as decks name one, included or read; and the largest number of them in a file."""
 
 Stamp = tuple[int, int, int] | None
 """Time, size and inode of a file; None where there is none."""
 
 
 class DeckFiles:
-    """The files and folders that are watched, as they were when they were last looked at."""
+    """The watched files and folders, as of the last check."""
 
     def __init__(self, deck: Path, include_dirs: Sequence[str] = ()) -> None:
         more = [each for each in os.environ.get("MET_DECK_PATH", "").split(os.pathsep) if each]
@@ -48,15 +48,15 @@ class DeckFiles:
         return tuple(self._stamps)
 
     def begin(self) -> float:
-        """Look at all files, before they are read; gives back when that was, for `found`."""
+        """Note all files, before they are read; returns the time, for `found`."""
         for path in self.paths:
             self._look(path)
         self._around = {folder: _stamp(folder) for folder in self._all_folders()}
         return time.time()
 
     def found(self, names: Iterable[str], begun: float) -> bool:
-        """Watch the files that a deck was read from since then, by the names that messages give them. True where one
-        that was not known has changed meanwhile, so that what was read of it is not known."""
+        """Watch the files from which a deck was read since then, by their names in messages. True where a new one has
+        changed meanwhile, so that the contents read are uncertain."""
         paths = dict.fromkeys([self._deck, *(path_of(name) for name in names if name != COMMAND_LINE)])
         new = [path for path in paths if path not in self._stamps]
         for path in [path for path in self._stamps if path not in paths]:
@@ -67,8 +67,8 @@ class DeckFiles:
         return any((stamp := self._stamps[path]) is not None and stamp[0] > begun * 1e9 for path in new)
 
     def changed(self, *, around: bool = False) -> bool:
-        """True if a file has other bytes than it had. around: or if in a folder something came, went or was renamed,
-        where a file that is looked for may be one."""
+        """True if the bytes of a file have changed. around: also if in a folder something came, went or was renamed,
+        where a searched file may be"""
         others = [path for path in self.paths if _stamp(path) != self._stamps[path]]
         changed = sum(map(self._look, others)) > 0
         if around and not changed:
@@ -77,7 +77,7 @@ class DeckFiles:
         return changed
 
     def wait(self, *, around: bool = False, until: Callable[[], bool] = lambda: False) -> None:
-        """Wait until something has changed and is written, or something else has happened."""
+        """Wait until something has changed and is written, or another event has occurred."""
         while not until():
             if self.changed(around=around):
                 self._settle()
@@ -85,7 +85,7 @@ class DeckFiles:
             time.sleep(PAUSE)
 
     def _settle(self) -> None:
-        """Wait while a file is being written, or has given up its name to one that is yet to take it."""
+        """Wait while a file is being written, or replaced by a rename."""
         end = time.monotonic() + LONGEST
         while time.monotonic() < end:
             before = {path: _stamp(path) for path in self.paths}
@@ -94,7 +94,7 @@ class DeckFiles:
                 return
 
     def _look(self, path: Path) -> bool:
-        """Take a file as it is now. True where its bytes are others."""
+        """Note a file's present state. True where its bytes have changed."""
         self._stamps[path] = _stamp(path)
         try:
             text = read_regular(path)
@@ -108,8 +108,8 @@ class DeckFiles:
         return before is not None and before != digest
 
     def _all_folders(self) -> list[Path]:
-        """Where a file is looked for: beside those that are watched, in the `-I` folders those of MET_DECK_PATH, and
-        in what a deck names of these, there or not."""
+        """Folders in which a file is searched: beside the watched ones, in the `-I` folders and those of MET_DECK_PATH,
+        and in folders that a deck names in these, existing or not."""
         named = [
             base / each
             for path, names in self._named.items()
@@ -120,7 +120,7 @@ class DeckFiles:
 
 
 def path_of(name: str) -> Path:
-    """The file that messages call so: `<servos/rigid_gearbox.ic>` is one of the standard library's."""
+    """The file of a name in messages: `<servos/rigid_gearbox.ic>` is one of the standard library's."""
     return LIBRARY / name[1:-1] if name.startswith("<") and name.endswith(">") else Path(name)
 
 

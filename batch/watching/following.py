@@ -1,8 +1,8 @@
 """`met view DECK`: wait until a deck is saved, compile it, show its run, run its cases; until the terminal is closed.
 
-The cases are run in a thread of their own, and given up when the deck is saved again, in the middle of one. A defect
-of MET ends neither: it is told in the terminal and on the page, and the next save is shown. Nothing is written but into
-the cache of compiled objects, so that whoever is killed in the middle leaves nothing.
+The cases are run in a thread of their own, and given up when the deck is saved again, in the middle of one. A defect of
+MET ends neither: it is reported in the terminal and on the page, and the next save is shown. Only the cache of compiled
+objects is written, so that a killed process leaves nothing behind.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from met.messages.visible import visible
 from met.run import Prepared, prepare
 
 HEAD_START_SECONDS = 0.25
-"""Seconds that a page has for itself before its cases are run: it is fetched and drawn meanwhile."""
+"""Seconds that a page has before its cases are run: it is fetched and drawn meanwhile."""
 
 PATIENCE_SECONDS = 2.0
-"""For cases that are given up, when all ends: a compiler is not to be left in the middle."""
+"""Seconds to wait at the end for cases that are given up, so that a compiler is not interrupted."""
 
 
 def follow(
@@ -62,8 +62,8 @@ def follow(
 
 
 class _Loop:
-    """The run that is shown, and the thread that runs its cases. name, group: asked for, or chosen on the page.
-    confess, tell: as `follow` has them; told once, tell is None."""
+    """The shown run, and the thread that runs its cases. name, group: requested, or chosen on the page; confess, tell:
+    as for `follow`, tell is None after its first call"""
 
     def __init__(
         self,
@@ -86,9 +86,9 @@ class _Loop:
         self._telling = threading.Lock()
 
     def run(self) -> None:
-        """Compile, show, wait; for ever."""
+        """Compile, show and wait, for ever."""
         again = self._sound()
-        gc.freeze()  # what stands at the start stays: looking through it takes a tenth of a save
+        gc.freeze()  # objects of the start are permanent: collecting over them takes a tenth of a save
         while True:
             if not again:
                 self._files.wait(around=self._is_broken, until=self._board.is_chosen)
@@ -98,13 +98,13 @@ class _Loop:
             again = self._sound()
 
     def give_up(self, seconds: float | None = None) -> None:
-        """Run no more cases of what is shown; wait until that is so, for so long at most."""
+        """Stop running the shown cases; wait for that, at most this long."""
         self._stop.set()
         if self._cases is not None and self._cases.is_alive():  # an interrupt may have come while it was started
             self._cases.join(seconds)
 
     def _sound(self) -> bool:
-        """What `_once` does; what nobody expected is told, and the deck is watched on."""
+        """Compile and show as `_once` does; unexpected errors are reported, and the deck is watched on."""
         try:
             return self._once()
         except Exception as mishap:
@@ -113,8 +113,8 @@ class _Loop:
             return False
 
     def _of(self, mishap: Exception) -> dict[str, Any]:
-        """What is shown of an error that is no mistake of the deck: of the machine's, or of MET's own, which stands in
-        the terminal too. To be called while it is handled."""
+        """The message about an error that is not a mistake of the deck: the machine's, or MET's own, which is also
+        printed in the terminal. To be called while it is handled."""
         told: dict[str, Any] = {"broken": True, "tried": time.time()}
         if isinstance(mishap, MemoryError | OSError):
             return told | {"messages": _words(Problem(of_machine(mishap)))}
@@ -122,7 +122,7 @@ class _Loop:
             return told | {"messages": visible(self._confess(mishap)), "fault": True}
 
     def _once(self) -> bool:
-        """Compile what is on the disk, and show it. True where that has changed meanwhile."""
+        """Compile the files on the disk, and show the result. True where they have changed meanwhile."""
         begun = self._files.begin()
         memo = AnalysisMemo(self._known)
         answer = answers.compiled(self._deck, self._name, self._group, memo)
@@ -146,7 +146,7 @@ class _Loop:
         return False
 
     def _show(self, answer: DeckAnswer, prepared: Prepared, told: dict[str, Any], begun: float) -> None:
-        """Put up the page, and begin to run its cases; where page and program are as they were, they stay."""
+        """Show the page, and begin to run its cases; an unchanged page or program stays."""
         experiment = prepared.experiment
         told |= {
             "run": experiment.name_in_deck, "group": experiment.name, "broken": False, "saved": begun, "tried": begun,
@@ -162,7 +162,7 @@ class _Loop:
         self._cases.start()
 
     def _run_cases(self, prepared: Prepared, page: int, stop: threading.Event) -> None:
-        """Run the cases of a page, and tell what comes of them while it is the one that is shown."""
+        """Run the cases of a page, and report their results while it is shown."""
         experiment, board = prepared.experiment, self._board
         total = len(answers.shown_rows(experiment))
 
@@ -171,7 +171,7 @@ class _Loop:
 
         if stop.wait(HEAD_START_SECONDS):
             return
-        while not self._running.acquire(timeout=HEAD_START_SECONDS):  # its compiler is not
+        while not self._running.acquire(timeout=HEAD_START_SECONDS):  # no compiler is running
             if stop.is_set():
                 return
             board.tell(page, doing="waiting for the end of what an earlier deck began")

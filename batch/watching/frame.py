@@ -1,7 +1,7 @@
-"""The page around the run of a deck that is watched: what `met check` says, which run is shown, how far it is.
+"""The page around the run of a watched deck: messages of `met check`, the shown run, and its progress.
 
-The run is a page of its own in it, which has all scripts, and no run at first. Each run that there is to show is given
-to it as data, takes the place of the one before, and is seen from where that was.
+The run is a page of its own in it, with all scripts, and no run at first. Each run to show is passed to it as data,
+replaces the one before, and keeps its viewpoint.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def _asset(name: str) -> str:
 
 @cache
 def frame() -> tuple[str, str]:
-    """The whole text, the same for each deck, and its content security policy."""
+    """The whole text, the same for each deck, with its content security policy."""
     script, style = _asset("frame.js"), "\n".join([inlined.style(), _asset("frame.css")])
     policy = (
         f"default-src 'none'; script-src {inlined.digest(script)}; style-src {inlined.digest(style)}; img-src data:; "
@@ -50,10 +50,11 @@ def frame() -> tuple[str, str]:
 
 @cache
 def page_of_runs() -> str:
-    """The whole text of the page in the frame, the same for each run; `assets/kept.js` gives it one after another."""
+    """The whole text of the page in the frame, the same for each run; `assets/kept.js` passes it one run after
+    another."""
     empty = {"kicker": "", "name": "", "lede": ""}
     return page_text(empty, [_asset("kept.js")], before=BY_CASE, style=_asset("kept.css"))
 
 
 FRAME_POLICY = "default-src 'none'; frame-ancestors 'none'"
-"""Of answers that are no page."""
+"""The policy of answers that are not pages."""

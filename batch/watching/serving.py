@@ -1,9 +1,8 @@
 """The page of a deck that is watched, over HTTP, on this machine alone and to one who has its address.
 
 Others use the machine too, and their browsers and programs reach every port of it; and any page in one's own browser
-can send requests there. So each request is refused that does not know the token in the address, that names another
-host than this one (a name that somebody has made lead here), or that another page has sent. Nothing of the disk is
-served: what can be asked for is five names.
+can send requests there. So requests are refused without the token in the address, with the name of another host (as
+after DNS rebinding), or from another page. Nothing of the disk is served: there are only five names to ask for.
 """
 
 from __future__ import annotations
@@ -31,20 +30,20 @@ HOST = "127.0.0.1"
 TOKEN_BYTES = 24
 
 MOST_OPEN = 64
-"""Connections at a time: a browser has two for all its pages. More are told to come again, so that nobody fills the
-memory with them."""
+"""Largest number of open connections: a browser has two for all its pages. Further ones are refused for a while, so
+that memory stays bounded."""
 
 FULL = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 1\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
-"""The answer to one who comes when all connections are taken."""
+"""The answer to a client when all connections are taken."""
 
 IDLE_SECONDS = 10.0
-"""A request that takes longer to come, as a whole, is given up; and so is one who takes longer to be answered."""
+"""Seconds for a whole request, and for a whole answer, after which the connection is closed."""
 
 ALIVE_SECONDS = 15.0
-"""Between two signs of life to a page that waits, by which one that has gone is noticed."""
+"""Seconds between two signs of life to a waiting page, by which a closed one is noticed."""
 
 MOST_CHOICE = 10_000
-"""Bytes of a choice."""
+"""Largest size of a choice in bytes."""
 
 SAFE = {
     "Cache-Control": "no-store",
@@ -54,11 +53,11 @@ SAFE = {
     "X-Content-Type-Options": "nosniff",
 }
 INNER_POLICY = "frame-ancestors 'self'"
-"""Besides what the page allows itself."""
+"""An additional policy besides the page's own."""
 
 
 class PageServer(ThreadingHTTPServer):
-    """Serves what is on the board until it is closed. Raises Problem E477 where the port cannot be had."""
+    """Server of the board until it is closed. Raises Problem E477 where the port cannot be had."""
 
     daemon_threads = True
     block_on_close = False
@@ -85,7 +84,7 @@ class PageServer(ThreadingHTTPServer):
         threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.5}, daemon=True).start()
 
     def end(self) -> None:
-        """Serve no more, and let everybody go who waits."""
+        """Stop serving, and release everybody who waits."""
         self.board.end()
         self.shutdown()
         self.server_close()
@@ -94,7 +93,7 @@ class PageServer(ThreadingHTTPServer):
         if self._open.acquire(blocking=False):
             super().process_request(request, client_address)
         else:
-            with suppress(OSError):  # nothing waits here: so little goes at once or not at all
+            with suppress(OSError):  # nothing waits here: a short answer goes at once or not at all
                 request.setblocking(False)
                 request.send(FULL)
             self.shutdown_request(request)
@@ -106,18 +105,18 @@ class PageServer(ThreadingHTTPServer):
             self._open.release()
 
     def server_bind(self) -> None:
-        """As of any server: that of HTTP asks a network what this machine is called."""
+        """Bind like a plain TCP server: the HTTP server's method asks a network for this machine's name."""
         TCPServer.server_bind(self)
         self.server_name, self.server_port = HOST, int(self.server_address[1])
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A connection that broke is nothing to tell."""
+        """Ignore a broken connection."""
         if not isinstance(sys.exception(), OSError):
             super().handle_error(request, client_address)
 
 
 class _InTime(io.RawIOBase):
-    """What comes over a connection within so many seconds, as a whole; afterwards reading raises TimeoutError."""
+    """The input of a connection, all of which must come within a time; afterwards reading raises TimeoutError."""
 
     def __init__(self, connection: socket, seconds: float) -> None:
         self._connection, self._seconds, self._end = connection, seconds, time.monotonic() + seconds
@@ -177,7 +176,7 @@ class _Request(BaseHTTPRequestHandler):
             self._refuse(HTTPStatus.BAD_REQUEST)
 
     def _asked(self, posted: bool = False) -> tuple[str | None, int]:
-        """The thing that is asked for behind the token, and its number; None where it was refused."""
+        """The requested name after the token, and its number; None where the request was refused."""
         hosts = self.headers.get_all("Host") or []
         if len(hosts) != 1 or hosts[0] not in self.server.hosts:
             return self._refuse(HTTPStatus.MISDIRECTED_REQUEST)
@@ -195,7 +194,7 @@ class _Request(BaseHTTPRequestHandler):
         return what, int(number or 0)
 
     def _events(self) -> None:
-        """The state each time that it changes, until the page goes or all ends."""
+        """Send the state each time that it changes, until the page is closed or the server ends."""
         self.send_response(HTTPStatus.OK)
         self._head("text/event-stream", FRAME_POLICY)
         self.end_headers()
@@ -224,18 +223,18 @@ class _Request(BaseHTTPRequestHandler):
             self.send_header(name, value)
 
     def _refuse(self, status: HTTPStatus) -> tuple[None, int]:
-        """An answer that says nothing of what there is."""
+        """Answer with a status only, which reveals nothing."""
         self.send_response(status)
         self.send_header("Content-Length", "0")
         self.end_headers()
         return None, 0
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Requests that cannot be read get the same."""
+        """Answer unreadable requests in the same way."""
         self._refuse(HTTPStatus(code))
 
     def log_message(self, format: str, *words: Any) -> None:
-        """Nothing is logged: an address holds the token."""
+        """Log nothing: an address holds the token."""
 
 
 def _is_number(text: str) -> bool:
