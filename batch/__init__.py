@@ -1,4 +1,4 @@
-"""Campaigns: many cases, run into archives that xarray opens as they are.
+"""Campaigns: many cases, run into archives that xarray opens directly.
 
 import batch
 archive = batch.run("two_link.ic")                      # -> two_link.h5
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @frozen
 class Archive:
-    """An archive on the disk, and what came of its cases, one summary an experiment."""
+    """An archive on disk, and the results of its cases, one summary for each experiment."""
 
     path: Path
     summaries: tuple[Summary, ...]
@@ -45,7 +45,7 @@ class Archive:
         return all(summary.ok for summary in self.summaries)
 
     def open(self) -> Any:
-        """Its contents as xarray has them (`batch.open`)."""
+        """The archive's contents as xarray objects (`batch.open`)."""
         return open(self.path)
 
 
@@ -79,7 +79,7 @@ def run(
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Archive:
-    """Run a plan's cases into an archive: what is missing of it, where an earlier run was interrupted.
+    """Run a plan's cases into an archive; after an interrupted run, only the missing ones.
 
     plan          a deck's path; what `ic.compile` gives; or a plan file (`met plan DECK -o p.json`)
     set, vary     of a deck: values in place of its own, and what a sweep of the run varies, as `ic.compile` has them
@@ -103,7 +103,7 @@ def run(
                   "worst:N:METRIC", the worst besides
     executor      who runs it, in place of threads, processes and dask (batch/executors)
 
-    Raises met.diagnostic.Problem for what a user can mend.
+    Raises met.diagnostic.Problem for mistakes that a user can correct.
     """
     from batch.campaigns.campaign import prepare
     from batch.campaigns.performing import perform
@@ -163,7 +163,7 @@ def linear(
     outputs: Sequence[str] = (),
     opened: Sequence[str] = (),
 ) -> LinearAnswer:
-    """Linearise the program of a plan's run, exactly, where a case is at an instant: docs/linear.md.
+    """Linearise the program of a plan's run exactly, at an instant of a case: docs/linear.md.
 
     experiment  name of a run or sweep; None: the plan's first
     case        row of the case table, `"#7"`, or the beginning of a case_id
@@ -221,8 +221,8 @@ def _plan(
     set: Mapping[str, object] | Sequence[str] = (),
     vary: Mapping[str, object] | Sequence[str] = (),
 ) -> Plan:
-    """A plan; the one in a plan file; or a deck compiled, its runs and sweeps of these names. TypeError for others, and
-    for values that are set or varied in a plan."""
+    """The plan: the given one, one from a plan file, or one from a deck, with its runs and sweeps of these names.
+    Raises TypeError for other arguments, and for values that are set or varied in a plan."""
     from met.plan import Plan
 
     if not isinstance(given, Plan | str | os.PathLike):
@@ -241,7 +241,7 @@ def _plan(
 
 
 def look(path: str | os.PathLike[str], notes: Sequence[str] = ()) -> Archive:
-    """An archive that exists, with its summaries."""
+    """An existing archive, with its summaries."""
     from batch.archive.read import ArchiveFile
     from batch.queries.summary import summarise
 
@@ -254,8 +254,8 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
 
     chunks  as xarray.open_dataset has it: `{}` for arrays of Dask, in the archive's own chunks
 
-    What it can besides is in `data.met` (batch.notebook): cases by what is varied in them, where links are, and more.
-    Of an archive of `--rows summary` it has the rows that were kept, which are no sample: it warns (UserWarning), and
+    Further methods are in `data.met` (batch.notebook): cases by varied parameters, positions of links, and more. From
+    an archive of `--rows summary` it has the rows that were kept, which are not a sample: it warns (UserWarning), and
     the attribute `summary_of_cases` is the number of cases of the summary.
     """
     from batch.archive.read import ArchiveFile, reading

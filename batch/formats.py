@@ -1,7 +1,7 @@
 """The formats that archives are exported to, by name.
 
-Everything that asks which formats there are asks here: `met export`, `met run -o FILE.ending`, what an archive must not
-be called, and what their help lists.
+All code that needs the list of formats uses this module: `met export`, `met run -o FILE.ending`, the check of an
+archive's name, and the help texts.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ FORMATS = {
 
 
 def format_of(path: Path) -> str | None:
-    """The name of the format that a file's ending says; None for any other ending."""
+    """The name of the format of a file's ending; None for any other ending."""
     ending = path.suffix.lower().removeprefix(".")
     return ending if ending in FORMATS else None
 

@@ -12,7 +12,7 @@ from met.frozen import frozen
 
 @frozen
 class LinearAnswer:
-    """The answer of `batch.linear`, as it is found (`found.poles`, `.natural`, `.loops`) and as data."""
+    """The answer of `batch.linear`, as found (`found.poles`, `.natural`, `.loops`) and as data."""
 
     found: Linearized
 
@@ -22,7 +22,7 @@ class LinearAnswer:
         return data.to_xarray(self.found)
 
     def state_space(self) -> Any:
-        """A `control.StateSpace` in discrete time. Raises Problem E451 where python-control is not there."""
+        """A `control.StateSpace` in discrete time. Raises Problem E451 where python-control is missing."""
         return data.state_space(self.found)
 
     def write(self, output: Path | str) -> None:

@@ -52,7 +52,7 @@ def to_xarray(found: Linearized) -> Any:
 
 
 def state_space(found: Linearized) -> Any:
-    """A `control.StateSpace` in discrete time, with names. Raises Problem E451 where python-control is not there."""
+    """A `control.StateSpace` in discrete time, with names. Raises Problem E451 where python-control is missing."""
     try:
         import control
     except ImportError as reason:
@@ -68,5 +68,5 @@ def state_space(found: Linearized) -> Any:
 
 
 def _word(name: str) -> str:
-    """A name without dots, which python-control keeps for signals of systems."""
+    """A name without dots, which python-control reserves for signals of systems."""
     return name.replace(".", "_")

@@ -16,21 +16,21 @@ from met.analysis.linear.answers import Linearized, LinearQuestion
 from met.diagnostic import Problem, error
 
 DAMPINGS = (0.1, 0.3, 0.5, 0.7)
-"""Ratios of damping of which lines are drawn."""
+"""Damping ratios for which lines are drawn."""
 
 MAP = "viridis"
 """Colours of the cases, from the least value to the largest."""
 
 ROOM = 1.05
-"""Times the fastest turning pole that the plane of s shows."""
+"""Extent of the s plane, relative to the fastest rotating pole."""
 
 WIDE, LEAST_SWING = 1.5, 0.05
-"""Times its height that the plane of s is wide at most, where something swings: a share of its width and more. What
-decays faster is in the plane of z."""
+"""Largest width of the s plane, relative to its height, where a pole oscillates: with at least this share of the width.
+Poles that decay faster are shown only in the z plane."""
 
 
 def draw(question: LinearQuestion, answers: Sequence[Linearized | str], output: Path) -> None:
-    """Draw the poles of all cases that have an answer. Raises Problem E450 where none has one, E305, E326."""
+    """Draw the poles of all cases that have an answer. Raises Problem E450 where there are none, E305, E326."""
     import matplotlib
 
     style: Any = STYLE
@@ -88,7 +88,7 @@ def figure(question: LinearQuestion, answers: Sequence[Linearized | str]) -> Any
 
 
 def _coordinate(question: LinearQuestion) -> tuple[np.ndarray, str]:
-    """The values by which cases are coloured, [case], in the deck's unit, and what they are of."""
+    """The values by which cases are coloured, [case], in the deck's unit, and their label."""
     cases = question.experiment.cases
     if not cases.coordinates:
         return np.arange(float(cases.count)), "case"
@@ -98,7 +98,7 @@ def _coordinate(question: LinearQuestion) -> tuple[np.ndarray, str]:
 
 
 def _circle(axes: Any) -> None:
-    """The edge of what is stable, and curves of equal damping within it, from z = 1 to the half of the rate."""
+    """The stability limit, and curves of equal damping within it, from z = 1 to half of the sampling rate."""
     turn = np.linspace(0.0, math.pi, 400)
     axes.plot(np.cos(turn), np.sin(turn), color=FAINT, linewidth=1.0)
     for ratio in DAMPINGS:
@@ -111,7 +111,7 @@ def _circle(axes: Any) -> None:
 
 
 def _damping(axes: Any) -> None:
-    """Rays of equal damping from s = 0 to the ends of the axes, each with its ratio, and the edge of what is stable."""
+    """Rays of equal damping from s = 0 to the ends of the axes, each with its ratio, and the stability limit."""
     left, right = axes.get_xlim()
     top = ROOM * axes.get_ylim()[1]
     if top > LEAST_SWING * -left:

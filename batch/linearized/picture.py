@@ -14,21 +14,21 @@ from met.analysis.linear.answers import Linearized, OpenLoop
 from met.diagnostic import Problem, error
 
 POINTS = 1500
-"""Frequencies of a curve."""
+"""Number of frequencies of a curve."""
 
 DECADES = 5
-"""Of a Bode picture, below the highest frequency that a loop sees."""
+"""Decades of a Bode picture, below the highest frequency that a loop sees."""
 
 LEAST_DEGREES, MOST_MARKS = 100.0, 8
-"""Of an axis of phases: its length, and marks on it before they are set wider apart."""
+"""Smallest length of an axis of phases, deg, and the number of marks on it above which they are set wider apart."""
 
 STEPS = 2000
-"""Periods of a step's picture, at most."""
+"""Largest number of periods in a picture of a step."""
 
 
 def draw(found: Linearized, output: Path) -> None:
-    """Draws what there is: of each opened loop its Bode and Nichols curves, with margins marked; of inputs and outputs
-    the answers to steps. Raises Problem E450 where there is neither, E305, E326."""
+    """Draw the available pictures: the Bode and Nichols curves of each opened loop, with margins marked; the responses
+    of outputs to steps of inputs. Raises Problem E450 where there is neither, E305, E326."""
     import matplotlib
 
     style: Any = STYLE
@@ -100,7 +100,7 @@ def _bode(size: Any, phase: Any, loops: list[OpenLoop], found: Linearized) -> No
 
 
 def _plain_numbers(axis: Any) -> None:
-    """Writes the numbers of a logarithmic axis without powers."""
+    """Write the numbers of a logarithmic axis without powers."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -108,13 +108,13 @@ def _plain_numbers(axis: Any) -> None:
 
 
 def _turned(L: np.ndarray) -> np.ndarray:
-    """The phase of a curve without jumps, the turn of its low end between -360 and 0 deg."""
+    """The phase of a curve without jumps, shifted so that its low end is between -360 and 0 deg."""
     turned = np.unwrap(np.angle(L))
     return np.asarray(turned - 2.0 * math.pi * math.ceil(turned[0] / (2.0 * math.pi)))
 
 
 def _degrees(axis: Any) -> tuple[float, float]:
-    """Marks an axis of phases every 45 deg, or 90, or 180 where it is long, and gives its ends: at least two marks are
+    """Mark an axis of phases every 45 deg, or 90, or 180 where it is long, and set its ends: at least two marks are
     between them."""
     from matplotlib.ticker import MultipleLocator
 

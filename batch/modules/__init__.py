@@ -1,1 +1,1 @@
-"""What whoever runs an experiment's module of WebAssembly must know of it, a program or a page."""
+"""Descriptions of experiments' WebAssembly modules, for programs and pages that run them."""

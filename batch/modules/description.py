@@ -1,4 +1,4 @@
-"""What a program must know of an experiment's module to run it and to show its numbers, as JSON has it."""
+"""The description of an experiment's module, as JSON, by which a program runs it and shows its numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FORMAT = "met module 1"
 """Name and version of the description."""
 
 MOST_CASES = 1_000
-"""Cases whose inputs are listed; of more, the first ones are."""
+"""Number of cases whose inputs are listed; if there are more, the first ones are."""
 
 
 def described(prepared: Prepared, module: WasmModule) -> dict[str, Any]:

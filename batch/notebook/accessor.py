@@ -1,4 +1,4 @@
-"""`data.met`: what an archive's Dataset can do besides what xarray lets every Dataset do."""
+"""`data.met`: MET's own methods of an archive's Dataset in xarray."""
 
 from __future__ import annotations
 
@@ -34,11 +34,12 @@ def without_internals(function: Callable[P, T]) -> Callable[P, T]:
 
 
 class Accessor(Generic[Data]):
-    """An archive's cases, chosen by what is varied in them and unfolded over it; where the links are; what was run.
+    """An archive's cases, selected by their varied parameters and unfolded over these; poses of links; and the plan
+    that was run.
 
     Selections and blocks are made of the Dataset alone. `frames`, `parameters`, `evidence`, `plan` and `sources` read
-    the archive that it was opened from, which must still be the same one. Everything raises met.diagnostic.Problem for
-    what a user can mend.
+    the archive that it was opened from, which must still be the same one. All methods raise met.diagnostic.Problem for
+    mistakes that a user can correct.
     """
 
     def __init__(self, data: Data) -> None:
@@ -46,7 +47,7 @@ class Accessor(Generic[Data]):
 
     @without_internals
     def sel(self, wanted: Mapping[str, Any] | None = None, /, **more: Any) -> Data:
-        """The cases that are as wanted in every respect, and of their histories those that are kept.
+        """The cases that match all conditions, with their kept histories.
 
         By path in the deck, or by name of a metric or of any other variable that each case has one of:
 
@@ -131,8 +132,8 @@ class Accessor(Generic[Data]):
 
     @without_internals
     def evidence(self) -> Any:
-        """The evidence of the cases for each requirement at each design point, a row each of a pandas.DataFrame: the
-        table of `met show --evidence`, numbers in SI. Of all cases, so ask before any are chosen."""
+        """The evidence of the cases for each requirement at each design point, as a pandas.DataFrame with a row each:
+        the table of `met show --evidence`, numbers in SI. It is about all cases, so ask before selecting any."""
         from batch.notebook.evidence import table
 
         return table(source.file_of(self._data), self._parts())
@@ -140,7 +141,7 @@ class Accessor(Generic[Data]):
     @property
     @without_internals
     def plan(self) -> Plan:
-        """The plan that was run, whole: what the deck means."""
+        """The whole plan that was run."""
         with source.archive(source.file_of(self._data), self._parts()) as file:
             return file.plan()
 

@@ -1,4 +1,4 @@
-"""What the cases of an archive show of each requirement, as a table."""
+"""The evidence of an archive's cases for each requirement, as a table."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def table(path: Path, parts: Mapping[str, xarray.Dataset]) -> Any:
 
 
 def _column(values: list[Any]) -> np.ndarray:
-    """Words as they are; numbers as such, with not-a-number where there is none."""
+    """Words unchanged; numbers as floats, with not-a-number where there is none."""
     if any(isinstance(value, str) for value in values):
         return np.array(values, object)
     return np.array([np.nan if value is None else value for value in values])

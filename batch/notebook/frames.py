@@ -1,4 +1,4 @@
-"""Where the links are: from the q of a Dataset, and the plan in its archive. The same functions as the export's."""
+"""Poses of links, from the q of a Dataset and the plan in its archive, by the same functions as for exports."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from met.plan.channel import OF_LINK
 
 LINK = "link"
 OWN = frozenset({"position", "orientation", LINK, "axis", "quaternion"})
-"""Names of what is computed; a deck's that is one of them gets a word before it, as in an archive."""
+"""Names of computed variables; a deck's name that equals one of them gets a word before it, as in an archive."""
 
 TOLD = {name: {"units": unit, "long_name": doc, "frame": frame} for name, unit, doc, _, frame in OF_LINK}
-"""Attributes of a link's position and orientation, as an archive has them where these are recorded."""
+"""Attributes of a link's position and orientation, as in an archive where these are recorded."""
 
 
 def frames(
     path: Path, parts: Mapping[str, xarray.Dataset], links: Sequence[str], *, whole: bool = False
 ) -> dict[str, xarray.Dataset]:
-    """Frames in the world of these links, none: of all, by Dataset of an archive; one that has none of the links is
-    left out. whole: every case has to have its history. Raises Problem E328, E370, E385, E389."""
+    """Frames in the world of these links, by Dataset of an archive (none: of all); one without any of the links is left
+    out. whole: every case must have its history. Raises Problem E328, E370, E385, E389."""
     out: dict[str, xarray.Dataset] = {}
     known: dict[str, None] = {}
     for name, data in parts.items():
@@ -98,14 +98,14 @@ def _stacked(links: Sequence[np.ndarray], unknown: np.ndarray) -> np.ndarray:
 
 
 def _all_recorded(data: xarray.Dataset, group: ArchiveGroup) -> None:
-    """Raises Problem E328 where a case has no history."""
+    """Raise Problem E328 where a case has no history."""
     recorded = data[RECORDED].values if RECORDED in data.coords else np.empty(0)
     for case in data[CASE].values[~np.isin(data[CASE].values, recorded)] if CASE in data.coords else ():
         group.recorded_position(f"#{int(case)}")
 
 
 def _positions(data: xarray.Dataset, own: Experiment) -> tuple[xarray.DataArray, ...]:
-    """q of each joint that moves, over the same dimensions, cases first; rad or m. Raises Problem E370."""
+    """q of each moving joint, over the same dimensions, cases first; rad or m. Raises Problem E370."""
     units = {joint.name: "m" if joint.kind == "prismatic" else "rad" for joint in own.structure.moving}
     found = {joint: _position(data, joint, unit) for joint, unit in units.items()}
     lacking = [joint for joint, q in found.items() if q is None]
@@ -135,7 +135,7 @@ def _base(data: xarray.Dataset, own: Experiment, instants: xarray.DataArray, val
 
 
 def _position(data: xarray.Dataset, joint: str, unit: str) -> xarray.DataArray | None:
-    """q of a joint, as a signal of its own or as one of all joints'."""
+    """q of a joint, as a signal of its own or as part of all joints' signal."""
     if f"{joint}.{POSITION}" in data:
         q = data[f"{joint}.{POSITION}"]
     elif POSITION in data:
@@ -157,13 +157,13 @@ def _of_joints(array: xarray.DataArray) -> bool:
 
 
 def _instants(data: xarray.Dataset) -> xarray.DataArray:
-    """Zeros over cases and time, where no joint moves."""
+    """Zeros over cases and time, for an arm without moving joints."""
     dims = [dim for dim in (RECORDED, "time") if dim in data.dims]
     return xarray.DataArray(np.zeros([data.sizes[dim] for dim in dims]), {dim: data[dim] for dim in dims}, dims)
 
 
 def _cases(data: xarray.Dataset, q: xarray.DataArray) -> np.ndarray:
-    """Positions in the case table of the cases whose q it is. Raises Problem E389."""
+    """Positions in the case table of the cases of this q. Raises Problem E389."""
     for name in (RECORDED, CASE):
         if name in q.coords:
             return np.atleast_1d(np.asarray(q[name].values))

@@ -15,7 +15,7 @@ from met.distinct import distinct
 from met.frozen import frozen
 
 EMPTIEST, SMALL = 100, 1_000_000
-"""So many places for each case a block may have at most, and so many whatever its cases are."""
+"""Largest number of places in a block for each case, and a number of places that is always allowed."""
 
 
 @frozen
@@ -30,8 +30,8 @@ class GridAxis:
 
 
 def to_grid(parts: Sequence[xarray.Dataset], names: Sequence[str]) -> xarray.Dataset:
-    """Variables that lie along cases, over what is varied; none: all metrics. Parameters that are varied in step share
-    a dimension, and one that is the same in all cases is a coordinate without one. Where there is no case it is
+    """Variables along cases, unfolded over the varied parameters; none: all metrics. Parameters that vary in step share
+    a dimension, and one that is the same in all cases is a coordinate without one. Places without a case are
     not-a-number. Raises Problem E385, E388."""
     sweeps = list(dict.fromkeys(run_name(data) for data in parts))
     if len(sweeps) > 1:
@@ -62,7 +62,8 @@ def to_grid(parts: Sequence[xarray.Dataset], names: Sequence[str]) -> xarray.Dat
 
 
 def _block(parts: Sequence[xarray.Dataset], name: str, dim: str, inner: Collection[str]) -> xarray.DataArray:
-    """inner: dimensions of the variables; a parameter of such a name gets a word before it, as in an archive."""
+    """The block of one variable. inner: dimensions of the variables; a parameter of such a name gets a word before it,
+    as in an archive"""
     count = sum(data.sizes[dim] for data in parts)
     if not count:
         raise Problem(error("E388", f"there are no cases of which `{name}` could be"))
@@ -100,7 +101,8 @@ def _block(parts: Sequence[xarray.Dataset], name: str, dim: str, inner: Collecti
 
 
 def _columns(parts: Sequence[xarray.Dataset], dim: str) -> dict[str, xarray.DataArray]:
-    """Varied parameters, by path, over all cases; what a structure lacks is not-a-number in it, or no word."""
+    """Varied parameters, by path, over all cases; one that a structure lacks is not-a-number there, or an empty
+    word."""
     tables = [varied(data, dim) for data in parts]
     out = {}
     for path in dict.fromkeys(path for table in tables for path in table):
@@ -116,12 +118,12 @@ def _columns(parts: Sequence[xarray.Dataset], dim: str) -> dict[str, xarray.Data
 
 
 def _held(data: xarray.Dataset, table: Mapping[str, xarray.DataArray], path: str) -> xarray.DataArray | None:
-    """A varied parameter of one Dataset, or the only repeat where nothing is repeated; None where it has no such."""
+    """A varied parameter of one Dataset, or the only repeat where nothing is repeated; None where it has neither."""
     return data[path] if path not in table and path == REPEAT and path in data.variables else table.get(path)
 
 
 def _axes(columns: Mapping[str, xarray.DataArray]) -> tuple[list[GridAxis], dict[str, Any]]:
-    """The dimensions, in the deck's order; and by path what all cases share."""
+    """The dimensions, in the deck's order; and by path the values that all cases share."""
     axes: list[GridAxis] = []
     alike: dict[str, Any] = {}
     for path, column in columns.items():
@@ -147,7 +149,8 @@ def _axes(columns: Mapping[str, xarray.DataArray]) -> tuple[list[GridAxis], dict
 
 
 def _labels(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The different values, numbers rising, words as they come; and which of them each is."""
+    """The distinct values, numbers ascending, words in their order of appearance; and the index of each value among
+    them."""
     labels, first, codes = np.unique(values, return_index=True, return_inverse=True)
     if values.dtype.kind in "iuf":
         return labels, codes
@@ -158,7 +161,7 @@ def _labels(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _each_once(
     parts: Sequence[xarray.Dataset], dim: str, places: np.ndarray, columns: Mapping[str, xarray.DataArray]
 ) -> None:
-    """Raises Problem E388 where two cases are at one place."""
+    """Raise Problem E388 where two cases are at one place."""
     order = np.argsort(places, kind="stable")
     twice = np.flatnonzero(np.diff(places[order]) == 0)
     if not len(twice):

@@ -1,4 +1,4 @@
-"""All parameters of one case, with who wrote them."""
+"""All parameters of one case, with their origins."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def table(path: Path, data: xarray.Dataset, case: int) -> Any:
 
 
 def _column(values: list[Any]) -> np.ndarray:
-    """Values as they are: a list of words and lists of numbers too is no array of more dimensions."""
+    """The values as an array of one dimension, even if they are lists."""
     out = np.empty(len(values), object)
     out[:] = values
     return out

@@ -1,4 +1,4 @@
-"""Numbers with units as somebody types them, `"20 kN*m/rad"`, and variables in other units."""
+"""Numbers with units in a user's notation, `"20 kN*m/rad"`, and variables in other units."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s
 
 
 def number(given: Any, name: str, unit: str) -> float:
-    """A value that was given for a variable, in its unit: a number is taken as it is, a text has a unit of its own.
-    Raises Problem E386."""
+    """A value given for a variable, in the variable's unit: a number is taken directly, a text has its own unit. Raises
+    Problem E386."""
     if isinstance(given, xarray.DataArray) and given.ndim == 0 and given.dtype.kind in "iuf":
         own, told = _measure(unit, name), str(given.attrs.get("units", unit))
         measure = _measure(told, name)
@@ -44,7 +44,7 @@ def number(given: Any, name: str, unit: str) -> float:
 
 
 def same_units(arrays: Mapping[str, xarray.DataArray], name: str) -> None:
-    """Raises Problem E386 where a variable is in other units in one Dataset than in another."""
+    """Raise Problem E386 where a variable has different units in two Datasets."""
     own = {path: str(array.attrs.get("units", "")) for path, array in arrays.items()}
     if len(set(own.values())) > 1:
         some = {unit: path.lstrip("/") for path, unit in reversed(own.items())}
@@ -53,8 +53,8 @@ def same_units(arrays: Mapping[str, xarray.DataArray], name: str) -> None:
 
 
 def in_units(data: xarray.Dataset, wanted: Mapping[str, str] | None) -> xarray.Dataset:
-    """Variables in these units; None: parameters and metrics as the deck writes them. What is repeated along
-    recorded_case follows. Raises Problem E386."""
+    """Variables in these units; None: parameters and metrics in the deck's units. Repeated variables along
+    recorded_case follow. Raises Problem E386."""
     changed: dict[Any, xarray.Variable] = {}
     for name, unit in (deck_units(data) if wanted is None else wanted).items():
         changed |= {each: _converted(data[each].variable, name, unit) for each in named(data, name)}
@@ -64,7 +64,7 @@ def in_units(data: xarray.Dataset, wanted: Mapping[str, str] | None) -> xarray.D
 
 
 def named(data: xarray.Dataset, name: str) -> list[Any]:
-    """The variables that are meant by a name, or by a path in the deck."""
+    """The variables with a name, or with a path in the deck."""
     return [each for each, array in data.variables.items() if name in (each, path_of(str(each), array.attrs))]
 
 
@@ -78,7 +78,7 @@ def deck_units(data: xarray.Dataset) -> dict[str, str]:
 
 
 def in_deck_unit(values: Iterable[float], attributes: Mapping[str, Any]) -> list[str]:
-    """Values of a variable as a deck would write them, to ten digits: what `number` reads back."""
+    """Values of a variable in the deck's notation, to ten digits, which `number` reads back."""
     unit, shown = str(attributes.get("units", "")), str(attributes.get("deck_unit", attributes.get("units", "")))
     if not _known(unit) or not _known(shown):
         unit = shown = ""

@@ -1,4 +1,4 @@
-"""Cases by what is varied in them, with units; by their places and ids; by how they ended."""
+"""Selection of cases by their varied values, with units; by their places and ids; by how they ended."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ from met.diagnostic import Problem, did_you_mean, error
 from met.distinct import distinct
 
 CLOSE = 1e-9
-"""Relative: a number that somebody types is one that the archive has, within this. The engine's rounding is 1e-16."""
+"""Relative tolerance within which a typed number equals one of the archive. The engine's rounding is 1e-16."""
 
 ZERO = 1e-14
-"""The same of 0, relative to the largest of the values: -1 + 10 * 0.1 is 0 but for its rounding."""
+"""The tolerance for 0, relative to the largest of the values: -1 + 10 * 0.1 is 0 only up to rounding."""
 
 RUN, FAILED, MET, MISSED = "run", "failed", "met", "missed"
-"""Words by which cases are chosen besides names of variables: the run or sweep; True for those that did not reach their
-end, that met every requirement, that missed one."""
+"""Words for selecting cases besides names of variables: the run or sweep; True for those that did not reach their end,
+that met every requirement, that missed one."""
 
 NEAREST = 2
-"""Values that are told where none is the one asked for."""
+"""Number of nearest values that a message names where none is the wanted one."""
 
 Parts = Mapping[str, xarray.Dataset]
 """Datasets of an archive, by path."""
 
 
 def selected(parts: Parts, wanted: Mapping[str, Any]) -> dict[str, xarray.Dataset]:
-    """Keep the cases that are as wanted, by name of a variable or path in the deck.
+    """Keep the cases that match, by name of a variable or path in the deck.
 
     A name is of numbers (a number, a text with a unit, a list of these, or a slice, both ends in it), of words (one,
     or a list), or one of the words above. A Dataset without such cases is left out, unless it is the only one. One
@@ -66,7 +66,7 @@ def selected(parts: Parts, wanted: Mapping[str, Any]) -> dict[str, xarray.Datase
 def _masks(
     parts: Parts, dims: Mapping[str, str], known: Mapping[str, Mapping[str, xarray.DataArray]], name: str, value: Any
 ) -> dict[str, np.ndarray]:
-    """For each Dataset, which of its cases are as one name wants them."""
+    """For each Dataset, a mask of the cases that match one condition."""
     if name == CASE and not isinstance(value, slice):
         return _named(parts, dims, value)
     found = {path: variables[name] for path, variables in known.items() if name in variables}
@@ -88,7 +88,7 @@ def _masks(
 
 
 def _names(data: xarray.Dataset, dim: str) -> list[str]:
-    """Names by which cases are chosen most of the time."""
+    """The usual names for selecting cases."""
     metrics = [str(name) for name in data if data[name].attrs.get("role") == "metric"] if dim == CASE else []
     return [*varied(data, dim), *metrics, CASE, *((FAILED, MET, MISSED) if dim == CASE else ())]
 
@@ -135,7 +135,7 @@ def _largest(values: np.ndarray) -> float:
 
 
 def _no_such(values: np.ndarray, value: float, given: Any, name: str, attributes: Mapping[str, Any]) -> Problem:
-    """E387, with the values next to the one that no case has."""
+    """The error E387, with the nearest values to the one that no case has."""
     finite = distinct(values[np.isfinite(values)])
     nearest = np.sort(finite[np.argsort(np.abs(finite - value), kind="stable")[:NEAREST]])
     unit, shown = (str(attributes.get(key, "")) for key in ("units", "deck_unit"))
@@ -148,7 +148,7 @@ def _no_such(values: np.ndarray, value: float, given: Any, name: str, attributes
 
 
 def _named(parts: Parts, dims: Mapping[str, str], wanted: Any) -> dict[str, np.ndarray]:
-    """For each Dataset, which of its cases have these names, as `--case` takes them, or these positions."""
+    """For each Dataset, a mask of the cases with these names, as `--case` takes them, or these positions."""
     rows = {path: data[dims[path]].values for path, data in parts.items()}
     ids = [_ids(data, dims[path]) for path, data in parts.items()]
     every, every_id = np.concatenate(list(rows.values())), np.concatenate(ids)
@@ -171,7 +171,7 @@ def _ids(data: xarray.Dataset, dim: str) -> np.ndarray:
 
 
 def _ended(data: xarray.Dataset, dim: str, name: str, wanted: Any) -> np.ndarray:
-    """True for each case that ended as wanted. Raises Problem E385, E386."""
+    """True for each case that ended in this way. Raises Problem E385, E386."""
     if not isinstance(wanted, bool | np.bool_):
         raise Problem(error("E386", f"`{name}` = {wanted!r}: it is True or False"))
     needed = "status" if name == FAILED else "met"
@@ -197,7 +197,7 @@ def _of_runs(parts: Parts, wanted: Any) -> dict[str, xarray.Dataset]:
 
 
 def _cut(data: xarray.Dataset, dim: str, mask: np.ndarray) -> xarray.Dataset:
-    """A Dataset of these cases alone, and of the histories that are theirs."""
+    """A Dataset of these cases only, with their histories."""
     keep: dict[Hashable, Any] = {dim: np.flatnonzero(mask)}
     if dim == CASE and RECORDED in data.dims:
         keep[RECORDED] = np.flatnonzero(np.isin(data[RECORDED].values, data[CASE].values[mask]))
@@ -210,7 +210,7 @@ def _one(wanted: Mapping[str, Any]) -> bool:
 
 
 def _alone(data: xarray.Dataset, name: Any) -> xarray.Dataset:
-    """The Dataset of a single case, which is no dimension any more; without signals where it has none."""
+    """The Dataset of a single case, without a dimension of cases; without signals where it has none."""
     dim = dimension(data)
     if data.sizes[dim] != 1:
         raise Problem(error("E387", f"case {name!r} is none of those that are chosen by the other values"))
@@ -225,7 +225,7 @@ def _listed(wanted: Any) -> Sequence[Any]:
 
 
 def _item(given: Any) -> Any:
-    """The value in an array of no dimensions, and anything else as it is."""
+    """The value in an array of no dimensions, and anything else unchanged."""
     return given.item() if isinstance(given, xarray.DataArray) and given.ndim == 0 else given
 
 

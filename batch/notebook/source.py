@@ -1,4 +1,4 @@
-"""The archive that a Dataset's numbers came from, asked for what the Dataset itself does not hold."""
+"""The archive of a Dataset's numbers, for data that the Dataset itself does not hold."""
 
 from __future__ import annotations
 

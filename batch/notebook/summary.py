@@ -1,4 +1,4 @@
-"""What a Dataset of an archive is, in a few lines."""
+"""A summary of an archive's Dataset in a few lines."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from met.distinct import distinct
 from met.run import DONE
 
 FEW = 5
-"""So many different values are listed."""
+"""Largest number of distinct values that are listed."""
 
 
 def summary(data: xarray.Dataset) -> str:
-    """Text about a Dataset: what was run, how many cases are here, how they ended, what is varied in them."""
+    """Text about a Dataset: its run, the number of its cases, how they ended, and its varied parameters."""
     if not name_of(data):
         return "a Dataset that is of no archive of MET"
     deck = str(data.attrs.get("deck", "")).strip("<>")
@@ -46,8 +46,8 @@ def summary(data: xarray.Dataset) -> str:
 
 
 def _answered(data: xarray.Dataset) -> list[str]:
-    """The requirements of a search in the cases of its answer, which its archive says; none where that is gone, or was
-    opened in part."""
+    """The requirements of a search in the cases of its answer, from its archive; none where that is gone, or was opened
+    in part."""
     try:
         with experiment(file_of(data), data) as (_, group):
             answer = SearchAnswer.of(group)
@@ -70,7 +70,7 @@ def _cases(data: xarray.Dataset) -> str:
 
 
 def _values(array: xarray.DataArray) -> str:
-    """The different values, few of them, or from where to where they are; in the deck's unit."""
+    """The distinct values if they are few, or their range; in the deck's unit."""
     values = distinct(array.values)
     numbers = values.dtype.kind in "iuf"
     if len(values) <= FEW:

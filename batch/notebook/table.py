@@ -1,4 +1,4 @@
-"""The cases of Datasets: along which dimension they lie, what is varied in them, and what they are called."""
+"""The cases of Datasets: their dimension, their varied parameters, and their names."""
 
 from __future__ import annotations
 
@@ -18,12 +18,11 @@ PREFIX = "recorded."
 NO_HISTORIES = "no signals of these cases were kept: `met run ... --histories all` keeps them"
 
 MOST_NAMES = 12
-"""So many of what there is are listed where something is not."""
+"""Largest number of existing names that are listed where a name is unknown."""
 
 
 def dimension(data: xarray.Dataset) -> str:
-    """Along which dimension the cases of a Dataset lie: recorded_case where only signals are left. Raises Problem
-    E385."""
+    """The dimension of a Dataset's cases: recorded_case where only signals are left. Raises Problem E385."""
     for name in (CASE, RECORDED):
         if name in data.dims:
             return name
@@ -38,7 +37,7 @@ def cases_of(data: xarray.Dataset) -> np.ndarray:
 
 
 def path_of(name: str, attributes: Mapping[str, Any]) -> str:
-    """The path in the deck of what is varied; of any other variable, its name."""
+    """The path in the deck of a varied quantity; for any other variable, its name."""
     if attributes.get("role") == "recorded":
         name = name.removeprefix(PREFIX)
     return str(attributes.get("path", name))
@@ -95,7 +94,7 @@ def run_name(data: xarray.Dataset) -> str:
 
 
 def unknown_name(parts: Sequence[xarray.Dataset], name: str, what: str, known: Iterable[str]) -> Problem:
-    """E385: something is asked for by a name that nothing here has. what: `no link`, `nothing`."""
+    """The error E385: nothing here has the name asked for. what: `no link`, `nothing`"""
     names = list(dict.fromkeys(known))
     some = ", ".join(names[:MOST_NAMES]) + (" ..." if len(names) > MOST_NAMES else "")
     helps = [*did_you_mean(name, names), f"there are: {some}" if names else "there are none"]

@@ -1,4 +1,4 @@
-"""Arguments of a simulation that are no values of parameters: whole numbers, names, texts; each read or refused."""
+"""Checks of a simulation's arguments other than parameter values: whole numbers, names, texts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from met.diagnostic import Problem, error
 
 BELOW = 2**32
-"""Numbers of repeats are below this, as in a plan (met/plan/check.py)."""
+"""Upper bound of numbers of repeats, as in a plan (met/plan/check.py)."""
 
 
 def shown(given: Any) -> str:
@@ -33,7 +33,8 @@ def whole(given: Any, name: str, *, least: int) -> int:
 
 
 def texts(given: Any, name: str, code: str, example: str, kinds: Any = str) -> tuple[Any, ...]:
-    """An argument that is one text or a list of texts. A set is none: it has no order. Raises Problem of this code."""
+    """An argument that is one text or a list of texts, but not a set, which has no order. Raises Problem of this
+    code."""
     if isinstance(given, np.ndarray):
         given = given.tolist()
     if isinstance(given, kinds):
@@ -62,4 +63,4 @@ def settings(given: Any) -> tuple[str, ...]:
 
 
 PATHS = (str, os.PathLike)
-"""Types of a file's or folder's path."""
+"""Types of the path of a file or folder."""

@@ -1,4 +1,4 @@
-"""Values of parameters as Python gives them, in SI: numbers, texts with units, quantities; one, or one a case."""
+"""Conversion of parameter values in Python to SI: numbers, texts with units, quantities; one, or one for each case."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def values_in_si(given: Any, path: str, unit: str) -> np.ndarray:
 
 
 def real(given: Any) -> float | None:
-    """A real finite number, of Python or in an array without dimensions; None for all else: truth values, what is
-    masked, complex, or has a unit, and numbers beyond the largest of 64 bits."""
+    """A finite real number, in Python or in an array without dimensions; None for anything else: truth values, masked
+    or complex values, those with a unit, and numbers too large for 64 bits."""
     if not isinstance(given, float):
         given, units = measured(given)
         if hasattr(given, "__array__"):
@@ -59,7 +59,7 @@ def real(given: Any) -> float | None:
 
 
 def columns(given: Mapping[str, np.ndarray], *, product: bool) -> tuple[dict[str, np.ndarray], int]:
-    """A column for each path, one value a case, and how many cases that makes.
+    """A column for each path, one value a case, and the number of cases.
 
     product  False: several lists go in step, so all have one length; True: each value of one with each of the others,
              the last fastest, as the axes of a sweep
@@ -92,7 +92,7 @@ def columns(given: Mapping[str, np.ndarray], *, product: bool) -> tuple[dict[str
 
 
 def check_room(count: int, numbers: int) -> None:
-    """Raise Problem E430 where so many cases of so many numbers have no room in memory."""
+    """Raise Problem E430 where so many cases with so many numbers do not fit in memory."""
     needed = 8 * count * numbers
     if needed > memory():
         message = f"{count:,} cases take {size_text(needed)} of memory"
@@ -119,7 +119,7 @@ def _in_si(given: Any, units: str | None, path: str, unit: str, where: str) -> f
 
 
 def measured(given: Any) -> tuple[Any, str | None]:
-    """The magnitude of a quantity, and its unit as MET reads one; the unit is None where it has none."""
+    """The magnitude of a quantity, and its unit in MET's notation; the unit is None where it has none."""
     units = getattr(given, "units", None)
     if units is not None and hasattr(given, "magnitude"):
         try:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class SimulationProgram:
-    """The program of a run whose inputs are some paths, and what makes Datasets of what it gives."""
+    """The program of a run whose inputs are some paths, with the maker of its Datasets."""
 
     varied: VariedRun
     prepared: engine.Prepared
@@ -50,7 +50,7 @@ class Simulation:
     The deck is compiled here, and again when a set of paths is first given: these become inputs of a program, which is
     kept as long as the simulation is. Machine code is kept in the cache of all of MET, no other file is written.
 
-    Raises met.diagnostic.Problem, here and in all it does, for what a user can mend.
+    All methods raise met.diagnostic.Problem for mistakes that a user can correct.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Simulation:
         histories: bool | str | Sequence[str] = False,
         threads: int | None = None,
     ) -> xarray.Dataset:
-        """Run a case for each value, and return what an archive of the same sweep would hold, as `batch.open` gives it.
+        """Run a case for each value, and return a Dataset as `batch.open` gives it for an archive of the same sweep.
 
         values     by path, as `--set` and `vary` take them: `gearbox.kp`, `elbow.servo.kp`, `links.lower.mass`, a
                    `let`. A number is in SI; a text has its unit, "25 kg"; so has anything with `magnitude` and `units`.
@@ -122,7 +122,8 @@ class Simulation:
     def gradient(
         self, values: Mapping[str, Any], *, metrics: str | Sequence[str] = (), threads: int | None = None
     ) -> xarray.Dataset:
-        """How the run's metrics move with each of these numbers, where they have these values; any number of the deck.
+        """The slopes of the run's metrics by each of these numbers, at these values; any number of the deck may be
+        given.
 
         values   as `run` takes them; a list makes a case for each of its values
         metrics  names; none: all
@@ -191,7 +192,7 @@ class Simulation:
             if path not in self._units:
                 self._units[path] = self._given.unit(path)
             unit = self._units[path]
-            if unit is None:  # then this says what is wrong with the path
+            if unit is None:  # then this reports the mistake in the path
                 self._given.vary({path: (value if isinstance(value, str) and value.isidentifier() else 0.0, "1")})
             elif unit == "":
                 raise _no_number(path, value)
@@ -199,7 +200,7 @@ class Simulation:
         return found
 
     def _program(self, first: Mapping[str, float], repeated: bool) -> SimulationProgram:
-        """The program whose inputs are these paths, compiled with these values where it is the first time."""
+        """The program whose inputs are these paths, compiled with these values on the first call."""
         key = tuple(first), repeated
         if key not in self._programs:
             values = {path: (value, self._units[path] or "1") for path, value in first.items()}
@@ -209,7 +210,8 @@ class Simulation:
         return self._programs[key]
 
     def _signals(self, histories: bool | str | Sequence[str], cases: int) -> tuple[str, ...]:
-        """The names of the signals that are kept. Raises Problem E432 for what is not recorded, or does not fit."""
+        """The names of the kept signals. Raises Problem E432 for signals that are not recorded, or do not fit in
+        memory."""
         if histories is False:
             return ()
         known = [recorded.name for recorded in self.experiment.structure.record]

@@ -1,8 +1,8 @@
-"""One case of a run, stepped from tick to tick by commands from outside: a loop of one's own around the engine.
+"""One case of a run, stepped from tick to tick by commands from outside, in a loop of the caller's.
 
 The program is the run's own, with each command's value as an input, so the bits are those of a run with these commands.
-What is seen at an instant are channels at that instant, before the new commands: the tick is done once with the
-commands so far, to look, then the case's memory is put back, and the tick is done with the new ones.
+The observation at an instant is that before the new commands: the tick is done once with the former commands, then the
+case's memory is restored, and the tick is done with the new ones.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from met.program.step import FAILURE
 from met.program.system import PARAMETER
 
 LANES = 4
-"""Cases of the kernel's block, of which one is stepped: the narrowest are not the fastest."""
+"""Number of cases of the kernel's block, of which one is stepped: the narrowest blocks are not the fastest."""
 
 MOST_SHOWN = 7
-"""Commands of an example, at most."""
+"""Largest number of commands of an example."""
 
 ALWAYS_SEEN = ("q", "qd")
-"""Signals that are seen whatever a run records."""
+"""Signals that are observed whatever a run records."""
 
 
 @dataclass
@@ -58,8 +58,8 @@ class SteppedProgram:
 
 
 class Observation:
-    """The sight of an instant: `time` (s), positions `q` and rates `qd` of all joints, and by name what else is
-    recorded, `seen["tau"]`, in SI. It is of its own: later steps leave it as it is."""
+    """The observation of an instant: `time` (s), positions `q` and rates `qd` of all joints, and other recorded signals
+    by name, `seen["tau"]`, in SI. Later steps do not change it."""
 
     __slots__ = ("_columns", "row", "time")
 
@@ -67,7 +67,7 @@ class Observation:
         self.time, self.row, self._columns = time, row, columns
 
     def __getitem__(self, name: str) -> Any:
-        """A signal: a number, or an array as a signal has it at one instant, (joint, component)."""
+        """A signal: a number, or an array of the signal's shape at one instant, (joint, component)."""
         if name not in self._columns:
             helps = [*did_you_mean(name, self._columns), known_words("seen are", self._columns)]
             raise Problem(
@@ -88,7 +88,7 @@ class Observation:
         return np.asarray(self["qd"])
 
     def keys(self) -> tuple[str, ...]:
-        """The names of what is seen."""
+        """The names of the observed signals."""
         return tuple(self._columns)
 
     def __repr__(self) -> str:
@@ -96,7 +96,7 @@ class Observation:
 
 
 class SteppedRun:
-    """A case on its way.
+    """A case under way.
 
     state = sim.start({"load": "25 kg"}, commands=["shoulder", "elbow"])
     while not state.done:
@@ -129,7 +129,7 @@ class SteppedRun:
         self.seen = self._look()
 
     def step(self, commands: Any) -> Observation:
-        """Hold these commands from now to the next step, and see what comes of it.
+        """Hold these commands from now to the next step; returns the observation there.
 
         commands  one number for each of `joints`, in the SI unit of its command: rad/s, rad, N m (m/s, m, N)
 
@@ -154,7 +154,7 @@ class SteppedRun:
 
     @property
     def cause(self) -> str:
-        """Why the case has failed, as an archive's variable `cause` says it; empty where it has not."""
+        """The cause of the failure, as in an archive's variable `cause`; empty where the case has not failed."""
         if not self.failed:
             return ""
         names = self._prepared.program.outputs
@@ -174,7 +174,7 @@ class SteppedRun:
         }
 
     def _look(self) -> Observation:
-        """Do the tick with the commands so far, and put the memory back."""
+        """Do the tick with the former commands, and restore the memory."""
         block, tick = self._block, self._tick
         np.copyto(self._memory, block.state)
         row = block.recorded(tick, tick)
@@ -255,8 +255,8 @@ def program(
 
 @frozen
 class OutsideCommand:
-    """A joint's command that is told from outside. unit: of its value, SI; word: the deck's text for it, "" where the
-    deck has such a one."""
+    """A joint's command from outside. unit: of its value, SI; word: the deck's text for it, "" where the deck has such
+    a command"""
 
     unit: str
     word: str
@@ -283,7 +283,8 @@ def _command(use: ServoUse, kind: str, structure: Structure, *, is_set: bool) ->
 
 
 def _seen(structure: Structure, record: Sequence[str] | None) -> tuple[Recorded, ...]:
-    """The signals seen at each step: q, qd, and these channels; None: what the deck records. Raises Problem E432."""
+    """The signals observed at each step: q, qd, and these channels; None: those that the deck records. Raises Problem
+    E432."""
     known = recordable(structure, record or ())
     found = {name: each for name in ALWAYS_SEEN for each in known[name]}
     found = {each.name: each for each in found.values()}
