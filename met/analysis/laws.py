@@ -238,8 +238,8 @@ def _sizes(start: np.ndarray, plain: int) -> np.ndarray:
 
 
 def _agreed(slopes: np.ndarray) -> np.ndarray:
-    """Of slopes over changes of several sizes, [lane, size, of, by], those that differ least from the slope of the next
-    size; 0 where all are 0."""
+    """The slopes, among those over changes of several sizes, [lane, size, of, by], that differ least from those of the
+    next size; 0 where all are 0."""
     one, other = slopes[:, :-1], slopes[:, 1:]
     larger = np.maximum(np.abs(one), np.abs(other))
     with np.errstate(all="ignore"):

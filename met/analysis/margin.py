@@ -271,7 +271,7 @@ def _holds(stretch: tuple[float, float | None], r: float) -> bool:
 
 
 def grow(loop: CaseLoop, ratios: Sequence[float]) -> list[bool]:
-    """Whether the loop grows, for each r."""
+    """A truth for each r: whether the loop grows there."""
     return (loop.radii(ratios) > 1.0 + STABLE).tolist()
 
 
