@@ -1,1 +1,1 @@
-"""The language server, `met lsp`: what editors ask about decks as they are written, and what MET answers."""
+"""The language server, `met lsp`: it answers editors' questions about decks as they are written."""

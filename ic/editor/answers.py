@@ -1,4 +1,4 @@
-"""Answers to what an editor asks about a position: completion, hover, definition, references."""
+"""Answers to an editor's questions about a position: completion, hover, definition, references."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NO_INDEX = DeckIndex((), ())
 
 
 class Asked:
-    """A position in an open text, with the deck that the text is part of, as far as that is known.
+    """A position in an open text, with the deck that the text is part of, if it is known.
 
     text   the text as it is now;  file: its name in the deck's places
     names  those of all texts of the deck, open ones as they are now
@@ -84,7 +84,7 @@ class Asked:
         ]
 
     def hover(self) -> types.Hover | None:
-        """All that is known of the word here."""
+        """The known facts about the word here."""
         token = self.token
         if token is None:
             return None
@@ -106,7 +106,7 @@ class Asked:
         return [self.location(each.token) for each in self.names.meant_in(self.text, token)]
 
     def references(self, also_definitions: bool) -> list[types.Location]:
-        """Where what the word here means is used: words that may mean the same definition."""
+        """The uses of the word's meaning here: words that may mean the same definition."""
         token = self.name_here
         if token is None or token.text not in self.names.by_name:
             return []
@@ -150,7 +150,7 @@ class Asked:
         return file_at(self._path) if inside.startswith("..") else FoundFile(self._path, f"<{inside}>")
 
     def _files_beside(self) -> Iterator[str]:
-        """The names of decks that an include in quotes finds, but for the library's and the text's own."""
+        """The names of decks that an include in quotes finds, without the library's and the text's own."""
         files = self._files()
         own = os.path.basename(self._path or "")
         folders = files.where(self._found_file(), False)[:-1]
@@ -163,7 +163,7 @@ def normal(text: str) -> str:
 
 
 def characters(codec: PositionCodec, line: str, units: int) -> int:
-    """The number of characters of a line that stand before a position in an editor's units."""
+    """The number of characters of a line before a position in an editor's units."""
     taken = 0
     for n, character in enumerate(line):
         if taken >= units:

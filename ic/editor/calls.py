@@ -1,4 +1,4 @@
-"""The call in whose parentheses a cursor stands, and which of its arguments is written there."""
+"""The call in whose parentheses a cursor stands, and the argument that is written there."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class OpenCall:
 
 
 def open_call(texts: Sequence[str]) -> OpenCall | None:
-    """The innermost call that the words of an entry, those before a cursor, leave open; None outside of any."""
+    """The innermost call that the words of an entry, those before a cursor, leave open; None outside of calls."""
     depth, opened = 0, len(texts) - 1
     while opened >= 0 and not (texts[opened] == "(" and depth == 0):
         depth += (texts[opened] in _CLOSED) - (texts[opened] in _OPEN)
@@ -60,7 +60,7 @@ def open_call(texts: Sequence[str]) -> OpenCall | None:
 
 
 def ends_a_model(texts: Sequence[str]) -> bool:
-    """True where the last word closes a call that is no number: of a model, of a shape, of a kind of command."""
+    """True where the last word closes a call that is not a number: of a model, of a shape, of a kind of command."""
     call = open_call(texts[:-1]) if texts[-1:] == [")"] else None
     return call is not None and (call.name in COMMAND_UNIT or bool(call.parameters))
 

@@ -1,8 +1,9 @@
-"""Messages of the last check, carried over into texts that have changed since, until these are checked: none flickers.
+"""Messages of the last check, carried over into texts that have changed since, until these are checked, to avoid
+flicker.
 
-What stands in lines that have not changed is taken for still right, at the place where these lines are now. So while a
-check tells what it has found so far, what it has not come to yet stays on the screen: of the definitions, and of the
-audit, which may take long.
+Messages about unchanged lines are assumed to be still right, at the present places of these lines. So while a check
+reports its first findings, messages of the parts that it has not reached stay on the screen: of the definitions, and of
+the audit, which may take long.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from met.diagnostic import Diagnostic, Label, Place
 
 
 class _MovedLines:
-    """Where the lines of a text are in another one that differs in one stretch of lines."""
+    """The map of a text's lines to another text that differs in one stretch of lines."""
 
     def __init__(self, before: str, after: str) -> None:
         old, new = before.split("\n"), after.split("\n")
@@ -24,7 +25,7 @@ class _MovedLines:
         self._behind, self._further = len(old) - same, len(new) - len(old)
 
     def line(self, line: int) -> int | None:
-        """Where a line is now, counted from 1; None where it has changed."""
+        """The present number of a line, counted from 1; None where it has changed."""
         if line <= self._first:
             return line
         return line + self._further if line > self._behind else None
@@ -35,7 +36,7 @@ class _Changed(Exception):
 
 
 def carried_over(last: CheckReply, now: CheckReply) -> CheckReply:
-    """A reply to which more is to come, with what the last one said of lines that are as they were."""
+    """A preliminary reply, completed by the last one's messages about unchanged lines."""
     moved = {name: _MovedLines(last.sources[name], text) for name, text in now.sources.items() if name in last.sources}
 
     def line(file: str, at: int) -> int:
@@ -68,22 +69,23 @@ def carried_over(last: CheckReply, now: CheckReply) -> CheckReply:
 
 
 class LastAudit:
-    """The messages of a deck's last audit that its definitions had not told, kept until the next audit has ended."""
+    """The messages of a deck's last audit beyond those of its definitions, kept until the next audit has ended."""
 
     def __init__(self) -> None:
         self._said: CheckReply | None = None
         self._defined: CheckReply | None = None  # the reply of the definitions whose audit has not ended
 
     def carried_into(self, reply: CheckReply) -> CheckReply:
-        """The reply of all definitions, with what the audit said of lines that are as they were. Where definitions have
-        errors nothing is added, since an audit then looks into no program, but it is kept for when they are mended."""
+        """The reply of all definitions, with the audit's messages about unchanged lines. Where definitions have errors
+        nothing is added, since an audit then examines no program, but the messages are kept until the errors are
+        corrected."""
         self._defined = reply
         if self._said is not None:
             self._said = carried_over(self._said, replace(reply, diagnostics=(), edits=()))
         return reply if self._said is None or _has_errors(reply) else carried_over(self._said, reply)
 
     def take(self, reply: CheckReply) -> None:
-        """Keep what an audit has said, the one that belongs to the definitions that were told last."""
+        """Keep the messages of an audit, the one that belongs to the last reported definitions."""
         if self._defined is not None and not _has_errors(self._defined):
             new = [n for n, each in enumerate(reply.diagnostics) if each not in self._defined.diagnostics]
             diagnostics = tuple(reply.diagnostics[n] for n in new)
@@ -91,8 +93,8 @@ class LastAudit:
         self._defined = None
 
     def give_up(self) -> CheckReply | None:
-        """Forget it where an audit has died; the reply of the definitions alone. None where it has ended, or there is
-        nothing to forget."""
+        """Discard the kept messages where an audit has died; returns the reply of the definitions alone. None where it
+        has ended, or nothing is kept."""
         alone = self._defined if self._said is not None else None
         if alone is not None:
             self._said = None

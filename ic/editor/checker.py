@@ -2,9 +2,8 @@
 
     python -m ic.editor.checker FD        started by `CheckerProcess`; FD is one end of a socket pair
 
-Each check begins from the same state, so what it says is what a fresh start says, and nothing is kept here that could
-grow. What a check may know from the last one is in the request. A check that is outdated is killed. One that crashes
-takes nothing with it.
+Each check begins from the same state, so its result is that of a fresh start, and memory does not grow. Knowledge from
+the last check is part of the request. An outdated check is killed. A crash affects only its own check.
 
 On the socket, from the server, a byte each: `b"c"`, with two file descriptors, of a memory file that holds a pickled
 `CheckRequest` and of the pipe for the answers; or `b"s"`, which stops the check that runs, as the next one does too.
@@ -25,7 +24,7 @@ from ic.editor.checking import CheckRequest, answer, answers
 
 
 def _warm_up() -> None:
-    """Import what a check imports, by a check; what is there from now on is shared by all children."""
+    """Import the modules of a check, by running one; all children share them."""
     list(answers(CheckRequest(os.getcwd(), "", "#include <two_link.ic>\n", (), (), {}), pause=0.0))
     gc.collect()
     gc.freeze()
@@ -37,7 +36,7 @@ def serve(connection: socket.socket) -> None:
     while True:
         head, passed, _, _ = socket.recv_fds(connection, 1, 2)
         if child:
-            os.kill(child, signal.SIGKILL)  # it may have ended long ago; nobody else has its number until `waitpid`
+            os.kill(child, signal.SIGKILL)  # it may have ended long ago; its number is not reused until `waitpid`
             os.waitpid(child, 0)
             child = 0
         if not head:

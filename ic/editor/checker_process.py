@@ -16,18 +16,18 @@ LARGEST = 1 << 30  # bytes of one answer
 
 
 class CheckerProcess:
-    """Starts the process of `ic.editor.checker`, again where it has gone, and asks it."""
+    """Client of the process of `ic.editor.checker`, which it starts, again after it has ended."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
         self._socket: socket.socket | None = None
 
     def start(self) -> None:
-        """Start it, where it does not run; it warms up while it is not asked yet."""
+        """Start the process if it does not run; it warms up before the first request."""
         if self._process is not None and self._process.poll() is None:
             return
         self.close()
-        folders = filter(None, os.environ.get("MET_DECK_PATH", "").split(os.pathsep))  # checks run in their decks' own
+        folders = filter(None, os.environ.get("MET_DECK_PATH", "").split(os.pathsep))  # checks run in deck folders
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(

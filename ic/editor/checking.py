@@ -1,8 +1,7 @@
-"""One check of a deck for an editor: what it is asked, and what it answers, between two processes.
+"""One check of a deck for an editor: its request and its answers, exchanged between two processes.
 
-First the definitions are checked, without what takes programs to be built, which is the audit. What they come to is
-told, and earlier where it takes long. The audit, `met check` itself, comes behind a pause: who types on never waits
-for it.
+First the definitions are checked, without the audit, which builds programs. Their findings are reported, in parts where
+it takes long. The audit, `met check` itself, comes after a pause, so that a typing user never waits for it.
 """
 
 from __future__ import annotations
@@ -28,17 +27,17 @@ if TYPE_CHECKING:
     from ic.editor.index import DeckIndex
 
 LENGTH = struct.Struct("!Q")
-"""The length of a pickled answer, which stands before it."""
+"""The length of a pickled answer, which precedes it."""
 
 EARLY = 0.05
-"""Seconds from the start of a check after which that is told which is found by then; and then again, where that is
-more, after as many."""
+"""Seconds from the start of a check after which its findings so far are reported; then again after as long as it has
+taken, if that is more."""
 
 DEAR = 0.5
-"""Seconds of an audit after which what it has found is kept, though it may not come to its end."""
+"""Seconds of an audit after which its findings are kept, even if it does not end."""
 
 AUDIT_PAUSE = 0.3
-"""Seconds without a change behind which the audit begins."""
+"""Seconds without a change after which the audit begins."""
 
 
 @frozen
@@ -65,8 +64,8 @@ class CheckRequest:
 
 @frozen
 class FoundAnswers:
-    """Answers of the analysis that an audit has found, pickled: what it is to be asked with next time, also where it
-    does not come to its end."""
+    """Answers of analyses that an audit has computed, pickled: input of the next audit, even if this one does not
+    end."""
 
     pickled: bytes
 
@@ -97,7 +96,7 @@ class Crash:
 
 
 def answer(request: CheckRequest, out: int) -> None:
-    """Check, and write what there is to say into the file descriptor."""
+    """Run the check, and write its answers into the file descriptor."""
     os.chdir(request.folder)
     try:
         for each in answers(request, pause=AUDIT_PAUSE, keep=partial(_send, out)):
@@ -109,9 +108,9 @@ def answer(request: CheckRequest, out: int) -> None:
 def answers(
     request: CheckRequest, *, pause: float, keep: Callable[[FoundAnswers], object] = lambda found: None
 ) -> Iterator[CheckReply | DeckIndex]:
-    """All that there is to say of a deck, in turn; the audit comes after the pause, in s.
+    """All answers about a deck, in turn; the audit comes after the pause, in s.
 
-    keep  called with what the audit has found so far, each time that it was dear, and in the end
+    keep called with the audit's answers so far, each time that one was slow, and at the end
     """
     readable = False
     for reply in first_replies(request):
@@ -129,7 +128,7 @@ def answers(
 
 
 def first_replies(request: CheckRequest, clock: Callable[[], float] = time.monotonic) -> Iterator[CheckReply]:
-    """Replies before the audit; about a deck that cannot be read, all that there is. clock: in s."""
+    """Replies before the audit; for a deck that cannot be read, all of them. clock: in s"""
     from ic.driver.by_definition import DefinitionChecks
     from ic.read import read
     from met.diagnostic import Problem
@@ -159,7 +158,7 @@ def first_replies(request: CheckRequest, clock: Callable[[], float] = time.monot
 def compiled_with_reply(
     request: CheckRequest, keep: Callable[[FoundAnswers], object] = lambda found: None
 ) -> tuple[Compiled, CheckReply]:
-    """A deck compiled, and the reply to the request, made in this process. keep: as of `answers`."""
+    """A compiled deck, with the reply to the request, made in this process. keep: as for `answers`"""
     from ic.driver.compile import check
     from met.analysis.memo import AnalysisMemo
 

@@ -1,8 +1,8 @@
 """The order of checks: of the decks that an editor has open, again after each change that concerns them.
 
 An open text is a deck of its own unless another open deck includes it. A check waits until nothing was typed for a
-moment; a change while it runs ends it, and while its audit runs that of another deck does too. So what is told is
-never older than what was told before, and once nothing changes any more it is what a fresh start would say.
+moment; a change while it runs ends it, and while its audit runs that of another deck does too. So messages are never
+older than former ones, and once nothing changes any more they are those of a fresh start.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ic.driver.by_definition import Known
 
 NO_DECKS = (".csv", ".urdf")
-"""The endings of files that decks name and that are none."""
+"""The endings of files that decks name and that are not decks."""
 
 PAUSE = 0.01
 """Seconds without a change before a check begins."""
@@ -48,7 +48,7 @@ class OpenText:
 
     @property
     def identity(self) -> str:
-        """The file's real path, or the address of what is in no file."""
+        """The file's real path, or the address of a text without a file."""
         return self.uri if self.path is None else os.path.realpath(self.path)
 
 
@@ -76,7 +76,7 @@ class CheckedDeck:
 
 
 class DeckChecks:
-    """The open texts, what is known of each, and the one check that runs.
+    """The open texts, the known facts about each, and the one running check.
 
     refresh  called where what an editor draws in a text may change though the text does not: colours, lenses
     """
@@ -111,17 +111,17 @@ class DeckChecks:
         self._resting.set()
 
     def open(self, text: OpenText) -> None:
-        """An editor has opened a text; it may be what another one lacked."""
+        """Handle the opening of a text, which may complete another one."""
         self.texts[text.uri] = text
         self.all_changed()
 
     def change(self, text: OpenText) -> None:
-        """A text has changed, and so have the decks that read it."""
+        """Handle a change of a text, which affects the decks that read it."""
         self.texts[text.uri] = text
         self._changed([text.identity])
 
     def shut(self, uri: str) -> None:
-        """An editor has closed a text: its file counts again."""
+        """Handle the closing of a text: its file counts again."""
         self.texts.pop(uri, None)
         self.checked.pop(uri, None)
         self.indexes.pop(uri, None)
@@ -135,23 +135,23 @@ class DeckChecks:
         self._tell(self.decks())
 
     def all_changed(self) -> None:
-        """Check all decks anew: files may have changed that no editor has open."""
+        """Check all decks anew, since files that no editor has open may have changed."""
         for uri in self.texts:
             self._make_stale(uri)
 
     def unsaved(self) -> dict[str, str]:
-        """The open texts that are of files, by the files' real paths."""
+        """The open texts of files, by the files' real paths."""
         return {each.identity: each.text for each in self.texts.values() if each.path is not None}
 
     def deck_of(self, uri: str) -> CheckedDeck | None:
-        """The deck that a text is part of, as it was last checked."""
+        """The deck that a text is part of, as last checked."""
         text = self.texts.get(uri)
         if uri in self.checked:
             return self.checked[uri]
         return next((each for each in self.decks() if text is not None and text.identity in each.files), None)
 
     def decks(self) -> list[CheckedDeck]:
-        """All that is known of the open texts that no other one includes."""
+        """The known decks among the open texts that no other one includes."""
         return [self.checked[uri] for uri in self._roots() if uri in self.checked]
 
     def request(self, deck: OpenText) -> CheckRequest:
@@ -170,11 +170,11 @@ class DeckChecks:
         )
 
     async def rest(self) -> None:
-        """Wait until all that is told is of what the texts are now."""
+        """Wait until all messages are about the present texts."""
         await self._resting.wait()
 
     async def work(self) -> None:
-        """Check what is to be checked, for ever."""
+        """Check changed decks, for ever."""
         while True:
             await self._wake.wait()
             self._wake.clear()
@@ -185,7 +185,7 @@ class DeckChecks:
                     continue
                 try:
                     await self._check(uri)
-                except Exception:  # a defect of the server ends no server
+                except Exception:  # a defect must not end the server
                     self._failed.add(uri)
                     self._log(f"this is a defect of MET; please report it:\n{traceback.format_exc()}")
             self._resting.set()
@@ -210,7 +210,7 @@ class DeckChecks:
         self._resting.clear()
 
     def _roots(self) -> list[str]:
-        """The open texts that no other one includes; of some that include each other, the first that was opened."""
+        """The open texts that no other one includes; among some that include each other, the first that was opened."""
         roots = []
         order = list(self.texts)
         for n, uri in enumerate(order):
@@ -229,7 +229,7 @@ class DeckChecks:
         return roots
 
     def _next(self) -> str | None:
-        """The deck to be checked next, the one that was changed last first."""
+        """The deck to check next, the last changed one first."""
         roots = self._roots()
         for uri in roots:
             if uri not in self.checked and uri not in self._failed:
@@ -288,7 +288,7 @@ class DeckChecks:
         self._keep(deck, request, texts, answer)
 
     def _keep(self, deck: OpenText, request: CheckRequest, texts: dict[str, OpenText], answer: CheckReply) -> None:
-        """Keep a reply as what is known of the deck, and tell it."""
+        """Keep a reply as the known state of the deck, and report it."""
         paths = (file_named(name, request.folder) for name in answer.sources)
         files = frozenset(os.path.realpath(path) for path in paths if path is not None)
         used = frozenset(name for text in answer.sources.values() for name in used_files(text))

@@ -40,7 +40,7 @@ GOALS = ("minimise", "maximise")
 _PATHS = ("record", "of", "against", "choose", "signal")
 
 _VARIED = ("vary", "with", "exclude")
-"""Words that paths of parameters follow, and no signals: these have no value before a case has run."""
+"""Words that are followed by paths of parameters, not signals, which have no value before a case has run."""
 
 _NOT_VARIED = ("seed", "record")
 """Keys of a run with a path, that no sweep varies."""
@@ -48,18 +48,18 @@ _NOT_VARIED = ("seed", "record")
 COMPARISONS = ("<", "<=", ">", ">=")
 
 _SAID = {"of": "the unit of the signal", "command": "the unit of the command"}
-"""Units that depend on another word of the deck, as a person says them."""
+"""Units that depend on another word of the deck, in words."""
 
 _SIGNALS_ALONE = ("record", "open")
-"""Keys whose values are signals and no parameters."""
+"""Keys whose values are signals and not parameters."""
 
 _OF_SIGNALS = (*_PATHS, *_SIGNALS_ALONE, *GOALS, "metric", "require")
-"""Words of entries in whose values the path of a signal may stand."""
+"""Keys of entries whose values may contain the path of a signal."""
 
 
 @frozen
 class Offer:
-    """A word that may stand here, what kind of thing it is, and what it means in a line."""
+    """A word that may stand here, its kind, and its meaning in a line."""
 
     word: str
     kind: types.CompletionItemKind
@@ -86,7 +86,7 @@ def offers(text: DeckText, offset: int, names: NamesInTexts, index: DeckIndex, f
 
 
 def _has_indices(word: str, indices: Collection[str]) -> bool:
-    """True but for a name with braces, `seg_{i-1}`, outside of the loop that gives it its index."""
+    """True except for a name with braces, `seg_{i-1}`, outside of the loop of its index."""
     return not any(set(re.findall(r"[A-Za-z_]\w*", each)) - set(indices) for each in re.findall(r"\{(.*?)\}", word))
 
 
@@ -192,7 +192,7 @@ def _behind_a_name(definition: str) -> Iterator[Offer]:
 
 
 def _beginnings(around: TextEntry | None, names: NamesInTexts) -> Iterator[Offer]:
-    """The words that an entry of a block may begin with."""
+    """The words with which an entry of a block may begin."""
     if around is None:
         yield from (Offer(each, types.CompletionItemKind.Keyword, BLOCKS[each].doc) for each in DEFINITIONS)
         for entry in TOP_LEVEL.entries:
@@ -220,7 +220,7 @@ def _beginnings(around: TextEntry | None, names: NamesInTexts) -> Iterator[Offer
 
 
 def parameters_of(entry: TextEntry, names: NamesInTexts) -> tuple[Parameter, ...]:
-    """The parameters of the model that an entry is of."""
+    """The parameters of an entry's model."""
     name = names.model_of(entry)
     for kind in models.GROUPS:
         found = models.available(kind).get(name)
@@ -232,7 +232,7 @@ def parameters_of(entry: TextEntry, names: NamesInTexts) -> tuple[Parameter, ...
 
 
 def _parameter(texts: list[str], around: TextEntry | None, names: NamesInTexts) -> Parameter | None:
-    """The parameter that an entry sets, where it is declared."""
+    """The parameter that an entry sets, if it is declared."""
     if around is None or not texts:
         return None
     call = open_call(texts)
@@ -261,7 +261,7 @@ def _limit(metric: str, names: NamesInTexts) -> Parameter | None:
 
 
 def _units(wanted: Parameter | None, names: NamesInTexts) -> Iterator[Offer]:
-    """The units of the table, those that fit first, and the deck's; a compound one that is wanted stands before all."""
+    """The units of the table, matching ones first, and the deck's; a wanted compound one precedes all."""
     fit: list[str] = []
     if wanted is not None and wanted.unit not in ("", "1"):
         try:
@@ -277,13 +277,13 @@ def _units(wanted: Parameter | None, names: NamesInTexts) -> Iterator[Offer]:
             yield from (Offer(each, types.CompletionItemKind.Unit, UNITS[each].word) for each in fit)
             if shown in UNITS:
                 yield from _named(names, UNIT)
-                return  # of others a unit that does not fit may be a factor: `deg/s`
+                return  # other units may be a factor: `deg/s`
     yield from _named(names, UNIT)
     yield from (Offer(each, types.CompletionItemKind.Unit, UNITS[each].word) for each in UNITS)
 
 
 def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
-    """The words that follow the beginning of a path: parts of parameters, of signals, and of definitions."""
+    """The words that continue a path: parts of parameters, of signals, and of definitions."""
     parts: list[str] = []
     for word in reversed(words):
         if word.text != "." and (word.kind != NAME or (parts and parts[-1] != ".")):
@@ -319,12 +319,12 @@ def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> 
 
 
 def _names_a_joint(head: str, names: NamesInTexts) -> bool:
-    """True for `JOINT.`, with a joint of the texts: it has signals before the deck was ever without an error."""
+    """True for `JOINT.`, with a joint of the texts: its signals are known before the deck is without errors."""
     return any(found.kind == "joint" for found in names.by_name.get(head[:-1], ()))
 
 
 def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
-    """The words that a value may begin with."""
+    """The words with which a value may begin."""
     key = texts[0]
     wanted = _parameter(texts, around, names)
     if wanted is not None and wanted.words:
@@ -396,14 +396,14 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
 
 
 def _of_expression(names: NamesInTexts) -> Iterator[Offer]:
-    """The words that any value may have in it."""
+    """The words that may occur in any value."""
     yield from _named(names, "let", "macro", "roof")
     yield from (Offer(each, types.CompletionItemKind.Function, ", ".join(USAGE[each])) for each in FUNCTIONS)
     yield from (Offer(each, types.CompletionItemKind.Constant) for each in CONSTANTS)
 
 
 def _of_goal(texts: list[str], around: TextEntry | None, names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
-    """The words behind `require`, `minimise` and `maximise`: metrics, then a limit; in a call, what it is about."""
+    """The words after `require`, `minimise` and `maximise`: metrics, then a limit; in a call, its signals."""
     if texts.count("(") > texts.count(")"):
         heads = dict.fromkeys(path.partition(".")[0] for path in index.signals)
         yield from _named(names, "metric", "linear", "joint", around=around)
@@ -421,7 +421,7 @@ def _of_goal(texts: list[str], around: TextEntry | None, names: NamesInTexts, in
 
 
 def _of_varied(texts: list[str], names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
-    """The words behind `vary`, `with` and `exclude when`: a path of a parameter, then its values."""
+    """The words after `vary`, `with` and `exclude when`: a path of a parameter, then its values."""
     if "=" not in texts:
         heads = dict.fromkeys(each.path.partition(".")[0] for each in index.values)
         for each in heads:
@@ -446,7 +446,8 @@ def _sweeps_of(run: str, names: NamesInTexts) -> Iterator[Offer]:
 
 
 def _named(names: NamesInTexts, *kinds: str, around: TextEntry | None = None) -> Iterator[Offer]:
-    """The names of some kinds; around: those of the arms and runs that what stands in it may mean, where any are."""
+    """The names of some kinds. around: restricts names to those of arms and runs that the surrounding entries may mean,
+    if there are any"""
     shown = {
         "let": types.CompletionItemKind.Variable,
         "macro": types.CompletionItemKind.Constant,

@@ -1,7 +1,7 @@
-"""Macros as a deck's texts use them: what an entry that is a macro's use becomes, where a body stands in the deck.
+"""Macros in a deck's texts: the expansion of their uses, and the place in the deck of their bodies.
 
-This is the preprocessor for names alone. It takes texts that are not whole, knows no conditions, and gives up early: an
-editor is better off without a name than without an answer.
+This is the preprocessor for names alone. It accepts incomplete texts, ignores conditions, and gives up early: for an
+editor, a missing name is better than no answer.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from ic.editor.structure import (
 from ic.text.lexer import NAME, PASTE, Token
 
 MOST_TOKENS = 20_000
-"""Tokens that the uses of macros in a text become, at most."""
+"""Largest number of tokens to which the uses of macros in a text expand."""
 
 
 class MacrosInTexts:
-    """The macros of some texts, the uses of them, and the entries that these make."""
+    """The macros of some texts, their uses, and the entries that these make."""
 
     def __init__(self, texts: Sequence[DeckText]) -> None:
         self._texts = texts
@@ -37,14 +37,14 @@ class MacrosInTexts:
         self._bodies: dict[int, list[TextEntry]] = {}
 
     def meant(self, use: Token) -> TextMacro | None:
-        """The macro that a token is a use of: the last that its text defines before it, or else any."""
+        """The macro that a token uses: the last that its text defines before it, or else any."""
         found = self.by_name.get(use.text, ())
         before = [each for each in found if each.name.source is use.source and each.name.offset <= use.offset]
         return before[-1] if before else found[-1] if found else None
 
     @staticmethod
     def at(text: DeckText, offset: int) -> TextMacro | None:
-        """The macro in whose body an offset of a text is, or behind which it stands on its line."""
+        """The macro in whose body, or on whose line after it, an offset of a text is."""
         for macro in text.macros:
             begin = macro.body[0].offset if macro.body else macro.end + 1
             behind = text.source.text[macro.end : offset]
@@ -56,7 +56,7 @@ class MacrosInTexts:
         """The entries of a macro's body, inside of what stands around its first use."""
         key = id(macro)
         if key not in self._bodies:
-            self._bodies[key] = []  # of a macro that is used in itself
+            self._bodies[key] = []  # for a macro that uses itself
             self._bodies[key] = entries_of(macro.body, macro.end, self._around_use(macro))
         return self._bodies[key]
 
@@ -71,7 +71,7 @@ class MacrosInTexts:
         return innermost_around(body, use.offset) or (body[0].within if body else self._around_use(inside))
 
     def _first_uses(self) -> Iterator[tuple[str, tuple[DeckText, Token]]]:
-        """The first use of each macro, one in a body only where there is no other."""
+        """The first use of each macro; one in a body only where there is no other."""
         for in_bodies in (True, False):
             for text in reversed(self._texts):
                 lines = (token for macro in text.macros for token in macro.body)
@@ -80,7 +80,7 @@ class MacrosInTexts:
                         yield token.text, (text, token)
 
     def made(self, text: DeckText) -> Iterator[TextEntry]:
-        """The entries that uses of macros make in a text: of those that are entries, or begin one."""
+        """The entries that uses of macros make in a text, where the use is an entry, or begins one."""
         room = TokensLeft(MOST_TOKENS)
         for entry in text.all_entries():
             if entry.words and entry.words[0].text in self.by_name:
@@ -114,13 +114,13 @@ class MacrosInTexts:
 
 @dataclass
 class TokensLeft:
-    """The tokens that may still be made."""
+    """The number of tokens that may still be made."""
 
     left: int
 
 
 def arguments_at(tokens: Sequence[Token], at: int) -> tuple[list[list[Token]], int]:
-    """The arguments in the parentheses that begin at an index, and the index behind them."""
+    """The arguments in the parentheses that begin at an index, and the index after them."""
     arguments: list[list[Token]] = [[]]
     depth = 0
     while at < len(tokens):
@@ -145,7 +145,7 @@ def _filled(body: Iterable[Token], given: Mapping[str, list[Token]]) -> Iterator
 
 
 def pasted(tokens: Iterable[Token]) -> list[Token]:
-    """The tokens with `##` carried out; what is joined stands where its first part does."""
+    """The tokens with `##` carried out; a joined token stands at the place of its first part."""
     made: list[Token] = []
     joins = False
     for token in tokens:

@@ -1,4 +1,4 @@
-"""The extension for VS Code as one file, `met lsp --vscode FILE.vsix`: made without a network, of what MET has.
+"""The extension for VS Code as one file, `met lsp --vscode FILE.vsix`: made without a network, from MET's own files.
 
 A .vsix is a ZIP file: the extension in the folder `extension`, its manifest, and the types of the files in it
 (github.com/microsoft/vscode-vsce). Equal versions of MET make equal bytes.
@@ -21,7 +21,7 @@ FOLDER = Path(__file__).parent / "vscode"
 DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a ZIP file can hold: a build's clock is no part of it
 
 MANIFEST = "extension.vsixmanifest"
-MOST_OF_MANIFEST = 20_000  # bytes of it that are looked at
+MOST_OF_MANIFEST = 20_000  # number of its bytes that are searched
 
 _TYPES = {"json": "application/json", "js": "application/javascript", "vsixmanifest": "text/xml"}
 
@@ -62,7 +62,7 @@ def is_extension(path: Path) -> bool:
         with open_regular(path) as file, zipfile.ZipFile(file) as archive, archive.open(MANIFEST) as manifest:
             return own.encode() in manifest.read(MOST_OF_MANIFEST)
     except (zipfile.BadZipFile, zlib.error, KeyError, RuntimeError, NotImplementedError):
-        return False  # no ZIP file, none with a manifest, or one that cannot be read
+        return False  # not a ZIP file, without a manifest, or unreadable
 
 
 def _manifest(described: Mapping[str, object]) -> str:

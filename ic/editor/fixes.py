@@ -1,4 +1,4 @@
-"""Quick fixes: the edits that stand beside the helps of diagnostics, where the text is still what was checked."""
+"""Quick fixes: the edits of diagnostics' helps, where the text is still the checked one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from met.messages.edits import Edit
 
 @frozen
 class QuickFix:
-    """An edit that does what the help of a diagnostic says, as an editor offers it.
+    """An edit that carries out the help of a diagnostic, as an editor offers it.
 
     file   the address of the file that it changes
     alone  whether it is the only one of its diagnostic
@@ -49,7 +49,7 @@ def quick_fixes(
 
 
 def actions(fixes: Iterable[QuickFix], at: types.Range) -> list[types.CodeAction]:
-    """Those of the fixes whose diagnostics meet a range, as an editor lists them."""
+    """The fixes whose diagnostics meet a range, in the form of an editor's list."""
     return [
         types.CodeAction(
             title=fix.title,

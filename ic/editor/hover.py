@@ -1,4 +1,4 @@
-"""The text that an editor shows of a word: what a key, model, unit or name means, and what a value came to."""
+"""The text that an editor shows about a word: the meaning of a key, model, unit or name, and resulting values."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from met.diagnostic import Place
 from met.messages.message import shown_place
 from met.units import UNITS
 
-MOST_VALUES = 4  # values that are shown of one place; of more, how many there are
+MOST_VALUES = 4  # values that are shown of one place; if there are more, their number
 
 
 def about(text: DeckText, token: Token, names: NamesInTexts, index: DeckIndex, file: str) -> list[str]:
@@ -87,7 +87,7 @@ def _of_values(index: DeckIndex, token: Token, entry: TextEntry | None, file: st
 
 
 def _lines(token: Token, entry: TextEntry | None) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Where the entry begins and ends, up to its block: lines and columns from 1."""
+    """The begin and end of an entry, up to its block: lines and columns from 1."""
     words = entry.words if entry is not None and entry.words else [token]
     first, last = words[0].place, words[-1].place
     return (first.line, first.column), (last.line, last.column + last.length)
@@ -107,5 +107,5 @@ def _words(value: ValueInDeck) -> str:
 
 
 def markdown(paragraphs: Iterable[str]) -> str:
-    """The paragraphs, parted by rules."""
+    """The paragraphs, separated by rules."""
     return "\n\n---\n\n".join(paragraphs)

@@ -1,4 +1,4 @@
-"""The values of a deck as it was last compiled: for completion, and for what an editor shows of a word."""
+"""The values of a deck as last compiled, for completion and hover."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MOST_NUMBERS = 6  # of a list, that are shown
 
 @frozen
 class ValueInDeck:
-    """A value that a run has, where the deck writes it.
+    """A value of a run, with its place in the deck.
 
     path   the parameter's, or the name of a `let`
     value  in SI, as a person reads it
@@ -93,7 +93,7 @@ def _cells(compiled: Compiled) -> Iterator[str]:
 
 
 def _values(compiled: Compiled) -> Iterator[ValueInDeck]:
-    """The values, of several runs those that are written elsewhere too."""
+    """The values; where several runs differ, those that are written elsewhere too."""
     assert compiled.plan is not None
     seen: set[tuple[str, Place | None]] = set()
     for number, (experiment, scope) in enumerate(zip(compiled.plan.experiments, compiled.scopes, strict=True)):

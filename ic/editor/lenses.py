@@ -1,7 +1,7 @@
-"""The lines that an editor shows above runs and sweeps: how many cases, how long, how the last run of them ended.
+"""The lines that an editor shows above runs and sweeps: the number of cases, the time, and the last run's outcome.
 
-The server opens no archive: whoever starts it hands it a function that does (`batch.queries.last_run`), which is asked
-when an editor asks for lenses. Nor does it run anything: a lens names a command for a terminal of the editor's.
+The server opens no archive: its caller passes a function that does (`batch.queries.last_run`), which is called when an
+editor asks for lenses. Nor does it run anything: a lens names a command for a terminal of the editor's.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ic.language import EXPERIMENTS
 from met.frozen import frozen
 
 IN_TERMINAL = "met.terminal"
-"""The command of an editor that runs words in a terminal: its one argument is the list of them."""
+"""The editor's command that runs words in a terminal: its one argument is their list."""
 
 
 @frozen
@@ -48,7 +48,7 @@ def lenses(
     runs: Mapping[str, LastRun],
     range_of: RangeOf,
 ) -> Iterator[types.CodeLens]:
-    """The lenses of a text. path: of its file, None where it is in none;  range_of: where an entry begins and ends."""
+    """The lenses of a text. path: of its file, None without one; range_of: the range of an entry."""
     for entry in text.entries:
         name = entry.named.text if entry.named is not None else ""
         if entry.kind not in EXPERIMENTS or not name:
@@ -80,7 +80,7 @@ def _duration(seconds: float) -> str:
 
 
 def _verdicts(entry: TextEntry, last: LastRun, range_of: RangeOf) -> Iterator[types.CodeLens]:
-    """The last run's verdict on each requirement that is written here."""
+    """The last run's verdict on each requirement written here."""
     words = {"".join(text.split()): counts for text, counts in last.requirements.items()}
     for inner in entry.entries:
         if inner.kind != "require" or len(inner.words) < 2:

@@ -1,4 +1,4 @@
-"""The names of a deck: where each is defined and used, in the texts of all its files."""
+"""The names of a deck, with their definitions and uses in the texts of all its files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ic.text.lexer import NAME, NUMBERS, Token
 from met.frozen import frozen
 
 BASE_WORDS = {"like": None, "of": "run"}
-"""Words that name a definition: of the same kind where it is None."""
+"""Words before the name of a definition: of the same kind where the value is None."""
 
 _BRACES = re.compile(r"\{[^{}]*\}")
 
@@ -25,23 +25,23 @@ _OF_RUNS: Mapping[str, str] = MappingProxyType({
 })  # fmt: skip
 
 UNDER: Mapping[str, str] = MappingProxyType({"links": "link", "initial": "joint", **_OF_RUNS})
-"""The kinds of the names that follow these first words of paths."""
+"""The kinds of names after these first words of paths."""
 
 _OF_KEY: Mapping[str, tuple[str, ...]] = MappingProxyType({
     "arm": ("arm",), "parent": ("link",), "child": ("link",), "link": ("link",), "of": ("joint", "linear"),
 })  # fmt: skip
-"""The kinds of the names that are values of these keys."""
+"""The kinds of names in the values of these keys."""
 
 _VALUES = ("let", "macro", "guide", "joint", "metric", "signal", "require", "sweep", "run", "servo", "link", "linear",
            "unit")  # fmt: skip
 """The kinds of names in any other value, the likeliest first."""
 
 REMOVED = ("metric", "require", "guide", "sensor", "payload", "signal", "linear")
-"""The kinds of names that `remove` takes away."""
+"""The kinds of names that `remove` removes."""
 
 
 OUTERMOST = (*DEFINED, "roof", "run", "sweep", "search", "tune", "macro", UNIT)
-"""The kinds of names that are of a deck itself, and not of an arm or a run."""
+"""The kinds of names that belong to a deck itself, not to an arm or a run."""
 
 NOTHING_MADE: Mapping[tuple[str, str], Sequence[str]] = MappingProxyType({})
 
@@ -64,7 +64,7 @@ class NameInText:
 
     @property
     def owner(self) -> str:
-        """The arm or run that it is of; "" of a deck's own."""
+        """The arm or run of the name; "" for a deck's own name."""
         around = self.entry.within if self.entry is not None else None
         return around.named.text if around is not None and around.named is not None else ""
 
@@ -96,13 +96,14 @@ class NamesInTexts:
         return any(each.kind == kind and each.owner == owner for each in self.by_name.get(name, ()))
 
     def written_out(self, name: str, kind: str, owners: Sequence[str]) -> list[str]:
-        """The names that a loop makes of one with braces: those of these arms and runs, of all where there are none."""
+        """The names that a loop makes from one with braces: those of these arms and runs, or of all where there are
+        none."""
         pattern = re.compile(_BRACES.sub(r"\\w+", name))
         made = (each for (of, owner), each in self._made.items() if of == kind and (not owners or owner in owners))
         return [each for found in made for each in found if pattern.fullmatch(each)]
 
     def entry_at(self, text: DeckText, token: Token) -> TextEntry | None:
-        """The entry that a word of a text stands in, before its block; also one of a macro's body."""
+        """The entry of a word of a text, before its block; also one in a macro's body."""
         macro = self.macros.at(text, token.offset)
         for entry in text.all_entries() if macro is None else flattened(self.macros.body(macro)):
             if entry.words and entry.words[0].offset <= token.offset <= entry.words[-1].offset:
@@ -128,7 +129,7 @@ class NamesInTexts:
         return self.meant(token, self.entry_at(text, token))
 
     def meant(self, token: Token, entry: TextEntry | None) -> list[NameInText]:
-        """The definitions that a word in an entry means: those of the kind that is wanted there."""
+        """The definitions that a word in an entry means: those of the kind that is expected there."""
         found = self.by_name.get(token.text) or self._made_by_loops(token.text)
         if any(_same(each.token, token) for each in found):
             return [each for each in found if _same(each.token, token)]
@@ -146,14 +147,14 @@ class NamesInTexts:
         return found if entry is None else []
 
     def _seen(self, found: list[NameInText], token: Token) -> list[NameInText]:
-        """Those that a word's text knows without a roof."""
+        """The definitions among these that a word's text sees without a roof."""
         if not self.used or not found:
             return found
         seen = self.used.seen_from(token.source.name)
         return [each for each in found if each.file in seen or each.kind not in OUTERMOST]
 
     def seen_from(self, text: DeckText) -> NamesInTexts:
-        """The names that a text knows without a roof, and those of arms and runs."""
+        """The names that a text sees without a roof, and those of arms and runs."""
         if not self.used:
             return self
         made, seen = copy(self), self.used.seen_from(text.source.name)
@@ -164,8 +165,8 @@ class NamesInTexts:
         return made
 
     def _under_roof(self, token: Token, entry: TextEntry | None) -> list[NameInText] | None:
-        """The definitions that a word behind roofs means, `d1` of `cell.panda.d1`, and the roof that one before means;
-        None where there is no roof."""
+        """The definitions that a word after roofs means, `d1` of `cell.panda.d1`, and the roof that the word before
+        means; None where there is no roof."""
         words = entry.words if entry is not None and entry.kind != USE and self.used else []
         at = next((i for i, word in enumerate(words) if word.offset == token.offset), None)
         if at is None:
@@ -185,7 +186,7 @@ class NamesInTexts:
         return [each for each in self._all.get(token.text, ()) if each.kind in DEFINED and each.file in files]
 
     def _of_owner(self, found: list[NameInText], entry: TextEntry | None) -> list[NameInText]:
-        """Those of the arm or the run that an entry is about, where some are."""
+        """The definitions of the arm or the run that an entry is about, if there are some."""
         if len(found) < 2 or entry is None:
             return found
         for owner in self.owners(entry):
@@ -212,7 +213,7 @@ class NamesInTexts:
         return owners
 
     def _named_behind(self, word: str, entry: TextEntry, kind: str) -> list[NameInText]:
-        """The definitions of a kind that an entry names behind a word, with roofs before the name or without."""
+        """The definitions of a kind that an entry names after a word, with or without roofs before the name."""
         token = entry.name_behind(word)
         if token is None:
             return []
@@ -233,7 +234,7 @@ class NamesInTexts:
         ]
 
     def uses(self, name: str) -> Iterator[Token]:
-        """All tokens of a name in the texts, those that define it too."""
+        """All tokens of a name in the texts, including its definitions."""
         for text in self.texts:
             lines = (token for line in text.directives if line.name != "include" for token in line.tokens[2:])
             for token in (*text.tokens, *lines):
@@ -241,7 +242,7 @@ class NamesInTexts:
                     yield token
 
     def model_of(self, entry: TextEntry) -> str:
-        """The model that a servo or a metric is of, through what it is `like`; "" where that is not said."""
+        """The model of a servo or a metric, through those that it is `like`; "" where it is not written."""
         for _ in range(16):
             for inner in entry.entries:
                 if inner.kind == "model" and len(inner.words) > 2:
@@ -277,12 +278,12 @@ def _named(entries: Iterable[TextEntry], made: bool) -> Iterator[NameInText]:
 
 
 def _same(one: Token, other: Token) -> bool:
-    """True for a token, and for one that stands for the same text."""
+    """True for the same token, and for one that stands for the same text."""
     return one is other or (one.source is other.source and one.offset == other.offset and one.text == other.text)
 
 
 def _wanted(token: Token, entry: TextEntry | None) -> Sequence[str]:
-    """The kinds of definitions that a word may mean where it stands, the likeliest first."""
+    """The kinds of definitions that a word may mean at its place, the likeliest first."""
     words = entry.words if entry is not None else []
     at = next((i for i, word in enumerate(words) if word is token or word.offset == token.offset), None)
     if entry is None or at is None:

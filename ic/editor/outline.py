@@ -13,7 +13,7 @@ from ic.text.lexer import Token
 from ic.text.limits import DEPTH
 
 Position = Callable[[int], types.Position]
-"""Where an offset of a text is."""
+"""A function that gives the position of an offset of a text."""
 
 _KINDS: Mapping[str, types.SymbolKind] = MappingProxyType({
     "arm": types.SymbolKind.Class, "servo": types.SymbolKind.Class, "link": types.SymbolKind.Struct,

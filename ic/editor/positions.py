@@ -1,4 +1,4 @@
-"""Places of decks and positions of editors: files and their addresses, characters and units of a line."""
+"""Conversion between places of decks and positions of editors: files and addresses, characters and units of a line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from met.diagnostic import Place
 
 
 def path_of(uri: str) -> str | None:
-    """The file at an address; None where it is none, such as a text that was never saved."""
+    """The file at an address; None where there is none, as for a text that was never saved."""
     parts = urlsplit(uri)
     return os.path.normpath(unquote(parts.path)) if parts.scheme == "file" and parts.path else None
 
@@ -37,21 +37,21 @@ def lines_of(text: str) -> list[str]:
 
 
 class Texts:
-    """The lines of texts by a name, and what stands where in them in the units that an editor counts in."""
+    """The lines of texts by a name, with positions in the units that an editor counts in."""
 
     def __init__(self, texts: Mapping[str, str], codec: PositionCodec) -> None:
         self._texts, self._codec = texts, codec
         self._lines: dict[str, list[str]] = {}
 
     def position(self, name: str, line: int, column: int) -> types.Position:
-        """Where a column of a line is, both counted from 1, the column in characters."""
+        """The position of a column of a line, both counted from 1, the column in characters."""
         lines = self.lines(name)
         number = min(max(line - 1, 0), max(len(lines) - 1, 0))
         before = lines[number][: max(column - 1, 0)] if lines else ""
         return types.Position(number, self._codec.client_num_units(before))
 
     def range(self, place: Place) -> types.Range:
-        """Where a place is: one character at least, where the line has one."""
+        """The range of a place: one character at least, where the line has one."""
         lines = self.lines(place.file)
         line = lines[place.line - 1] if 0 < place.line <= len(lines) else ""
         first = min(max(place.column, 1), len(line) + 1)

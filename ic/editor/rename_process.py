@@ -1,4 +1,4 @@
-"""Renaming as the server does it: which decks may have the name, and the process in which the edits are proved."""
+"""Renaming in the server: the choice of decks that may have the name, and the process that proves the edits."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ MOST_BYTES = 1 << 20  # of a deck that is looked into
 
 
 class CannotRename(JsonRpcException):
-    """The answer to an editor that a name is not changed, with the reason."""
+    """The answer that a name cannot be changed, with the reason."""
 
     CODE = types.LSPErrorCodes.RequestFailed.value
 
 
 def nameable(asked: Asked) -> types.PrepareRenamePlaceholder | None:
-    """The stretch of the name here, where it may be renamed as far as texts tell. Raises CannotRename."""
+    """The stretch of the name here, if the texts allow a renaming. Raises CannotRename."""
     token = asked.name_here
     if token is None:
         return None
@@ -91,7 +91,7 @@ async def _proved(request: RenameRequest) -> Renamed:
 
 
 def _others(checks: DeckChecks, deck: CheckedDeck, word: str, roots: Iterable[str]) -> Iterator[CheckRequest]:
-    """The other decks with a word, open ones and those in the folders that are open; one more than are taken."""
+    """The other decks with a word, open ones and those in the open folders; at most one more than the limit."""
     has_word = re.compile(rf"\b{re.escape(word)}\b")
     known = {deck.deck.identity}
     for other in checks.decks():

@@ -1,7 +1,7 @@
-"""A name changed wherever it stands, in all decks that have it: edits that are proved, or why there are none.
+"""Renaming in all decks that have a name: proved edits, or the reason why there are none.
 
-The edits are found by name and place in the texts, which is not as sharp as the compiler. So they are proved: every
-deck that has the name is compiled as it is and as it will be, and the two plans must be equal up to the name.
+The edits are found by name and place in the texts, which is less exact than the compiler. So they are proved: every
+deck that has the name is compiled before and after, and the two plans must be equal up to the name.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ WORDS = ("for", "in", "let", "param", "like", "of", "from", "and", "or", "not", 
 """Words of the grammar, which name nothing."""
 
 NO_RUN = "D161"
-"""The error of a text that is a part of decks and none itself."""
+"""The error of a text that is a part of decks and not a deck."""
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _WORDS = re.compile(r"\w+|\W+")
@@ -51,7 +51,8 @@ class RenameRequest:
 
 @frozen
 class Renamed:
-    """Offsets and lengths of what is replaced, by the files' real paths (a text in no file: ""); or why nothing is.
+    """Offsets and lengths of the replaced stretches, by the files' real paths (a text in no file: ""); or the reason
+    why there are none.
 
     texts  the files' texts, by their paths
     """
@@ -66,7 +67,7 @@ class NotRenamed(Exception):
 
 
 def refusal_of_word(new: str) -> str:
-    """Why a word can be no name; "" where it can."""
+    """The reason why a word cannot be a name; "" where it can."""
     if _NAME.fullmatch(new) is None:
         return f"`{new}` is no name: letters, digits and `_`, not a digit first"
     if is_unit(new):
@@ -77,7 +78,7 @@ def refusal_of_word(new: str) -> str:
 
 
 def refusal_of_name(token: Token, meant: Sequence[NameInText]) -> str:
-    """Why what a word means cannot be renamed, as far as texts alone tell; "" where it may be."""
+    """The reason why the meaning of a word cannot be renamed, judged by texts alone; "" where it can."""
     if any("{" in each.token.text for each in meant):
         return f"`{token.text}` is made by a loop: change `{meant[0].token.text}` by hand"
     if any(each.made for each in meant):
@@ -91,7 +92,7 @@ def refusal_of_name(token: Token, meant: Sequence[NameInText]) -> str:
 
 
 class _Deck:
-    """A deck as it is: compiled, with the names in its texts."""
+    """A compiled deck, with the names in its texts."""
 
     def __init__(self, request: CheckRequest) -> None:
         self.request = request
@@ -120,7 +121,7 @@ def _compiled(request: CheckRequest) -> Compiled:
 
 
 def renamed(asked: RenameRequest) -> Renamed:
-    """The edits that change the name, proved; or why there are none."""
+    """The proved edits that change the name, or the reason why there are none."""
     try:
         return _renamed(asked)
     except NotRenamed as reason:
@@ -191,7 +192,7 @@ def edited(text: str, edits: Iterable[tuple[int, int]], new: str) -> str:
 
 
 def _is_proved(deck: _Deck, edits: Mapping[str, tuple[tuple[int, int], ...]], old: str, new: str) -> bool:
-    """True where a deck's plan is the same but for the name; False where it has none, for it has no runs. Raises
+    """True where a deck's plan is the same except for the name; False where it has none, since it has no runs. Raises
     NotRenamed."""
     codes = deck.codes
     if codes and codes != [NO_RUN]:
@@ -223,7 +224,7 @@ _COLUMNS = ("column", "length")
 
 
 def same_but_for(old: str, new: str, before: Any, after: Any) -> bool:
-    """True for two values of plans that are equal where one word stands for another, and columns of places aside."""
+    """True for two values of plans that are equal with one word in place of another, and columns of places aside."""
     if isinstance(before, str) and isinstance(after, str):
         return before == after or _renamed_words(old, new, before, after)
     if isinstance(before, dict) and isinstance(after, dict):

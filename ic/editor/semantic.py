@@ -1,6 +1,7 @@
 """The meaning of each word of a text, for an editor's colours: keys, models, units, names by what they name, macros.
 
-A grammar of colours goes by how a word is written; this goes by what the language declares and the deck defines.
+A colour grammar uses only the spelling of a word; this module uses the declarations of the language and the definitions
+of the deck.
 """
 
 from __future__ import annotations
@@ -40,9 +41,9 @@ _OF_NAME: Mapping[str, str] = MappingProxyType({
 def semantic_tokens(
     text: DeckText, names: NamesInTexts, position: Callable[[int], types.Position], units: Callable[[str], int]
 ) -> types.SemanticTokens:
-    """The words of a text that mean something, as the protocol packs them.
+    """The meaningful words of a text, packed for the protocol.
 
-    position  of an offset, for the editor;  units: the length of a text, for the editor
+    position of an offset, for the editor; units: the length of a text, for the editor
     """
     data: list[int] = []
     line = column = 0
@@ -59,7 +60,7 @@ def semantic_tokens(
 
 
 def meanings(text: DeckText, names: NamesInTexts) -> Iterator[tuple[Token, str, int]]:
-    """The words of a text in order, each with its kind of `TYPES` and bits of `MODIFIERS`; those that mean nothing are
+    """The words of a text in order, each with its kind of `TYPES` and bits of `MODIFIERS`; words without a meaning are
     left out."""
     entries = [entry for entry in text.all_entries() if entry.words]
     for macro in text.macros:
@@ -146,7 +147,7 @@ def _key(token: Token, entry: TextEntry, names: NamesInTexts) -> tuple[str, int]
 
 
 def _words_of(entry: TextEntry, names: NamesInTexts) -> tuple[str, ...]:
-    """The words that the value of an entry may be."""
+    """The words that are allowed as the value of an entry."""
     around = entry.within
     if around is None:
         return ()

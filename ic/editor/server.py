@@ -27,19 +27,19 @@ from met.diagnostic import Problem
 from met.version import VERSION
 
 PYGLS_LOG = "pygls.protocol.json_rpc"
-"""The logger to which pygls writes each error that is an answer, with where it was raised."""
+"""The logger to which pygls writes each error answer, with its traceback."""
 
 OPTIONS = ("includeDirs", "defines", "helpInMessage")
 """The keys that an editor may give in its `initializationOptions`."""
 
 
 def _is_no_refusal(record: logging.LogRecord) -> bool:
-    """True but for an answer that refuses a name, which is no fault of the server's and belongs in no log."""
+    """True except for an answer that refuses a name, which is not a fault of the server's and belongs in no log."""
     return record.exc_info is None or not isinstance(record.exc_info[1], CannotRename)
 
 
 class DeckServer(LanguageServer):
-    """A language server with what it knows of decks."""
+    """A language server with its knowledge of decks."""
 
     def __init__(self, include_dirs: Iterable[str], defines: Iterable[str], last_runs: FindLastRuns | None) -> None:
         super().__init__("met", VERSION, text_document_sync_kind=types.TextDocumentSyncKind.Full)
@@ -93,21 +93,21 @@ class DeckServer(LanguageServer):
         self.window_log_message(types.LogMessageParams(types.MessageType.Error, f"met lsp: {text}"))
 
     def refresh(self) -> None:
-        """Have the editor ask again for colours and lenses, where it does so: other files of a deck have changed."""
+        """Ask the editor to refresh colours and lenses, if it supports that: other files of a deck have changed."""
         if self._refreshes_colours:
             self.workspace_semantic_tokens_refresh(None)
         if self._refreshes_lenses:
             self.workspace_code_lens_refresh(None)
 
     def forget_notifications(self) -> None:
-        """Let go of what was dealt with: pygls keeps a future of each change of a text, as of a request that is yet to
-        be answered, a kilobyte each."""
+        """Release finished notifications: pygls keeps a future for each change of a text, as for an open request, a
+        kilobyte each."""
         waiting = self.protocol._request_futures
         for number in [number for number, future in waiting.items() if future.done()]:
             del waiting[number]
 
     def end(self) -> None:
-        """End the process that checks."""
+        """End the checking process."""
         if self._worker is not None:
             self._worker.cancel()
         self.process.close()
@@ -123,17 +123,17 @@ class DeckServer(LanguageServer):
         return next((each.uri for each in self.checks.texts.values() if each.identity == real), uri_of(path))
 
     def _as_checked(self, deck: CheckedDeck, uri: str) -> bool:
-        """True where a text is what it was when the deck was checked."""
+        """True where a text is the same as when the deck was checked."""
         return deck.texts.get(uri) == self.checks.texts.get(uri)
 
     def unchanged(self, deck: CheckedDeck) -> bool:
-        """True where all texts of a deck are what they were when it was checked."""
+        """True where all texts of a deck are the same as when it was checked."""
         return all(
             self._as_checked(deck, uri) for uri, each in self.checks.texts.items() if each.identity in deck.files
         )
 
     def layout(self, uri: str) -> list[types.TextEdit]:
-        """The edit that lays a text out as `met fmt` does; none where it is laid out, or broken, which is logged."""
+        """The edit that formats a text as `met fmt` does; none where it is formatted, or broken, which is logged."""
         from ic.formatting.files import lay_out_text
 
         opened = self.checks.texts.get(uri)
@@ -157,7 +157,7 @@ class DeckServer(LanguageServer):
         return DeckText(uri, "\n".join(lines_of(opened.text if opened is not None else "")))
 
     def position_in(self, text: DeckText) -> Callable[[int], types.Position]:
-        """Where offsets of a text are, for the editor."""
+        """A function from offsets of a text to the editor's positions."""
         texts = Texts({text.source.name: text.source.text}, self.workspace.position_codec)
 
         def position(offset: int) -> types.Position:
@@ -172,7 +172,7 @@ class DeckServer(LanguageServer):
         return [path for path in map(path_of, addresses) if path is not None]
 
     def lenses(self, uri: str) -> list[types.CodeLens]:
-        """The lines above the runs of a text, with what archives beside its file say of them."""
+        """The lines above the runs of a text, with data from archives beside its file."""
         asked, path = self.asked_about(uri, types.Position(0, 0)), path_of(uri)
         known = self._last_runs(path) if self._last_runs is not None and path is not None else {}
         position = self.position_in(asked.text)
@@ -191,7 +191,7 @@ class DeckServer(LanguageServer):
         return Asked(self.checks, self.workspace.position_codec, self.address, uri, position)
 
     def publish(self, decks: Iterable[CheckedDeck]) -> None:
-        """Tell the editor what is wrong in which file, where that is another than it knows."""
+        """Send the editor the diagnostics of each file whose diagnostics have changed."""
         found: dict[str, list[types.Diagnostic]] = {}
         versions: dict[str, int | None] = {}
         self.fixes = {}
@@ -220,7 +220,7 @@ class DeckServer(LanguageServer):
 def make(
     include_dirs: Sequence[str] = (), defines: Sequence[str] = (), last_runs: FindLastRuns | None = None
 ) -> DeckServer:
-    """A server with all that it answers."""
+    """A server with handlers for all its requests."""
     server = DeckServer(include_dirs, defines, last_runs)
 
     @server.feature(types.INITIALIZE)
@@ -314,7 +314,7 @@ def make(
 
     @server.feature("met/settled")
     async def settled(parameters: None) -> bool:
-        """An answer once all that the editor has said is checked, and told."""
+        """An answer after all changes from the editor are checked, and reported."""
         await server.checks.rest()
         return True
 
@@ -326,11 +326,11 @@ def make(
 
 
 def serve(include_dirs: Sequence[str] = (), defines: Sequence[str] = (), last_runs: FindLastRuns | None = None) -> None:
-    """Serve an editor until it says that it ends, or has gone. last_runs: finds what archives say, for lenses."""
+    """Serve an editor until it ends the session, or has gone. last_runs: reads archives, for lenses"""
     server = make(include_dirs, defines, last_runs)
     logging.getLogger(PYGLS_LOG).addFilter(_is_no_refusal)
     out = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever prints does not print into the protocol
+    os.dup2(2, 1)  # output of any code must not get into the protocol
     try:
         server.start_io(stdout=out)
     finally:

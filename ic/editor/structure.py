@@ -1,7 +1,7 @@
 """The blocks and names of a deck's text as it stands, whole or not: for outlines, completion and the search for names.
 
-The parser's tree is of a deck with its includes and macros, and there is none where the text is broken. This one is of
-a single text, and takes whatever there is.
+The parser's tree is that of a deck with its includes and macros, and does not exist for a broken text. This one is that
+of a single text, complete or not.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ INSIDE_SERVO = "sensor"
 NAMING = frozenset({
     *DEFINITIONS, *LETS, UNIT, "require", *(word for block in BLOCKS.values() for word in block.named),
 }) - {"substitute", "with"}  # fmt: skip
-"""Words that a new name follows."""
+"""Words that are followed by a new name."""
 
 
 @dataclass
@@ -68,7 +68,8 @@ class TextEntry:
 
     @property
     def block(self) -> str:
-        """The block of the language that it is: `servo` also of `elbow = motor { ... }` among a run's servos."""
+        """The block of the language to which it belongs: `servo` also for `elbow = motor { ... }` among a run's
+        servos."""
         if "=" in self.texts[1:]:
             if self.within is not None and self.within.kind == "servos":
                 return "servo"
@@ -77,7 +78,7 @@ class TextEntry:
 
     @property
     def named(self) -> Token | None:
-        """The token of the name that it defines: `reach` of `let reach = 2 m;`, `motor` of `servo motor { ... }`."""
+        """The token of the name that it defines: `reach` in `let reach = 2 m;`, `motor` in `servo motor { ... }`."""
         words = self.words[len(self.words) - len(self.texts) :]
         if len(words) < 2 or words[0].text not in NAMING or words[1].kind != NAME:
             return None
@@ -88,12 +89,12 @@ class TextEntry:
         return words[1] if len(words) > 2 and words[2].text in ("=", ":") else None
 
     def word_behind(self, word: str) -> str:
-        """The word behind another one, such as the servo that one is `like`; "" where there is none."""
+        """The word after another one, such as the servo after `like`; "" where there is none."""
         texts = self.texts
         return texts[texts.index(word) + 1] if word in texts[:-1] else ""
 
     def name_behind(self, word: str) -> Token | None:
-        """The token of the name behind a word, `drive` of `like panda.drive`; None where there is none."""
+        """The token of the name after a word, `drive` in `like panda.drive`; None where there is none."""
         words = self.words[len(self.words) - len(self.texts) :]
         at = self.texts.index(word) + 1 if word in self.texts[:-1] else len(words)
         while at + 2 < len(words) and words[at + 1].text == "." and words[at + 2].kind == NAME:
@@ -123,7 +124,7 @@ def _is_call(words: list[Token]) -> bool:
 
 
 def entries_of(tokens: Iterable[Token], last: int, within: TextEntry | None = None) -> list[TextEntry]:
-    """The entries that tokens make, in whose names braces are joined; last: the offset at which the text ends."""
+    """The entries of a sequence of tokens, with braces in names joined; last: the offset at which the text ends."""
     outermost: list[TextEntry] = []
     around: TextEntry | None = None
     entry: TextEntry | None = None
@@ -170,7 +171,7 @@ def _end(entry: TextEntry | None, at: int, complete: bool) -> None:
 
 
 def with_whole_names(seen: Sequence[Token]) -> Iterator[Token]:
-    """The tokens, of a name with braces in a loop all in one: `seg_{i-1}`."""
+    """The tokens, with a name with braces in a loop joined into one: `seg_{i-1}`."""
     indices: list[str] = [""]  # of each block that is open; "" where it is no loop's
     index, at = "", 0
     while at < len(seen):
@@ -215,7 +216,7 @@ def innermost_around(entries: Iterable[TextEntry], offset: int) -> TextEntry | N
 
 
 def through_loops(entries: Iterable[TextEntry]) -> Iterator[TextEntry]:
-    """Entries of a block with those that loops in it have, as the block is read."""
+    """Entries of a block including those in its loops, in the order in which the block is read."""
     waiting = list(reversed(list(entries)))
     while waiting:
         entry = waiting.pop()
@@ -333,5 +334,5 @@ class KnownStructures:
         return found
 
     def forget(self, deck: str) -> None:
-        """Let go of what is known of a deck, which an editor has closed."""
+        """Release the structures of a deck that an editor has closed."""
         self._of.pop(deck, None)

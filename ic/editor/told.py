@@ -1,4 +1,4 @@
-"""Diagnostics as editors take them: in the words of `met check`, helps and notes as what is related."""
+"""Diagnostics in an editor's form: in the words of `met check`, with helps and notes as related information."""
 
 from __future__ import annotations
 

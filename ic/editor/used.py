@@ -1,4 +1,4 @@
-"""Decks that a text uses: which of a deck's texts a name is of, with roofs before it and without."""
+"""Decks that a text uses: the texts in which a name may be defined, with roofs before it and without."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class UseInText:
 
 
 def uses_in(text: DeckText) -> Iterator[UseInText]:
-    """The uses of decks that a text writes, as far as they are whole."""
+    """The uses of decks in a text, as far as they are complete."""
     for entry in text.entries:
         words = entry.words
         end = next((n for n, word in enumerate(words) if word.text == AS), 0)
@@ -44,7 +44,7 @@ def uses_in(text: DeckText) -> Iterator[UseInText]:
 
 
 def used_files(text: str) -> set[str]:
-    """The names, without their folders, of the files that a text uses, whose runs are none of the deck's."""
+    """The names, without folders, of the files that a text uses, whose runs do not belong to the deck."""
     return {os.path.basename(quoted or angled) for quoted, angled in _USE.findall(text)}
 
 
@@ -81,7 +81,7 @@ class DecksUsed:
         return {name for name in self._uses if pattern.fullmatch(name)}
 
     def seen_from(self, name: str) -> set[str]:
-        """The texts whose definitions a text knows without a roof, its own among them."""
+        """The texts whose definitions a text sees without a roof, including itself."""
         return self._connected({name}) if self else set(self._uses)
 
     def _connected(self, names: Iterable[str]) -> set[str]:
@@ -98,7 +98,8 @@ class DecksUsed:
         return {use.roof.text: use for name in names for use in self._uses.get(name, ())}
 
     def under(self, name: str, words: Sequence[str]) -> set[str]:
-        """The texts that roofs in a text stand for, `cell`, `panda` of `cell.panda.d1`; none where one is no roof."""
+        """The texts for which roofs in a text stand, `cell`, `panda` in `cell.panda.d1`; none where one is not a
+        roof."""
         found = self.seen_from(name)
         for word in words:
             use = self.roofs(found).get(word)
