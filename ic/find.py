@@ -33,5 +33,5 @@ def library_files() -> list[str]:
 
 
 def standard_decks() -> list[str]:
-    """The decks of the standard library that can be run as they are; those in its folders are to be included."""
+    """The decks of the standard library that can be run directly; those in its folders are for inclusion."""
     return sorted(path.name for path in LIBRARY.glob("*.ic"))

@@ -1,4 +1,4 @@
-"""Files that a deck names besides decks: beside the file that names them, then where `-I` says; each read once."""
+"""Files that a deck names besides decks, found beside the naming file, then in the folders of `-I`; each read once."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 
 class NamedFiles(Generic[T]):
-    """The files of one kind, each as what `load` makes of its name and text.
+    """The files of one kind, each as the result of `load` for its name and text.
 
     kind, ending  what messages call one, and how their names end;  most  bytes of one
     missing       the code of the message where there is none of a name
@@ -34,12 +34,12 @@ class NamedFiles(Generic[T]):
 
     @property
     def sources(self) -> tuple[SourceFile, ...]:
-        """The files that were read, whole, in order."""
+        """The files that were read, complete, in order."""
         return tuple(self._files.read_so_far.values())
 
     @property
     def loaded(self) -> Iterable[T]:
-        """The contents of the files in which nothing is wrong."""
+        """The contents of the files without mistakes."""
         return (each for each in self._read.values() if not isinstance(each, Problem))
 
     def get(self, named: String) -> T:

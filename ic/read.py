@@ -1,4 +1,4 @@
-"""A deck's path to its tree: preprocessor and parser, one after the other, and all that either has to say."""
+"""A deck's path to its tree: preprocessor and parser in turn, with all their messages."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ UNKNOWN_TEXT = (
     "D001", "D002", "D005", "D006", "D007", "D008", "D009", "D010", "D014", "D016", "D018",
     "D395", "D396", "D397",
 )  # fmt: skip
-"""Errors after which it is not known what the deck says: a file or a branch of it may be lacking."""
+"""Errors after which the deck's text is not fully known: a file or a branch of it may be missing."""
 
 
 def read(
@@ -77,14 +77,14 @@ def read(
 
 
 def read_again(deck: Deck, defines: Sequence[str], *, library: Path = LIBRARY) -> Deck:
-    """A deck as it is with further macros, `NAME=VALUE`, in place of those of their names on the command line."""
+    """A deck read again with further macros, `NAME=VALUE`, which replace those of their names on the command line."""
     names = {each.partition("=")[0] for each in defines}
     kept = [each for each in deck.defines if each.partition("=")[0] not in names]
     return read(deck.path, deck.include_dirs, (*kept, *defines), library=library, text=deck.text, unsaved=deck.unsaved)
 
 
 def in_order(diagnostics: Iterable[Diagnostic], sources: Sequence[SourceFile]) -> tuple[Diagnostic, ...]:
-    """Diagnostics as one meets them reading the files, one after the other; those without a place come last."""
+    """Diagnostics in the order of the files' text; those without a place come last."""
     number = {source.name: i for i, source in enumerate(sources)}
 
     def key(diagnostic: Diagnostic) -> tuple[int, int, int]:

@@ -1,7 +1,7 @@
 """The decks that a deck uses, `use <panda.ic> as panda;`: each read by itself, its definitions under its roof.
 
-A used deck has a preprocessor of its own, which knows no macro of who uses it nor of `-D`, and is parsed by itself, in
-its own edition and with units of its own. Its runs and sweeps stay away.
+A used deck has a preprocessor of its own, without macros of its user or of `-D`, and is parsed alone, in its own
+edition and with its own units. Its runs and sweeps are left out.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ TAKEN = (
     *HEADS, "J_eff", "arm", "b", "base", "duration", "energy", "integrator", "limits", "macro", "mode", "momentum",
     "pi", "q", "qd", "qdd", "reaction", "record", "seed", "servo", "servos", "signals", "tau", "tau_load",
 )  # fmt: skip
-"""Words that other paths begin with, or are, and that so can be no roof."""
+"""Words with which other paths begin, or which are paths, and which so cannot be roofs."""
 
 
 class UsedDecks:
@@ -44,7 +44,7 @@ class UsedDecks:
         self.unreadable: list[UnreadableStretch] = []
 
     def parse(self, seen: Tokens, file: FoundFile, within: tuple[FoundFile, ...] = ()) -> tuple[Parsed, Roofs]:
-        """A deck with what it uses among its entries, and its roofs; what is wrong is in the findings.
+        """A deck with the entries of its used decks, and its roofs; errors are in the findings.
 
         within  the decks that use it, the outermost first
         """
@@ -69,7 +69,7 @@ class UsedDecks:
         return replace(parsed, entries=(*brought, *with_full_names(parsed.entries, roofs))), roofs
 
     def _may_be_called(self, roof: Word, roofs: Roofs, own: dict[str, Word]) -> bool:
-        """Return True if a roof may have this name; report why it may not."""
+        """Return True if a roof may have this name; otherwise report the reason."""
         name = roof.text
         also: tuple[Label, ...] = ()
         if name in roofs:

@@ -1,4 +1,4 @@
-"""`met fmt`: a deck's text, laid out the same way everywhere, with its tokens and comments as they were.
+"""`met fmt`: uniform layout of a deck's text, with unchanged tokens and comments.
 
     text  --rows-->  rows of pieces, brackets matched  --layout-->  text  --proof-->  the same tokens as before
 

@@ -4,11 +4,11 @@ Neighbours are lines of one block with no blank line between; lines within a nes
 aligned where they are of one family, one of them is set apart, and both begin at the same column, or end there, or
 have their decimal points there. They stay as far out as they were, or go as far as they must.
 
-A piece is set apart by two blanks at least, and by more than it needs. All else that meets does so by chance: a number
-and a `<`, or two `=` with a blank before each.
+A piece is set apart by two blanks at least, and by more than it needs. Other coincidences are by chance: a number and a
+`<`, or two `=` with a blank before each.
 
-Where one `=` of a paragraph of entries has more than it needs, all are to be aligned: so a name that has become longer
-takes the others with it. For this the `{` of `rates { ... }` is as good as a `=`.
+Where one `=` of a paragraph of entries has more than it needs, all are aligned: so a longer name moves the others. For
+this the `{` of `rates { ... }` is as good as a `=`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ic.formatting.row import BLANK, CODE, REMARK, Row, RowPiece
 REACH = 3  # lines: two that are aligned may have as many less one between them
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 ANCHORS = ("start", "end", "point")
-Anchor = str  # what of the pieces of a group is at one column
+Anchor = str  # the part of the pieces of a group that is at one column
 Node = tuple[int, int]  # a row's position, and that of a piece on it
 
 
@@ -41,7 +41,7 @@ class Groups:
         self._leaders: dict[Node, Node] = {}
 
     def group(self, node: Node) -> Node | None:
-        """A piece that stands for the group of this one."""
+        """The piece that represents the group of this one."""
         if node not in self.anchors:
             return None
         while self._leaders[node] != node:
@@ -68,7 +68,7 @@ def offset(piece: RowPiece, anchor: Anchor) -> int:
 
 
 def aligned(found: Sequence[Row], *, paragraphs: bool) -> Groups:
-    """The groups of all rows. paragraphs: whether a `=` that is alone in its wide gap takes the others with it."""
+    """The groups of all rows. paragraphs: whether a `=` that is alone in its wide gap moves the others"""
     groups = Groups()
     separators = {at: sign for at, row in enumerate(found) if (sign := _separator(row)) is not None}
     paragraph: dict[int, int] = {}  # rows that have a separator, by the first of their paragraph
@@ -191,7 +191,7 @@ def _side(piece: int, separator: int) -> int:
 
 
 def _separator(row: Row) -> int | None:
-    """The position of the piece that stands between an entry's name and the rest; None where there is none."""
+    """The position of the piece between an entry's name and the rest; None where there is none."""
     if row.kind != CODE or row.exact or row.closes is not None:
         return None
     for at, piece in enumerate(row.pieces):
@@ -203,7 +203,7 @@ def _separator(row: Row) -> int | None:
 
 
 def _paragraphs(found: Sequence[Row], separators: Mapping[int, int]) -> Iterator[list[int]]:
-    """Entries that follow one another and are alike: as many words before the separator, the first one the same."""
+    """Neighbouring similar entries: with equally many words before the separator, the first one the same."""
     rows: list[int] = []
     for at, row in enumerate(found):
         if row.kind == REMARK:
@@ -240,7 +240,7 @@ def neighbours(found: Sequence[Row]) -> Iterator[tuple[int, int]]:
 
 
 def _is_wide(pieces: Sequence[RowPiece], at: int) -> bool:
-    """Return True if this piece is set apart. Behind a `[` one blank does that, as in `[ 90, 5]` below `[-90, 5]`."""
+    """Return True if this piece is set apart. After a `[` one blank is enough, as in `[ 90, 5]` below `[-90, 5]`."""
     before, piece = pieces[at - 1], pieces[at]
     needed = blanks_between(before, piece)
     least = 1 if before.text == "[" or (before.kind == "open" and piece.kind == "number") else 2

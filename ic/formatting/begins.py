@@ -1,4 +1,4 @@
-"""The beginning of a row: a new entry, the continuation of one, or a place below what follows a bracket."""
+"""The beginning of a row: a new entry, the continuation of one, or a place below the text after a bracket."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _LEFT_OPEN = _JOINING | {"not", "when", "like", "of"}
 
 
 def stands_below(row: Row) -> bool:
-    """Return True if a row was written below what follows the bracket that it stands in."""
+    """Return True if a row was written below the text after its bracket."""
     if row.parent is None or row.closes is not None:
         return False
     outer, opener = row.parent
@@ -26,7 +26,7 @@ def _sets_others(row: Row) -> bool:
 
 
 def goes_on(row: Row) -> bool:
-    """Return True if a row continues what the row before has begun, where no bracket says so."""
+    """Return True if a row continues the one before without a bracket that says so."""
     behind = row.behind
     if row.closes is not None or stands_below(row):
         return False

@@ -1,4 +1,4 @@
-"""Decks on a disk, for `met fmt`: which there are, what each would be, and how that is written in its place."""
+"""Deck files for `met fmt`: finding them, formatting them, and writing them back."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STDIN = "-"
 
 @frozen
 class LaidOut:
-    """A deck as it is and as it is to be.
+    """A deck before and after formatting.
 
     name     for messages
     before   its text, its lines ended by newlines whatever they were
@@ -39,7 +39,7 @@ class LaidOut:
     ends: bool
 
     def diff(self) -> Iterator[str]:
-        """The changes, as `diff -u` prints them."""
+        """The changes in the format of `diff -u`."""
         old, new = (list(io.StringIO(text)) for text in (self.before, self.after))
         for line in difflib.unified_diff(old, new, self.name, f"{self.name} (formatted)"):
             yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
@@ -77,7 +77,8 @@ def _inside(folder: str) -> Iterator[str]:
 
 
 def lay_out(path: str, text: str | None = None) -> LaidOut:
-    """One deck; laid out as if it had this text. Raises Problem where it cannot be read, is broken, or is no deck."""
+    """One formatted deck; with this text in place of its own, if given. Raises Problem where it cannot be read, is
+    broken, or is not a deck."""
     if path == STDIN:
         if sys.stdin is None:
             raise Problem(error("D001", "cannot read standard input: it is closed", help="name a deck, or pipe one in"))
@@ -86,13 +87,13 @@ def lay_out(path: str, text: str | None = None) -> LaidOut:
         help = "`met fmt` is for decks"
         raise Problem(error("E342", f"`{path}` is a plan, and plans are written by `met plan`", help=help))
     file = FoundFile(path, os.path.normpath(path))
-    Files().text(file)  # complains as every reader of decks does
+    Files().text(file)  # complains like every reader of decks
     with open_regular(path) as stream:
         return _laid_out(file, stream.read(MOST_BYTES + 1), text)
 
 
 def lay_out_text(path: str, text: str) -> str:
-    """The text of a deck at a path, as an editor has it, laid out. Raises Problem where it is broken."""
+    """The formatted text of a deck at a path, as an editor has it. Raises Problem where it is broken."""
     file = FoundFile(path, os.path.normpath(path))
     return formatted(file.name, text, making_strings(text, file))
 
@@ -109,7 +110,7 @@ def _laid_out(file: FoundFile, data: bytes, new: str | None = None) -> LaidOut:
 
 
 def write(path: str, text: str) -> None:
-    """Puts the text in the place of the file, all at once; its permissions stay, and a link to it stays a link.
+    """Replace the file's text, all at once; its permissions stay, and a link to it stays a link.
 
     Raises Problem E338, and leaves the file as it was, where the system refuses, or where a link leads to a file that
     is not called a deck: a folder that somebody gave may hold a link to any file.

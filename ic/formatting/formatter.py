@@ -19,7 +19,7 @@ def formatted(name: str, text: str, making_strings: Collection[str] = ()) -> str
     Raises Problem where the text is broken, and E340 where laying it out would change what it says.
     """
     laid = text
-    for _ in range(MOST_TURNS):  # what is aligned only by chance may need a second turn
+    for _ in range(MOST_TURNS):  # accidental alignments may need a second turn
         before = laid
         laid = laid_out(rows_as_seen(Text(name, before), making_strings))
         if laid == before:
@@ -29,7 +29,7 @@ def formatted(name: str, text: str, making_strings: Collection[str] = ()) -> str
 
 
 def prove(name: str, before: str, after: str) -> None:
-    """Raises Problem E340 where two texts do not have the same tokens, line by line, and the same comments."""
+    """Raise Problem E340 where two texts do not have the same tokens, line by line, and the same comments."""
     old, new = _lines(Text(name, before)), _lines(Text(name, after))
     at = next((i for i, (one, other) in enumerate(zip(old, new, strict=False)) if one[0] != other[0]), None)
     if at is None and len(old) != len(new):
@@ -42,7 +42,7 @@ def prove(name: str, before: str, after: str) -> None:
 
 
 def _characters(text: str) -> str:
-    """All that is not blank."""
+    """All non-blank characters."""
     return "".join(text.split())
 
 

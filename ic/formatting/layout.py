@@ -1,8 +1,8 @@
 """The column of everything on a row: indentation, blanks between pieces, alignment with rows above and below.
 
-A line begins four blanks to the right of the line that opened the bracket it stands in, and four more where it goes on
-with an entry. Behind a bracket that is not the last of its line it may stand below what follows the bracket, if it did.
-Comments at the ends of lines stay where they are, two blanks behind their line at least, and stay aligned.
+A line begins four blanks to the right of the line that opened its bracket, and four more where it continues an entry.
+After a bracket that is not the last of its line it may stand below the text after the bracket, if it did. Comments at
+the ends of lines keep their places, at least two blanks after their line, and stay aligned.
 
 Columns depend on columns to their left and on lines further out, and grow only: the rows are gone through until nothing
 moves.
@@ -23,7 +23,7 @@ MOST_BLANK = 2  # lines at the top level; within a bracket it is one
 
 
 def laid_out(found: Sequence[Row]) -> str:
-    """The text that these rows are to be."""
+    """The formatted text of these rows."""
     columns = _columns(found)
     tails = _tails(found, columns)
     keep = any(token.text == "__LINE__" for row in found for token in row.tokens)  # which counts blank lines too
@@ -40,7 +40,7 @@ def laid_out(found: Sequence[Row]) -> str:
 
 
 def _most_blank(above: Row | None, row: Row) -> int:
-    """The number of blank lines that may stand between two rows: none at the edges of a block and of the file."""
+    """The largest number of blank lines between two rows: none at the edges of a block and of the file."""
     if above is None or row.closes is not None or (above.pieces and above.pieces[-1].kind == "open"):
         return 0
     return 1 if row.parent else MOST_BLANK
@@ -60,7 +60,7 @@ def _text(row: Row, columns: Sequence[int], tail: int) -> str:
 
 
 def _remark(row: Row, column: int) -> str:
-    """A comment that stands alone; the further lines of a long one move with its first."""
+    """The text of a separate comment; the further lines of a long one move with its first."""
     first, *others = row.raw.split("\n")
     moved = column - row.column(row.whole[0].offset)
     lines = [" " * column + first.strip(BLANKS)]
@@ -72,10 +72,10 @@ def _remark(row: Row, column: int) -> str:
 
 
 def _columns(found: Sequence[Row]) -> list[list[int]]:
-    """The column of each piece of each row; of a remark, that of its comment.
+    """The column of each piece of each row; for a comment row, that of the comment.
 
-    Columns that the author had are consistent with each other. Those of a paragraph that is to be aligned need not be,
-    and who has written a deck by a program may have more of either than is worth the time: then less is aligned.
+    Columns of the author's are consistent with each other. Those of a paragraph that is to be aligned need not be, and
+    a generated deck may have more of either than time allows: then less is aligned.
     """
     for paragraphs in (True, False):
         columns = _settled(found, aligned(found, paragraphs=paragraphs))
@@ -122,8 +122,8 @@ def _settled(found: Sequence[Row], groups: Groups) -> list[list[int]] | None:
 
 
 def _steps(at: int, row: Row, groups: Groups) -> list[tuple[int, Node | None, int, int]]:
-    """For each piece: how far its column is from the one before, at least; the group that it is aligned with, how far
-    in it the anchor is, and how far from the row's beginning it stays at least."""
+    """For each piece: the smallest distance of its column from the one before; its group, the anchor's offset in it,
+    and the smallest distance from the row's beginning."""
     steps: list[tuple[int, Node | None, int, int]] = [(0, None, 0, 0)] if row.pieces else []
     for i in range(1, len(row.pieces)):
         before, piece = row.pieces[i - 1 : i + 1]
@@ -141,7 +141,7 @@ def _as_written(row: Row) -> list[int]:
 
 
 def _indentation(row: Row, positions: dict[int, int], columns: Sequence[Sequence[int]], below: bool) -> int:
-    """The column, from 0, at which a row begins that does not continue another."""
+    """The column, from 0, of a row that does not continue another."""
     if row.closes is not None:
         return columns[positions[id(row.closes)]][0]
     if row.parent is None:
@@ -151,7 +151,7 @@ def _indentation(row: Row, positions: dict[int, int], columns: Sequence[Sequence
 
 
 def _tails(found: Sequence[Row], columns: Sequence[Sequence[int]]) -> list[int]:
-    """The column of each comment that ends a line, and of those that go on with one below; -1 for all else."""
+    """The column of each comment at the end of a line, and of those that continue one below; -1 for all others."""
     tails = [-1] * len(found)
     paragraph: list[int] = []
     for at, row in enumerate([*found, None]):
@@ -182,7 +182,7 @@ def _settle(found: Sequence[Row], columns: Sequence[Sequence[int]], paragraph: S
     for column, together in places.items():
         ends = [columns[at][-1] + len(found[at].pieces[-1].text) for at in together]
         row = found[together[0]]
-        if len(together) == 1:  # alone: as far from its line as it was
+        if len(together) == 1:  # alone: as far from its line as before
             written = row.column(row.whole[-2].end)
             column = ends[0] + column - written
         column = max(column, max(ends) + BEFORE_COMMENT)

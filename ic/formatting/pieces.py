@@ -1,7 +1,7 @@
 """The pieces of a line, tokens that belong together, and the blanks between them.
 
-A path, a unit and a number with its sign are one piece each. Where a unit ends is asked of the parser, so that the
-`*` of `2 kg*m^2` is told from that of `2 * width`.
+A path, a unit and a number with its sign are one piece each. The parser finds the end of a unit, so that the `*` of `2
+kg*m^2` is told from that of `2 * width`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from met import units
 from met.units import ONE
 
 WORDS = ("and", "or", "not", "when", "require", "by", "in")
-"""Behind these a value begins."""
+"""Words after which a value begins."""
 
 OPERATORS = ("+", "-", "*", "/", "^", "=", "+=", "<", "<=", ">", ">=", "==", "!=", "..", "&&", "||")
 _SIGNS = ("-", "+", "!")
@@ -30,7 +30,7 @@ _OPERANDS = ("name", "number", "unit", "string", "close")
 
 
 def cut(rows: Iterable[Row]) -> None:
-    """Gives every row of code its pieces; the comment at its end is none of them."""
+    """Give every row of code its pieces, without the comment at its end."""
     code = list(rows)
     tokens = [token for row in code for token in row.tokens]
     if not tokens:
@@ -44,7 +44,7 @@ def cut(rows: Iterable[Row]) -> None:
 
 
 def _declared_units(tokens: Sequence[Token]) -> Iterator[str]:
-    """The units that a file of edition 2 declares, or has from another file: nothing else stands behind a number."""
+    """The units that a file of edition 2 declares, or has from another file: only units stand after a number."""
     if tokens[0].source.edition > 1:
         yield from declarations(tokens)
         for before, token in pairwise(tokens):
@@ -117,7 +117,7 @@ def _piece(parser: Expressions, at: int, free: int, before: RowPiece | None, ope
 
 
 def _is_used(before: Sequence[Token]) -> bool:
-    """Return True behind the `use` that begins an entry, by the two tokens before."""
+    """Return True after the `use` that begins an entry, by the two tokens before."""
     return before[-1:] != [] and before[-1].text == USE and (len(before) == 1 or before[0].text in (";", "}"))
 
 
@@ -147,7 +147,7 @@ def _number(parser: Expressions, at: int, free: int) -> int:
 
 
 def _unit(parser: Expressions, at: int, before: RowPiece) -> int:
-    """The number of tokens of the unit that begins behind this piece; 0 where none does."""
+    """The number of tokens of the unit that begins after this piece; 0 where none does."""
     token, following = parser.tokens[at], parser.tokens[at + 1]
     over = None
     if token.kind == WHOLE and token.text == "1" and following.text == "/":
@@ -176,7 +176,7 @@ def blanks_between(before: RowPiece, piece: RowPiece) -> int:
 
 
 def _wanted(before: RowPiece, piece: RowPiece) -> int | None:
-    """The blanks between two pieces by their kinds; None to leave it to the author, whether one or none."""
+    """The blanks between two pieces by their kinds; None to keep the author's choice of one or none."""
     first, second = before.kind, piece.kind
     if second == "stop" and first != "comment":
         return 1 if before.text == "{" else 0
@@ -213,7 +213,7 @@ def _around_brace(before: RowPiece, piece: RowPiece) -> int | None:
 
 @lru_cache(maxsize=4096)
 def _stay_apart(before: str, after: str) -> bool:
-    """Return True if the lexer still tells two texts apart when nothing stands between them."""
+    """Return True if the lexer still separates two texts when nothing stands between them."""
 
     def texts(text: str) -> list[str]:
         return [token.text for line in logical_lines(Text("", text)) for token in line if token.kind != SPACE]

@@ -109,13 +109,13 @@ class Row:
         return self.tokens[1].text if self.kind == DIRECTIVE and len(self.tokens) > 1 else ""
 
     def column(self, offset: int) -> int:
-        """The column, from 0, of what stands at this offset."""
+        """The column, from 0, of the character at this offset."""
         inside = offset - self.start
         before = self.raw.rfind("\n", 0, inside) + 1 if self._lines else 0
         return inside - before if self._tabs is None else self._tabs[inside]
 
     def _expanded(self) -> list[int] | None:
-        """By character, how far in its row it is; None where no tab makes this another than its position."""
+        """By character, its distance in the row; None where no tab makes this differ from its position."""
         if "\t" not in self.raw:
             return None
         at, column = [0], 0
@@ -126,5 +126,5 @@ class Row:
 
 
 def written(token: Token) -> str:
-    """The token as the file has it; the lexer makes one blank of a comment."""
+    """The token as in the file; the lexer makes one blank of a comment."""
     return token.source.text[token.offset : token.end]

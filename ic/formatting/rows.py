@@ -82,7 +82,8 @@ class _OpenConditional:
 
 
 def _match_all(found: list[Row], findings: Findings) -> None:
-    """Match the brackets; what `#if` surrounds is made opaque where they do not match, elsewhere that is reported."""
+    """Match the brackets; text surrounded by `#if` is made opaque where they do not match, elsewhere that is
+    reported."""
     stack: list[_OpenBracket] = []
     ifs: list[_OpenConditional] = []
     for at, row in enumerate(found):
@@ -128,12 +129,12 @@ def _match_all(found: list[Row], findings: Findings) -> None:
 
 
 def _match(row: Row, stack: list[_OpenBracket]) -> Diagnostic | None:
-    """Opens and closes the row's brackets. Gives back what is wrong with the row, if anything is."""
+    """Open and close the row's brackets. Returns the finding about the row, if any."""
     for token in row.tokens:
         if token.kind == BAD:
             findings = Findings()
             complain_of_stray(token, findings)
-            if not findings.all:  # a character that is not seen
+            if not findings.all:  # an invisible character
                 complain_of_unseen(token.source, findings)
             return findings.all[0]
         if token.text in OPENING:
@@ -153,7 +154,7 @@ def _match(row: Row, stack: list[_OpenBracket]) -> Diagnostic | None:
 
 
 def _keep_uses(found: Sequence[Row], names: Collection[str]) -> None:
-    """Makes exact the rows in which these names are used with arguments."""
+    """Make the rows exact in which these names are used with arguments."""
     named, depth = False, 0
     for row in found:
         if row.kind != CODE or row.opaque:

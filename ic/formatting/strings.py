@@ -1,5 +1,5 @@
-"""Macros that make a string of what they are given: `#define SAID(X) #X`. A blank in such an argument is seen, so the
-lines of a use are left as they are."""
+"""Macros that make a string of their arguments: `#define SAID(X) #X`. Blanks in such an argument count, so the lines of
+a use are not changed."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _included(text: str, file: FoundFile, files: Files) -> Iterator[FoundFile]:
 
 
 def _text(file: FoundFile) -> str:
-    """The readable part of a file; `met check` says what is wrong with it."""
+    """The readable part of a file; `met check` reports its errors."""
     try:
         with open_regular(file.path) as stream:
             return stream.read(MOST_BYTES).decode("utf-8", "replace")

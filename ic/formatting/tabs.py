@@ -1,4 +1,4 @@
-"""The author's tab stops. A deck does not state them; its columns do: they meet where the author saw them meet."""
+"""The author's tab stops. A deck does not state them, but they follow from its columns, which met for the author."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ic.formatting.row import BLANK, CODE, REMARK, Row
 from ic.formatting.rows import rows
 from ic.text.lexer import Text
 
-OTHER_STOPS = (8, 2)  # what terminals have, and the narrowest that editors are set to
+OTHER_STOPS = (8, 2)  # the default of terminals, and the narrowest setting of editors
 
 
 def rows_as_seen(source: Text, making_strings: Collection[str] = ()) -> list[Row]:
@@ -25,7 +25,7 @@ def rows_as_seen(source: Text, making_strings: Collection[str] = ()) -> list[Row
 
 
 def _met(found: Sequence[Row]) -> int:
-    """A score of tab stops: how many things stand exactly below what they may have been aligned with."""
+    """A score of tab stops: the number of pieces exactly below those with which they may have been aligned."""
     lines = lines_of(found)
     met = {
         (one, first, other, second)
@@ -38,7 +38,7 @@ def _met(found: Sequence[Row]) -> int:
 
 
 def _comments_met(found: Sequence[Row]) -> int:
-    """The number of comments that stand below one that ends a line of the same paragraph."""
+    """The number of comments below one that ends a line of the same paragraph."""
     met, above = 0, -1
     for row in found:
         if row.kind == BLANK:

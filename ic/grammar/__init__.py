@@ -1,1 +1,1 @@
-"""Tokens -> syntax tree: what was written, in the order written."""
+"""Tokens -> syntax tree: the entries as written, in the order written."""

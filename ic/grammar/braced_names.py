@@ -21,7 +21,7 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 class NotWhole(Exception):
-    """Raised where what should be a whole number is none: the token, what is wrong, and the remedy."""
+    """Raised where a whole number is expected and missing: the token, the fault, and the remedy."""
 
     def __init__(self, token: Token, message: str, help: str = "") -> None:
         super().__init__(message)
@@ -29,7 +29,7 @@ class NotWhole(Exception):
 
 
 class NoName(Exception):
-    """Raised where braces make no name: the text that they make."""
+    """Raised where braces do not make a name: the text that they make."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -42,7 +42,8 @@ def adjacent(first: Token, second: Token) -> bool:
 
 
 def _may_touch(first: Token, second: Token) -> bool:
-    """The same where a macro may have put an argument between or beside the two: then it is as if nothing were."""
+    """Return True if two tokens touch, or a macro may have put an argument between or beside them: then they count as
+    touching."""
     if adjacent(first, second) or not second.expansions:
         return adjacent(first, second)
     apart = second.offset - first.end
@@ -94,7 +95,7 @@ def _leading_length(tokens: Sequence[Token], at: int) -> int:
 
 
 def filled(tokens: Sequence[Token], known: Mapping[str, str]) -> str:
-    """The name that these tokens make, where indices stand for what `known` says. Raises NotWhole, NoName."""
+    """The name of these tokens, with indices replaced by their values in `known`. Raises NotWhole, NoName."""
     text, at = "", 0
     while at < len(tokens):
         length = braces_length(tokens, at)

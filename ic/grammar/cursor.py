@@ -1,7 +1,7 @@
 """The parser's position in the tokens, its messages, and how it goes on after an error.
 
-A mistake is noted and raises Unreadable; the list of entries that holds the one in trouble catches it, skips to its
-end and goes on, so that one run reports several mistakes, and none twice.
+A mistake is noted and raises Unreadable; the list of entries around the faulty one catches it, skips to its end and
+goes on, so that one run reports several mistakes, and none twice.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Unreadable(Exception):
 
 
 class EndedInsideBlock(Exception):
-    """The tokens ended inside a block, and that has been said."""
+    """Raised where the tokens end inside a block, which has been reported."""
 
 
 def token_in_words(token: Token) -> str:
@@ -57,7 +57,7 @@ class Cursor:
         self.peak = 0
         self.misindented: tuple[Token, Token] | None = None
         self.unbalanced = False  # whether a brace is missing somewhere, or a bracket too many
-        self.indices: Mapping[str, str] = {}  # of the loops around: what each stands for in this turn
+        self.indices: Mapping[str, str] = {}  # of the loops around: the value of each in this turn
         self.declared: Mapping[str, Measure] = {}  # units that the deck declares
         self.unsized: set[str] = set()  # those whose declarations are wrong (reported already)
         self.depth = 0  # brackets that are open around the tokens
@@ -102,7 +102,7 @@ class Cursor:
         also: Iterable[Label] = (),
         help: str | Iterable[str] = (),
     ) -> NoReturn:
-        if self.token.kind != BAD:  # of such a token enough has been said
+        if self.token.kind != BAD:  # such a token has been reported
             self.tell(code, message, at, also=also, help=help)
         raise Unreadable
 
@@ -110,18 +110,18 @@ class Cursor:
         self.fail("D020", f"expected {wanted}, found {token_in_words(self.token)}", self.token, help=help)
 
     def write(self, new: str, first: Token, last: Token) -> Help:
-        """The help which says to write this in place of what stands from the first token to the last."""
+        """The help that says to write this in place of the stretch from the first token to the last."""
         place = span(first, last)
         return write(new, at=place) if first is last or place != first.place else Help(f"write `{new}`")
 
     def behind(self, token: Token) -> Place:
-        """The place just behind a token, where something is missing."""
+        """The place just after a token, where something is missing."""
         return token.source.place(token.end, 1, token.expansions)
 
     # brackets
 
     def enter(self) -> Token:
-        """Takes an opening brace, bracket or parenthesis."""
+        """Take an opening brace, bracket or parenthesis."""
         opening = self.advance()
         if self.depth + len(self.open) >= DEPTH:
             self.tell("D029", f"braces, brackets and parentheses go deeper than {DEPTH}", opening)
@@ -130,7 +130,7 @@ class Cursor:
         return opening
 
     def leave(self, wanted: str = "") -> Token:
-        """Takes the matching closing one."""
+        """Take the matching closing one."""
         opening = self.open[-1]
         closing = OPENING[opening.text]
         if self.token.text != closing:
@@ -192,7 +192,7 @@ class Cursor:
     # recovery
 
     def recover(self, start: int, depth: int) -> None:
-        """Skips the rest of an entry that began at `start`, when `depth` brackets were open."""
+        """Skip the rest of an entry that began at `start`, when `depth` brackets were open."""
         unclosed = len(self.open) - depth
         braces = sum(token.text == "{" for token in self.open[depth:])
         rounds = unclosed - braces

@@ -1,7 +1,7 @@
 """Units that a deck declares, `unit ozin = 7.061552e-3 N*m;`: names that are units behind a number, in edition 2.
 
-They are known before the deck is parsed, since what a name behind a number is decides how the deck reads; so their
-sizes are made of numbers and units alone, and found exactly.
+They are found before the deck is parsed, since the meaning of a name after a number decides how the deck reads; so
+their sizes consist of numbers and units only, and are computed exactly.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ TAKEN = (
     "in", "with", "of", "and", "or", "not", "by", "when", "like", "from", "cases", "confidence", "because", "pi", "for",
     "let", "param", "deck", UNIT,
 )  # fmt: skip
-"""Words that stand behind numbers, or begin what stands there, and so can be no unit."""
+"""Words that stand after numbers, or begin the text there, and so cannot be units."""
 
 MOST_BITS = 4096  # of a size, over or under the line: decks write a few digits
 DEEPEST = 64  # units that need units
@@ -38,7 +38,7 @@ def declarations(tokens: Sequence[Token]) -> dict[str, int]:
         if token.text == "{":
             depth += 1
         elif token.text == "}":
-            depth = max(depth - 1, 0)  # a bracket that closes none is reported, and no more
+            depth = max(depth - 1, 0)  # a bracket that closes none is only reported
         elif token.text == UNIT and depth == 0 and is_declaration(tokens, at) and token.source.edition > 1:
             found.setdefault(tokens[at + 1].text, at + 1)
     return found
@@ -54,11 +54,11 @@ def is_declaration(tokens: Sequence[Token], at: int) -> bool:
 
 
 class Unsized(Exception):
-    """Raised where a unit needs one that has no size (already reported)."""
+    """Raised where a unit depends on one without a size (already reported)."""
 
 
 def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) -> dict[str, Measure]:
-    """The measure of each unit that has one; why others have none is reported, each mistake once.
+    """The measure of each unit that has one; the reasons why others have none are reported, each mistake once.
 
     sizes  the token of each unit's name, and what it is declared to be; without those that cannot be read
     """
@@ -98,7 +98,7 @@ def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) 
 
 
 def _check_name(token: Token) -> None:
-    """Raises Problem D394 where no unit may be called so."""
+    """Raise Problem D394 where a unit may not have this name."""
     name = token.text
     if name in units.ALL_UNITS:
         unit = units.ALL_UNITS[name]
@@ -111,7 +111,7 @@ def _check_name(token: Token) -> None:
 
 
 def _measure(size: Expression, find: Callable[[str], Measure]) -> Measure:
-    """The measure that an expression of numbers, units and `pi` is. Raises Problem D394 where it is something else."""
+    """The measure of an expression of numbers, units and `pi`. Raises Problem D394 for other expressions."""
     place = size.place
     match size:
         case Number():
@@ -137,7 +137,7 @@ def _measure(size: Expression, find: Callable[[str], Measure]) -> Measure:
 
 
 def _product(one: Measure, other: Measure, place: Place) -> Measure:
-    """The product where numbers can hold it. Raises Problem D394."""
+    """The product, if it is not too large for numbers. Raises Problem D394."""
     made = one * other
     if made.over == 0:
         raise Problem(error("D394", "a unit has a size above 0", place, help=USAGE))

@@ -1,4 +1,5 @@
-"""Where editions 1 and 2 read a text otherwise. Edition 1 warns of it, with the change that means the same in both.
+"""Differences between the readings of editions 1 and 2. Edition 1 warns about them, with the change that means the same
+in both.
 
 In edition 1 the names of units name no value. In edition 2 they may, and are units only behind a number, a bracket, or
 `*` and `/` behind a unit. So `2 m/s` is a unit, whatever the deck calls `s`; where the same file calls a value so, it
@@ -20,7 +21,7 @@ from met.diagnostic import Help, Label, Place, write
 
 class EditionDifferences(Cursor):
     units_alone = False
-    """True where a unit is declared here, so that no name is that of a value."""
+    """True where a unit is declared here, so that no name can be a value's."""
 
     @cached_property
     def names_of_units(self) -> frozenset[str]:
@@ -46,11 +47,11 @@ class EditionDifferences(Cursor):
         }
 
     def is_reserved(self, token: Token) -> bool:
-        """Return True if a name is that of a unit, and so may name no value in the edition of its file."""
+        """Return True if a name is that of a unit, and so cannot name a value in its file's edition."""
         return units.is_unit(token.text) and token.source.edition == 1
 
     def as_edition_2(self, token: Token, why: str) -> Help:
-        """The help which says to make the file of a token one of edition 2."""
+        """The help that says to change the file of a token to edition 2."""
         source, found = token.source, token.source.heading
         text = f"{why}: write `{EDITION_WORD} 2;` as its first line"
         if found is None:
@@ -59,12 +60,12 @@ class EditionDifferences(Cursor):
         return write("2", text, at=source.place(start, end - start))
 
     def not_a_value_too(self, taken: Sequence[Token]) -> None:
-        """Refuses `2 m/s` in a file of edition 2 that calls a value `s`. taken: the tokens of the unit."""
+        """Refuse `2 m/s` in a file of edition 2 that calls a value `s`. taken: the tokens of the unit"""
         if len(taken) == 1 or self.units_alone:
             return
         at = 2 if taken[0].kind in NUMBERS else 0  # `15 1/s`
         depth = 0
-        while at < len(taken):  # what stands in brackets behind the number is of units alone
+        while at < len(taken):  # text in brackets after the number consists of units only
             depth += {"(": 1, ")": -1}.get(taken[at].text, 0)
             at += 1
             if depth == 0:
@@ -92,7 +93,7 @@ class EditionDifferences(Cursor):
             )
 
     def not_a_value_behind(self, first: Token) -> None:
-        """Warns of `2 kg*rev` in edition 1 where `rev` is a value. first: the quantity's first token."""
+        """Warn about `2 kg*rev` in edition 1 where `rev` is a value. first: the quantity's first token"""
         sign, named = self.token, self.following
         if (
             sign.text not in ("*", "/")
@@ -116,7 +117,7 @@ class EditionDifferences(Cursor):
         )
 
     def not_a_bare_fraction(self, left: Expression, right: Expression, first: Token, under: Token) -> None:
-        """Warns of `1/2 m` in edition 1, and refuses it in edition 2. first, under: tokens that the two begin with."""
+        """Warn about `1/2 m` in edition 1, and refuse it in edition 2. first, under: first tokens of the two"""
         if under.kind not in NUMBERS or not isinstance(right, Number) or right.unit is None or not _is_bare(left):
             return
         last = self.previous
@@ -138,7 +139,7 @@ class EditionDifferences(Cursor):
 
 
 def _is_bare(expression: Expression) -> bool:
-    """Return True for numbers without a unit, and what is computed of them."""
+    """Return True for numbers without a unit, and expressions of them."""
     match expression:
         case Number():
             return expression.unit is None

@@ -22,11 +22,11 @@ class EditionEntries(Loops):
 
     @cached_property
     def refused_units(self) -> set[str]:
-        """Files of edition 1 that declare units, of which this is reported."""
+        """Files of edition 1 that declare units, which has been reported."""
         return set()
 
     def declare_units(self) -> None:
-        """Finds the units that the deck declares, wherever it does so, before it is parsed."""
+        """Find the units that the deck declares anywhere, before it is parsed."""
         self.take_misplaced_editions()
         self.unsized.update(
             self.tokens[at + 1].text
@@ -51,19 +51,19 @@ class EditionEntries(Loops):
         self.at, self.units_alone = 0, False
 
     def take_misplaced_editions(self) -> None:
-        """Reads a file whose `deck 2;` is out of place, which is reported, as it says: all else may be well."""
+        """Read a file with a misplaced `deck 2;`, which is reported, in that edition: the rest may be right."""
         for word, number in pairwise(self.tokens):
             if word.text == EDITION_WORD and word.source.heading is None and number.text in map(str, EDITIONS):
                 word.source.edition = int(number.text)
 
     def step_over_unit(self) -> None:
-        """Steps over `unit NAME = SIZE;`, which has been read, and refuses it where it has no place."""
+        """Step over `unit NAME = SIZE;`, which has been read, and refuse it where it is not allowed."""
         start, (word, name) = self.at, self.tokens[self.at : self.at + 2]
         depth = len(self.open)
         try:
             if word.source.edition == 1:
                 help = self.as_edition_2(word, "a file of edition 2 declares units")
-                if word.source.name in self.refused_units:  # of the file it is said once
+                if word.source.name in self.refused_units:  # once for each file
                     raise Unreadable
                 self.refused_units.add(word.source.name)
                 self.fail("D394", "edition 1 declares no units", span(word, name), help=help)
@@ -82,7 +82,7 @@ class EditionEntries(Loops):
             self.recover(start, depth)
 
     def not_the_edition(self, word: Token) -> NoReturn:
-        """`deck 2;` where it does not say the edition, at its number."""
+        """Report a `deck 2;` that does not set the edition, at its number."""
         number = self.token
         heading = word.source.heading
         said = f"{word.text} {number.text};"

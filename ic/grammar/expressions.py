@@ -47,7 +47,7 @@ class Expressions(Quantities):
         raise NotImplementedError
 
     def value(self) -> Expression:
-        """An expression of its own: an entry's value, a list's item, a call's argument."""
+        """A separate expression: an entry's value, a list's item, a call's argument."""
         before = self.operators
         if self.begins_entry(self.at):
             self.fail("D020", "expected a value", self.behind(self.previous))
@@ -123,7 +123,7 @@ class Expressions(Quantities):
         return word
 
     def only_a_name(self) -> bool:
-        """Return True if a word that could be an operator is a name of the deck's."""
+        """Return True if a word that could be an operator is a name in the deck."""
         return self.following.text in (";", ",", ")", "]", "}", ".")
 
     def operand(self) -> Expression:
@@ -153,7 +153,7 @@ class Expressions(Quantities):
         self.unexpected("a value", help=helps.get(token.text, ()))
 
     def stand_in(self, index: Token) -> Token:
-        """The token that the index of a loop stands for in this turn, at the index's place."""
+        """The token for which the index of a loop stands in this turn, at the index's place."""
         token = copy(index)
         token.text = self.indices[index.text]
         token.kind = WHOLE if token.text.lstrip("-").isdigit() else NAME
@@ -234,7 +234,7 @@ class Expressions(Quantities):
         return name
 
     def not_a_lone_unit(self) -> None:
-        """`m` where a value stands, without a number: an operand, or before its number."""
+        """Report a unit such as `m` in place of a value, without a number: as an operand, or before its number."""
         token, after = self.token, self.following
         if not units.is_unit(token.text) or after.text in ("(", "{", "."):
             return
@@ -298,7 +298,7 @@ class Expressions(Quantities):
         return call if body is not None else self.with_unit(call, first)
 
     def refuse_braces(self) -> None:
-        """Refuses `seg_{i}` where there is no loop: at the brace."""
+        """Refuse `seg_{i}` outside of a loop, at the brace."""
         length = braces_length(self.tokens, self.at)
         if length and adjacent(self.previous, self.token):
             first, start = self.token, self.at - 1
@@ -329,7 +329,7 @@ class Expressions(Quantities):
         return List(tuple(items), span(opening, closing))
 
     def another(self, closing: str) -> bool:
-        """Return True if a further item follows, its comma taken; a missing or mistaken comma is reported."""
+        """Return True if a further item follows, after taking its comma; a missing or wrong comma is reported."""
         token = self.token
         if token.text == ",":
             self.advance()
@@ -349,6 +349,6 @@ class Expressions(Quantities):
         return False
 
     def ends_entry(self) -> bool:
-        """Return True if the semicolon here ends the entry, so that the closing bracket is the one that is missing."""
+        """Return True if the semicolon here ends the entry, so that only the closing bracket is missing."""
         after = self.following
         return after.text == "}" or after.kind == "END" or self.begins_entry(self.at + 1)

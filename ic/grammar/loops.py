@@ -1,9 +1,9 @@
-"""Entries that stand for several: `for i in 1 .. 6 { ... }`, `for side in [left, right] { ... }`, and
-`[lift, swing] = turner;`.
+"""Entries that stand for several: `for i in 1 .. 6 { ... }`, `for side in [left, right] { ... }`, and `[lift, swing] =
+turner;`.
 
-The block of a loop is read anew in each turn. Its tokens know the turn, behind the macros that they came through
-(`Expansion.turn`); names with braces in them are made, and where a value begins the index stands for itself. So what
-comes behind the parser meets plain names, and messages know the loop and the value of its index.
+The block of a loop is read anew in each turn. Its tokens know the turn, after the macros that they came through
+(`Expansion.turn`); names with braces are replaced, and so is the index where a value begins. So later stages see plain
+names, and messages know the loop and the value of its index.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _ENDS = "its ends are whole numbers, macros that are such (`#define COUNT 6`, `-
 
 
 class Loops(Expressions):
-    """The part of the parser that knows entries which stand for several."""
+    """The part of the parser for entries which stand for several."""
 
     def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
         super().__init__(tokens, findings)
@@ -50,7 +50,7 @@ class Loops(Expressions):
     # loops
 
     def at_loop(self) -> bool:
-        """Return True if a loop begins here, or something that was meant for one."""
+        """Return True if a loop begins here, or text that was meant for one."""
         if self.token.text != "for":
             return False
         behind = self.tokens[self.at + 2].text
@@ -224,7 +224,7 @@ class Loops(Expressions):
     # turns
 
     def pieces(self, start: int, end: int) -> list[tuple[Token, ...]]:
-        """The tokens of a loop's block, of a name with braces all in one; loops in it are left as they are."""
+        """The tokens of a loop's block, with a name with braces as one piece; inner loops are not changed."""
         found: list[tuple[Token, ...]] = []
         at = start
         while at < end:
@@ -262,7 +262,7 @@ class Loops(Expressions):
         return made
 
     def fill(self, token: Token, piece: Sequence[Token], known: dict[str, str]) -> None:
-        """Makes of a token the name that a piece with braces stands for; where there is none, that is reported."""
+        """Replace a piece with braces by the name that it stands for; if there is none, that is reported."""
         written = "".join(each.text for each in piece)
         try:
             token.kind, token.text = NAME, filled(piece, known)
@@ -303,7 +303,8 @@ class Loops(Expressions):
         return heads
 
     def at_several(self) -> bool:
-        """Return True if names in brackets begin an entry here, or `*`, which is all that have none of their own."""
+        """Return True if names in brackets begin an entry here, or `*`, which stands for all without one of their
+        own."""
         token = self.token
         return token.text == "[" or (token.text == EVERY_JOINT and self.following.text in ("=", "{"))
 
@@ -339,5 +340,5 @@ class Loops(Expressions):
 
 
 def _indices(known: Mapping[str, str]) -> str:
-    """`i`, or `i` or `j`."""
+    """The indices in words: `i`, or `i` or `j`."""
     return " or ".join(f"`{each}`" for each in known)

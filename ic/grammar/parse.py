@@ -57,7 +57,7 @@ _NOT_OPEN = "leave it out, or open it where it begins"
 
 @frozen
 class Parsed:
-    """The entries of a deck, and what else its text says.
+    """The entries of a deck, and further results of parsing.
 
     unreadable  the stretches that could not be read
     sound       whether the rest is where it belongs: not where a brace is missing or too many
@@ -75,8 +75,7 @@ class Parsed:
 def parse(
     tokens: Sequence[Token], findings: Findings | None = None, declared: Mapping[str, Measure] = NO_UNITS
 ) -> tuple[tuple[Entry, ...], tuple[Diagnostic, ...]]:
-    """The entries of a deck, and what is wrong with it; where something is, the entries are not all there. declared:
-    units that are known besides."""
+    """The entries of a deck, and its errors; with errors, the entries are incomplete. declared: further known units."""
     findings = findings if findings is not None else Findings()
     return parse_on(tokens, findings, declared).entries, findings.all
 
@@ -87,8 +86,8 @@ def parse_on(
     declared: Mapping[str, Measure] = NO_UNITS,
     looped: list[int] | None = None,
 ) -> Parsed:
-    """The deck of these tokens; what is wrong with it is in the findings. looped: the tokens of all turns of loops so
-    far, of decks that count together."""
+    """The deck of these tokens; its errors go into the findings. looped: the tokens of all turns of loops so far, of
+    decks that count together"""
     parser = _Parser(tokens, findings)
     parser.declared = declared
     parser.looped = looped if looped is not None else parser.looped
@@ -104,7 +103,7 @@ def parse_on(
 def parse_expression(
     tokens: Sequence[Token], findings: Findings, declared: Mapping[str, Measure] = NO_UNITS
 ) -> Expression | None:
-    """The one expression that these tokens are; None, and what is wrong is in the findings, where they are not one."""
+    """The expression that these tokens make; None, with errors in the findings, where they do not make one."""
     parser = _Parser(tokens, findings)
     parser.declared = declared
     with suppress(GiveUp, EndedInsideBlock, Unreadable):
@@ -155,7 +154,7 @@ class _Parser(Uses):
                 into += self.note_unreadable(start)
 
     def note_unreadable(self, start: int) -> list[Entry]:
-        """Notes that an entry could not be read; what of it is known: what it sets, to a value that nobody knows."""
+        """Note that an entry could not be read, with the known part: the name that it sets, to an unknown value."""
         tokens = self.tokens[start : max(self.at, start + 1)]
         names = list(takewhile(lambda token: token.kind == NAME, tokens))
         behind = len(names)
@@ -404,7 +403,7 @@ class _Parser(Uses):
         return Group(_words(words), like, of, body, span(words[0], words[-1]))
 
     def group_from(self, names: list[Token]) -> Group:
-        """`arm NAME from urdf("FILE") { ... }`: the block that follows is the group's, not the call's."""
+        """Read `arm NAME from urdf("FILE") { ... }`, where the block is the group's, not the call's."""
         words, called = names[:-2], names[-1]
         if _base_at(words) is not None:
             self.fail(
@@ -429,7 +428,8 @@ class _Parser(Uses):
         return Group(_words(words), None, None, body or (), span(words[0], words[-1]), made_from)
 
     def statement(self, start: int, names: list[Token], tail: list[Token]) -> Statement:
-        """`require settle < 10 s;`: which of the names belong to the value is seen from what follows them."""
+        """Read a statement such as `require settle < 10 s;`: the text after the names decides which of them belong to
+        the value."""
         token = self.token
         count = _words_before_value(names, bool(tail), token)
         if count == 0 or (count == len(names) and not (self.begins_value() or token.text in ("-", "+", "!"))):
@@ -445,14 +445,15 @@ class _Parser(Uses):
         return Statement(_words(words), value, span(words[0], words[-1]))
 
     def named_requirement(self, names: list[Token]) -> Statement:
-        """`require NAME: COMPARISON;`"""
+        """Read `require NAME: COMPARISON;`."""
         self.advance()
         value = self.over_cases(self.value())
         self.semicolon(value)
         return Statement(_words(names[:1]), value, span(names[0], names[-1]), _word(names[1]))
 
     def over_cases(self, comparison: Expression) -> Expression:
-        """`in SHARE of cases` and `with CONFIDENCE confidence`, one of them or both, behind a comparison or not."""
+        """Read `in SHARE of cases` and `with CONFIDENCE confidence`, one of them or both, after an optional
+        comparison."""
         if self.token.text not in ("in", "with") or self.on_new_line(self.at):
             return comparison
         first = self.token
@@ -469,7 +470,7 @@ class _Parser(Uses):
         return OverCases(comparison, share, confidence, span(first, self.previous))
 
     def needs_word(self, word: str, usage: str) -> None:
-        """Step over a word that has to stand here."""
+        """Step over a required word."""
         if self.token.text != word:
             self.unexpected(f"`{word}`", help=usage)
         self.advance()
@@ -484,7 +485,7 @@ class _Parser(Uses):
         self.unexpected(f"{wanted} after `{last.text[:40]}`")
 
     def semicolon(self, value: Expression) -> None:
-        """The end of an entry. A missing semicolon at a line's end is noted and forgiven."""
+        """Read the end of an entry. A missing semicolon at a line's end is noted and forgiven."""
         token = self.token
         if token.text == ";":
             self.advance()
@@ -518,7 +519,7 @@ class _Parser(Uses):
         )
 
     def decimal_comma(self) -> str:
-        """The remedy for `0,325`; "" where the comma stands otherwise."""
+        """The remedy for `0,325`; "" where the comma has another meaning."""
         whole, part = self.previous, self.following
         if not (whole.kind == part.kind == WHOLE and whole.end == self.token.offset and self.token.end == part.offset):
             return ""

@@ -1,4 +1,4 @@
-"""The stretch of text that an expression takes up."""
+"""The stretch of text of an expression."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from met.diagnostic import Place
 
 
 def place_of(expression: Expression) -> Place:
-    """The stretch that an expression takes up, as far as it is on one line."""
+    """The stretch of an expression, as far as it is on one line."""
     match expression:
         case Number(unit=unit) if unit is not None:
             return spanned(expression.place, unit.place)

@@ -56,8 +56,8 @@ class Quantities(EditionDifferences):
             self.fail("D027", f"`{first.text}{token.text}` is not a number", span(first, token))
 
     def unit(self) -> Unit | None:
-        """The unit that follows, if one does. In `15 1/s` the 1 belongs to it, since no number follows a number, and so
-        does the bracket in `9 (m/s)^2`."""
+        """The unit that follows, if any. In `15 1/s` the 1 belongs to it, since no number follows a number, and so does
+        the bracket in `9 (m/s)^2`."""
         token = self.token
         over = None
         if token.kind == WHOLE and token.text == "1" and self.following.text == "/":
@@ -103,7 +103,7 @@ class Quantities(EditionDifferences):
         return Unit(tuple(factors), span(taken[0], taken[-1]), text, tuple(declared))
 
     def reads_as_unit(self, at: int, *, first: bool = False) -> bool:
-        """Return True if the name at token `at`, which stands behind a number or a unit, is one.
+        """Return True if the name at token `at`, which follows a number or a unit, is a unit.
 
         first  it stands behind the number, where no other name may stand
         """
@@ -119,7 +119,7 @@ class Quantities(EditionDifferences):
         return name not in self.names_of_units
 
     def is_word_of_requirement(self) -> bool:
-        """Return True at `in 99 %`, `of cases`, `with 90 %` or `confidence`, of which none is a unit."""
+        """Return True at `in 99 %`, `of cases`, `with 90 %` or `confidence`, none of which is a unit."""
         text, following = self.token.text, self.following
         if text in ("in", "with"):
             return following.kind in (*NUMBERS, NAME) or following.text == "("
@@ -128,7 +128,8 @@ class Quantities(EditionDifferences):
     def unit_product(
         self, at: int, sign: int, depth: int, first: tuple[list[tuple[Word, int]], int] | None = None
     ) -> tuple[list[tuple[Word, int]], int] | None:
-        """Factors from token `at` on, and the token behind them; None where no unit begins there. first: was read."""
+        """The factors from token `at` on, and the token after them; None where no unit begins there. first: True for
+        the first factor"""
         first = self.unit_factor(at, sign, depth, first=at == self.at) if first is None else first
         if first is None:
             return None
@@ -202,8 +203,8 @@ class Quantities(EditionDifferences):
     def not_joined_otherwise(self, at: int, start: int) -> None:
         """Refuses `N.m` and `N-m`, and `s-1`, whose last unit before the sign is token `at`, of a unit from `start` on.
 
-        Without a space these are a unit for those who write them, and no number can go on so: names of units are of
-        units alone, and nothing but a pure number is added to one.
+        Without a space these are meant as a unit, and no number can continue so: names of units are of units alone, and
+        nothing but a pure number is added to one.
         """
         unit, sign, more = self.tokens[at : at + 3] if at + 3 <= len(self.tokens) else (self.token,) * 3
         if sign.text not in (".", "-") or sign.offset != unit.end or more.offset != sign.end or unit.text == "%":
@@ -224,7 +225,7 @@ class Quantities(EditionDifferences):
             )
 
     def unknown_unit(self) -> None:
-        """A name behind a number that is no unit: says so, and takes it for one."""
+        """Report a name after a number that is not a unit, and treat it as one."""
         token = self.token
         if (
             self.on_new_line(self.at)

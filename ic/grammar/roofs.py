@@ -2,7 +2,7 @@
 
 A definition of a used deck is called by its full name, `panda.drive`, which is one word here. In the deck that uses it
 `panda.drive.kp` is a path of two words. In the used deck itself names are written without the roof, and each notes it:
-what such a name means is decided where it is looked up, since only there is it known to be the name of a value.
+its meaning is decided where it is looked up, since only there it is known to be the name of a value.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ic.grammar.syntax import Call, Entry, Expression, Group, Indexed, Let, Name
 
 
 def full_words(path: tuple[Word, ...], roofs: Collection[str]) -> tuple[Word, ...]:
-    """The words of a path, of which the first is the full name where the path begins with a roof."""
+    """The words of a path, the first of which is the full name where the path begins with a roof."""
     if not path or path[0].text not in roofs:
         return path
     name, count = path[0].text, 1
@@ -27,7 +27,7 @@ def full_words(path: tuple[Word, ...], roofs: Collection[str]) -> tuple[Word, ..
 
 
 def split_path(path: str, roofs: Collection[str]) -> list[str]:
-    """The words of a path as text, of which the first is the full name where the path begins with a roof."""
+    """The words of a path as text, the first of which is the full name where the path begins with a roof."""
     first, *rest = path.split(".")
     while rest and first in roofs:
         first = f"{first}.{rest.pop(0)}"
@@ -47,7 +47,7 @@ def with_full_names(entries: Iterable[Entry], roofs: Collection[str]) -> tuple[E
 
 
 def under_roof(entries: Iterable[Entry], roof: str, left: Collection[str]) -> tuple[tuple[Entry, ...], dict[str, str]]:
-    """The entries of a used deck with full names, and the kinds of those that stay away, by name.
+    """The entries of a used deck with full names, and the kinds of the omitted ones, by name.
 
     left  kinds of definitions that stay away
     """

@@ -23,7 +23,7 @@ _VARIES = ([VARY], [VARY, "macro"])
 
 
 def command_line(texts: Sequence[str], before: str = "") -> SourceFile:
-    """The text that messages show: a line for each setting, behind the macros of -D."""
+    """The text that messages show: a line for each setting, after the macros of -D."""
     return SourceFile(COMMAND_LINE, before + "".join(f"{_one_line(text)}\n" for text in texts), "")
 
 
@@ -35,7 +35,7 @@ def read_settings(
     before          as in `command_line`
     edition, units  of the deck that they are for
 
-    Raises Problem with all that is wrong with them: what the syntax does not have, and D231, D232.
+    Raises Problem with all their errors: of the syntax, and D231, D232.
     """
     source = Text(COMMAND_LINE, command_line(texts, before).text)
     source.edition = edition
@@ -62,7 +62,7 @@ def read_settings(
 
 
 def read_expression(text: str) -> Expression:
-    """An expression of the command line, as behind `--where`. Raises Problem with all that is wrong with it."""
+    """An expression of the command line, as after `--where`. Raises Problem with all its errors."""
     text = _one_line(text)
     source, findings = Text(COMMAND_LINE, f"{text}\n"), Findings()
     source.edition = LATEST
@@ -123,7 +123,7 @@ def _remedy(words: list[str], example: str) -> list[str]:
 
 
 def _tokens(source: Text, at: int, text: str, findings: Findings) -> Iterator[Token]:
-    """The tokens of a line, white space apart, as tokens of the whole text."""
+    """The tokens of a line, without white space, as tokens of the whole text."""
     for line in logical_lines(Text("", text)):
         for token in line:
             if token.kind == SPACE:

@@ -1,4 +1,4 @@
-"""Expressions as text again, for messages and for what a plan quotes of its deck."""
+"""Expressions as text again, for messages and for a plan's quotes of its deck."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LOOSE = {"or": 1, "and": 2, "<": 3, "<=": 3, ">": 3, ">=": 3, "==": 3, "!=": 3, 
 
 
 def spell(expression: Expression, within: int = 0) -> str:
-    """The expression as a deck would write it. within: how tightly what is around it binds."""
+    """The expression in a deck's syntax. within: the binding strength of the surrounding operator"""
     match expression:
         case Number():
             if expression.unit is None:

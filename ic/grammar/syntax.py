@@ -39,7 +39,7 @@ from met.units import Measure
 
 @frozen
 class Word:
-    """An identifier and where it stands."""
+    """An identifier and its place."""
 
     text: str
     place: Place
@@ -92,7 +92,7 @@ class Name:
 
 @frozen
 class Indexed:
-    """`lengths[i]`: one of the values of a list, the first of which is `lengths[0]`."""
+    """The element `lengths[i]` of a list, the first of which is `lengths[0]`."""
 
     name: Name
     index: Expression
@@ -159,7 +159,7 @@ class OverCases:
     comparison: Expression
     share: Expression | None
     confidence: Expression | None
-    place: Place  # of the words behind the comparison
+    place: Place  # of the words after the comparison
 
 
 @frozen
@@ -173,7 +173,7 @@ Expression = Number | String | Name | Indexed | List | Call | WithUnit | Range |
 
 
 def children(expression: Expression) -> tuple[Expression, ...]:
-    """The expressions that one is made of, as written; a call's body is not looked into."""
+    """The direct subexpressions, as written; a call's body is left out."""
     match expression:
         case List(items=items):
             return items
@@ -195,7 +195,7 @@ def children(expression: Expression) -> tuple[Expression, ...]:
 
 
 def mapped(expression: Expression, change: Callable[[Expression], Expression]) -> Expression:
-    """The expression with others in place of those that it is made of (`children`)."""
+    """The expression with its direct subexpressions (`children`) changed."""
     match expression:
         case List(items=items):
             return replace(expression, items=tuple(map(change, items)))
@@ -298,14 +298,15 @@ class UseEntry:
 
 @frozen
 class Roof:
-    """A roof of a deck: the entry that made it, and the kinds of the used deck's runs and sweeps, which stay away."""
+    """A roof of a deck: the entry that made it, and the kinds of the used deck's runs and sweeps, which are left
+    out."""
 
     use: UseEntry
     left: Mapping[str, str] = field(default_factory=dict)
 
 
 Roofs = Mapping[str, Roof]
-"""Roofs by their full names: `panda`, and `cell.panda` of a deck that a used one uses."""
+"""Roofs by their full names: `panda`, or `cell.panda` for a deck that a used one uses."""
 
 
 NO_ROOFS: Roofs = MappingProxyType({})
@@ -315,12 +316,11 @@ NO_ROOFS: Roofs = MappingProxyType({})
 class Deck:
     """A whole deck after the preprocessor: its entries in order, the files they came from, and warnings so far.
 
-    include_dirs: further directories in which files that the deck names are looked for.
-    path, text, defines: what it was read from and with, to read it again; text: None where it was in a file.
-    unsaved: texts that count in place of what files hold.
-    unreadable: what could not be read; where there are some, `warnings` holds errors too.
-    units: those that the deck declares, which files of its editions may use.
-    roofs: those under which definitions of decks that it uses are among the entries, with full names.
+    include_dirs: further directories in which files that the deck names are searched. path, text, defines: its source,
+    to read it again; text: None where it was in a file. unsaved: texts that count in place of files. unreadable:
+    stretches that could not be read; if there are some, `warnings` holds errors too. units: those that the deck
+    declares, which files of its editions may use. roofs: those under which definitions of decks that it uses are among
+    the entries, with full names.
     """
 
     file: str

@@ -15,14 +15,14 @@ USAGE = 'write `use <panda.ic> as panda;` or `use "beside.ic" as beside;`'
 
 
 class Uses(EditionEntries):
-    """The part of the parser that knows this entry."""
+    """The part of the parser for this entry."""
 
     def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
         super().__init__(tokens, findings)
         self.uses: list[UseEntry] = []
 
     def at_use(self) -> bool:
-        """Return True if a deck is used here, or something that was meant for that."""
+        """Return True if a deck is used here, or text that was meant for that."""
         if self.token.text != USE:
             return False
         if self.following.text == "<" or self.following.kind == STRING:

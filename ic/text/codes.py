@@ -1,4 +1,4 @@
-"""The codes of messages, as the page docs/diagnostics.md has them."""
+"""The codes of messages on the page docs/diagnostics.md."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ _CODE = re.compile(r"^(?:### |\| )([A-Z]\d{3})(?:: | \| )", re.MULTILINE)
 
 
 def is_on_the_page(code: str) -> bool:
-    """Return True if the page has this code; False where it is not installed, too."""
+    """Return True if the page has this code; False also where it is not installed."""
     return PAGE.is_file() and code in _CODE.findall(PAGE.read_text(encoding="utf-8"))

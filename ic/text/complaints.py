@@ -19,19 +19,19 @@ inertia, a rate too slow, no entry of a run, no channel, no such key, a unit tha
 
 
 REMARKED_ONCE = ("D317", "D318", "D319", "D320", "D322")
-"""Codes of warnings that a place has once: of a rate or a servo that several runs and sweeps share."""
+"""Codes of warnings that are given once at a place: of a rate or a servo that several runs and sweeps share."""
 
 
 PROVISIONAL = ("D104", "D105", "D249")
-"""Codes of what a servo or a sensor says of its own step, which waits for what the whole arm's step says."""
+"""Codes of a servo's or sensor's own step warnings, which wait for those of the whole arm's step."""
 
 
 MOST_TURNS_SHOWN = 4
-"""Turns of a loop that are named beside a mistake of the first."""
+"""Number of further turns of a loop that are named beside a mistake in the first."""
 
 
 MOST_ROOFS_SHOWN = 4
-"""Uses of a file that are named beside a mistake in it."""
+"""Number of further uses of a file that are named beside a mistake in it."""
 
 
 UNKNOWN_WORDS = ("D044", "D045", "D082", "D108", "D136", "D157")
@@ -87,11 +87,11 @@ class Complaints:
 
     @property
     def is_clear(self) -> bool:
-        """True where nothing at all was found or noted."""
+        """True where nothing was found or noted."""
         return not (self._found or self._remarks or self._provisional or self.known_missing or self.error_count)
 
     def copied(self) -> Complaints:
-        """The same findings, to which others can be added."""
+        """A copy with the same findings, to which others can be added."""
         made = copy(self)
         for name, value in vars(self).items():
             if isinstance(value, dict | set | list):
@@ -100,7 +100,7 @@ class Complaints:
         return made
 
     def apart(self) -> Complaints:
-        """A collector for one definition by itself, which knows of what is here only `known_before`."""
+        """A collector for one definition alone, which knows only `known_before` of the present findings."""
         made = Complaints([_BEFORE] if self.errors else [])
         made._torn, made._lost = set(self._torn), set(self._lost)
         made.known_missing = set(self.known_missing)
@@ -108,12 +108,12 @@ class Complaints:
 
     @property
     def known_before(self) -> tuple[object, ...]:
-        """All on which it depends what a collector that is `apart` finds: equal where it would find the same."""
+        """Everything on which the findings of an `apart` collector depend: if it is equal, they are equal."""
         sets = (frozenset(each) for each in (self._torn, self._lost, self.known_missing))
         return (bool(self.errors), *sets)
 
     def findings(self) -> DefinitionFindings:
-        """The findings of a collector that is `apart`."""
+        """The findings of an `apart` collector."""
         return DefinitionFindings(
             tuple(each for each in self._found if each != _BEFORE),
             tuple(self._remarks),
@@ -126,7 +126,7 @@ class Complaints:
         )
 
     def take(self, found: DefinitionFindings) -> None:
-        """Take over what was found apart, but for what is known here already."""
+        """Take over findings of an `apart` collector, except those known here already."""
         before = self._allowed
         for each in (*found.diagnostics, *found.remarks):  # without those that the definition allows
             self._allowed = None if each in found.of_no_run else {}
@@ -144,8 +144,8 @@ class Complaints:
 
     @property
     def all(self) -> tuple[Diagnostic, ...]:
-        """All findings; of a mistake that several turns of a loop make, or roofs of a file have, the first, which names
-        the others."""
+        """All findings; of a mistake in several turns of a loop, or under several roofs of a file, only the first,
+        which names the others."""
         return tuple(once_for_all_roofs(map(self._with_turns, self._found)))
 
     @property
@@ -158,7 +158,7 @@ class Complaints:
 
     @property
     def allowed(self) -> Mapping[Diagnostic, Place]:
-        """The warnings that were allowed wherever they were found, each with the place of an `allow`."""
+        """The allowed warnings wherever they were found, each with the place of an `allow`."""
         return {each: place for each, place in self._silenced.items() if each not in self._found}
 
     def add(self, *diagnostics: Diagnostic) -> None:
@@ -200,23 +200,24 @@ class Complaints:
         return replace(diagnostic, also=(*diagnostic.also, Label(loop.use, text)))
 
     def note_unreadable(self, stretches: Sequence[UnreadableStretch]) -> None:
-        """Note what could not be read, so that nothing is reported that follows from it, nor from the errors so far."""
+        """Note stretches that could not be read, so that errors that follow from them, or from the errors so far, are
+        not reported."""
         self._spots.update(_spot(each.at.place) for each in self.errors if each.at is not None)
         self._unreadable += stretches
         self._torn.update(each.within for each in stretches if each.within is not None)
         self.note_lost_names(*(name for each in stretches for name in each.names))
 
     def note_lost_names(self, *names: str) -> None:
-        """Notes names that something may have defined which could not be taken in, already reported."""
+        """Note names that may be defined by something that could not be taken in, already reported."""
         self._lost.update(names)
 
     def note_base(self, of: Place, base: Place) -> None:
-        """Notes that what is defined at `of` has what its base has, and may lack what that lacks."""
+        """Note that the definition at `of` inherits its base's entries, and lacks those that the base lacks."""
         if base in self._torn:
             self._torn.add(of)
 
     def _follows_from_unreadable(self, diagnostic: Diagnostic) -> bool:
-        """Return True if this is about something that could not be read, or about a name that this may have defined."""
+        """Return True if this is about an unreadable stretch, or a name that it may have defined."""
         if diagnostic.code not in UNKNOWN_WORDS and diagnostic.message.startswith("no "):
             path = diagnostic.message.split("`")[1:2]
             if any(word in self._lost for text in path for word in text.split(".")):
@@ -254,7 +255,7 @@ class Complaints:
             self.add(found)
 
     def settle(self, refuted: Collection[str] = ()) -> frozenset[str]:
-        """Report what was provisional, but for these codes; returns the codes that were reported."""
+        """Report provisional warnings, except those of these codes; returns the codes that were reported."""
         kept = [each for each in self._provisional if each.code not in refuted]
         self._provisional = []
         for each in kept:
@@ -265,8 +266,8 @@ class Complaints:
         return frozenset(each.code for each in kept)
 
     def note_misspelling(self, of: Place, word: str, known: Iterable[str]) -> None:
-        """Notes what an unknown entry of what is defined at `of` may have been meant for: that is not missing
-        besides."""
+        """Note the entry for which an unknown one in the definition at `of` may have been meant, so that it is not
+        reported as missing."""
         near = meant(word, known)
         if near is not None:
             self.known_missing.add((of, near.rpartition(".")[2]))
@@ -289,14 +290,15 @@ class Complaints:
         also: Iterable[Label] = (),
         help: Iterable[str] | str = (),
     ) -> None:
-        """An error about what is defined at `of`, which has none of these entries, unless that is known already."""
+        """Report an error about the definition at `of`, which has none of these entries, unless that is known
+        already."""
         if not self.is_known_to_lack(of, *names):
             self.error(code, message, at or of, also=also, help=help)
 
     def lack(
         self, of: Place, name: str, code: str, message: str, at: Label | Place, *, also: Iterable[Label], help: str
     ) -> None:
-        """An error about what is defined at `of`, which has no entry of this name; that is known from now on."""
+        """Report an error about the definition at `of`, which has no entry of this name, and note that."""
         self.known_missing.add((of, name))
         found = error(code, message, at, also=also, help=help)
         self._lacking[found] = (of, name)
@@ -322,11 +324,11 @@ class Complaints:
         also: Iterable[Label] = (),
         help: Iterable[str] | str = (),
     ) -> None:
-        """A warning about what the deck means, which says something only once the deck has no errors."""
+        """Add a warning about the deck's meaning, which is given only if the deck has no errors."""
         self.pass_on(replace(error(code, message, at, also=also, help=help), severity="warning"))
 
     def pass_on(self, diagnostic: Diagnostic) -> None:
-        """The same of a warning that is put into words elsewhere."""
+        """Add such a warning that is already put in words."""
         if diagnostic.code in PROVISIONAL:
             self._provisional.append(diagnostic)
         else:
@@ -340,16 +342,16 @@ class Complaints:
             self._remarks.setdefault(diagnostic)
 
     def admit_remarks(self) -> None:
-        """Makes warnings of the remarks."""
+        """Turn the remarks into warnings."""
         for diagnostic in self._remarks:
             self._record(diagnostic)
         self._remarks = {}
 
     @contextmanager
     def allowing(self, allowed: Mapping[str, Place]) -> Iterator[None]:
-        """Inside, where a run or sweep is looked at, warnings with the codes that it allows are left out.
+        """A block in which a run or sweep is checked, and warnings with the codes that it allows are left out.
 
-        allowed  the place of the `allow` by its code
+        allowed the place of the `allow` by its code
         """
         before, self._allowed = self._allowed, allowed
         try:
@@ -358,9 +360,9 @@ class Complaints:
             self._allowed = before
 
     def silence(self, allowed: Mapping[str, Iterable[Place]]) -> None:
-        """Leave out warnings that are of no single run, such as of a macro, with codes that all runs allow.
+        """Leave out warnings that belong to no single run, such as about a macro, with codes that all runs allow.
 
-        allowed  the places of each `allow` by the code
+        allowed the places of each `allow` by the code
         """
         for diagnostic in [each for each in self.warnings if each in self._of_no_run and each.code in allowed]:
             places = tuple(allowed[diagnostic.code])
@@ -369,7 +371,7 @@ class Complaints:
             del self._found[diagnostic]
 
     def _is_silenced(self, diagnostic: Diagnostic) -> bool:
-        """Return True if the run that is looked at allows this warning, or if it is known from one that does."""
+        """Return True if the run that is checked allows this warning, or one that allows it has found it too."""
         if self._allowed is None:
             if diagnostic in self._silenced:
                 return True
@@ -383,7 +385,7 @@ class Complaints:
         return False
 
     def mark(self, since: int, *labels: Label) -> None:
-        """Adds places, and what they say, to the errors found after the first `since` diagnostics."""
+        """Add places, with texts, to the errors found after the first `since` diagnostics."""
         found = list(self._found)
         for n, each in enumerate(found):
             if n >= since and each.severity == "error":
@@ -401,14 +403,14 @@ class Complaints:
 
 
 def _mistake(diagnostic: Diagnostic) -> object:
-    """Equal of mistakes that turns of a loop have in common: the code and the place, without the turn."""
+    """A key that is equal for a mistake in all turns of a loop: the code and the place, without the turn."""
     assert diagnostic.at is not None
     place = diagnostic.at.place
     return diagnostic.code, diagnostic.severity, place.file, place.line, place.column, place.macros
 
 
 def once_for_all_roofs(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
-    """The diagnostics with each mistake of a file that is used under several roofs once, at the first of them."""
+    """The diagnostics with each mistake of a file under several roofs once, at the first of them."""
     first: dict[object, Diagnostic] = {}
     others: dict[object, dict[Place, None]] = {}
     kept: list[tuple[Diagnostic, object]] = []
@@ -433,13 +435,13 @@ def once_for_all_roofs(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
 
 
 def _spot(place: Place) -> tuple[str, int, int]:
-    """The file, line and column that the deck's reader sees; for what a macro made, those of the macro's use."""
+    """The file, line and column that the deck's reader sees; for the product of a macro, those of the macro's use."""
     at = place.macros[-1].use if place.macros else place
     return at.file, at.line, at.column
 
 
 def where_it_belongs(word: str) -> list[str]:
-    """The remedy for a word of the language that stands in another block only."""
+    """The remedy for a word of the language that belongs in another block."""
     places = {
         "substitute": "`substitute JOINT { ... }`, in a run, puts a joint's motor on a bed",
         "payload": "`payload NAME { ... }`, in a run, is a body that a link carries or grapples",
@@ -451,12 +453,12 @@ def where_it_belongs(word: str) -> list[str]:
 
 
 def with_article(word: str, *, quoted: bool = False) -> str:
-    """`an arm`, `a servo`; quoted: in the quotes of what a deck writes."""
+    """A word with its article, `an arm`, `a servo`; quoted: in the quotes of deck text"""
     return f"{'an' if word[:1] in tuple('aeiou') else 'a'} {f'`{word}`' if quoted else word}"
 
 
 def known_words(what: str, known: Iterable[str], most: int = 24) -> str:
-    """`keys of a link: com, inertia, mass, shape`, cut where there are many."""
+    """The known words in a sentence, `keys of a link: com, inertia, mass, shape`, cut where there are many."""
     names = list(dict.fromkeys(known))
     shown = ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
     return f"{what}: {shown}" if names else f"{what}: none"

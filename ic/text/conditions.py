@@ -39,7 +39,7 @@ _COMPUTED: Mapping[str, Callable[[int, int], int]] = MappingProxyType(
 
 
 class Refused(Exception):
-    """The condition has no meaning, and that has been said."""
+    """Raised where a condition has no meaning, which has been reported."""
 
 
 class _Value(NamedTuple):
@@ -83,7 +83,7 @@ def with_defined(tokens: Sequence[Token], is_macro: Callable[[str], bool], findi
 
 
 def _each_defined(written: Sequence[Token], findings: Findings) -> list[tuple[int, int, int]] | None:
-    """Positions of each `defined`, its name, and the token behind; None, with an error, if one has no name."""
+    """Positions of each `defined`, its name, and the token after it; None, with an error, if one has no name."""
     stretches: list[tuple[int, int, int]] = []
     texts = [token.text for token in written] + ["", "", ""]
     for i, token in enumerate(written):
@@ -102,7 +102,7 @@ def _each_defined(written: Sequence[Token], findings: Findings) -> list[tuple[in
 def evaluate(tokens: Sequence[Token], findings: Findings, unknown: Callable[[Token], None]) -> bool:
     """Return True if an expanded condition holds; raises Refused, with the error noted, where it has no meaning.
 
-    unknown: called with each name that is no macro and counts as 0
+    unknown: called with each name that is not a macro and counts as 0
     """
     return _Condition([token for token in tokens if token.kind != SPACE], findings, unknown).truth()
 
@@ -154,7 +154,7 @@ class _Condition:
             raise Refused
 
     def no_double(self, token: Token) -> None:
-        """`--` and `++`, which C reads as one token."""
+        """Report `--` and `++`, which C reads as one token."""
         if token.text in ("-", "+") and self.text() == token.text:
             after = self.tokens[self.at]
             if after.source is token.source and after.offset == token.end:
@@ -273,7 +273,7 @@ class _Condition:
         self.no_stray(token)
         if token.kind == WHOLE:
             return self.number(token)
-        if token.kind == NAME:  # what is no macro is 0, as in C
+        if token.kind == NAME:  # a name that is not a macro is 0, as in C
             self.at += 1
             if live:
                 self.unknown(token)
@@ -341,6 +341,6 @@ class _Condition:
 
 
 def _wrapped(number: int, plain: bool) -> _Value:
-    """The number brought into 64 bits."""
+    """The number wrapped into 64 bits."""
     number &= (1 << 64) - 1
     return _Value(number if plain or number < 1 << 63 else number - (1 << 64), plain)

@@ -111,7 +111,7 @@ def _checked_parameters(name: Token, written: list[Token], findings: Findings) -
 
 
 def _checked_strings(written: list[Token], parameters: set[str], findings: Findings) -> bool:
-    """Return True if a parameter follows each `#` of a macro that takes arguments; reports it where none does."""
+    """Return True if a parameter follows each `#` of a macro that takes arguments; reports the others."""
     known = parameters - {"...", ","} | ({REST, OPTIONAL} if "..." in parameters else set())
     for i, token in enumerate(written):
         if token.text == "#" and (i + 1 == len(written) or written[i + 1].text not in known):
@@ -223,7 +223,7 @@ def _may_be_unit(body: Sequence[Token], parameters: Container[str], is_macro: Ca
 
 
 def warn_of_quantity(name: Token, body: list[Token], findings: Findings) -> None:
-    """`#define LENGTH 2.0 m`: the value of `LENGTH^2` would surprise."""
+    """Warn about `#define LENGTH 2.0 m`, since the value of `LENGTH^2` would surprise."""
     written = [token for token in body if token.kind != SPACE]
     if written and written[0].text in ("-", "+"):
         del written[0]
@@ -250,7 +250,7 @@ def parameters(head: list[Token]) -> tuple[str, ...] | None:
 
 
 def spelling(macro: Macro) -> tuple[object, ...]:
-    """A key that is equal for equal definitions: parameters and body, any white space being as good as another."""
+    """A key that is equal for equal definitions: parameters and body, with all white space alike."""
     body: list[str] = []
     for token in macro.body:
         blank = token.kind == SPACE

@@ -1,4 +1,4 @@
-"""The edition of the deck language that a file is written in: its line `deck 2;`, which stands before all but comments.
+"""The edition of the deck language that a file is written in: its line `deck 2;`, before which only comments may stand.
 
 What a deck means never changes within an edition. A file without the line is of edition 1.
 """
@@ -45,7 +45,7 @@ def heading(text: str) -> Heading | None:
 
 
 def edition_of(text: str) -> int:
-    """The edition of a file's text; the latest where it names one that there is not, which is reported."""
+    """The edition of a file's text; the latest for an unknown one, which is reported."""
     found = heading(text)
     if found is None:
         return FIRST

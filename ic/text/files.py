@@ -1,4 +1,4 @@
-"""Finds a deck's files, and reads them: a regular file of UTF-8 text, not too large.
+"""Finding and reading of a deck's files: regular files of UTF-8 text, not too large.
 
 An `#include "name"` looks beside the including file first; both forms then look in the `-I` directories, in those of
 MET_DECK_PATH, and in the standard library (ic/decks), whose files are called `<servos/rigid_gearbox.ic>` in messages
@@ -31,10 +31,10 @@ DECK_IN_MEMORY = "deck"
 """The name in messages and archives of a deck that is given as text."""
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
-"""The bytes that an HDF5 file begins with."""
+"""The first bytes of an HDF5 file."""
 
 Unsaved = Mapping[str, str]
-"""Texts that count in place of what files hold, by the files' real paths: what an editor has and has not saved yet."""
+"""Texts that count in place of files' contents, by the files' real paths: those that an editor has not saved yet."""
 
 NOTHING_UNSAVED: Unsaved = MappingProxyType({})
 
@@ -43,7 +43,7 @@ _NOT_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
 @frozen
 class Directory:
-    """A directory to look in, and the name it goes by in messages; "<" begins the library's."""
+    """A directory to search, and its name in messages; "<" begins the library's."""
 
     path: str
     name: str
@@ -64,7 +64,7 @@ class Directory:
 
 @frozen
 class FoundFile:
-    """A file: the path to open it by, and its name in messages."""
+    """A file: its path, and its name in messages."""
 
     path: str
     name: str
@@ -81,7 +81,7 @@ class FoundFile:
 
 
 def file_at(path: str) -> FoundFile:
-    """A file that is not the library's, by a name that no other file has.
+    """A file outside of the library, under a unique name.
 
     `a/../b.ic` is `b.ic`, unless `a` is a link to elsewhere.
     """
@@ -114,17 +114,17 @@ class Files:
         return next((found for d in self.path if os.path.isfile((found := d.join(name)).path)), given)
 
     def given(self, text: str) -> FoundFile:
-        """A deck that is given as text: its includes are looked for as if it stood in the current folder."""
+        """The deck given as text: its includes are searched as if it stood in the current folder."""
         file = FoundFile(DECK_IN_MEMORY, DECK_IN_MEMORY)
         self._keep(file, text.encode("utf-8", "surrogatepass"), "deck", MOST_BYTES)
         return file
 
     def where(self, includer: FoundFile, angled: bool) -> list[Directory]:
-        """The directories in which an include is looked for, in order."""
+        """The directories in which an include is searched, in order."""
         return self.path if angled else [includer.directory, *self.path]
 
     def find(self, header: str, directories: Sequence[Directory]) -> FoundFile | None:
-        """The first that there is; a folder of that name only where there is no file."""
+        """The first existing file; a folder of that name only where there is no file."""
         asked = [file_at(header)] if os.path.isabs(header) else [d.join(header) for d in directories]
         there = [file for file in asked if self._is_there(file)]
         return next((file for file in there if not os.path.isdir(file.path)), there[0] if there else None)
@@ -133,7 +133,7 @@ class Files:
         return os.path.exists(file.path) or (bool(self._unsaved) and file.identity in self._unsaved)
 
     def dangling(self, header: str, directories: Sequence[Directory]) -> str | None:
-        """The name of a link that leads nowhere, where that is what an include has found."""
+        """The name of a broken link, where an include has found one."""
         files = (d.join(header) for d in directories)
         return next((file.name for file in files if os.path.islink(file.path)), None)
 
@@ -173,7 +173,7 @@ class Files:
         return self.read_so_far[file.name].text
 
     def _keep(self, file: FoundFile, data: bytes, kind: str, most: int) -> None:
-        """Keep a file's bytes as text, and what is wrong with them. Raises Problem D018."""
+        """Keep a file's bytes as text, with its errors. Raises Problem D018."""
         if len(data) > most:
             raise Problem(_too_large(file, kind, f"{len(data) / 2**20:.1f} MiB", most))
         text, complaint = decode(data, file.name, kind)
@@ -193,7 +193,7 @@ def library_defines(kind: str, name: str, library: Path = LIBRARY) -> str | None
 
 
 def add_include(file: str, place: Place, what: str = "it") -> Help:
-    """The help which says to include a standard deck, in the file that the place is in."""
+    """The help that says to include a standard deck, in the file of the place."""
     head = Place(place.file, 1, 1, 0)
     text = f"a standard deck defines {what}: add `#include <{file}>`"
     return write(f"#include <{file}>\n", text, at=head, where="before")
@@ -250,7 +250,7 @@ def _too_large(file: FoundFile, kind: str, size: str, most: int) -> Diagnostic:
 
 
 def decode(data: bytes, name: str, kind: str) -> tuple[str, Diagnostic | None]:
-    """The text, and what is wrong with it; where something is, the text is good enough to show the line."""
+    """The text, with its errors; with errors, it is good enough to show the line."""
     complaint = None
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         complaint = error("D002", f"`{name}` is UTF-16, but {kind}s are UTF-8", help="save it as UTF-8")

@@ -95,7 +95,7 @@ class Text:
 
     @cached_property
     def _joints(self) -> tuple[list[int], list[int]]:
-        """Offsets in the joined text at which something was taken away, and how much up to and with each."""
+        """Offsets in the joined text at which characters were removed, with the number removed up to each."""
         at, taken, total = [], [], 0
         for match in _SPLICE.finditer(self.text):
             at.append(match.start() - total)
@@ -110,7 +110,7 @@ class Text:
 
     @cached_property
     def heading(self) -> Heading | None:
-        """The line that says the edition, by offsets in the text as written."""
+        """The line with the edition, by offsets in the text as written."""
         found = heading(self.joined)
         if found is None or len(self.joined) == len(self.text):
             return found
@@ -187,7 +187,7 @@ class Token:
 
     @property
     def end(self) -> int:
-        """The offset just behind the token."""
+        """The offset just after the token."""
         return self.offset + self.length
 
     def __copy__(self) -> Token:
@@ -214,7 +214,7 @@ def logical_lines(source: Text) -> Iterator[list[Token]]:
 
 
 def _where_written(line: list[Token], source: Text) -> list[Token]:
-    """The tokens of the joined text, moved to where they stand in the text."""
+    """The tokens of the joined text, with their places in the original text."""
     for token in line:
         last = source.written_at(max(token.offset, token.offset + token.length - 1))
         token.offset = source.written_at(token.offset)

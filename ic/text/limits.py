@@ -45,7 +45,7 @@ MOST_ERRORS = 30  # then reading stops: the rest would seldom say more
 
 
 class GiveUp(Exception):
-    """Ends the reading of a deck at once; what is to be said has been noted."""
+    """Ends the reading of a deck at once; messages have been noted."""
 
 
 class Findings(Complaints):

@@ -1,4 +1,4 @@
-"""Macros: what may be defined, and what a use of one becomes.
+"""Macros: their definitions, and the expansion of their uses.
 
 The scan that finds what to expand is linear, does what gcc's does (C leaves some of it open), and lets every token know
 each macro that it came through. A deck's macros can be neither endless nor large, and may not take a unit's name.
@@ -30,7 +30,7 @@ from met.diagnostic import Expansion, Label, Place
 
 
 class Macros(Pcpp):
-    """The half of the preprocessor that knows macros."""
+    """The half of the preprocessor for macros."""
 
     def __init__(self, findings: Findings) -> None:
         self.findings = findings
@@ -96,14 +96,14 @@ class Macros(Pcpp):
     def expand_macros(self, tokens: list[Token], expanding_from: object = ()) -> list[Token]:
         """The tokens with every macro expanded; at the outermost level without white space.
 
-        As gcc does it: a macro is not used while what it made is being read, up to the token of kind LEFT behind that;
-        where its name is met meanwhile, that token is never again a use of it.
+        As in gcc, a macro is not used while its expansion is being read, up to the token of kind LEFT after it; a token
+        of its name that is met meanwhile is never again a use of it.
         """
         macros, inside = self.macros, self._inside
         keep_space = self._depth > 0
         pending = tokens[::-1]
         out: list[Token] = []
-        before = ""  # the last token that is no white space
+        before = ""  # the last token that is not white space
         while pending:
             token = pending.pop()
             kind = token.kind
@@ -134,7 +134,7 @@ class Macros(Pcpp):
         return out
 
     def _next_solid(self, pending: list[Token]) -> Token | None:
-        """The next token that is no white space, which stays; macros whose end is passed on the way are left."""
+        """The next token that is not white space, which stays; macros whose end is passed on the way are left."""
         blanks = []
         while pending and pending[-1].kind in (SPACE, LEFT):
             piece = pending.pop()
@@ -156,13 +156,13 @@ class Macros(Pcpp):
         return True
 
     def _is_varied(self, pending: list[Token]) -> bool:
-        """Return True if a macro's name behind `macro` stands in `vary macro NAME = [...]`, which means the macro, not
+        """Return True if a macro's name after `macro` stands in `vary macro NAME = [...]`, which means the macro, not
         its body."""
         following = self._next_solid(pending)
         return following is not None and following.text == "="
 
     def _keep_defined(self, pending: list[Token], out: list[Token], token: Token) -> None:
-        """`defined NAME` that a macro made: the name is asked for, not expanded."""
+        """Keep a `defined NAME` from a macro: the name is noted as used, not expanded."""
         out.append(token)
         if self._opens(pending):
             out.append(Token("CPP_LPAREN", "(", token.source, token.offset, token.length))
@@ -201,7 +201,7 @@ class Macros(Pcpp):
         return made
 
     def _use_refused(self, token: Token, pending: list[Token]) -> Token:
-        """Skip the use of a macro that was refused, arguments too; no more is reported of what it makes."""
+        """Skip the use of a refused macro, including arguments; its expansion causes no further messages."""
         if self.refused[token.text]:
             if not self._opens(pending):
                 return token
@@ -216,7 +216,7 @@ class Macros(Pcpp):
         return bad
 
     def _use(self, token: Token, macro: Macro, pending: list[Token]) -> bool:
-        """Puts a macro's replacement in front of what is pending; False where the name is no use of it."""
+        """Put a macro's replacement in front of the pending tokens; False where the name is not a use of it."""
         if not token.expansions and self._depth == 0:
             self._expanded_here = 0
         if len(token.expansions) >= MACRO_DEPTH:
@@ -240,7 +240,7 @@ class Macros(Pcpp):
         return True
 
     def _collect(self, token: Token, macro: Macro, pending: list[Token]) -> list[Argument] | None:
-        """Takes a call's arguments and its ")" off the pending tokens; None, and a message, for a wrong number."""
+        """Take a call's arguments and its ")" off the pending tokens; None, and a message, for a wrong number."""
         arguments = [Argument()]
         depth = taken = 0
         names = macro.parameters or ()
@@ -318,7 +318,7 @@ class Macros(Pcpp):
         return Label(macro.name_token.place, f"`{macro.name}` is defined here")
 
     def _substitute(self, token: Token, macro: Macro, arguments: list[Argument]) -> list[Token]:
-        """The macro's body with the arguments in it; sizes are checked before."""
+        """The macro's body with the arguments in it, after checks of its size."""
         self._depth += 1
         if self._depth > MACRO_DEPTH:
             self._endless(token, f"macro calls within arguments go deeper than {MACRO_DEPTH}")

@@ -70,7 +70,7 @@ def preprocess(
     *,
     library: Path = LIBRARY,
 ) -> Tokens:
-    """Reads a deck and all that it includes. `defines` are as after `-D`: `NAME` or `NAME=VALUE`."""
+    """Preprocess a deck and all files that it includes. `defines` are as after `-D`: `NAME` or `NAME=VALUE`."""
     files = Files(include_dirs, library)
     return preprocess_on(files, Findings(), lambda: files.deck(path), defines)
 
@@ -85,7 +85,7 @@ def preprocess_on(
     used: tuple[int, ...] = (),
     count: int = 0,
 ) -> Tokens:
-    """Reads a deck and all that it includes; what is wrong is in the findings.
+    """Preprocess a deck and all files that it includes; errors go into the findings.
 
     deck            finds it; raises Problem
     defines         as after `-D`
@@ -111,7 +111,7 @@ def preprocess_on(
 def find_file(
     files: Files, findings: Findings, includer: FoundFile, name: str, angled: bool, at: Place
 ) -> FoundFile | None:
-    """The file that an `#include` or a `use` names; None where there is none, which is reported."""
+    """The file of an `#include` or a `use`; None where there is none, which is reported."""
     directories = files.where(includer, angled)
     file = files.find(name, directories)
     if file is None:
@@ -128,7 +128,7 @@ def find_file(
 
 
 class _Conditional:
-    """A conditional that is open: the directive, whether what surrounds it counts, whether its present part does."""
+    """An open conditional: the directive, whether the text around it counts, whether its present part does."""
 
     __slots__ = ("active", "done", "otherwise", "outer", "token")
 
@@ -175,13 +175,13 @@ class _Preprocessor(Macros):
 
     def read_deck(self, file: FoundFile, included: tuple[tuple[str, int], ...], used: tuple[int, ...]) -> None:
         source = Text(file.name, self.files.text(file), included, used)
-        if self._given_text is not None:  # which is read as the deck is
+        if self._given_text is not None:  # which is read like the deck
             self._given_text.edition = source.edition
         self._read(file, source, source.place(0, 1))
         self.output.append(Token(END, "", source, len(source.text.rstrip()), 1))
 
     def warn_of_names(self) -> None:
-        """Warns of names in conditions that are no macros, and of macros on the command line that nothing asks for."""
+        """Warn about names in conditions that are not macros, and macros on the command line that nothing uses."""
         named = ((word.text, name) for word, name in pairwise(self.output) if name.kind == NAME)
         lets = {name.text: name for word, name in named if word in ("let", "param")}
         for name, place in self._zeros.items():
@@ -231,7 +231,7 @@ class _Preprocessor(Macros):
         self._entered.pop()
 
     def _check_heading(self, source: Text) -> None:
-        """Looks at the line that says a file's edition, which no token of the deck comes from."""
+        """Check the line with a file's edition, which gives the deck no tokens."""
         found = source.heading
         if found is None:
             return
@@ -247,7 +247,7 @@ class _Preprocessor(Macros):
             self.findings.error("D021", "expected `;`", at, help=write(";", "an entry ends with `;`", where="before"))
 
     def group_lines(self, _text: str, source: Text) -> Iterable[list[Token]]:
-        """The lines that pcpp works on. Those that `#if` leaves out are lexed, since a comment may begin there."""
+        """The lines for pcpp. Those that `#if` leaves out are lexed, since a comment may begin there."""
         ifs = self._ifs[-1]
         long = _LONG_LINE.search(source.joined)
         if long is not None:
@@ -292,7 +292,7 @@ class _Preprocessor(Macros):
                 )
 
     def include(self, tokens: list[Token], _line: object) -> Iterable[Token]:
-        """Reads an included file. Its tokens go straight to the output: pcpp has handed over all before them."""
+        """Read an included file. Its tokens go straight to the output, since pcpp has handed over all before them."""
         directive = self._directive
         assert directive is not None
         header = self._header(tokens, directive)
@@ -319,7 +319,7 @@ class _Preprocessor(Macros):
         return ()
 
     def _header(self, tokens: list[Token], directive: Token) -> tuple[str, bool, Place] | None:
-        """The name that an `#include` asks for, whether in < >, and its place."""
+        """The name in an `#include`, whether in < >, and its place."""
         if tokens and tokens[0].kind == STRING:
             name, angled, at, rest = tokens[0].text[1:-1], False, tokens[0].place, tokens[1:]
         elif tokens and tokens[0].text == "<":
@@ -349,7 +349,7 @@ class _Preprocessor(Macros):
         return name, angled, at
 
     def _too_deep(self, at: Place) -> None:
-        """Report the circle that includes go in, at the include that closes it, or just that they go too deep."""
+        """Report the circle of includes, at the include that closes it, or just that they go too deep."""
         chain = [file.identity for file, _ in self._including]
         for last, identity in enumerate(chain):
             first = chain.index(identity)
@@ -362,7 +362,7 @@ class _Preprocessor(Macros):
     # directives
 
     def on_directive_handle(self, directive: Token, args: list[Token], _passing: bool, _before: object) -> bool:
-        """Every directive comes through here before pcpp acts on it; what it must not see is taken away."""
+        """Handle each directive before pcpp acts on it; parts that pcpp must not see are removed."""
         self._directive = directive
         ifs = self._ifs[-1]
         name = directive.text
@@ -412,7 +412,7 @@ class _Preprocessor(Macros):
         tell("D014" if name == "error" else "D015", said[:LONGEST_NAME], directive.place)
 
     def _conditional(self, name: str, directive: Token, args: list[Token], ifs: list[_Conditional]) -> None:
-        """Follows the conditionals beside pcpp, which is given only what it can digest: a name, 0 or 1."""
+        """Follow the conditionals beside pcpp, which gets only a name, 0 or 1."""
         if name in ("if", "ifdef", "ifndef"):
             outer = not ifs or ifs[-1].active
             truth = False
@@ -504,17 +504,17 @@ class _Preprocessor(Macros):
         return False
 
     def evalexpr(self, tokens: list[Token]) -> tuple[Any, Any]:
-        """The value that pcpp asks for, found by `_condition`."""
+        """The value for pcpp, found by `_condition`."""
         return (tokens[0].text == "1", None)
 
     def on_error(self, _file: object, _line: object, message: str) -> None:
-        """pcpp's own complaints: those that ours have not forestalled."""
+        """Report pcpp's own errors that ours have not forestalled."""
         if not message.startswith("Unterminated") and self._directive is not None:
             self.findings.error("D007", f"the preprocessor cannot read this: {message}", self._directive.place)
 
 
 def _as_elif(line: list[Token], at: int) -> None:
-    """Makes an `#elif`, which pcpp knows, of `#elifdef` and `#elifndef`; the token's kind says which it is."""
+    """Turn `#elifdef` and `#elifndef` into an `#elif`, which pcpp knows; the token's kind keeps the difference."""
     directive = next((token for token in line[at:] if token.kind != SPACE), None)
     if directive is not None and directive.text in ("elifdef", "elifndef"):
         directive.kind, directive.text = directive.text, "elif"
@@ -528,7 +528,7 @@ def _shown(directive: Token) -> str:
 def reached_by(
     complaint: Diagnostic, at: Place, included: tuple[tuple[str, int], ...], used: tuple[int, ...]
 ) -> Diagnostic:
-    """The mistake in an included file, moved to the line that names it where it has no place of its own."""
+    """The mistake in an included file, moved to the line that names the file where it has no place of its own."""
     place = at if complaint.at is None else replace(complaint.at.place, included=included, used=used)
     return replace(complaint, at=Label(place))
 

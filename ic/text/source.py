@@ -1,4 +1,4 @@
-"""Text that was read, and stretches of it that could not be."""
+"""Text that was read, and its unreadable stretches."""
 
 from __future__ import annotations
 
@@ -32,5 +32,5 @@ class SourceFile:
 
     @property
     def edition(self) -> int:
-        """The edition of the deck language that its text is written in; 1 of what is no deck."""
+        """The edition of the deck language of the text; 1 for a file that is not a deck."""
         return edition_of(self.text)

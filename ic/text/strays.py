@@ -1,4 +1,4 @@
-"""Messages for text that is no token: unclosed comments and strings, and characters that a deck does not have."""
+"""Messages for text outside of tokens: unclosed comments and strings, and characters that are not allowed in a deck."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ic.text.lexer import CHARACTER, Text, Token
 from ic.text.limits import Findings
 from met.diagnostic import write
 
-# characters that come out of word processors and other notations, and what a deck writes for them
+# characters from word processors and other notations, with the deck's text for them
 _PLAIN: Mapping[str, str] = MappingProxyType({
     "\u00b5": "u", "\u03bc": "u", "\u03a9": "ohm", "\u2126": "ohm", "\u00b0": "deg",  # micro, ohm, degree
     "\u00d7": "*", "\u00b7": "*", "\u22c5": "*", "\u00f7": "/",  # times and dots, division sign
@@ -20,7 +20,7 @@ _PLAIN: Mapping[str, str] = MappingProxyType({
     "\uff1a": ":", "\uff1b": ";", "\uff0c": ",",  # full width
 })  # fmt: skip
 
-# marks that no one sees: those that turn the direction of writing, joiners and blanks without width, tags
+# invisible marks: those that change the direction of writing, joiners and blanks without width, tags
 _UNSEEN = re.compile(
     "[\u00ad\u034f\u061c\u115f\u1160\u17b4\u17b5\u180b-\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\u3164\ufeff\uffa0"
     "\ufff9-\ufffb\U000e0000-\U000e007f]"
@@ -29,7 +29,7 @@ _JOINERS = "\u00ad\u200c\u200d"  # some languages write with them
 
 
 def complain_of_unseen(source: Text, findings: Findings) -> None:
-    """Says where a text, comments and strings too, has characters that are not seen; of those in a line, once."""
+    """Report invisible characters in a text, including comments and strings; those in one line once."""
     if source.text.isascii():
         return
     seen: set[tuple[int, bool]] = set()
@@ -52,7 +52,7 @@ def complain_of_unseen(source: Text, findings: Findings) -> None:
 
 
 def complain_of_stray(token: Token, findings: Findings) -> None:
-    """Says why a token of kind BAD, a character constant or a `#` cannot stand in a deck."""
+    """Report why a token of kind BAD, a character constant or a `#` cannot stand in a deck."""
     text = token.text
     tell = findings.error
     if text == "/*":

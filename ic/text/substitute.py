@@ -12,7 +12,7 @@ JOINED = "JOINED"
 
 
 class NotOneToken(Exception):
-    """`##` makes of two tokens a text that is not one token."""
+    """Raised where `##` makes a text of two tokens that is not one token."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -88,7 +88,7 @@ class _Substitution:
         self.optional_depth = 0
 
     def of(self, body: list[Token]) -> list[Token]:
-        """The tokens that a body, or a part of one, becomes; an empty one beside a `##` is a token of kind NOTHING."""
+        """The tokens of an expanded body, or a part of one; an empty one beside a `##` is a token of kind NOTHING."""
         made: list[Token] = []
         at, pasting = 0, False
         while at < len(body):
@@ -108,7 +108,7 @@ class _Substitution:
         return [_as_one(token) for token in made] if self.macro.pastes else made
 
     def pieces(self, body: list[Token], at: int, pasting: bool) -> tuple[list[Token], int]:
-        """The tokens that the element at `at` becomes, and the position behind it; at least one token beside a `##`."""
+        """The tokens of the expanded element at `at`, and the position after it; at least one token beside a `##`."""
         token = body[at]
         if self.macro.parameters is None or token.text not in ("#", OPTIONAL, *self.macro.numbers):
             return [token], at + 1
@@ -129,11 +129,11 @@ class _Substitution:
         return pieces, end
 
     def end(self, body: list[Token], at: int) -> int:
-        """The position behind the parameter, or behind the `__VA_OPT__(...)`, that stands at `at`."""
+        """The position after the parameter, or after the `__VA_OPT__(...)`, at `at`."""
         return at + 1 if body[at].text != OPTIONAL else closing(body, _solid(body, at + 1)) + 1
 
     def optional(self, body: list[Token], at: int, end: int) -> list[Token]:
-        """The tokens that the `__VA_OPT__(...)` at `at` becomes: none, where the rest of the arguments is empty."""
+        """The tokens of the expanded `__VA_OPT__(...)` at `at`: none where the rest of the arguments is empty."""
         if not any(token.kind != SPACE for token in self.arguments[-1].expanded):
             return []
         inside = body[_solid(body, at + 1) + 1 : end - 1]
@@ -143,8 +143,7 @@ class _Substitution:
         return made
 
     def string(self, body: list[Token], at: int) -> Token:
-        """`#` and the parameter, or the `__VA_OPT__(...)`, at `at`: its text as a string, white space being one
-        blank."""
+        """The string of `#` with the parameter, or the `__VA_OPT__(...)`, at `at`, with white space as one blank."""
         token = body[at]
         if token.text == OPTIONAL:
             pieces = self.optional(body, at, self.end(body, at))
@@ -167,7 +166,7 @@ class _Substitution:
         return body[at + 1].kind == PASTE and body[at + 2].text == REST and after != PASTE
 
     def comma_and_rest(self, comma: Token, made: list[Token]) -> None:
-        """Adds the comma and the rest of the arguments as written, or nothing at all where none is written."""
+        """Add the comma and the rest of the arguments as written, or nothing where there is no rest."""
         rest = self.arguments[-1]
         if rest.omitted:
             if made and made[-1].kind == SPACE:
@@ -180,7 +179,7 @@ class _Substitution:
 
 
 def _joined(left: Token, right: Token) -> Token:
-    """The token, of kind JOINED, that `##` makes of two; the other one as it is, where one of them is nothing."""
+    """The token, of kind JOINED, that `##` makes of two; if one of them is empty, the other one unchanged."""
     if right.kind == NOTHING:
         return left
     if left.kind == NOTHING:
@@ -211,7 +210,7 @@ def closing(body: Sequence[Token], opening: int) -> int:
 
 
 def _solid(body: Sequence[Token], at: int) -> int:
-    """The first place from `at` on that holds no white space."""
+    """The first place from `at` on without white space."""
     while body[at].kind == SPACE:
         at += 1
     return at
