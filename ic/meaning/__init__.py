@@ -1,4 +1,4 @@
-"""Syntax tree -> plan: what is meant, in SI, with the origin of every value.
+"""Syntax tree -> plan: resolved values in SI, with the origin of every value.
 
 Each room imports only from those above it.
 

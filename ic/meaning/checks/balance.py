@@ -1,4 +1,4 @@
-"""Errors of a run that is to begin balanced with servos that cannot hold their joints."""
+"""Errors of runs that should begin balanced with servos that cannot hold their joints."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from met.plan import Experiment, Formula
 
 
 def check_balance(complaints: Complaints, experiment: Experiment) -> None:
-    """Reports servos that are too weak to hold their joints where a run begins balanced.
+    """Report servos that are too weak to hold their joints at a balanced start.
 
     Where a sweep varies numbers, each case is judged when it is run, and fails.
     """

@@ -1,4 +1,4 @@
-"""Warnings of motors on beds whose loops are unstable with the arm that they are to stand for."""
+"""Warnings about motors on beds whose loops are unstable with the arm that they emulate."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from met.analysis.margin import Margin
 
 MOST_CASES = 3
-"""Cases that are looked at: each takes some 25 ms."""
+"""Largest number of cases that are examined: each takes some 25 ms."""
 
 
 def check_beds(complaints: Complaints, experiment: Experiment, memo: AnalysisMemo) -> None:
-    """Warns of each joint on a bed that is unstable in the first case, or where something is least or largest."""
+    """Warn about each joint on a bed that is unstable in the first case, or in one with an extreme value."""
     if not experiment.structure.substitutions or not experiment.cases.count:
         return
     from met.analysis.margin import margins
@@ -29,7 +29,7 @@ def check_beds(complaints: Complaints, experiment: Experiment, memo: AnalysisMem
     left = experiment.cases.count - len(cases)
     try:
         found = memo.answer("margins", experiment, lambda: margins(experiment, cases), cases)
-    except Problem:  # said where the program is built
+    except Problem:  # reported where the program is built
         return
     for each in (one for of_case in found for one in of_case):
         if not each.stable and each.joint not in told:
@@ -40,7 +40,7 @@ def check_beds(complaints: Complaints, experiment: Experiment, memo: AnalysisMem
 
 
 def bed_warning(experiment: Experiment, found: Margin, where: str) -> Diagnostic:
-    """A warning of a loop that grows. where: in which pose of which case, in words."""
+    """A warning about a loop that grows. where: the pose and the case, in words"""
     from met.analysis.margin import remedy
 
     r = found.least if found.too_light else found.together

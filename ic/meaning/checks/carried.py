@@ -16,22 +16,21 @@ from met.content import Hump, humps_from_zero, humps_of_turns
 from met.frozen import frozen
 
 OFF = 0.05
-"""Share by which an integral, or a peak, may be off."""
+"""Largest relative error of an integral, or a peak."""
 
 FEW = 20.0
-"""Intervals in a pulse, from which on its integral is off by less than `OFF`: half an interval at each end."""
+"""Number of intervals in a pulse from which on its integral is within `OFF`: half an interval at each end."""
 
 SLIGHT = 0.1
-"""Share of the largest pulse below which another is not looked at."""
+"""Share of the largest pulse below which another is ignored."""
 
 ROUNDING = 1e-9
-"""Share of an interval by which an instant may miss what it is at."""
+"""Share of an interval by which an instant may miss its time."""
 
 
 @frozen
 class Uncarried:
-    """A pulse that is seen as more or less than it is: from and until, s; its integral, or its peak, as it is and as
-    it is seen."""
+    """A pulse with a wrong size in samples: from and until, s; its true integral, or peak, and the sampled one."""
 
     begins: float
     ends: float
@@ -40,14 +39,14 @@ class Uncarried:
 
     @property
     def off(self) -> float:
-        """Share by which what is seen is off."""
+        """Relative error of the sampled size."""
         return abs(self.seen / self.truth - 1.0)
 
 
 def uncarried(
     points: Sequence[tuple[float, float]], interval: float, duration: float, *, integral: bool
 ) -> list[Uncarried]:
-    """The pulses of a course of straight lines that instants every so many seconds do not carry.
+    """The pulses of a course of straight lines whose size is wrong in samples at this interval, s.
 
     integral  whether the integral counts, else the peak
     """

@@ -17,7 +17,7 @@ from met.trace import Scalar
 
 
 def remark_degrees(deck: Deck, definitions: Definitions, complaints: Complaints) -> None:
-    """Report `sin(90)`: more than a turn of radians, which were not made with pi."""
+    """Report `sin(90)`: more than a turn in radians, without pi in the expression."""
     if not any("sin(" in text or "cos(" in text for text in (source.text.replace(" ", "") for source in deck.sources)):
         return
     names = Names(definitions, {})

@@ -1,6 +1,6 @@
 """Checks of environment models that act on a joint's servo: that there is such a servo, and that they have an effect.
 
-`Environment.servo_of` has what a model does to a servo, `Environment.friction_joint` friction beside it.
+`Environment.servo_of` declares that a model affects a servo, `Environment.friction_joint` additional friction.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from met.plan.uses import quantities
 
 @frozen
 class ServoFailure:
-    """A model that does something to the servo of a joint, or rubs the joint; place: of the joint's name."""
+    """A model that affects the servo of a joint, or adds friction to the joint; place: of the joint's name."""
 
     use: EnvironmentUse
     model: Any
@@ -41,7 +41,7 @@ def check_failures(
     environment: Sequence[EnvironmentUse],
     schedule: Schedule,
 ) -> None:
-    """Report models about servos that are not there, have not what the model is about, or are on a bed."""
+    """Report models about servos that are missing, lack the affected part, or are on a bed."""
     servos = {use.joint: use for use in uses}
     beds = {each.joint: each.place for each in found}
     sound = []
@@ -66,7 +66,7 @@ def check_failures(
 
 
 def check_friction(scope: Scope, uses: Iterable[Use], environment: Iterable[EnvironmentUse]) -> None:
-    """Report friction on a joint that is told its acceleration, for which it would do nothing."""
+    """Report friction on a joint with a prescribed acceleration, where it would have no effect."""
     servos = {use.joint: use for use in uses}
     for failure in _about(scope, environment, "friction_joint"):
         servo = servos.get(failure.joint)
@@ -85,7 +85,7 @@ def check_friction(scope: Scope, uses: Iterable[Use], environment: Iterable[Envi
 
 
 def _about(scope: Scope, environment: Iterable[EnvironmentUse], which: str) -> Iterable[ServoFailure]:
-    """The models of this sort on joints of which something can be said. which: the field that names the parameter."""
+    """The models of this sort about joints that can be checked. which: the field that names the parameter"""
     for use in environment:
         model = models.find("environment", use.model)
         named = getattr(model, which)
@@ -130,7 +130,7 @@ def _wrong(
 
 
 def _check_full(scope: Scope, failure: ServoFailure, servo: Use) -> None:
-    """Report a drive that would run away without a limit."""
+    """Report a runaway drive without a limit."""
     if failure.model.replaced_outputs is None or servo.servo.full is None or servo.parameters is None:
         return
     numbers = servo.parameters
@@ -156,14 +156,14 @@ def _check_full(scope: Scope, failure: ServoFailure, servo: Use) -> None:
 
 
 def _window(scope: Scope, failure: ServoFailure) -> tuple[float, float] | None:
-    """When it acts, from and until, s; None where that varies, or the model has no such window."""
+    """The window in which it acts, from and until, s; None where that varies, or the model has no such window."""
     found = [scope.parameters.get(f"environment.{failure.use.name}.{name}") for name in ("from", "until")]
     begins, ends = (each.value if each is not None else None for each in found)
     return (begins, ends) if isinstance(begins, float) and isinstance(ends, float) else None
 
 
 def _remark_between_ticks(scope: Scope, failure: ServoFailure, period: float, duration: float) -> None:
-    """Report a window that lies between two ticks of the law, which never sees it."""
+    """Report a window between two ticks of the law, which never sees it."""
     window, model = _window(scope, failure), failure.model
     if window is None or (model.replaced_outputs is None and model.replaced_reading is None):
         return
@@ -185,8 +185,8 @@ def _remark_between_ticks(scope: Scope, failure: ServoFailure, period: float, du
 
 
 def _remark_overlaps(scope: Scope, failures: Iterable[ServoFailure]) -> None:
-    """Report two models of one sort that act on the same of a joint at a time: the later one has the last word."""
-    known = models.find_own("environment").values()  # what another package's does to an earlier one is its own affair
+    """Report two models of one sort that affect the same part of a joint at once: the later one wins."""
+    known = models.find_own("environment").values()  # another package's model may affect an earlier one on purpose
     before: dict[tuple[str, str, Any], list[tuple[ServoFailure, tuple[float, float]]]] = {}
     for failure in failures:
         window, model = _window(scope, failure), failure.model

@@ -41,7 +41,7 @@ def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str,
 
 
 def remark_kinds(scope: Scope, environment: Any, item: Item, arm: ResolvedArm) -> None:
-    """Report numbers for joints of a kind (`Parameter.joints`) that the arm has none of."""
+    """Report numbers for joints of a kind (`Parameter.joints`) that the arm does not have."""
     kinds = {joint.kind for joint in arm.moving}
     for parameter in environment.parameters:
         written = (item.body or MergedBlock()).get(parameter.name)
@@ -56,7 +56,8 @@ def remark_kinds(scope: Scope, environment: Any, item: Item, arm: ResolvedArm) -
 
 
 def remark_beginnings(scope: Scope, uses: tuple[EnvironmentUse, ...]) -> None:
-    """Report a joint that begins beyond the ends that a model keeps it between. After the initial state's."""
+    """Report a joint that begins outside of the ends between which a model keeps it. To be called after the initial
+    state."""
     for use in uses:
         model = models.find("environment", use.model)
         found = {name: scope.parameters.get(f"environment.{use.name}.{name}") for name in model.initial_range}

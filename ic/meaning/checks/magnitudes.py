@@ -68,24 +68,24 @@ MAGNITUDES = (
         for unit, known in (("rad/s", "the fastest spindles have some 40,000 rad/s"), ("m/s", "meteors have 70 km/s"))
     ),
 )
-"""Kinds of numbers. A limit such as `v_max` is none of them: decks write any large number for one that is far away."""
+"""Kinds of numbers. A limit such as `v_max` is not included: decks write any large number for one that is far away."""
 
 BY_UNIT: dict[str, list[Magnitude]] = {}
 for _kind in MAGNITUDES:
     BY_UNIT.setdefault(_kind.unit, []).append(_kind)
 
 THIN, DENSE = 0.1, 1e6
-"""kg/m^3 of a shape: the lightest solids have 1, and a shape may stand for something hollow; the densest have 22,600,
-and decks draw a mass as a ball that is far too small."""
+"""Smallest and largest density of a shape, kg/m^3: the lightest solids have 1, and a shape may stand for something
+hollow; the densest have 22,600, and decks draw a mass as a ball that is far too small."""
 
 HEAVY_ROD = 1e5
-"""kg/m of a rod: steel of 4 m across."""
+"""Largest mass per length of a rod, kg/m: steel of 4 m across."""
 
 SOLIDS = (
     ("kg/m^3", "solids have 1 to 22,600", 10.0, 23e3),
     ("kg/m", "a bar of steel of 1 m across has 6,200", 0.01, 1e4),
 )
-"""Unit of a solid's density and of a rod's, what there is in words, and what is usual."""
+"""Unit of a solid's density and of a rod's, the existing range in words, and the usual range."""
 
 LESS = (
     ("with 1,000 times less mass", 1e-3, 1.0),
@@ -97,17 +97,17 @@ MORE = (
     ("with a tenth of the sizes", 1.0, 10.0),
     ("with a thousandth of the sizes", 1.0, 1e3),
 )
-"""Cures of a density: words, factors of the mass, and of the density for each size."""
+"""Remedies of a density: words, factors of the mass, and of the density for each size."""
 
 GYRATION, LEAST_GYRATION = 10.0, 10.0
-"""Times the length of an arm or a shape, and m: a radius of gyration that is above both is of no link of the arm, one
-above the former of no body of that shape."""
+"""Radius of gyration relative to the length of an arm or a shape, and in m: above both no link of the arm has one, and
+above the former no body of that shape."""
 
 OTHER_UNITS = (1e3, 1e6, 1e9)
-"""What a number is too large or small by where a prefix went wrong."""
+"""Factors by which a number is wrong after a wrong prefix."""
 
 OTHER_INERTIAS = ((1e4, "kg*cm^2"), (1e6, "kg*mm^2"), (1e7, "g*cm^2"), (1e9, "g*mm^2"))
-"""What a moment of inertia is too large by where it was in this unit."""
+"""Factors by which a moment of inertia is wrong if it was in this unit."""
 
 OF_BASE = f"links.{BASE}"
 
@@ -115,7 +115,7 @@ MEANT = 'if it is meant so, `allow {} because "...";`'
 
 
 def check_magnitudes(scope: Scope, structure: Structure) -> None:
-    """Warn of numbers and of bodies that nothing is like; of many of one kind once, with the worst."""
+    """Warn about implausible numbers and bodies; about several of one kind once, with the worst."""
     if scope.complaints.error_count:
         return
     found: dict[Magnitude, list[tuple[str, Settled]]] = {}
@@ -128,19 +128,19 @@ def check_magnitudes(scope: Scope, structure: Structure) -> None:
     bodies = list(_bodies(scope, structure))
     _observe_densities(scope, [body for body in bodies if body.sizes and body.may_be_odd])
     of_their_own = [body for body in bodies if any(each.origin.kind != "derived" for each in body.moments)]
-    # the inertia of a shape is its shape's; a base may be as large as it likes, and so may what an arm carries
+    # the inertia of a shape follows from it; a base may be of any size, and so may a payload
     told = [body for body in of_their_own if body.sizes or (body.head.startswith("links.") and body.head != OF_BASE)]
     _observe_inertias(scope, structure, told)
 
 
 def _observe(scope: Scope, kind: Magnitude, those: list[tuple[str, Settled]]) -> None:
-    """Look at all numbers of a kind, in all cases."""
+    """Check all numbers of a kind, in all cases."""
     numbers: list[tuple[str, Settled, Real]] = []
     for path, settled in those:
         values = settled.value if isinstance(settled.value, tuple) else (settled.value,)
         numbers += [(path, settled, value) for value in values if not isinstance(value, str)]
     place = numbers[0][1].origin.place
-    assert place is not None  # by what is looked at
+    assert place is not None  # by the selection
 
     def warn(rows: np.ndarray) -> None:
         beyond = np.array([_beyond(kind, column) for column in rows.T]).T
@@ -171,7 +171,7 @@ def _observe(scope: Scope, kind: Magnitude, those: list[tuple[str, Settled]]) ->
 
 
 def _may_be_beyond(kind: Magnitude, settled: Settled) -> bool:
-    """True where a number that the deck wrote is beyond what passes, or varies."""
+    """True where a number in the deck is beyond the allowed range, or varies."""
     if settled.origin.place is None or settled.origin.kind == "derived" or isinstance(settled.value, str):
         return False
     values = settled.value if isinstance(settled.value, tuple) else (settled.value,)
@@ -185,7 +185,7 @@ def _beyond(kind: Magnitude, values: np.ndarray) -> np.ndarray:
 
 @frozen
 class WeighedBody:
-    """A link or a payload, and what is known of it: mass, largest moments and sizes of its shape.
+    """A link or a payload with its known properties: mass, largest moments and sizes of its shape.
 
     name    in words;  head: of its paths
     place   of its shape, or of its inertia
@@ -213,7 +213,7 @@ class WeighedBody:
 
     @property
     def may_be_odd(self) -> bool:
-        """True where the density is none of a solid, or varies."""
+        """True where the density is not that of a solid, or varies."""
         numbers = [self.mass.value, *(each.value for each in self.sizes.values())]
         if any(isinstance(each, Scalar) for each in numbers):
             return True
@@ -223,12 +223,12 @@ class WeighedBody:
 
     @property
     def densities(self) -> tuple[float, float]:
-        """The least and the largest density that is let pass, kg/m^3, of a rod kg/m."""
+        """The smallest and the largest allowed density, kg/m^3, or for a rod kg/m."""
         return (0.0, HEAVY_ROD) if self.is_rod else (THIN, DENSE)
 
 
 def _bodies(scope: Scope, structure: Structure) -> Iterator[WeighedBody]:
-    """Links and payloads whose numbers are known."""
+    """Links and payloads with known numbers."""
     named = [("link", "links", each.name) for each in structure.links]
     named += [("payload", "payloads", each.name) for each in structure.payloads]
     shapes: dict[str, dict[str, Settled]] = {}
@@ -248,7 +248,7 @@ def _bodies(scope: Scope, structure: Structure) -> Iterator[WeighedBody]:
 
 
 def _observe_densities(scope: Scope, bodies: Sequence[WeighedBody]) -> None:
-    """Look at what bodies of these shapes and masses would be made of."""
+    """Check the densities that follow from bodies' shapes and masses."""
     settled = [each for body in bodies for each in (body.mass, *body.sizes.values())]
     ends = np.cumsum([1 + len(body.sizes) for body in bodies]).tolist()
 
@@ -259,7 +259,7 @@ def _observe_densities(scope: Scope, bodies: Sequence[WeighedBody]) -> None:
             thin, dense = body.densities
             with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
                 densities = mass / body.volume(sizes.T)
-            fine = ~(_beyond(MASSES, mass) | _beyond(LENGTHS, sizes).any(axis=1))  # else that is told
+            fine = ~(_beyond(MASSES, mass) | _beyond(LENGTHS, sizes).any(axis=1))  # else that is reported
             bad = fine & np.isfinite(densities) & (mass > 0.0) & ((densities < thin) | (densities > dense))
             if bad.any():
                 row = int(np.flatnonzero(bad)[np.abs(np.log(densities[bad])).argmax()])
@@ -282,7 +282,7 @@ def _observe_densities(scope: Scope, bodies: Sequence[WeighedBody]) -> None:
 
 
 def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[WeighedBody]) -> None:
-    """Look at bodies' radii of gyration beside their shapes, and those of links without one beside the arm's length."""
+    """Check bodies' radii of gyration against their shapes, and those of links without one against the arm's length."""
     if not bodies:
         return
     paths = [f"{joint.name}.at" for joint in structure.joints] + [f"links.{each.name}.com" for each in structure.links]
@@ -293,7 +293,7 @@ def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[Weigh
     ends = np.cumsum([4 + len(body.sizes) for body in bodies]).tolist()
 
     def warn(rows: np.ndarray) -> None:
-        with np.errstate(over="ignore"):  # an arm of 1e200 m is endless, which is what is said of it
+        with np.errstate(over="ignore"):  # an arm of 1e200 m overflows to infinity, which is reported
             arm = np.sqrt((rows[:, ends[-1] :].reshape(len(rows), -1, 3) ** 2).sum(axis=2)).sum(axis=1)
         found = []
         for body, first, last in zip(bodies, [0, *ends], ends, strict=False):
@@ -329,14 +329,14 @@ def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[Weigh
 
 
 def _where(scope: Scope, body: WeighedBody, row: int, mass: float) -> str:
-    """A remark in words on the case in which a body is so, with its mass; none where it is so in all."""
+    """A remark on the case in which a body is so, with its mass; empty where it is so in all cases."""
     numbers = [each.value for each in (body.mass, *body.moments, *body.sizes.values())]
     case = scope.checks.where(row, numbers)
     return f"{case} ({mass:.4g} kg)" if case else ""
 
 
 def _others(count: int) -> str:
-    """A remark in words that others are so too, beside the one that is told."""
+    """A remark that others are so too, besides the reported one."""
     return f", and {count - 1} more {'is' if count == 2 else 'are'} so" if count > 1 else ""
 
 

@@ -1,4 +1,4 @@
-"""Warnings of grapples from afar: where a payload flies when its link cannot be near, however the joints turn."""
+"""Warnings about distant grapples: a payload that flies where its link cannot be, however the joints turn."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from met.plan import Experiment, Formula, Payload, Structure
 from met.trace import Real
 
 FAR = 1.5
-"""Times the reach, beyond which a grapple is from afar: nothing is said of what is near."""
+"""Distance relative to the reach beyond which a grapple counts as distant."""
 
 
 def check_reach(scope: Scope, block: MergedBlock, structure: Structure) -> None:
-    """Warn of payloads that are grappled beyond the reach of their links: on a fixed base, with revolute joints."""
+    """Warn about payloads that are grappled beyond the reach of their links: on a fixed base, with revolute joints."""
     if scope.complaints.error_count:
         return
     items = {item.name: item for item in block.of_kind("payload")}
@@ -35,7 +35,7 @@ def check_reach(scope: Scope, block: MergedBlock, structure: Structure) -> None:
 
 
 def flies_from_afar(experiment: Experiment, name: str) -> bool:
-    """True where the check warns of the grapple of the payload of this name."""
+    """True where the check warns about the grapple of the payload of this name."""
     structure = experiment.structure
     payload = next((each for each in structure.payloads if each.name == name), None)
     looked_at = _looked_at(structure, payload, experiment.parameters) if payload is not None else None
@@ -52,14 +52,14 @@ def flies_from_afar(experiment: Experiment, name: str) -> bool:
 
 @frozen
 class _LookedAt:
-    """The numbers by which a grapple is from afar: paths of scalars, then of vectors by component, those of gravities
-    before those of the joints."""
+    """The numbers that decide whether a grapple is distant: paths of scalars, then of vectors by component, those of
+    gravities before those of the joints."""
 
     paths: tuple[str, ...]
     gravities: int
 
     def away(self, rows: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The rows that are from afar; of all rows the distance from the base then, and the link's reach, m.
+        """The rows with a distant grapple; for all rows the distance from the base, and the link's reach, m.
 
         rows  values at the paths: [case, path]
         """
@@ -75,7 +75,8 @@ class _LookedAt:
 
 
 def _looked_at(structure: Structure, payload: Payload, parameters: Mapping[str, Any]) -> _LookedAt | None:
-    """None where nothing can be said: the base moves, a joint slides, it is pushed, or it is not grappled."""
+    """The numbers to check; None where no statement is possible: the base moves, a joint slides, the payload is pushed,
+    or it is not grappled."""
     joints = _way_to(structure, payload.link)
     if structure.base is not None or joints is None or not payload.grappled:
         return None
@@ -91,7 +92,7 @@ def _looked_at(structure: Structure, payload: Payload, parameters: Mapping[str, 
 
 
 def _way_to(structure: Structure, link: str) -> list[str] | None:
-    """The joints between a link and the base; None where one of them slides, so that its reach has no end."""
+    """The joints between a link and the base; None where one of them slides, so that the reach is unlimited."""
     carrying = {joint.child: joint for joint in structure.joints}
     found = []
     while link in carrying:
@@ -104,7 +105,7 @@ def _way_to(structure: Structure, link: str) -> list[str] | None:
 
 
 def _is_pushed(structure: Structure, payload: Payload, parameters: Mapping[str, Any]) -> bool:
-    """Return True if something but uniform gravity may act on a payload while it flies."""
+    """Return True if forces other than uniform gravity may act on a payload in flight."""
     known = models.find_own("environment")
     for load in structure.environment:
         model = models.find("environment", load.model, load.place)
@@ -122,7 +123,7 @@ def _observe(scope: Scope, payload: Payload, looked_at: _LookedAt, duration: flo
     settled = [scope.parameters.get(path) for path in looked_at.paths]
     values: list[Real] = [each.value for each in settled if each is not None]  # type: ignore[misc]  # they are numbers
     if len(values) < len(settled):
-        return  # one that lacks is already reported
+        return  # a missing one is already reported
 
     def warn(rows: np.ndarray) -> None:
         if scope.complaints.error_count:
@@ -145,7 +146,8 @@ def _observe(scope: Scope, payload: Payload, looked_at: _LookedAt, duration: flo
 
 
 def _size(rows: np.ndarray) -> np.ndarray:
-    """How far a body goes from its centre at most, of usual shapes, m; rows: mass, and moments of inertia (kg m^2)."""
+    """Largest distance of a body's matter from its centre, for usual shapes, m; rows: mass, and moments of inertia (kg
+    m^2)."""
     mass, largest = rows[:, 0], rows[:, 1:].max(axis=1)
     return np.asarray(3.0 * np.sqrt(largest / np.where(mass > 0.0, mass, math.inf)))
 

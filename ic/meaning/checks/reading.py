@@ -1,4 +1,4 @@
-"""Warnings of sensors, and of failures of sensors, that no servo's law reads."""
+"""Warnings about sensors, and failures of sensors, that no servo's law reads."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from met.plan.uses import quantities
 
 
 def remark_unread(scope: Scope, uses: Iterable[Use], structure: Structure) -> None:
-    """Report sensors that no law sees through and nothing records, and dead ones that no law would see."""
+    """Report sensors that no law uses and nothing records, and dead ones that no law would notice."""
     servos = {each.joint: each for each in structure.servos}
     known: dict[Hashable, frozenset[str] | None] = {}  # many joints have one law
     for use in uses:
@@ -61,7 +61,7 @@ def _kept(structure: Structure, servo: ServoUse, of: str) -> bool:
 
 
 def _dead(scope: Scope, structure: Structure, joint: str) -> Iterable[tuple[str, Any]]:
-    """Models that keep the law of this joint from seeing: their names, and what of."""
+    """Models that hide a quantity from the law of this joint: their names, and the quantity."""
     for use in structure.environment:
         model, head = models.find("environment", use.model), f"environment.{use.name}"
         about, of = scope.parameters.get(f"{head}.{model.servo_of}"), scope.parameters.get(f"{head}.of")

@@ -1,4 +1,4 @@
-"""Warnings of requirements that say nothing: that no run can miss or meet, or whose metric this run cannot show."""
+"""Warnings about requirements without content: no run can miss or meet them, or the run cannot show their metric."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from met.plan.linear_uses import FIGURES, LinearFigure
 from met.trace import Scalar
 
 NEAR = 0.02
-"""Share of its way within which a command has come to its target: as a settling time's band is by default."""
+"""Share of its way within which a command counts as being at its target: as with a settling time's default band."""
 
 FOLLOWED = {"q": "position", "qd": "rate"}
-"""The kind of command that a joint's channel is to follow."""
+"""The kind of command that a joint's channel should follow."""
 
 
 def check_requirements(
     scope: Scope, requirements: Sequence[Requirement], structure: Structure, linear: Sequence[MetricUse] = ()
 ) -> None:
-    """Warn of requirements that are decided before the run, and of metrics that this run cannot show. linear: the
-    metrics of linear answers."""
+    """Warn about requirements that are decided before the run, and metrics that this run cannot show. linear: the
+    metrics of linear answers"""
     if scope.complaints.error_count:
         return
     uses = {use.name: use for use in structure.metrics}
@@ -43,11 +43,11 @@ def check_requirements(
         use = uses[requirement.metric]
         metric: Metric = models.find("metric", use.model, use.place)
         place, duration = requirement.place, structure.schedule.duration
-        if place is not None:  # the first that is so: one warning is enough
+        if place is not None:  # the first one: a single warning is enough
             _ = (
                 _remark_bound(scope, requirement, metric, place)
                 or _remark_begin(scope, requirement, use, metric, place)
-                or (metric.times and duration < requirement.limit < math.inf)  # only the run shows if it is seen
+                or (metric.times and duration < requirement.limit < math.inf)  # only the run shows whether it is seen
                 or _remark_target(scope, requirement, use, metric, structure, place)
                 or _remark_window(scope, requirement, use, metric, duration, place)
             )
@@ -55,7 +55,7 @@ def check_requirements(
 
 
 def _remark_bound(scope: Scope, requirement: Requirement, metric: Metric | LinearFigure, place: Place) -> bool:
-    """Return True, with a warning, if the limit is where the metric cannot be."""
+    """Return True, with a warning, if the limit is outside of the metric's range."""
     upper, strict = requirement.comparison.startswith("<"), not requirement.comparison.endswith("=")
     beyond = requirement.limit < metric.least or (requirement.limit == metric.least and strict is upper)
     if beyond:
@@ -70,7 +70,7 @@ def _remark_bound(scope: Scope, requirement: Requirement, metric: Metric | Linea
 
 
 def _remark_contradictions(scope: Scope, requirements: Iterable[Requirement]) -> None:
-    """Report two requirements of which one is missed always."""
+    """Report two requirements of which one is always missed."""
     lowest: dict[str, Requirement] = {}
     highest: dict[str, Requirement] = {}
     for each in requirements:
@@ -110,7 +110,7 @@ def _remark_window(
 
 
 def _remark_begin(scope: Scope, requirement: Requirement, use: MetricUse, metric: Metric, place: Place) -> bool:
-    """Return True, with a warning, for a metric that is no number from where its channel begins."""
+    """Return True, with a warning, for a metric that is undefined at its channel's initial value."""
     first, p = scope.parameters.get(f"initial.{use.of}"), _parameters(scope, use, metric)
     if metric.undefined is None or first is None or not isinstance(first.value, float) or p is None:
         return False
@@ -128,7 +128,7 @@ def _remark_begin(scope: Scope, requirement: Requirement, use: MetricUse, metric
 def _remark_target(
     scope: Scope, requirement: Requirement, use: MetricUse, metric: Metric, structure: Structure, place: Place
 ) -> bool:
-    """Return True, with a warning, for a target to which the joint's command comes after the run's end."""
+    """Return True, with a warning, for a target that the joint's command reaches after the run's end."""
     joint, _, quantity = use.of.rpartition(".")
     servo = next((each for each in structure.servos if each.joint == joint), None)
     command = servo.command if servo is not None else None

@@ -1,5 +1,5 @@
-"""Warnings of commands, courses and loads that the instants that sample them do not carry, or that the run is too short
-for (`met.content`)."""
+"""Warnings about commands, courses and loads that their sampling instants do not resolve, or the run is too short for
+(`met.content`)."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from met.plan import BASE, Schedule, Structure
 from met.trace import Real
 
 MOST_ROWS = 1000
-"""Different cases of a sweep that are looked at, evenly spread."""
+"""Largest number of different cases of a sweep that are examined, evenly spread."""
 
 ROUNDING = 1e-9
-"""Share of an interval by which an instant may miss what it is at."""
+"""Share of an interval by which an instant may miss its time."""
 
 MOST_TIMES = 40
-"""Times the rate that there is, up to which one is sought that carries a pulse."""
+"""Factor over the present rate up to which a sufficient one is searched for."""
 
 ENOUGH = 10
-"""Instants in a swing that show its shape, and not only that it swings."""
+"""Number of instants in a swing that show its shape, and not only its existence."""
 
 
 @frozen
 class SampledContent:
-    """The content that a model brings in time, and the instants that see it.
+    """The time content of a model, and the instants that sample it.
 
     label     whose it is, in words;  path: of its parameters
     declared  its parameters;  content: what it brings (`Profile.content`, `Environment.content`)
@@ -53,7 +53,7 @@ class SampledContent:
 
 
 def check_sampling(scope: Scope, structure: Structure) -> None:
-    """Warn of what begins after the run's end, and of swings and pulses that fall between the instants that see it."""
+    """Warn about changes that begin after the run's end, and swings and pulses between the sampling instants."""
     if scope.complaints.error_count:
         return  # a table may lack numbers, and no warning is given
     for sampled in _all_sampled(structure):
@@ -199,8 +199,8 @@ def _uncarried(sampled: SampledContent, content: Content, duration: float) -> li
 def _rates_that_carry(
     sampled: SampledContent, points: tuple[tuple[float, float], ...], duration: float, base: float
 ) -> list[str]:
-    """The slowest of the rates that fit with which its pulses are seen as they are, as a remedy in words; none where it
-    would be beyond some dozens of the rate that there is."""
+    """The slowest fitting rate at which its pulses are sampled correctly, as a remedy in words; none where it would be
+    some dozens of times the present rate."""
     for times in range(2, MOST_TIMES):
         hz = _fitting(times / sampled.interval, base)
         if not uncarried(points, 1.0 / hz, duration, integral=sampled.integral):

@@ -1,4 +1,4 @@
-"""Warnings of steps that are too long for what spins from the start: a free base, payloads."""
+"""Warnings about steps that are too long for bodies that spin from the start: a free base, payloads."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from met.diagnostic import Label, Place
 from met.plan import BASE, Structure
 
 LOST_A_TURN = 0.01
-"""Share of the energy of a body that tumbles; a warning is given where a turn may lose or gain more."""
+"""Share of the energy of a tumbling body that a turn may lose or gain without a warning."""
 
 FIRST, HIGHER = 1.6, 5.0
-"""An integrator of order p is off by up to (h rate/HIGHER)^p of the energy of a body that tumbles for each radian, and
-h rate/FIRST where p is 1: measured, of bodies whose centre of mass is as far from their frame as they are large
-(docs/physics.md, section 3)."""
+"""Error coefficients: an integrator of order p has an error of up to (h rate/HIGHER)^p of the energy of a body that
+tumbles for each radian, and h rate/FIRST where p is 1: measured, of bodies whose centre of mass is as far from their
+frame as they are large (docs/physics.md, section 3)."""
 
 
 def check_spins(scope: Scope, block: MergedBlock, structure: Structure) -> None:
-    """Warns of what flies from the start, and turns too far in a step for the integrator to follow."""
+    """Warn about bodies that fly from the start, and turn too far in a step for the integrator."""
     integrator, schedule = models.find("integrator", structure.integrator), structure.schedule
     limit = (FIRST if integrator.order == 1 else HIGHER) * (LOST_A_TURN / (2.0 * math.pi)) ** (1.0 / integrator.order)
     for label, path, place in _spinning(block, structure):
@@ -53,12 +53,12 @@ def check_spins(scope: Scope, block: MergedBlock, structure: Structure) -> None:
 
 
 def _spinning(block: MergedBlock, structure: Structure) -> Iterator[tuple[str, str, Place]]:
-    """Free bodies that spin from the start: in words, the path of their angular velocity, and where it is written."""
+    """Free bodies that spin from the start: in words, with the path and the place of their angular velocity."""
     if structure.base is not None and structure.free:
         initial = block.get("initial")
         written = initial.body.get(f"{BASE}.rate") if initial is not None and initial.body is not None else None
         place = value_place(written) if written is not None else structure.base.place
-        assert place is not None  # a base that moves comes from a deck
+        assert place is not None  # a moving base comes from a deck
         yield "the base", f"initial.{BASE}.rate", place
     items = {item.name: item for item in block.of_kind("payload")}
     for payload in structure.payloads:

@@ -1,4 +1,4 @@
-"""The words of warnings of steps and ticks that are too long for the arm: at a check, and of instants of a run."""
+"""The words of warnings about steps and ticks that are too long for the arm, at a check and at instants of a run."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 def fault_warning(
     experiment: Experiment, fault: StepFault, better: Remedy, place: Place | None, where: str
 ) -> Diagnostic:
-    """A warning of a mode that the step does not follow: D317, D318 or D319.
+    """A warning about a mode that the step does not follow: D317, D318 or D319.
 
-    place  of the rate, or of the run;  where: the state that this is about, in words
+    place of the rate, or of the run; where: the state concerned, in words
     """
     code, message, text, helps = _words(experiment, fault, better)
     label = None if place is None else Label(place, text)
@@ -34,7 +34,8 @@ def at_the_start(experiment: Experiment, case: int) -> str:
 
 
 def from_instants(experiment: Experiment, case: int, at: float, until: float | None = None) -> str:
-    """An instant of a case and how long it stays so, where that is known, in words; in s from the start of the run."""
+    """An instant of a case, with the duration of the finding if it is known, in words; in s from the start of the
+    run."""
     of = f" of {_case(experiment, case)}" if experiment.cases.count > 1 else ""
     return f"at t = {at:.4g} s{of}" + (f", and so it is until {until:.4g} s" if until is not None else "")
 
@@ -44,9 +45,9 @@ def _case(experiment: Experiment, case: int) -> str:
 
 
 def loop_warning(experiment: Experiment, loop: Unstable, place: Place | None, where: str) -> Diagnostic:
-    """A warning of servo loops that are unstable with this arm: by their ticks, D320, or by themselves, D322.
+    """A warning about servo loops that are unstable with this arm: by their ticks, D320, or without them, D322.
 
-    place  where no servo has one;  where: in which pose of which case, in words
+    place where no servo has one; where: the pose and the case, in words
     """
     structure = experiment.structure
     uses = [use for use in structure.servos if use.joint in loop.joints]
@@ -79,7 +80,7 @@ def loop_warning(experiment: Experiment, loop: Unstable, place: Place | None, wh
 
 
 def _fitting(experiment: Experiment, loop: Unstable) -> str:
-    """The gains with which it is stable, in words."""
+    """The stable gains, in words."""
     joint, share = loop.joints[0], loop.gain
     if loop.parameters:
         several = [_bound(experiment, loop.case, f"{joint}.servo.{name}", x) for name, x in loop.parameters.items()]
@@ -96,18 +97,18 @@ def _fitting(experiment: Experiment, loop: Unstable) -> str:
 
 
 def _bound(experiment: Experiment, case: int, path: str, share: float) -> str:
-    """A share of a parameter's value in a case, up to which or from which on something is so, in words."""
+    """A share of a parameter's value in a case, up to which or from which on the finding holds, in words."""
     return f"{_value_of(experiment, case, path, share)} and {'less' if share < 1.0 else 'more'}"
 
 
 def _value_of(experiment: Experiment, case: int, path: str, share: float) -> str:
-    """A share of a parameter's value in a case, as a deck writes it."""
+    """A share of a parameter's value in a case, in a deck's notation."""
     value, parameter = float(_value(experiment, path, case)) * share, experiment.parameters[path]
     return f"{path.rpartition('.')[2]} = {value:.3g} {parameter.unit}"
 
 
 def _gain_places(experiment: Experiment, loop: Unstable) -> Iterator[Label]:
-    """Where the gains of the loops are written, and the sensors without which it would not be so."""
+    """The places of the loops' gains, and the sensors without which the loops would be stable."""
     names = tuple(loop.parameters) or ("kp",)
     paths = (f"{joint}.servo.{name}" for joint in loop.joints for name in names)
     places = (experiment.parameters[path].origin.place for path in paths if path in experiment.parameters)
@@ -161,7 +162,7 @@ def _hertz(root: complex) -> str:
 
 
 def _places(experiment: Experiment, fault: StepFault, better: Remedy) -> Iterator[Label]:
-    """The servo of the joint, and the environment model without which it would not be so."""
+    """The servo of the joint, and the environment model without which the mode would be followed."""
     structure = experiment.structure
     for use in structure.servos:
         if use.joint == fault.joint and use.place is not None:
@@ -172,7 +173,7 @@ def _places(experiment: Experiment, fault: StepFault, better: Remedy) -> Iterato
 
 
 def _others(better: Remedy, head: str) -> list[str]:
-    """Other integrators that do at the same rate, if there are any."""
+    """Other integrators that suffice at the same rate, if there are any."""
     return [known_words(head, (f"`integrator = {name};`" for name in better.others))] if better.others else []
 
 

@@ -1,7 +1,7 @@
-"""Warnings of steps of the dynamics that make the arm swing up, damp what should swing on, or are long for it.
+"""Warnings about steps of the dynamics that excite the arm, damp lasting swings, or are long for it.
 
-The program itself is linearised (`met.analysis.step_map`), so whatever acts on the arm has its part, with the inertia
-that it has at the start. What servos and sensors declare of themselves (D104, D105, D249) holds where it agrees.
+The program itself is linearised (`met.analysis.step_map`), so everything that acts on the arm is included, with its
+inertia at the start. The declarations of servos and sensors themselves (D104, D105, D249) count where they agree.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ LARGEST = 700.0
 """The largest logarithm that a number has in double precision, rounded down."""
 
 NOTE = "step size: "
-"""The beginning of the plan's note on it."""
+"""The beginning of the plan's note on the step size."""
 
 BEYOND = 1.2
-"""Times the figure of what a servo declares of itself, above which the arm's own is reported in its place."""
+"""Factor over a servo's own figure above which the arm's is reported in its place."""
 
 
 def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Experiment:
-    """The experiment with a note of its fastest mode; warns of modes that the steps do not follow."""
+    """The experiment with a note on its fastest mode; warns about modes that the steps do not follow."""
     complaints, declared = scope.complaints, scope.declared_rates
     known = experiment.structure.integrator in models.find_own("integrator")  # another package's is only recorded
     if not known or not experiment.cases.count or scope.rate_place is None or not experiment.structure.moving:
@@ -53,14 +53,14 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
 
     try:
         found = memo.answer("steps", experiment, lambda: look().without_matrices(), rows)
-    except Problem:  # said where the program is built
+    except Problem:  # reported where the program is built
         complaints.settle()
         return experiment
     grows = any(each.kind == "grows" for each in found.faults)
     fast = any(each.kind == "fast" for each in found.faults)
     refuted = set()
     if found.finite:
-        # a payload that is let go leaves a lighter arm than that of the start
+        # a released payload leaves a lighter arm than that of the start
         refuted |= set() if grows or experiment.structure.payloads else {"D104"}
         refuted |= set() if fast else {"D105"}
         refuted |= set() if grows and found.grown <= BEYOND * declared.get("D249", (0.0, ()))[0] else {"D249"}
@@ -84,7 +84,7 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
 def _is_told(
     fault: StepFault, kept: frozenset[str], declared: dict[str, tuple[float, tuple[int, ...]]], found: StepSize
 ) -> bool:
-    """True where what a servo or sensor declares of itself has said it."""
+    """True where the declaration of a servo or sensor has reported it."""
     if "D104" in kept:
         return True
     if fault.kind == "grows":
@@ -95,12 +95,12 @@ def _is_told(
 
 
 def _is_of_loops(fault: StepFault, found: StepSize) -> bool:
-    """True where a mode grows in truth, and loops that are unstable say why."""
+    """True where a mode truly grows, and unstable loops explain it."""
     return bool(found.loops) and fault.kind == "grows" and fault.mode.grows_in_truth(found.map.h)
 
 
 def _where(experiment: Experiment, fault: StepFault, found: StepSize) -> str:
-    """Which state this is about, in words, and what was not looked at."""
+    """The state concerned, in words, with the cases that were not examined."""
     cases = experiment.cases
     where = at_the_start(experiment, fault.mode.case)
     if fault.mode.loose:
@@ -111,8 +111,8 @@ def _where(experiment: Experiment, fault: StepFault, found: StepSize) -> str:
 
 
 def _note(experiment: Experiment, found: StepSize) -> Iterator[str]:
-    """The fastest mode of the first case, what a step makes of it, and the line of the servo of its joint; which cases
-    were looked at."""
+    """The fastest mode of the first case, its growth in a step, the line of its joint's servo; and the examined
+    cases."""
     looked = _looked_at(experiment, found.cases)
     if found.mode is None:
         yield f"{NOTE}nothing changes by more than 1 % in a step{looked}"
@@ -129,7 +129,7 @@ def _note(experiment: Experiment, found: StepSize) -> Iterator[str]:
 
 
 def _looked_at(experiment: Experiment, rows: Sequence[int]) -> str:
-    """Which cases were looked at, in words; "" where these are all."""
+    """The examined cases in words; "" where these are all."""
     cases = experiment.cases
     if len(rows) >= cases.count:
         return ""

@@ -1,4 +1,4 @@
-"""Warnings of steps that are too long for the stops that joints may run into."""
+"""Warnings about steps that are too long for stops that joints may run into."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from met.plan import Experiment, Formula, Quantity
 from met.plan.columns import ends
 
 ENOUGH = {1: 10.0, 2: 10.0}
-"""Steps in a contact, by the integrator's order, with which it gives or takes 3 % of the energy at most."""
+"""Number of steps in a contact, by the integrator's order, with which it gains or loses at most 3 % of the energy."""
 
 FEW = 4.0
-"""The same of higher orders: 2 %."""
+"""The number of steps for higher orders, with at most 2 %."""
 
 
 def check_stops(complaints: Complaints, experiment: Experiment) -> None:
-    """Warns of stops so stiff that a contact takes few steps, and gives energy that nobody put in."""
+    """Warn about stops so stiff that a contact takes few steps, and creates energy."""
     structure = experiment.structure
     uses = {use.name: use for use in structure.environment if models.find("environment", use.model).springs}
     if not uses or not experiment.cases.count:
@@ -57,11 +57,11 @@ def check_stops(complaints: Complaints, experiment: Experiment) -> None:
 
 
 _AT_MOST = math.nextafter(1.0, 2.0)
-"""The first number that a step times the rate that is needed must stay below: 1 itself is enough."""
+"""The bound of a step times the required rate, exclusive, so that 1 itself is enough."""
 
 
 def _stiffest(experiment: Experiment, stiffness: Quantity) -> int:
-    """The first case in which it is largest."""
+    """The first case in which the stiffness is largest."""
     if not isinstance(stiffness.value, Formula):
         return 0
     return ends(experiment.column(stiffness.value))[1]

@@ -1,7 +1,7 @@
-"""Warnings of oscillations in a servo or a sensor that the integrator's steps make grow: x'' = -a x - b x'.
+"""Warnings about oscillations in a servo or a sensor that the integrator's steps make grow: x'' = -a x - b x'.
 
-The figure h lambda is about decay, and a swing has roots beside the real axis, where integrators bear other steps: the
-methods of order 2 and 1 let an undamped swing grow at any step, slowly or fast. So the integrator itself is asked. Its
+The figure h lambda is about decay, and a swing has roots off the real axis, where integrators have other limits: the
+methods of order 2 and 1 let an undamped swing grow at any step, slowly or fast. So the integrator itself is run. Its
 step takes (x, x') to M (x, x'), and with r the largest size of M's eigenvalues a swing grows by r^n in n steps.
 """
 
@@ -31,7 +31,8 @@ FINEST = 1000  # times the base rate: beyond, no rate is proposed
 
 
 def growth(integrator: Any, h: float, a: Any, b: Any) -> Any:
-    """ln of what one step of h s makes of a swing with these coefficients (1/s^2, 1/s), numbers or arrays of them."""
+    """ln of the factor of one step of h s for a swing with these coefficients (1/s^2, 1/s), numbers or arrays of
+    them."""
 
     def slope(_: float, y: Motion) -> Slope:
         return Slope((), (), (y.x[1], -a * y.x[0] - b * y.x[1]))
@@ -59,7 +60,7 @@ def check_swing(
     *,
     held: bool,
 ) -> None:
-    """A remark where a swing grows over the run at this step.
+    """Warn where a swing grows over the run at this step.
 
     label  what swings, in words;  path: of what it belongs to
     held   whether it is reckoned with a joint that stands still
@@ -98,7 +99,7 @@ def check_swing(
 
 
 def _enough(integrator: Any, h: float, steps: int, a: float, b: float) -> float | None:
-    """The least damping b, 1/s, with which the swing does not grow over the run; None where none is enough."""
+    """The smallest damping b, 1/s, with which the swing does not grow over the run; None where none suffices."""
     low, high = b, max(b, np.sqrt(a))
     if steps * growth(integrator, h, a, high) > GROWS:
         return None
@@ -109,7 +110,8 @@ def _enough(integrator: Any, h: float, steps: int, a: float, b: float) -> float 
 
 
 def _slowest(schedule: Schedule, integrator: Any, a: float, b: float) -> str:
-    """The slowest rate of the dynamics, faster than it is, at which the swing does not grow over the run; in words."""
+    """The slowest rate of the dynamics, faster than the present one, at which the swing does not grow over the run; in
+    words."""
     for per_second, steps in _finer(schedule):
         if steps * growth(integrator, 1.0 / per_second, a, b) <= GROWS:
             return f"{hz(per_second)} Hz"
@@ -159,7 +161,7 @@ def check_sensor(
     dynamics: Rate,
     path: str,
 ) -> None:
-    """The filter of a sensor at the dynamics' step. label: the sensor in words; path: of its parameters."""
+    """Check the filter of a sensor at the dynamics' step. label: the sensor in words; path: of its parameters"""
     rate = evaluate_declared(scope, sensor.fastest, values, path)
     if rate is not None:
         check_stability(
@@ -186,7 +188,7 @@ def evaluate_declared(
     """
     if function is None or scope.checks.failed(path):
         return None
-    # as in the engine, a division by a product that is too small for a double is infinite, and no exception
+    # as in the engine, a division by a product that underflows is infinite, without an exception
     numbers = {name: np.float64(x) if isinstance(x, float) else x for name, x in values.items()}
     with scope.complaints.gather(), np.errstate(all="ignore"):
         return function(SimpleNamespace(**numbers), *more)

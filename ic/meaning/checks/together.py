@@ -1,4 +1,5 @@
-"""Warnings of models that cannot both hold: a stop or a spring and a servo that no torque stops, two of one thing."""
+"""Warnings about models that contradict each other: a stop or a spring with a servo that ignores torque, or two of one
+kind."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ from met.plan import EnvironmentUse, Structure
 from met.trace import Scalar
 
 INSTANTS = 1000
-"""Instants of a run at which a command is looked at."""
+"""Number of instants of a run at which a command is examined."""
 
 
 def check_together(scope: Scope, uses: Iterable[Use], structure: Structure) -> None:
@@ -33,8 +34,8 @@ def check_together(scope: Scope, uses: Iterable[Use], structure: Structure) -> N
 
 
 def _remark_stop(scope: Scope, load: EnvironmentUse, servos: dict[str, Use], duration: float) -> None:
-    """Report a model that would keep a joint between two ends, where the servo goes on whatever the torque; not where
-    its positions, in a run of so many seconds, are all between them."""
+    """Report a model that would keep a joint between two ends, where the servo moves on against any torque; not where
+    its positions, during the run, are all between them."""
     model = models.find("environment", load.model, load.place)
     named = next((each.name for each in model.parameters if each.names == "joint"), None)
     settled = scope.parameters.get(f"environment.{load.name}.{named}") if model.initial_range and named else None
@@ -58,7 +59,7 @@ def _remark_stop(scope: Scope, load: EnvironmentUse, servos: dict[str, Use], dur
 
 
 def _stays_between(scope: Scope, load: EnvironmentUse, model: Environment, servo: Use, duration: float) -> bool:
-    """True where a joint begins at rest between the ends, and its position command has no instant outside of them."""
+    """True where a joint begins at rest between the ends, and its position command never leaves them."""
     command = servo.command
     if command is None or command.kind != "position" or command.guide:
         return False
@@ -77,8 +78,8 @@ def _stays_between(scope: Scope, load: EnvironmentUse, model: Environment, servo
 
 
 def _remark_hold(scope: Scope, load: EnvironmentUse, servos: Mapping[str, Use], structure: Structure) -> None:
-    """Report a model that would hold two bodies, where servos tell all joints between them what to do: then it moves
-    nothing."""
+    """Report a model that would hold two bodies, where servos prescribe the motion of all joints between them: then it
+    has no effect."""
     model = models.find("environment", load.model, load.place)
     if model.holds is None or load.place is None:
         return
@@ -119,13 +120,13 @@ def _and_others(count: int) -> str:
 
 
 def _is_of_torques(channel: str) -> bool:
-    """True for a channel, or an expression, of what a joint or its motor takes."""
+    """True for a channel, or an expression, of the torque of a joint or its motor."""
     return not {"tau", "torque", "reaction", "current", "power"}.isdisjoint(re.split(r"\W+", channel))
 
 
 def _joints_between(structure: Structure, bodies: list[str]) -> list[str] | None:
-    """The joints that move between two bodies, or between one and the ground; None where a base moves freely there, or
-    a payload is one of them."""
+    """The moving joints between two bodies, or between one and the ground; None where a free base or a payload is
+    involved."""
     carrying = {joint.child: joint for joint in structure.joints}
     ways = []
     for body in [*bodies, WORLD][:2]:
@@ -144,7 +145,7 @@ def _joints_between(structure: Structure, bodies: list[str]) -> list[str] | None
 
 
 def _remark_alone(scope: Scope, environment: Iterable[EnvironmentUse]) -> None:
-    """Report two models that both give what only one should (`Environment.alone`)."""
+    """Report two models that give a quantity of which only one is allowed (`Environment.alone`)."""
     first: dict[str, EnvironmentUse] = {}
     for load in environment:
         model = models.find("environment", load.model, load.place)
@@ -167,7 +168,7 @@ def _remark_alone(scope: Scope, environment: Iterable[EnvironmentUse]) -> None:
 
 
 def _value(scope: Scope, path: str, vector: bool) -> object:
-    """A parameter's constant; None where it varies or is unknown."""
+    """The constant value of a parameter; None where it varies or is unknown."""
     if vector:
         parts = [_value(scope, f"{path}.{axis}", False) for axis in "xyz"]
         return None if None in parts else tuple(parts)

@@ -1,4 +1,4 @@
-"""A value or a course in time, where a deck may write one: of a command, of a base's motion, of a guide's path."""
+"""A value or a course in time, where a deck allows either: a command, a base's motion, a guide's path."""
 
 from __future__ import annotations
 
@@ -73,12 +73,12 @@ def use_course(
 
 
 def _check_room(scope: Scope, owner: Owner, profile: Profile, values: Mapping[str, Any], body: MergedBlock) -> None:
-    """A course that is made of parts has the time for all of them, in every case."""
+    """Check that a course made of parts has the time for all of them, in every case."""
     assert profile.shortest is not None
     path, item = owner.join("over"), body.get("over")
     try:
         least = profile.shortest(SimpleNamespace(**values))
-    except ZeroDivisionError:  # of a number that is out of its range, which is told
+    except ZeroDivisionError:  # a number that is out of its range, which is reported
         return
 
     def test(times: np.ndarray) -> tuple[np.ndarray, list[str]]:
@@ -98,7 +98,7 @@ def _check_room(scope: Scope, owner: Owner, profile: Profile, values: Mapping[st
 
 
 def course_named(scope: Scope, inner: Expression) -> Expression:
-    """The name of a course alone, and of nothing else, is that course with nothing written."""
+    """The course that a single name stands for, without parameters."""
     if isinstance(inner, Name) and inner.text in models.available("command") and not scope.names.is_value(inner):
         return Call(inner, (), (), None, inner.place)
     return inner

@@ -34,7 +34,7 @@ from met.trace import Real, Scalar
 
 KIND: Final = "guide"
 COURSES_BEHIND_GUIDES: Final = frozenset({"pulse"})
-"""Courses whose names guides may bear, in decks that are older than they are: there the guide is meant."""
+"""Courses whose names guides may have, in decks that are older than the courses: there the guide is meant."""
 
 USAGE = "write `guide NAME = MODEL { ... }`"
 
@@ -81,7 +81,7 @@ class Guiding:
 
 
 def name_guides(scope: Scope, block: MergedBlock) -> None:
-    """Enters the run's guides in the scope, so that commands may name them; reports names that are something else's."""
+    """Enter the run's guides in the scope, so that commands may name them; names that are taken are reported."""
     scope.guides = {item.name: item for item in block.of_kind(KIND)}
     for name, item in scope.guides.items():
         let = scope.definitions.lets.get(name)
@@ -96,7 +96,7 @@ def name_guides(scope: Scope, block: MergedBlock) -> None:
 
 
 def _meaning(scope: Scope, name: str, place: Place) -> str:
-    """The other meaning of a name where a command's value stands; "" where it may be a guide's name."""
+    """The other meaning of a name in place of a command's value; "" where it may be a guide's name."""
     if name in scope.definitions.lets:
         return "a value"
     if units.is_unit(name) and scope.definitions.edition_at(place) == 1:
@@ -119,7 +119,7 @@ def resolve_guides(
 
 
 def check_guides(scope: Scope, guides: Iterable[Guiding], structure: Structure) -> None:
-    """Check that each guide can work: its joints carry the link, and are as many as its components."""
+    """Check that each guide can work: its joints carry the link, and are at least as many as its components."""
     for guide in guides:
         idle = [joint for joint in guide.joints if guide.link and not carries(structure, guide.link, joint)]
         if idle:
@@ -145,7 +145,7 @@ def check_guides(scope: Scope, guides: Iterable[Guiding], structure: Structure) 
 
 
 def check_period(scope: Scope, guide: Guiding, rate: Rate) -> None:
-    """A guide brings its error down from tick to tick."""
+    """Check that a guide reduces its error from tick to tick."""
     if guide.fastest is None:
         return
 
@@ -234,7 +234,7 @@ def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration
 
 
 def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any], duration: float) -> None:
-    """Report a guide that does nothing, or a part of it that does, by its written constants."""
+    """Report a guide that does nothing, or a part of it, by its written constants."""
     numbers = [x for value in values.values() for x in (value if isinstance(value, tuple) else (value,))]
     if guide.idle is None or any(isinstance(x, Scalar) for x in numbers):
         return
@@ -255,7 +255,8 @@ def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any]
 def _of_joints(
     scope: Scope, owner: Owner, guide: Any, body: MergedBlock, arm: ResolvedArm, joints: Iterable[str]
 ) -> None:
-    """The parameters of each joint: as written for it, else as written for all, whom a path without a joint reaches."""
+    """The parameters of each joint: those written for it, else those written for all, which a path without a joint
+    reaches."""
     kinds = {joint.name: joint.kind for joint in arm.moving}
     joints = list(joints)
     for wanted in guide.of_joint:

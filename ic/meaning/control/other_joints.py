@@ -1,4 +1,4 @@
-"""`* = spindle;` in the servos of a run: the servo of every joint that has none of its own."""
+"""The entry `* = spindle;` in the servos of a run: the servo of every joint without one of its own."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from met.diagnostic import leave_out
 
 
 def with_other_joints(body: MergedBlock, arm: ResolvedArm, complaints: Complaints) -> MergedBlock:
-    """The servos, with an entry for each joint that moves, in the arm's order; `*` stands for those that have none.
+    """The servos, with an entry for each moving joint, in the arm's order; `*` stands for those that have none.
 
     An entry that only changes its servo, `lift { kp = ...; }`, changes that of `*`.
     """
@@ -40,6 +40,6 @@ def with_other_joints(body: MergedBlock, arm: ResolvedArm, complaints: Complaint
 
 
 def _changed(every: Item, own: Item, complaints: Complaints) -> Item:
-    """The entry of `*` as one joint changes it."""
+    """The entry of `*` as changed by one joint's entry."""
     body = own.body if every.body is None or own.body is None else overlay(every.body, own.body, complaints)
     return replace(every, name=own.name, body=body, upon=own.place)

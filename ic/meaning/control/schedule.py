@@ -1,4 +1,4 @@
-"""Rates as whole divisors of one base rate, exactly, and what they mean for stability.
+"""Rates as exact whole divisors of one base rate, and their effect on stability.
 
 Rates are taken as fractions, so that 1000/3 Hz divides 1 kHz and 333.3 Hz does not.
 """
@@ -26,12 +26,12 @@ WARN_ABOVE = 0.5  # of h lambda: above it, a step sees less than the decay it sh
 
 
 CONTINUOUS = math.inf
-"""The `Rate.hz` of a servo's law that is continuous."""
+"""The `Rate.hz` of a continuous law."""
 
 
 @frozen
 class Rate:
-    """A rate as written: whose it is, in words, how often (Hz), and where."""
+    """A rate as written: its owner, in words, its value (Hz), and its place."""
 
     label: str
     hz: float
@@ -40,7 +40,8 @@ class Rate:
 
 @frozen
 class Ticks:
-    """When the law of a servo acts: every so many base ticks; continuous, as a part of each step of the dynamics."""
+    """The ticks of a servo's law: the number of base ticks between them; or continuous, as a part of each step of the
+    dynamics."""
 
     divisor: int
     continuous: bool
@@ -58,14 +59,14 @@ def exact(value: float) -> Fraction:
 
 
 def base_rate(rates: list[Rate], written: Rate | None) -> Rate:
-    """The base: as written, else the fastest of the rates (the first of those)."""
+    """The base rate: as written, else the fastest of the rates (the first of those)."""
     if written is not None:
         return written
     return max(rates, key=lambda rate: rate.hz)
 
 
 def divisor(complaints: Complaints, rate: Rate, base: Rate, others: list[Rate], *, written: bool) -> int:
-    """Base ticks a tick of this rate; reports where that is not a whole number, and gives 1 then."""
+    """The number of base ticks between ticks of this rate; where that is not whole, it is reported, and 1 returned."""
     if base.hz.is_integer() and rate.hz.is_integer() and base.hz % rate.hz == 0.0:
         return int(base.hz // rate.hz)
     ratio = exact(base.hz) / exact(rate.hz)
@@ -95,7 +96,7 @@ def _fitting(base_hz: float, n: int) -> str:
 
 
 def _common(rates: list[Fraction]) -> str | None:
-    """The slowest rate that all divide, where it is not absurd."""
+    """The slowest rate that all divide, unless it is absurd."""
     from fractions import Fraction
 
     common = Fraction(math.lcm(*(rate.numerator for rate in rates)), math.gcd(*(rate.denominator for rate in rates)))
@@ -115,7 +116,7 @@ def make_schedule(
     *,
     base_written: bool,
 ) -> Schedule:
-    """The schedule. Reports what does not fit. duration: of the run, s; None: unknown (already reported)."""
+    """The schedule. Mismatches are reported. duration: of the run, s; None: unknown (already reported)"""
     all_rates, before = [dynamics, record, *others], complaints.error_count
     step = divisor(complaints, dynamics, base, all_rates, written=base_written)
     row = step if record == dynamics else divisor(complaints, record, base, all_rates, written=base_written)
@@ -132,7 +133,7 @@ def make_schedule(
         )
         return Schedule(base.hz, step, row, 1)
     in_whole = duration.is_integer() and base.hz.is_integer()
-    refused = complaints.error_count > before  # and so are the steps that a duration would be made of
+    refused = complaints.error_count > before  # and so are the steps from which a duration would be made
     ticks = int(duration) * int(base.hz) if in_whole else exact(duration) * exact(base.hz)
     whole = round(ticks)
     if refused:
@@ -174,7 +175,7 @@ def fastest_rate(
         return None
     from types import SimpleNamespace
 
-    # as in the engine, a division by a product that is too small for a double is infinite, and no exception
+    # as in the engine, a division by a product that underflows is infinite, without an exception
     numbers = {name: np.float64(x) if isinstance(x, float) else x for name, x in parameters.items()}
     with scope.complaints.gather(), np.errstate(all="ignore"):
         found: Real = bound(SimpleNamespace(**numbers))
@@ -240,7 +241,8 @@ def check_stability(
 
 
 def slowest_that_fits(schedule: Schedule, limit: float) -> Callable[[float], str]:
-    """Give a function: rate constant (1/s) -> slowest rate of the dynamics that keeps h times it below the limit."""
+    """A function from a rate constant (1/s) to the slowest rate of the dynamics that keeps h times it below the
+    limit."""
 
     def name(fastest: float) -> str:
         if not math.isfinite(fastest):
@@ -256,5 +258,5 @@ def slowest_that_fits(schedule: Schedule, limit: float) -> Callable[[float], str
 
 
 def hz(value: float) -> str:
-    """A rate as it is written."""
+    """A rate in a deck's notation."""
     return f"{value:.6g}"

@@ -20,7 +20,7 @@ USAGE = "write `sensor QUANTITY = MODEL { ... }`"
 
 
 def without_sensors(block: MergedBlock) -> MergedBlock:
-    """A servo's block, its plain entries alone."""
+    """A servo's block with its plain entries only."""
     return replace(block, items={key: item for key, item in block.items.items() if item.kind != "sensor"})
 
 

@@ -1,4 +1,4 @@
-"""Servos on joints: the definition with what the use overrides, its model's parameters, its command and rate."""
+"""Servos on joints: the definition with the use's overrides, its model's parameters, its command and rate."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ from met.unit_parser import parse_unit
 
 SLOWEST, FASTEST = 1e-3, 1e9
 APART, DIGITS = 1e-9, 1e-5
-"""Positions are the same place within APART (rad or m: far above rounding of a deck's numbers, far below what anyone
-sees) and a unit of the sixth digit: so many are printed, and a position that was copied from there is the one meant."""
+"""Positions are equal within APART (rad or m: far above rounding of a deck's numbers, far below visible differences)
+and a unit of the sixth digit: so many are printed, and a position copied from there counts as equal."""
 
 RATE = Parameter(
     name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, ticks=True, doc="how often the servo's computer ticks"
@@ -90,9 +90,8 @@ class Use:
 
 
 def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[list[Use], frozenset[str]]:
-    """Every servo of the run, in the order of the arm's joints; the joints whose servo failed or may be one of a name
-    that is no joint's (already reported).
-    """
+    """Every servo of the run, in the order of the arm's joints; and the joints whose servo failed or may belong to an
+    unknown name (already reported)."""
     uses = {}
     body = with_other_joints(body, arm, scope.complaints)
     _note_kinds(scope, body, arm)
@@ -113,7 +112,7 @@ def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[l
 
 
 def _note_kinds(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> None:
-    """Note, for every servo definition and its bases, which kinds of joints it moves in this run."""
+    """Note, for every servo definition and its bases, the kinds of joints that it moves in this run."""
     for item in body.items.values():
         kind, definition = arm.kind(item.name), scope.definitions.of_kind("servo").get(word_of(item.value) or "")
         if kind is not None and kind != "fixed" and definition is not None:
@@ -197,7 +196,7 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
 
 
 def _report_no_model(scope: Scope, block: MergedBlock, owner: Owner, used: Place) -> None:
-    """A servo without a model, or the entry that may have been meant for it; of the others nothing can be said."""
+    """Report a servo without a model, or the entry that may have been meant for it."""
     known = known_words("servo models", sorted(models.find_own("servo")))
     for item in block.items.values():
         if not item.kind and (helps := did_you_mean(item.name, ("model",))):
@@ -213,8 +212,8 @@ def _report_no_model(scope: Scope, block: MergedBlock, owner: Owner, used: Place
 
 
 def moving_kind(scope: Scope, item: Item, arm: ResolvedArm, so: str) -> str | None:
-    """The kind of the joint that an entry names; None where it is none or fixed (already reported). so: the
-    message where it is fixed."""
+    """The kind of the joint that an entry names; None where it is unknown or fixed (already reported). so: the message
+    where it is fixed"""
     kind = arm.kind(item.name) if item.kind in ("", "substitute") else None
     definition = scope.definitions.of_kind("arm").get(arm.name)
     if kind is None and definition is not None and scope.complaints.is_known_to_lack(definition.place):
@@ -261,7 +260,7 @@ def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, bloc
 
 
 def _check_above(scope: Scope, owner: Owner, parameter: Parameter, command: Command, bound: float) -> None:
-    """A number that does nothing under other commands is above its bound under this one, in every case."""
+    """Check that a number without effect under other commands is above its bound under this one, in every case."""
     path = owner.join(parameter.name)
     settled = scope.parameters.get(path)
     if settled is None or settled.origin.place is None or isinstance(settled.value, str | tuple):
@@ -286,7 +285,7 @@ def _check_above(scope: Scope, owner: Owner, parameter: Parameter, command: Comm
 
 
 def check_rest(scope: Scope, use: Use) -> None:
-    """A joint whose servo must begin at rest does, in every case. After the initial state is settled."""
+    """Check that a joint whose servo must begin at rest does, in every case. To be called after the initial state."""
     path = f"initial.{use.joint}.qd"
     begins = scope.parameters.get(path)
     if use.servo.at_rest is None or use.parameters is None or begins is None or begins.origin.place is None:
@@ -307,7 +306,7 @@ def check_rest(scope: Scope, use: Use) -> None:
 
 
 def check_start(scope: Scope, use: Use) -> None:
-    """Remarks where the joint of a servo that follows whatever the arm does not begin where its command does."""
+    """Warn where a joint whose servo follows regardless of the arm does not begin at its command."""
     command = use.command
     if not use.servo.follows or command is None or command.kind != "position" or scope.complaints.errors:
         return
@@ -453,7 +452,7 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
 
 
 def _asked(scope: Scope, command: Call) -> Expression:
-    """The argument of a command; the name of a course alone is that course with nothing written. Raises Problem."""
+    """The argument of a command; the name of a course alone is that course without parameters. Raises Problem."""
     inner = command.positional[0]
     if isinstance(inner, String):
         raise Problem(
@@ -468,7 +467,7 @@ def _asked(scope: Scope, command: Call) -> Expression:
 
 
 def _check_known(scope: Scope, inner: Name) -> None:
-    """Raises Problem D278 for the name of nothing, where guides are what a command may follow too."""
+    """Raise Problem D278 for an unknown name, where a command may also follow a guide."""
     if len(inner.path) > 1 or scope.names.is_value(inner) or inner.text in models.available("command"):
         return
     raise Problem(
@@ -494,7 +493,7 @@ def _is_guide(scope: Scope, inner: Expression) -> bool:
 
 
 def check_servo_definition(scope: Scope, name: str) -> None:
-    """Check a servo definition that no run uses, as far as that goes: its model and its keys."""
+    """Check a servo definition that no run uses, as far as possible: its model and its keys."""
     definition = scope.definitions.of_kind("servo")[name]
     block = scope.definitions.block(definition)
     if block is None:

@@ -1,4 +1,4 @@
-"""Servos that are on joints as their definitions say: resolved once for all joints of one kind, of all runs of a deck.
+"""Servos without overrides at their joints, resolved once for all joints of one kind, in all runs of a deck.
 
 Such a servo is resolved alone, on a joint that no deck can have. If nothing of it is wrong, worth a remark or made of
 what a run sets or varies, a joint that uses it has the same values under its own name.
@@ -27,7 +27,8 @@ ANY = "\0"
 """The joint on which a shared servo is resolved: no name of a deck has this character."""
 
 Resolve = Callable[[Scope, Item, ResolvedArm], Any]
-"""Enters the servo of one joint in a scope: its `ic.meaning.control.servos.Use`, None where something is wrong."""
+"""A function that enters the servo of one joint in a scope, and returns its `ic.meaning.control.servos.Use`, None where
+there is a mistake."""
 
 
 @frozen
@@ -50,8 +51,8 @@ class SharedServo:
 
 
 def use_shared(scope: Scope, item: Item, arm: ResolvedArm, resolve: Resolve) -> Any:
-    """The servo that an entry of a run's `servos` puts on a joint, entered in the scope; None where something of it is
-    wrong (already reported). resolve: what does that for one joint, and is handed on"""
+    """The servo that an entry of a run's `servos` puts on a joint, entered in the scope; None where it has a mistake
+    (already reported). resolve: the function for a single joint, which is passed on"""
     kind = arm.kind(item.name)
     shared = None
     if not item.kind and item.body is None and kind in ("revolute", "prismatic") and not scope.guides:
@@ -95,8 +96,8 @@ def _on_joint(why: NotSweepable, on_joint: Callable[[str], str]) -> NotSweepable
 
 
 def _shared(scope: Scope, item: Item, kind: str, resolve: Resolve) -> SharedServo | None:
-    """The servo as joints of this kind have it; None where the entry says more than its name, or something is wrong or
-    worth a remark."""
+    """The servo for joints of this kind; None where the entry contains more than its name, or there is a mistake or a
+    remark."""
     name = scope.definitions.definition_named(item.value) or word_of(item.value)
     definition = scope.definitions.of_kind("servo").get(name or "")
     if not isinstance(item.value, Name) or definition is None:
@@ -130,8 +131,8 @@ def _alone(scope: Scope, item: Item, kind: str, definition: Definition, resolve:
 
 
 def _is_as_written(scope: Scope, shared: SharedServo, joint: str) -> bool:
-    """True where no sweep and nothing set by the run or from outside changes a number of the servo, or what one is made
-    of."""
+    """True where neither a sweep nor a setting of the run or from outside changes a number of the servo, or a name in
+    one."""
     given = {*scope.varied, *scope.settings}
     if not given:
         return True

@@ -1,5 +1,5 @@
-"""Motors on beds: `substitute JOINT { bed = ...; law = ...; }`, the models' parameters, scales, and that joints go
-together."""
+"""Motors on beds: `substitute JOINT { bed = ...; law = ...; }`, the models' parameters, scales, and checks across
+joints."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ from met.substitution.bed_scale import BedScale
 
 DEFAULTS: dict[models.Kind, str] = {"bed": BED, "law": LAW}
 RATES = ("rate", "position")
-"""Kinds of a joint's command from which a servo's law has a rate to tell a drive."""
+"""Kinds of a joint's command with which a servo's law has a rate to command a drive."""
 SLOWEST_BED_HZ = 10.0
-"""Rate at which a bed is exchanged with at least: its shaft is reckoned in steps of 250 us, each of them recorded."""
+"""Lowest rate of exchanges with a bed: its shaft is computed in steps of 250 us, each of them recorded."""
 USAGE = "write `substitute JOINT { bed = BED(...);  law = LAW(...); }`"
 
 
@@ -77,7 +77,7 @@ def resolve_substitutions(
 
 
 def check_ticks(scope: Scope, found: tuple[Substitution, ...], ticks: Mapping[str, Ticks], schedule: Schedule) -> None:
-    """The servos of substituted joints tick, and together."""
+    """Check that the servos of substituted joints tick, and together."""
     for use in found:
         if ticks[use.joint].continuous and use.place is not None:
             scope.complaints.error(
@@ -112,7 +112,7 @@ def check_ticks(scope: Scope, found: tuple[Substitution, ...], ticks: Mapping[st
 
 
 def check_brakes(scope: Scope, found: tuple[Substitution, ...], environment: Iterable[EnvironmentUse]) -> None:
-    """No model puts dry friction on a joint whose motor is on a bed: there friction is the bed's."""
+    """Check that no model puts dry friction on a joint whose motor is on a bed: there friction is the bed's."""
     for use in environment:
         friction_joint = models.find("environment", use.model).friction_joint
         joint = scope.parameters.get(f"environment.{use.name}.{friction_joint}") if friction_joint else None
@@ -129,7 +129,8 @@ def check_brakes(scope: Scope, found: tuple[Substitution, ...], environment: Ite
 
 
 def check_runaways(scope: Scope, found: tuple[Substitution, ...], environment: Iterable[EnvironmentUse]) -> None:
-    """No model replaces the outputs of a servo whose rate loop is the drive's: they do not reach the drive."""
+    """Check that no model replaces the outputs of a servo whose rate loop is the drive's: they do not reach the
+    drive."""
     on_rate = {use.joint: use for use in found if models.find("bed", use.bed).drive == "rate"}
     for use in environment:
         model = models.find("environment", use.model)
@@ -240,8 +241,8 @@ def _substitution(
 
 
 def _has_rate(scope: Scope, item: Item, block: MergedBlock, bed: Any, use: Use) -> bool:
-    """True where the servo's law has a rate loop that a bed's drive may have in its place, and its command a rate to
-    give it; else that was reported."""
+    """True where the servo's law has a rate loop that a bed's drive may replace, and its command gives it a rate;
+    otherwise that was reported."""
     named = block.get("bed")
     place = item.place if named is None or named.value is None else _name_place(named.value)
     told = f"`{bed.name}` tells the drive of joint `{item.name}` a rate"
@@ -266,7 +267,7 @@ def _of_kind(kind: str) -> str:
 
 
 def _name_place(value: Expression) -> Place:
-    """The place of a model's name, without what stands behind it."""
+    """The place of a model's name alone."""
     return value.name.place if isinstance(value, Call) else place_of(value)
 
 
@@ -313,7 +314,7 @@ def _not_its_quotient(table: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 
 def _check_strength(scope: Scope, owner: Owner, use: Use, scale: BedScale, scaled: Item) -> None:
-    """Warn where the bed's motor is at its largest torque before the joint's would be."""
+    """Warn where the bed's motor reaches its largest torque before the joint's would."""
     path, of = owner.join("tau_max"), f"{use.joint}.servo.tau_max"
     own, joints = scope.parameters.get(path), scope.parameters.get(of)
     if own is None or joints is None:
@@ -343,8 +344,8 @@ def _check_strength(scope: Scope, owner: Owner, use: Use, scale: BedScale, scale
 
 
 def _use_bed(scope: Scope, owner: Owner, bed: Any, body: MergedBlock, use: Use, scale: BedScale | None = None) -> None:
-    """Every parameter of a bed: what the deck writes, else the word's of its faults, the servo's, the default. Of one
-    that is scaled the servo's over their scale, so that its motor is an exact model of the joint's."""
+    """Every parameter of a bed: as in the deck, else from the word of its faults, the servo's, or the default. For a
+    scaled bed, the servo's value is divided by its scale, so that the motor is an exact model of the joint's."""
     written = models.written(bed)
     check_keys(scope, body, [p.name for p in written], owner)
     faults, preset = None, {}
@@ -367,7 +368,7 @@ def _use_bed(scope: Scope, owner: Owner, bed: Any, body: MergedBlock, use: Use, 
 
 
 def _preset(scope: Scope, owner: Owner, wanted: Parameter, faults: Item | None) -> None:
-    """A parameter that the word written as `faults` sets; its origin is that word."""
+    """The value of a parameter from the word written as `faults`, which is its origin."""
     scope.number(owner, wanted, None)
     settled = scope.parameters.get(owner.join(wanted.name))
     if settled is not None and settled.origin.kind == "default" and faults is not None and faults.value is not None:

@@ -1,4 +1,4 @@
-"""Guides and sensors of links as things that tick: how often, and that each tick is at an instant of the dynamics."""
+"""Ticks of guides and sensors of links: their rates, and the check that each tick is at an instant of the dynamics."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Ticking(Protocol):
 
 
 def rate_of(scope: Scope, each: Ticking, shared: Rate | None) -> Rate | None:
-    """Its own rate, else that of the servos; None where there is neither (already reported)."""
+    """The own rate, else that of the servos; None where there is neither (already reported)."""
     found = each.rate or shared
     if found is None or found.hz == CONTINUOUS:
         message = "the servos are continuous" if found is not None else "the run has no rate of the servos"
@@ -53,7 +53,7 @@ def rate_of(scope: Scope, each: Ticking, shared: Rate | None) -> Rate | None:
 
 
 def check_instants(scope: Scope, each: Ticking, divisor: int, dynamics: int, rate: Rate, step: Rate) -> None:
-    """It ticks at instants of the dynamics: it sees the arm as it is there."""
+    """Check that it ticks at instants of the dynamics, since it sees the arm there."""
     if divisor % dynamics:
         scope.complaints.error(
             each.code,

@@ -24,7 +24,8 @@ FEWEST = 2  # rows: a curve goes from one to the next
 
 
 def with_file_named(call: Call) -> Call:
-    """`trajectory("moves.csv")` is short for `trajectory(file = "moves.csv")`; a name is one without its quotes."""
+    """The call with its file named: `trajectory("moves.csv")` is short for `trajectory(file = "moves.csv")`, and a name
+    is a file without its quotes."""
     if len(call.positional) != 1 or not isinstance(call.positional[0], String | Name):
         return call
     named = call.positional[0]

@@ -1,1 +1,1 @@
-"""Definitions of a deck, by kind and name, merged with what they are like; and the files of numbers that they name."""
+"""Definitions of a deck, by kind and name, merged with their bases; and the number files that they name."""

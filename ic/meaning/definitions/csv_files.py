@@ -40,8 +40,8 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 @frozen
 class CsvColumn:
-    """A column as its head names it: number, name, unit as written (None where there is none), place of its head, and
-    the names in its unit that are units of the deck's own, which no CSV file has."""
+    """A column as described by its head: number, name, unit as written (None where there is none), place of its head,
+    and units of the deck's own in its unit, which no CSV file can use."""
 
     number: int
     name: str
@@ -71,14 +71,14 @@ class CsvTable:
         return next((column for column in self.columns if column.name == name), None)
 
     def numbers(self, column: CsvColumn, text: str, dimension: Dimension, label: Label) -> tuple[float, ...]:
-        """The column in SI. text, dimension: the unit that is wanted; label: who wants it.
+        """The column in SI. text, dimension: the unit that is wanted; label: the part that needs it.
 
         Raises Problem D193 for its unit, D194 for a cell that is no number.
         """
         return self._numbers(column, _measure(column, text, dimension, label))
 
     def quantities(self, column: CsvColumn) -> tuple[tuple[float, ...], Measure]:
-        """The column in SI, and what its own unit means. Raises Problem D193, D194."""
+        """The column in SI, and the meaning of its own unit. Raises Problem D193, D194."""
         measure = units.ONE if column.unit is None else _meaning(column, "", ())
         return self._numbers(column, measure), measure
 
@@ -88,7 +88,7 @@ class CsvTable:
         return CsvCell(column, _stripped(row.split(",")[column.number])[0], self._cell(line, row, column.number))
 
     def quantity(self, cell: CsvCell) -> tuple[float, Measure]:
-        """The number of a cell in SI, and what its column's unit means. Raises Problem D193, D194."""
+        """The number of a cell in SI, and the meaning of its column's unit. Raises Problem D193, D194."""
         measure = units.ONE if cell.column.unit is None else _meaning(cell.column, "", ())
         number = _si(cell.text, measure)
         if number is None:
@@ -96,7 +96,7 @@ class CsvTable:
         return number, measure
 
     def check_numbers(self, column: CsvColumn) -> None:
-        """Raises Problem D193, D194 where a cell of the column is neither a number nor empty."""
+        """Raise Problem D193, D194 where a cell of the column is neither a number nor empty."""
         measure = _meaning(column, "", ())
         for number in range(len(self.rows)):
             text = self._text(column, number)
@@ -106,7 +106,7 @@ class CsvTable:
     def words(self, column: CsvColumn) -> list[tuple[str, Place]] | None:
         """The column's cells and their places, where they are words and it has no unit; None where they are numbers.
 
-        Raises Problem D194 for a cell that is no word below one that is.
+        Raises Problem D194 for a cell that is not a word below one that is.
         """
         cells = [(_stripped(row.split(",")[column.number])[0], line, row) for line, row in self.rows]
         if column.unit is not None or not cells or not _WORD.fullmatch(cells[0][0]):
@@ -138,7 +138,7 @@ class CsvTable:
         return _stripped(self.rows[number][1].split(",")[column.number])[0]
 
     def rising(self, column: CsvColumn, times: tuple[float, ...]) -> None:
-        """Raises Problem D195 where the column's numbers, its times, do not rise."""
+        """Raise Problem D195 where the column's numbers, its times, do not rise."""
         for n, (before, after) in enumerate(itertools.pairwise(times)):
             if not before < after:
                 line, row = self.rows[n + 1]
@@ -160,14 +160,14 @@ class CsvTable:
 
 
 def _si(text: str, measure: Measure) -> float | None:
-    """The number of a cell in SI; None where it is none, or one that no double holds."""
+    """The number of a cell in SI; None where it is not one, or does not fit in a double."""
     number = measure.to_si(float(text), text) if _NUMBER.fullmatch(text) else math.inf
     lost = number == 0.0 and any(digit in "123456789" for digit in text.lower().partition("e")[0])
     return None if lost or not math.isfinite(number) else number
 
 
 def _no_number(cell: CsvCell, measure: Measure) -> Problem:
-    """Says what a cell holds that `_si` finds no number in."""
+    """The error for a cell without a number for `_si`."""
     text = cell.text
     found = f"`{text[:40]}` is not a number" if text else "there is no number here"
     if _NUMBER.fullmatch(text):
@@ -197,7 +197,7 @@ def csv_files(deck: Deck) -> NamedFiles[CsvTable]:
 
 
 def read_csv(path: str) -> CsvTable:
-    """A CSV file that a command is given. Raises Problem D190 where it cannot be read, and D002, D191 to D198."""
+    """A CSV file from a command line. Raises Problem D190 where it cannot be read, and D002, D191 to D198."""
     try:
         data = read_regular(path, MOST_CSV_BYTES)
     except OSError as reason:
@@ -294,7 +294,7 @@ def _columns(file: str, line: int, row: str, declared: Collection[str]) -> Itera
 
 
 def _stripped(cell: str) -> tuple[str, int]:
-    """A cell without the spaces and quotes around it, and how many characters those are before it."""
+    """A cell without the spaces and quotes around it, and the number of characters removed before it."""
     text = cell.strip()
     gap = len(cell) - len(cell.lstrip()) if text else 0
     if len(text) > 1 and text[0] == text[-1] == '"':
@@ -304,7 +304,7 @@ def _stripped(cell: str) -> tuple[str, int]:
 
 
 def _measure(column: CsvColumn, text: str, dimension: Dimension, label: Label) -> Measure:
-    """The measure of a column's unit. Raises Problem D193 where it has none, or another than is wanted."""
+    """The measure of a column's unit. Raises Problem D193 where it has none, or a different one from the wanted one."""
     helps = write_either((f"{column.name} [{each}]" for each in in_degrees(text)), old=column.name)
     if column.unit is None:
         if dimension == PURE:
@@ -326,7 +326,7 @@ def _measure(column: CsvColumn, text: str, dimension: Dimension, label: Label) -
 
 
 def _meaning(column: CsvColumn, remedy: str, also: Iterable[Label], dimension: Dimension | None = None) -> Measure:
-    """The measure of a column's unit. remedy: where no unit like it is known; dimension: the one that is needed."""
+    """The measure of a column's unit. remedy: for a unit without a similar known one; dimension: the required one"""
     assert column.unit is not None
     try:
         return parse_unit(column.unit)
@@ -345,7 +345,7 @@ def _short(name: str) -> str:
 
 
 def missing_column(table: CsvTable, name: str, place: Place, why: str = "") -> Problem:
-    """Says that a file has no column of this name, which is asked for at this place. why: in words, it is needed."""
+    """The error that a file lacks a column that is needed at this place. why: the reason, in words"""
     names = [_short(column.name) for column in table.columns]
     round_brackets = next((each for each in names if each.startswith(f"{name} (") and each.endswith(")")), None)
     near = did_you_mean(name, names)

@@ -1,4 +1,4 @@
-"""Blocks merged: what a base has with what is written upon it, each entry with its history.
+"""Merging of blocks: a base's entries with those written over it, each with its history.
 
 An entry with a kind (`metric settle = ...`, `link upper { ... }`) adds; one without overrides what the base has under
 that name. `+=` appends, `remove` takes away. Of two requirements of one name the later one stands.
@@ -15,10 +15,10 @@ from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, erro
 from met.frozen import frozen
 
 WITH = "with"
-"""Kind of a run's entries `with PATH = VALUE;`, of which the later one of a path stands."""
+"""Kind of a run's entries `with PATH = VALUE;`, of which the last one for a path counts."""
 
 REQUIREMENT = "requirement"
-"""What messages call the one statement that may have a name."""
+"""The word in messages for the one statement that may have a name."""
 
 
 @frozen
@@ -52,7 +52,7 @@ class Item:
 
 @frozen
 class Removed:
-    """A key that `remove` took away, how many statements stood before that, and where it is written."""
+    """A key that `remove` removed, the number of statements before that, and its place."""
 
     key: str
     before: int
@@ -183,7 +183,7 @@ class _Merger:
         self.items[key] = self._made(entry, kind, name, detail, earlier)
 
     def _state(self, entry: Statement) -> None:
-        """Take a statement in, one with a name in the place of the base's of that name."""
+        """Take a statement; one with a name replaces the base's of that name."""
         if entry.name is not None:
             name = entry.name.text
             key = f"{REQUIREMENT} {name}"
@@ -237,8 +237,8 @@ class _Merger:
         return replace(earlier, body=body, detail=detail or earlier.detail, upon=upon)
 
     def _earlier(self, kind: str, name: str, place: Place, *, removed: bool = False) -> Item | None:
-        """The entry that one of this kind and name replaces. A value that `with` sets, whose path may be the name of
-        another entry, is replaced by `with` alone. removed: what is removed is such a value before a plain entry."""
+        """The entry that one of this kind and name replaces. A value set by `with`, whose path may equal the name of
+        another entry, is replaced only by `with`. removed: prefer such a value over a plain entry, for `remove`"""
         if kind:
             return self.items.get(f"{kind} {name}")
         keys = [key for key in self.names.get(name, []) if removed or self.items[key].kind != WITH]
@@ -300,7 +300,7 @@ class _Merger:
         self.names[name].remove(earlier.key)
         self.written.pop(earlier.key, None)
         self.removed.append(Removed(earlier.key, len(self.statements), entry.place))
-        if self.upon_name and not earlier.kind:  # it was written over the definition's, which goes too
+        if self.upon_name and not earlier.kind:  # it was written over the definition's, which is removed too
             self.pending.append(entry)
 
 
@@ -318,7 +318,7 @@ def _name_of(each: Item | Statement) -> str:
 
 
 def _nothing(entry: Statement, there: Iterable[Item | Statement]) -> Diagnostic:
-    """Says of a `remove` that there is nothing of its name."""
+    """The error that a `remove` finds nothing of its name."""
     name, known = _meant(entry), [_name_of(each) for each in there]
     return error(
         "D058",
@@ -329,7 +329,7 @@ def _nothing(entry: Statement, there: Iterable[Item | Statement]) -> Diagnostic:
 
 
 def overlay(base: MergedBlock, over: MergedBlock, complaints: Complaints) -> MergedBlock:
-    """The base's entries with those of a use upon them, which no definition's path reaches. What the use removes goes
+    """The base's entries with those of a use over them, which no definition's path reaches. Removals of the use go
     first, so that it may put another in its place."""
     items, removed = dict(base.items), list(base.removed)
     for entry in over.pending:
@@ -360,8 +360,8 @@ def _of_name(items: Mapping[str, Item], name: str) -> Item | None:
 
 
 def with_meant_names(block: MergedBlock, keys: Iterable[str], kinds: Iterable[str]) -> MergedBlock:
-    """The block with entries that nobody knows, which is reported, under the names that are meant: what is in them is
-    looked at, too, and nothing is missing besides.
+    """The block with unknown entries, which are reported, under the names that were probably meant: so their contents
+    are checked too, and nothing is reported as missing.
 
     keys, kinds  what the block may have; an entry that it has stays
     """
@@ -390,13 +390,13 @@ def refuse_pending(block: MergedBlock, complaints: Complaints) -> None:
 
 
 def no_block(name: str, place: Place, written: Place | None = None) -> Diagnostic:
-    """Says of a block, at this place, that an entry takes none. written: the value that it has, where it has one."""
+    """The error that an entry at this place takes no block. written: its value, if it has one"""
     also = [Label(written, "written here")] if written is not None else []
     return error("D054", f"`{name}` is a value, not a block", place, also=also, help=f"write `{name} = ...;`")
 
 
 def refuse_block(item: Item) -> None:
-    """Raises Problem where a block is written upon the value of an entry that takes none: one that is a number or a
+    """Raise Problem where a block is written over the value of an entry that takes none: one that is a number or a
     word, not the name of something with entries of its own."""
     if item.upon is not None:
         raise Problem(no_block(item.name, item.upon, item.place))
@@ -412,7 +412,7 @@ def open_call(value: Expression, home: str | None, complaints: Complaints) -> tu
 
 
 def _taken_over(item: Item, homes: tuple[str, ...]) -> Item:
-    """The item of a base, now reached under the name of the definition that took it over too."""
+    """The item of a base, now also reached under the name of the definition that inherits it."""
     if not homes:
         return item
     body = item.body

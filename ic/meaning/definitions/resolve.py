@@ -1,4 +1,4 @@
-"""Definitions of a deck by kind and name, merged with their bases when they are asked for.
+"""Definitions of a deck by kind and name, merged with their bases on demand.
 
 A definition refers to its base, or to the file that it is made from (`merge`).
 """
@@ -48,7 +48,7 @@ class Definition:
 
     @property
     def roof(self) -> str:
-        """The roof under which it is; "" of the deck's own."""
+        """The roof of the definition; "" for the deck's own."""
         return self.name.rpartition(".")[0] if self.kind not in EXPERIMENTS else ""
 
     @property
@@ -84,14 +84,14 @@ class Definitions:
         self._check_defaults()
 
     def replacing(self, *changed: Definition, lets: Sequence[Let] = ()) -> Definitions:
-        """A copy of the definitions and lets in which these take the places of those of their names."""
+        """A copy of the definitions and lets in which these replace those of their names."""
         if not changed and not lets:
             return self
         other = copy(self)
         other.lets = {**self.lets, **{let.name.text: let for let in lets}}
         other._by_kind = {kind: dict(known) for kind, known in self._by_kind.items()}
         other._merged, other._failed, other._meant = {}, set(), dict(self._meant)
-        if not lets and all(each.kind in EXPERIMENTS for each in changed):  # arms and servos stay as they are
+        if not lets and all(each.kind in EXPERIMENTS for each in changed):  # arms and servos do not change
             other._merged = {key: block for key, block in self._merged.items() if key[0] not in EXPERIMENTS}
             other._failed = {key for key in self._failed if key[0] not in EXPERIMENTS}
         else:
@@ -101,7 +101,7 @@ class Definitions:
         return other
 
     def reporting_to(self, complaints: Complaints) -> Definitions:
-        """A copy, with what is merged so far, that reports mistakes there."""
+        """A copy, including all merged blocks so far, that reports mistakes there."""
         other = copy(self)
         other._complaints = complaints
         other._merged, other._failed, other._meant = dict(self._merged), set(self._failed), dict(self._meant)
@@ -126,15 +126,15 @@ class Definitions:
         return found
 
     def edition_at(self, place: Place) -> int:
-        """The edition of the deck language that the file of a place is written in."""
+        """The edition of the deck language in which the file of a place is written."""
         return self._editions.get(place.file, FIRST)
 
     def of_kind(self, kind: str) -> Mapping[str, Definition]:
         return self._by_kind[kind]
 
     def in_full(self, name: Name) -> Name:
-        """A name of a value as the deck itself would write it: one that a used deck writes, with its roof. Where the
-        used deck has no such value it stays as it is."""
+        """A value's name as the deck itself would write it: one in a used deck gets its roof. If the used deck has no
+        such value it is unchanged."""
         if not name.roof:
             return name
         first = name.path[0]
@@ -144,16 +144,16 @@ class Definitions:
         return Name((Word(full, first.place), *name.path[1:]), name.place)
 
     def split(self, path: str) -> list[str]:
-        """The words of a path, of which the first is a full name where the path begins with a roof."""
+        """The words of a path, the first of which is a full name where the path begins with a roof."""
         return split_path(path, self.roofs) if self.roofs else path.split(".")
 
     def under(self, roof: str, names: Iterable[str]) -> list[str]:
-        """Those of some full names that are under a roof, as its own deck writes them; all of them where it is ""."""
+        """The full names that are under a roof, as its own deck writes them; all of them where it is ""."""
         return [each[len(roof) + 1 :] for each in names if each.startswith(f"{roof}.")] if roof else list(names)
 
     def definition_named(self, value: Expression | None) -> str | None:
-        """The full name of a definition that a value names, alone or with a block; None where the deck has no roof, and
-        names are single words."""
+        """The full name of a definition as a value, alone or with a block; None where the deck has no roof, and names
+        are single words."""
         name = value.name if isinstance(value, Call) else value
         return name.text if self.roofs and isinstance(name, Name) else None
 
@@ -170,8 +170,8 @@ class Definitions:
         ]
 
     def find(self, kind: str, name: Word, roof: str = "") -> Definition:
-        """The definition of this name. Raises D041 with what was probably meant. roof: of the used deck that names
-        it."""
+        """The definition of this name. Raises D041 with the name that was probably meant. roof: of the used deck that
+        names it"""
         if name.text in self._by_kind[kind]:
             return self._by_kind[kind][name.text]
         known = self.under(roof, self._by_kind[kind])
@@ -379,7 +379,7 @@ class Definitions:
             near = meant(kind.text, DEFINITIONS)
             if near is None or len(words) != 2:
                 raise Problem(unknown)
-            self._complaints.add(unknown)  # what is in it is looked at, too
+            self._complaints.add(unknown)  # its contents are checked, too
             kind = replace(kind, text=near)
         if len(words) == 1:
             raise Problem(
@@ -446,7 +446,7 @@ class Definitions:
         self._add(Definition(kind.text, name.text, group, default))
 
     def _define_sum(self, entry: Setting) -> None:
-        """`sweep both = gains + spread;`"""
+        """Define a sum such as `sweep both = gains + spread;`."""
         if len(entry.path) > 1 or entry.operator != "=":
             raise Problem(
                 error(
@@ -475,8 +475,8 @@ class Definitions:
         self._add(Definition("sweep", entry.path[0].text, group, len(entry.words) > 1, (at, *reversed(parts))))
 
     def _add(self, definition: Definition) -> None:
-        """Enters a definition under its name, which nothing else of its kind may bear; all that has cases shares one
-        space of names."""
+        """Enter a definition under its name, which must be unique in its kind; everything with cases shares one space
+        of names."""
         kind, name = definition.kind, definition.group.words[-1]
         for space in EXPERIMENTS if kind in EXPERIMENTS else (kind,):
             if name.text in self._by_kind[space]:
@@ -500,11 +500,11 @@ class Definitions:
         return [d for kind in EXPERIMENTS for d in self._by_kind[kind].values() if d.default]
 
     def writes(self, definition: Definition) -> bool:
-        """Return True if the deck itself, and no file that it includes, writes this definition."""
+        """Return True if the deck itself, not an included file, contains this definition."""
         return self.writes_at(definition.place)
 
     def writes_at(self, place: Place) -> bool:
-        """Return True if what stands at this place stands in the deck itself, and in no file that it includes."""
+        """Return True if the deck itself, not an included file, contains this place."""
         return shown_place(place).file == self._file
 
     def default(self) -> Definition | None:
@@ -515,7 +515,7 @@ class Definitions:
 
 
 def _includes(outer: Let, inner: Let) -> bool:
-    """Return True if the file of `outer` includes that of `inner`, behind it."""
+    """Return True if the file of `outer` includes that of `inner`, directly or not."""
     at = shown_place(outer.place)
     return any(file == at.file and line > at.line for file, line in shown_place(inner.place).included)
 

@@ -5,8 +5,8 @@
     stick, 7.1,       0.3,       0,         0.02
 
 The first column names the rows. The others hold values in the unit of their head; without one they hold pure numbers,
-or remarks, which are looked at where they are asked for. Columns `com.x`, `com.y` and `com.z` are the vector `com` too,
-and so are `inertia.xx` to `inertia.yz`, in the order that `inertia` of a link has. An empty cell holds no value.
+or remarks, which are checked only when used. Columns `com.x`, `com.y` and `com.z` are the vector `com` too, and so are
+`inertia.xx` to `inertia.yz`, in the order that `inertia` of a link has. An empty cell holds no value.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ CSV: Final = "csv"
 ALL: Final = "all"
 USAGE: Final = 'write `let NAME = csv("FILE.csv");`'
 VECTORS: Final = (("x", "y", "z"), ("xx", "yy", "zz", "xy", "xz", "yz"), ("xx", "yy", "zz"))
-"""Last words of the columns that are a vector together, in its order."""
+"""Last words of columns that form a vector together, in order."""
 
 _WORD = re.compile(r"[^\W\d]\w*")
 
 
 def is_row_table(value: Expression) -> TypeGuard[Call]:
-    """Return True if a value is `csv("FILE.csv")`, or was meant for that."""
+    """Return True if a value is `csv("FILE.csv")`, or was meant to be."""
     return isinstance(value, Call) and value.name.text == CSV
 
 
@@ -47,7 +47,7 @@ class RowTable:
     all_used: Place | None = None
 
     def unused(self, let: str, used: Iterable[str]) -> Diagnostic | None:
-        """The warning of rows that none of these paths names, where the deck asks for it. let: the table's name."""
+        """The warning about rows that none of these paths names, if the deck asks for it. let: the table's name"""
         if self.all_used is None:
             return None
         named = {path[len(let) + 1 :].split(".")[0] for path in used if path.startswith(f"{let}.")}
@@ -61,7 +61,7 @@ class RowTable:
         return Diagnostic("D385", message, Label(place), also, tuple(helps), severity="warning")
 
     def cells(self, name: Name) -> tuple[CsvCell, ...]:
-        """The cells that a path means, `bodies.boom.mass`: one, or those of a vector. Raises Problem, placed."""
+        """The cells of a path, `bodies.boom.mass`: one, or those of a vector. Raises Problem, placed."""
         if len(name.path) < 3:
             raise self._no_value(name)
         _, row, *words = name.path
@@ -80,7 +80,7 @@ class RowTable:
         return found
 
     def paths(self) -> Iterator[str]:
-        """The paths of all values, without the table's name: `boom.mass`; of a vector also the one of all of it."""
+        """The paths of all values, without the table's name: `boom.mass`; for a vector also its own."""
         columns = dict.fromkeys(column.name for column in self.csv.columns[1:])
         heads = dict.fromkeys(head for name in columns for head, dot, _ in [name.rpartition(".")] if dot)
         whole = [head for head in heads if any(all(f"{head}.{part}" in columns for part in parts) for parts in VECTORS)]
@@ -100,7 +100,7 @@ class RowTable:
         raise missing_column(self.csv, text, words[0].place)
 
     def _no_value(self, name: Name) -> Problem:
-        """Says that a path names the table, or a row of it, and no value."""
+        """The error that a path names the table, or a row of it, and no value."""
         what = "a table" if len(name.path) == 1 else "a row of a table"
         columns = [column.name for column in self.csv.columns[1:]]
         rest = f".{columns[0] if columns else 'COLUMN'}"

@@ -1,4 +1,5 @@
-"""A `param` that nothing uses, and that was meant for one of another file: `param raech = 0.9 m;` above an include."""
+"""Warnings about a `param` that nothing uses, and that was meant for one of another file: `param raech = 0.9 m;` above
+an include."""
 
 from __future__ import annotations
 
@@ -13,8 +14,7 @@ from met.messages.message import shown_place
 
 
 def misspelt_params(entries: Sequence[Entry]) -> Iterator[Diagnostic]:
-    """Warns of each `param` that nothing names, where a file that its own includes has one that is called nearly so
-    (D386)."""
+    """Warn about each `param` that nothing names, where an included file has one of nearly the same name (D386)."""
     params = [entry for entry in entries if isinstance(entry, Let) and entry.is_param]
     near: dict[str, tuple[Let, Let]] = {}
     for let in params:

@@ -1,4 +1,4 @@
-"""Numbers that are given from outside of a deck, in place of what it writes; and how an origin says so."""
+"""Numbers from outside of a deck, in place of its own, and their origins."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def written_origin(place: Place, overrides: tuple[Place, ...], note: str = "") -
 
 
 def evaluate_setting(entry: Setting, path: str, names: Names) -> CommandLineValue:
-    """The number that an entry sets. Raises Problem where it is no number."""
+    """The number that an entry sets. Raises Problem where it is not a number."""
     found = names.evaluate(entry.value)
     if not isinstance(found, Value):
         raise Problem(

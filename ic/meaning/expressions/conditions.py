@@ -1,4 +1,4 @@
-"""Conditions on values: tested at once, or over all cases of a sweep once they are known; and what has failed."""
+"""Conditions on values, tested at once, or over all cases of a sweep once they are known; and the failed ones."""
 
 from __future__ import annotations
 
@@ -18,24 +18,25 @@ from met.plan.swept import blocks
 from met.trace import Formulas, Graph, Real, Scalar
 
 Test = Callable[[np.ndarray], tuple[np.ndarray, list[str]]]
-"""Values [n, k] -> which rows are bad [n], and in words why the first is."""
+"""A test: values [n, k] -> a truth for each bad row [n], and the reason of the first in words."""
 
 PIECE = 1 << 16
-"""Cases that `in_pieces` tests at a time."""
+"""Number of cases that `in_pieces` tests at a time."""
 
 
 WHOLE = 1 << 20
-"""Cases up to which a test is given all of them at once; more are tested piece by piece."""
+"""Largest number of cases that a test gets at once; more are tested piece by piece."""
 
 SHOWN = 1 << 16
-"""Cases of more that are looked at for warnings, evenly spread, besides those where what varies has its ends."""
+"""Number of cases, evenly spread, that are examined for warnings if there are more, besides those at the ends of varied
+values."""
 
 MOST_BAD = 1000
-"""Cases that fail a check in pieces that it is asked about once more, for the reason."""
+"""Largest number of failing cases of a check in pieces for which the reason is determined."""
 
 
 def in_pieces(test: Test, values: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """Apply a test that looks at each row by itself piece by piece, in little memory: a million cases would take 300 MB
+    """Apply a test that treats each row separately piece by piece, in little memory: a million cases would take 300 MB
     where a test needs matrices."""
     if len(values) <= PIECE:
         return test(values)
@@ -67,7 +68,7 @@ class VariedPath:
 
 @frozen
 class Check:
-    """A condition on values that hold only once the cases are known."""
+    """A condition on values that are only known with the cases."""
 
     values: tuple[Real, ...]
     test: Test
@@ -81,7 +82,7 @@ class Check:
 
 
 class Checks:
-    """The checks of one run, and the paths of what failed, so that nothing is said twice of one mistake."""
+    """The checks of one run, and the paths of failed ones, so that one mistake is reported once."""
 
     def __init__(self, complaints: Complaints, graph: Graph, varied: Mapping[str, VariedPath]) -> None:
         self.complaints, self.graph, self.varied = complaints, graph, varied
@@ -92,15 +93,15 @@ class Checks:
         self._tested: Formulas | None = None  # of the values of all checks that wait, once no more come
 
     def of_other_cases(self) -> Checks:
-        """The same checks for cases of another table, of which nothing has failed yet; but for those that warn, or
-        that only the whole arm decides."""
+        """The same checks for cases of another table, without failures yet, except those that warn or concern the whole
+        arm."""
         found = Checks(Complaints(), self.graph, self.varied)
         found._waiting = [check for check in self._waiting if not check.warns and check.code not in PROVISIONAL]
         found._tested = found._formulas()
         return found
 
     def errors(self, cases: Mapping[str, CaseValues], count: int) -> tuple[Diagnostic, ...]:
-        """The errors that so many cases with these values make, whatever was asked before."""
+        """The errors of `count` cases with these values, independent of former calls."""
         if count <= WHOLE:
             columns = {path: np.asarray(values) for path, values in cases.items()}
             if not any(check.test(table)[0].any() for check, table in self._tables(columns, count)):
@@ -111,14 +112,14 @@ class Checks:
         return asked.complaints.errors
 
     def broken(self, cases: Mapping[str, np.ndarray], count: int) -> np.ndarray:
-        """For each of so many cases with these values whether `errors` would have something to say of it, [n]."""
+        """A truth for each of `count` cases with these values: whether `errors` would report it, [n]."""
         bad = np.zeros(count, bool)
         for check, table in self._tables(cases, count):
             bad |= check.test(table)[0]
         return bad
 
     def _formulas(self) -> Formulas:
-        """The values of all checks that wait, one after the other."""
+        """The values of all waiting checks, one after the other."""
         return self._tested or Formulas.of(self.graph, [x for check in self._waiting for x in check.values])
 
     @property
@@ -172,8 +173,8 @@ class Checks:
     def observe(
         self, values: tuple[Real, ...], act: Callable[[np.ndarray], None], place: Place, needs: tuple[str, ...] = ()
     ) -> None:
-        """Call `act` with [n, k] values now, or once the cases are known where one of them varies: for warnings. Of
-        very many cases it gets some, with all ends of what varies."""
+        """Call `act` with [n, k] values now, or once the cases are known where one of them varies: for warnings. If
+        there are very many cases it gets some, with all ends of varied values."""
 
         def test(table: np.ndarray) -> tuple[np.ndarray, list[str]]:
             act(table)
@@ -182,15 +183,14 @@ class Checks:
         self.require(values, test, code="", message="", place=place, needs=needs, warns=True)
 
     def case_of(self, row: int) -> int | None:
-        """The case in this row of what a test is looking at; None while that is a piece of a long table, of which only
-        the outcome counts."""
+        """The case in this row of a test's values; None while these are a piece of a long table, of which only the
+        outcome counts."""
         if self._rows is None:
             return row
         return int(self._rows[row]) if len(self._rows) else None
 
     def where(self, row: int, values: Iterable[object]) -> str:
-        """Words for the case in this row of what a warning looks at, ` in case #7`, where one of these values varies;
-        else none."""
+        """Words for the case in this row of a warning, ` in case #7`, where one of these values varies; else none."""
         case = self.case_of(row) if any(isinstance(value, Scalar) for value in values) else None
         return "" if case is None else f" in {self._case(case)}"
 
@@ -198,7 +198,7 @@ class Checks:
         return f"case #{row}" if row < self._listed else "a case that may be chosen"
 
     def run(self, cases: Mapping[str, CaseValues], count: int, listed: int | None = None) -> None:
-        """Every check that waited for the cases, over all of them; names the first case that fails one.
+        """Run every check that waited for the cases, over all of them; messages name the first failing case.
 
         listed  how many of them have numbers; those behind may come, and have none yet. None: all
         """
@@ -214,7 +214,7 @@ class Checks:
                 self._refuse(check, cases, int(np.flatnonzero(bad)[0]), int(bad.sum()), causes)
 
     def _tables(self, values: Mapping[str, np.ndarray], count: int) -> Iterator[tuple[Check, np.ndarray]]:
-        """Every check that waited, with what it tests of so many cases, [n, k]."""
+        """Every waiting check, with its values for `count` cases, [n, k]."""
         columns = iter(self._formulas().replay(values))
         for check in self._waiting:
             table = np.empty((count, len(check.values)))
@@ -223,8 +223,8 @@ class Checks:
             yield check, table
 
     def _run_in_pieces(self, cases: Mapping[str, CaseValues], count: int) -> None:
-        """The same of a long table: each check is tested on all of it, and asked for its reason, or what it warns of,
-        on some rows."""
+        """Run the waiting checks on a long table: each is tested on all of it, and gives its reason, or warnings, for
+        some rows."""
         shown = _shown_rows(cases, count)
         some: list[list[np.ndarray]] = [[] for _ in self._waiting]
         rows: list[list[np.ndarray]] = [[] for _ in self._waiting]
@@ -252,7 +252,7 @@ class Checks:
     def _refuse(
         self, check: Check, cases: Mapping[str, CaseValues], row: int, count: int, causes: Sequence[str]
     ) -> None:
-        """Report a check that fails in so many cases, of which this is the first."""
+        """Report a check that fails in some cases, of which this is the first."""
         if any(self.failed(each) for each in check.needs):
             return
         self.fail(check.path)
@@ -267,7 +267,7 @@ class Checks:
         )
 
     def _narrower(self, check: Check) -> tuple[str, ...]:
-        """The remedy where what is checked was drawn from a normal distribution, which has no bounds."""
+        """The remedy where the checked value was drawn from a normal distribution, which has no bounds."""
         checked = {value.ref for value in check.values if isinstance(value, Scalar)} if check.code == "D077" else set()
         for varied in self.varied.values():
             drawn = varied.value.number
@@ -290,12 +290,12 @@ class Checks:
 
 
 MOST_ENDS = 10
-"""Axes whose ends are looked at together, each with each."""
+"""Largest number of axes whose ends are combined with each other."""
 
 
 def _shown_rows(cases: Mapping[str, CaseValues], count: int) -> np.ndarray:
-    """Rows of a long table that stand for all of it, rising: some in even steps, and those where coordinates are least
-    and largest, in a product also several of them at once."""
+    """Rows of a long table that represent all of it, ascending: some in even steps, and those with extreme coordinates,
+    in a product also several at once."""
     corners: list[int] = [row for column in cases.values() for row in ends(column)]
     axes = {column.axis: column for column in cases.values() if isinstance(column, AxisColumn)}
     if axes and all(column.rows.kept is None for column in axes.values()) and len(axes) <= MOST_ENDS:

@@ -1,4 +1,5 @@
-"""Units that mean another angle: a hertz where radians or decays count, and the reverse. Nothing of it is an error.
+"""Units with another angle than the declared one: a hertz in place of radians or decays, and the reverse. None of these
+is an error.
 
 Hz and 1/s are one dimension, and beside metres or kilograms a radian counts as one. So `bandwidth = 5 Hz` is taken as
 5 1/s, and a volt for each hertz as a volt for each radian a second: less by 2 pi than cycles would be.
@@ -21,7 +22,7 @@ _FLUX = parse_unit("V*s").dimension  # of a motor's constant: V*s/rad and N*m/A 
 
 @frozen
 class AmbiguousUnit:
-    """A unit that may be a mistake: what the value is taken for, and what to write for each possible meaning."""
+    """A unit that may be a mistake: the assumed meaning, and the text to write for each possible meaning."""
 
     taken: str
     helps: tuple[str, ...]
@@ -144,7 +145,7 @@ def _write(condition: str, new: str) -> Help:
 
 
 def _unit(value: Value) -> Unit | None:
-    """The unit that the whole value is written in; None where it is computed."""
+    """The unit in which the whole value is written; None for a computed value."""
     unit = value.unit
     if unit is None or not unit.factors or measure_of(unit).dimension != value.dimension:
         return None
@@ -152,7 +153,7 @@ def _unit(value: Value) -> Unit | None:
 
 
 def _number(value: Value) -> str:
-    """The number in SI, as a deck writes it."""
+    """The number in SI, in a deck's notation."""
     return "[...]" if isinstance(value.number, Scalar) else f"{value.number:.12g}"
 
 

@@ -67,7 +67,7 @@ COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 BIGGEST_EXPONENT = 16
 
 RESERVED = ("sqrt", "sin", "cos", "min", "max", "linspace", "logspace")
-"""Functions whose names may not name a `let`; those of the others may, in decks that are older than they are."""
+"""Functions whose names may not name a `let`; names of the others may, in decks that are older than they are."""
 
 FUNCTIONS = (
     *RESERVED,
@@ -134,7 +134,7 @@ def _leaf(expression: Expression, lookup: Lookup) -> Value | ValueList:
             first, last, step = (evaluate_number(each, lookup) for each in parts)
             written = expression.step
             if isinstance(written, Number) and written.unit and first.bare and last.bare and step.dimension != PURE:
-                # the unit at the end is for all, as in `0 .. 90 by 5 deg`
+                # the unit at the end applies to all, as in `0 .. 90 by 5 deg`
                 bare = replace(expression, step=replace(written, unit=None))
                 return _with_unit(WithUnit(bare, written.unit, written.unit.place), lookup)
             return range_of(expression, first, last, step)
@@ -162,7 +162,7 @@ def _number(number: Number) -> Value:
 
 
 def _of_pi(decimal: str) -> bool:
-    """Return True if a number is pi or 2 pi to the places that are written, rounded or cut off: `3.14`, `6.2832`."""
+    """Return True if a number is pi or 2 pi to its written places, rounded or cut off: `3.14`, `6.2832`."""
     places = decimal.partition(".")[2]
     if len(places) < 2 or not places.isdigit():
         return False
@@ -276,7 +276,7 @@ def _of_numbers(node: Binary, left: Value, right: Value) -> Value:
 
 
 def _made_alike(node: Binary, left: Value, right: Value) -> Help:
-    """The remedy where a bare number is added to a quantity, or quantities of two dimensions are."""
+    """The remedy where a bare number is added to a quantity, or two dimensions are."""
     of_macro = [each.macro for each in node.place.macros]
     outside = [each for each in (node.left, node.right) if not place_of(each).macros]
     if of_macro and (outside or any(place_of(each).expansions != node.place.expansions for each in children(node))):
@@ -339,7 +339,7 @@ def _power(node: Binary, base: Value, exponent: Value) -> Value:
 
 
 def _items(written: List, lookup: Lookup) -> Iterable[Value | ValueList]:
-    """A list's items; a range or a linspace among them stands for its values."""
+    """A list's items, with ranges and linspaces replaced by their values."""
     for item in written.items:
         value = evaluate(item, lookup)
         inner = item.inner if isinstance(item, WithUnit) else item
@@ -438,7 +438,7 @@ def _call(call: Call, lookup: Lookup) -> Value | ValueList:
 
 
 def _number_of(call: Call, number: Real) -> Real:
-    """A function's result. Raises D066 where its argument has none, D067 where it is too large."""
+    """A function's result. Raises D066 where it is undefined for the argument, D067 where it is too large."""
     if not isinstance(number, Scalar) and math.isnan(number):
         raise Problem(error("D066", f"`{call.name.text}` of this number is none", place_of(call.positional[0])))
     return representable(as_float(number), call.place)

@@ -1,7 +1,7 @@
 """Arithmetic of lists, number by number: `[1, 2, 3] m * 2`, `a + b`, `-v`; and the components of a vector, `v.x`.
 
 Each number of the result is that of the same arithmetic on single numbers, so it has the same bits, and is recorded
-where a sweep varies what it comes from.
+where it depends on a varied value.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def signed(operator: str, written: ValueList, place: Place) -> ValueList:
 
 
 def component(name: Name, vector: Value | ValueList) -> Value:
-    """The number that `v.x` names of a vector. Raises Problem D071 where the value is no list of three numbers."""
+    """The component `v.x` of a vector. Raises Problem D071 where the value is not a list of three numbers."""
     head, axis = name.path
     if not isinstance(vector, ValueList) or len(vector.items) != len(COMPONENTS):
         has = "is one number" if isinstance(vector, Value) else f"has {len(vector.items)}"
@@ -69,7 +69,7 @@ def component(name: Name, vector: Value | ValueList) -> Value:
 
 
 def indexed(node: Indexed, written: Value | ValueList, index: Value) -> Value | ValueList:
-    """The value that `lengths[i]` names of a list, the first of which has the index 0. Raises Problem D286."""
+    """The element `lengths[i]` of a list, the first of which has the index 0. Raises Problem D286."""
     name, number = node.name.text, index.number
     if not isinstance(written, ValueList):
         helps = f"write it without brackets, or a list: `let {name} = [..., ...];`"
@@ -90,7 +90,7 @@ def indexed(node: Indexed, written: Value | ValueList, index: Value) -> Value | 
 
 
 def _made(items: list[Value], place: Place) -> ValueList:
-    """The list of what was computed, each number at the place of the whole, where its unit is to be mended."""
+    """The list of computed numbers, each at the place of the whole, where its unit would be corrected."""
     bare = len(items) > 1 and all(each.bare for each in items)
     return ValueList(tuple(replace(each, place=place, bare=bare) for each in items), place)
 

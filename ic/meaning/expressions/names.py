@@ -19,16 +19,16 @@ from met.frozen import frozen
 from met.messages import other_units
 from met.trace import Real
 
-DEEPEST = 64  # lets that need lets: far more than a deck has, far less than Python's recursion bears
+DEEPEST = 64  # depth of lets that need lets: far more than in decks, far less than Python's recursion limit
 
 
 def _uses(place: Place) -> list[Place]:
-    """The places at which the macros were used that a place came through."""
+    """The places at which the macros of a place were used."""
     return [each.use for each in place.macros]
 
 
 def _macro(place: Place) -> str:
-    """The macro whose body a place is in."""
+    """The macro whose body contains a place."""
     return place.macros[0].macro
 
 
@@ -38,8 +38,8 @@ def _if_a_unit(help: str) -> Help:
 
 @frozen
 class FoundNames:
-    """The values that names were found to have: `let`s, cells of tables by the paths that asked for them, and the
-    numbers of such cells by identity."""
+    """The values found for names: `let`s, cells of tables by the requested paths, and the numbers of such cells by
+    identity."""
 
     worth: Mapping[str, Value | ValueList | Problem]
     cells: Mapping[str, tuple[CsvCell, ...]]
@@ -47,20 +47,21 @@ class FoundNames:
 
     @property
     def named(self) -> Collection[str]:
-        """Names whose values were asked for and found, those behind them included, and tables' of which a cell was."""
+        """Names whose values were requested and found, including those in their expressions, and tables of requested
+        cells."""
         return self.worth.keys() | {path.partition(".")[0] for path in self.cells}
 
     @property
     def is_plain(self) -> bool:
-        """True where nothing in it is a mistake, or goes by identity."""
+        """True where it contains no mistake, and nothing by identity."""
         return not self.cells and not self.read and not any(isinstance(each, Problem) for each in self.worth.values())
 
 
 class Names:
-    """Evaluates expressions in a deck; what a name is worth is found once.
+    """Evaluator of expressions in a deck, which finds each name's value once.
 
-    varied   paths that a sweep varies, with the value that stands for them
-    watched  paths whose being named is to be seen in `followed`, like that of the varied
+    varied paths that a sweep varies, with the value that stands for them watched paths whose use is recorded in
+    `followed`, like that of the varied
     """
 
     def __init__(self, definitions: Definitions, varied: Mapping[str, Value], watched: Collection[str] = ()) -> None:
@@ -79,7 +80,7 @@ class Names:
         return FoundNames(self._worth, self.cells, self._read)
 
     def take_over(self, found: FoundNames) -> None:
-        """Take over what others found, which is the same here."""
+        """Take over values that were found elsewhere, and are the same here."""
         for name, worth in found.worth.items():
             self._worth.setdefault(name, worth)
         if found.cells or found.read:
@@ -94,12 +95,12 @@ class Names:
         return text in self.varied or text in self.definitions.lets or text in CONSTANTS
 
     def is_value(self, name: Name) -> bool:
-        """Return True if a name is a single word that has a value, where it stands."""
+        """Return True if a name is a single word with a value at its place."""
         found = self.definitions.in_full(name)
         return self.knows(found.text) if not found.roof else found.text in CONSTANTS
 
     def find(self, name: Name) -> Value | ValueList:
-        """The value of a name. Raises Problem D065 where there is none, D073 where it needs itself."""
+        """The value of a name. Raises Problem D065 where there is none, D073 where it depends on itself."""
         name = self.definitions.in_full(name)
         if name.roof:
             raise self._unknown_in_used(name)
@@ -153,10 +154,8 @@ class Names:
         return found
 
     def row_table(self, let: str, words: int = 1) -> RowTable | None:
-        """The table that a `let` stands for; None where it stands for none, or a servo of its name is meant.
-
-        words: of the path that begins with it.  Raises Problem with what is wrong in its file.
-        """
+        """The table of a `let`; None where it is not one, or a servo of its name is meant. words: of the path that
+        begins with it. Raises Problem with the errors of its file."""
         written = self.definitions.lets.get(let)
         if written is None or not is_row_table(written.value):
             return None
@@ -165,7 +164,7 @@ class Names:
         return self.definitions.row_table(written.value)
 
     def _cells(self, table: RowTable, name: Name) -> Value | ValueList:
-        """The value that a cell holds, or the vector of several."""
+        """The value of a cell, or the vector of several."""
         cells = table.cells(name)
         self.cells[name.text] = cells
         made = []
@@ -178,7 +177,7 @@ class Names:
         return made[0] if len(made) == 1 else ValueList(tuple(made), name.place)
 
     def names_a_component(self, name: Name) -> bool:
-        """Return True for `v.x` of a `let`: a servo of that name, or a path that a sweep varies, comes before it."""
+        """Return True for `v.x` of a `let`: a servo of that name, or a path that a sweep varies, takes precedence."""
         return (
             len(name.path) == 2
             and name.path[1].text in COMPONENTS
@@ -188,7 +187,7 @@ class Names:
         )
 
     def _reached(self, name: Name) -> str:
-        """The path to go by: that of the base that a sweep varies, where a servo definition has the value from it."""
+        """The path to look up: that of the base that a sweep varies, where a servo definition inherits the value."""
         first, *rest = (word.text for word in name.path)
         servo = self.definitions.of_kind("servo").get(first) if rest else None
         block = self.definitions.block(servo) if servo is not None and name.text not in self.varied else None
@@ -198,12 +197,12 @@ class Names:
         return next((path for path in paths if path in self.varied or path in self.watched), name.text)
 
     def label_of_cell(self, number: Real, place: Place) -> list[Label]:
-        """The cell of a table that this number is, as a label for messages about it at another place."""
+        """The cell of a table with this number, as a label for messages about it at another place."""
         found = self._read.get(id(number))
         return [found[1]] if found is not None and found[1].place != place else []
 
     def label(self, value: Value) -> list[Label]:
-        """The place that defines the name written for this value, as a label for messages about it."""
+        """The place that defines the name in this value, as a label for messages about it."""
         cell = self.label_of_cell(value.number, value.place)
         if cell:
             return cell
@@ -279,7 +278,7 @@ class Names:
         return Problem(error("D065", f"no value `{name.text}`", name.place, help=helps))
 
     def check_lets(self) -> list[Problem]:
-        """Every mistake in the deck's lets, used or not."""
+        """Report every mistake in the deck's lets, used or not."""
         problems: list[Problem] = []
         for text, let in self.definitions.lets.items():
             if len(problems) >= MOST_DIAGNOSTICS:  # no more would be reported, and each searches all names

@@ -44,7 +44,7 @@ class ValueList:
 
 
 def measure_of(unit: Unit) -> units.Measure:
-    """The measure of a unit. Raises D074 where a factor is no unit."""
+    """The measure of a unit. Raises D074 where a factor is not a unit."""
     declared = dict(unit.declared)
     for word, _ in unit.factors:
         if word.text not in units.ALL_UNITS and word.text not in declared:
@@ -81,7 +81,7 @@ def as_float(number: Real) -> Real:
 
 
 def representable(number: Real, place: Place, *factors: Real) -> Real:
-    """The number. Raises D067 where it is too large to be one, or is 0 although none of its factors is."""
+    """The number. Raises D067 where it overflows, or is 0 although none of its factors is."""
     if isinstance(number, Scalar):
         return number
     if not math.isfinite(number):

@@ -1,4 +1,4 @@
-"""Rows of values that a deck does not write out: `first .. last by step`, linspace and logspace."""
+"""Rows of values in short notation: `first .. last by step`, linspace and logspace."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def range_of(expression: Range, first: Value, last: Value, step: Value) -> Value
         )
     a, b, by = (float(value.number) for value in (first, last, step))
     turning = measure_of(step.unit) if step.unit is not None else units.ONE
-    if turning.turns and turning.dimension == step.dimension:  # a multiple of pi is no decimal: steps are of the unit
+    if turning.turns and turning.dimension == step.dimension:  # a multiple of pi is not a decimal
         scale = turning.scale
         low, high, stride = (float(f"{x / scale:.15g}") for x in (a, b, by))
         between = list(_steps(low, high, stride, expression, first, scale))[1:-1]
@@ -55,7 +55,7 @@ def range_of(expression: Range, first: Value, last: Value, step: Value) -> Value
 
 
 def _steps(a: float, b: float, step: float, expression: Range, first: Value, scale: float = 1.0) -> Iterable[float]:
-    """The points of a range. scale: SI units in one of what the numbers are in."""
+    """The points of a range. scale: SI units in one of the numbers' unit"""
 
     def shown(number: float) -> str:
         """The number in the unit of the first value, where that has one of its own."""

@@ -1,4 +1,4 @@
-"""Rows of numbers between two ends, each the double nearest to what the decimals as written give."""
+"""Rows of numbers between two ends, each the double nearest to the exact result from the decimals as written."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Steps:
 
     @classmethod
     def between(cls, a: float, b: float, step: float) -> Steps:
-        """The steps from a to b; the step is not zero, and leads there. 0 to 1 by 0.1 has 0.3 in it."""
+        """The steps from a to b; the step is not zero, and has the right sign. 0 to 1 by 0.1 includes 0.3."""
         made = [_shortest(x) for x in (a, b, step)]
         below = math.prod(under for _, under in made)
         first, last, by = (top * (below // under) for top, under in made)
@@ -38,7 +38,8 @@ class Steps:
 
 
 def even(a: float, b: float, n: int) -> Iterable[float]:
-    """Each point is the double nearest to what the ends' shortest decimals give: 0.01 to 0.04 in 7 has 0.015 in it."""
+    """Points that are each the double nearest to the result from the ends' shortest decimals: 0.01 to 0.04 in 7
+    includes 0.015."""
     (first, under_first), (last, under_last) = _shortest(a), _shortest(b)
     below = under_first * under_last
     p, q = first * under_last, last * under_first
@@ -49,7 +50,7 @@ def even(a: float, b: float, n: int) -> Iterable[float]:
 
 
 def _shortest(x: float) -> tuple[int, int]:
-    """The shortest decimal that reads back as x, as a fraction. (Not a `Fraction`: importing them takes 2 ms.)"""
+    """The shortest decimal that reads back as x, as a fraction. (Not a `Fraction`, whose import takes 2 ms.)"""
     return fraction(repr(x))
 
 

@@ -31,7 +31,7 @@ EXAMPLE = "such as `gearbox.kp > 0.03 V*s/rad`, joined by `and`, `or`, `not`"
 
 @frozen
 class NumberComparison:
-    """A comparison of numbers, read: its expression, its sides, and these as formulas of columns."""
+    """A parsed comparison of numbers: its expression, its sides, and these as formulas of columns."""
 
     expression: Binary
     sides: tuple[Value, Value]
@@ -62,12 +62,13 @@ class Truths:
         self._read: dict[int, NumberComparison] = {}  # by the expression: read once, whatever the pieces
 
     def take(self, columns: Mapping[str, np.ndarray], length: int) -> None:
-        """Take a piece of the table, of so many rows. columns: the values of the graph's inputs by name, [row]"""
+        """Take a piece of the table with `length` rows. columns: the values of the graph's inputs by name, [row]"""
         self.columns, self.length = columns, length
 
     def of(self, expression: Expression, asked: np.ndarray) -> np.ndarray:
-        """Rows for which it holds. asked: rows for which it matters, as behind an `and` those that may still hold.
-        Raises Problem D130 where it is no condition, D063 where the sides of a comparison are of two dimensions."""
+        """Rows for which it holds. asked: rows for which the answer matters, as after an `and` those that may still
+        hold. Raises Problem D130 where it is not a condition, D063 where the sides of a comparison have two
+        dimensions."""
         if isinstance(expression, Unary) and expression.operator == "not":
             return ~self.of(expression.operand, asked)
         if isinstance(expression, Binary) and expression.operator in ("and", "or"):
@@ -81,7 +82,8 @@ class Truths:
         return self._of_numbers(expression, asked) if of_words is None else of_words
 
     def _of_words(self, expression: Binary) -> np.ndarray | None:
-        """The truth of a comparison of a choice with a word; None if none is compared, or one that is a number."""
+        """The truth of a comparison of a choice with a word; None for other comparisons, and for a word that is a
+        number."""
         for side, other in ((expression.left, expression.right), (expression.right, expression.left)):
             if isinstance(side, Name) and side.text in self.words:
                 text = self.words[side.text]
@@ -110,7 +112,7 @@ class Truths:
         return np.asarray(HOLDS[expression.operator](left, right)) & ~(np.isnan(left) | np.isnan(right))
 
     def _comparison(self, expression: Binary) -> NumberComparison:
-        """A comparison of numbers, read. Raises Problem where its sides cannot be compared."""
+        """A parsed comparison of numbers. Raises Problem where its sides cannot be compared."""
         left, right = (evaluate_number(side, self.find) for side in (expression.left, expression.right))
         if not units.same(left.dimension, right.dimension):
             helps = Help("both must be of one dimension")
@@ -130,7 +132,7 @@ class Truths:
         return NumberComparison(expression, (left, right), Formulas.of(self.graph, [left.number, right.number]))
 
     def warn(self, found: Diagnostic) -> None:
-        """Called with what may be meant otherwise; nothing is done with it here."""
+        """Handle a possible misreading; ignored here."""
 
     def look_at(self, compared: NumberComparison, left: np.ndarray, right: np.ndarray, asked: np.ndarray) -> None:
-        """Called with the numbers of each comparison of a piece before it is decided."""
+        """Handle the numbers of each comparison of a piece before it is decided."""

@@ -1,4 +1,4 @@
-"""Arms: links with their inertia, joints with their frames, and whether they make a tree that could exist."""
+"""Arms: links with their inertia, joints with their frames, and the check that they form a tree."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class ResolvedArm:
 
 @frozen
 class SharedPart:
-    """A link or a joint in which nothing is wrong, resolved without a sweep.
+    """A link or a joint without mistakes, resolved without a sweep.
 
     parameters, auxiliary, known, not_sweepable  as a scope has them that holds nothing but this part
     names  what the `let`s that it is made of are worth
@@ -76,8 +76,7 @@ class SharedPart:
 
 @frozen
 class SharedArm:
-    """An arm in which nothing is wrong: what runs have in common of it, each but for the parts of which it varies
-    something.
+    """An arm without mistakes: the parts that runs share, each run except for the parts in which it varies something.
 
     parts  its links, then its joints, in the deck's order
     """
@@ -87,7 +86,8 @@ class SharedArm:
 
 
 def packed_arm(definitions: Definitions, name: str) -> bytes:
-    """The arm of a definition as runs share it, for `bring_arm`; nothing where it was not resolved, or cannot be."""
+    """The arm of a definition in the form shared by runs, for `bring_arm`; empty where it was not resolved, or cannot
+    be."""
     shared = definitions.memo.get(_memo_key(name))
     if isinstance(shared, bytes):
         return shared
@@ -96,7 +96,7 @@ def packed_arm(definitions: Definitions, name: str) -> bytes:
 
 
 def bring_arm(definitions: Definitions, name: str, packed: bytes) -> None:
-    """Have the runs of these definitions share an arm that was resolved before, of an equal definition."""
+    """Let the runs of these definitions share an arm that was resolved earlier, from an equal definition."""
     if packed:
         definitions.memo[_memo_key(name)] = packed
 
@@ -108,7 +108,7 @@ def _memo_key(name: str) -> tuple[str, str]:
 def resolve_arm(scope: Scope, definition: Definition) -> ResolvedArm | None:
     """The arm, with its numbers entered as parameters; None where its definition could not be merged.
 
-    Each link and joint is resolved once for all runs of the deck, but for those that set or vary something of it.
+    Each link and joint is resolved once for all runs of the deck, except those that set or vary something in it.
     """
     shared = _shared(scope, definition)
     if shared is None:
@@ -127,7 +127,7 @@ def _name(thing: Link | Joint) -> tuple[str, str]:
 
 
 def _take_over(scope: Scope, part: SharedPart) -> None:
-    """Enter a part in a scope as it is shared."""
+    """Enter a shared part in a scope."""
     scope.parameters |= part.parameters
     scope.auxiliary |= part.auxiliary
     for path, parameters in part.known.items():
@@ -138,7 +138,7 @@ def _take_over(scope: Scope, part: SharedPart) -> None:
 
 
 def _shared(scope: Scope, definition: Definition) -> SharedArm | None:
-    """The arm as all runs have it; None where something of it is wrong, or worth a remark."""
+    """The arm shared by all runs; None where it has a mistake, or a remark."""
     if scope.complaints.is_known_to_lack(definition.place):
         return None
     memo, key = scope.definitions.memo, _memo_key(definition.name)
@@ -151,7 +151,7 @@ def _shared(scope: Scope, definition: Definition) -> SharedArm | None:
 
 
 def _alone(scope: Scope, definition: Definition) -> SharedArm | None:
-    """The arm resolved by itself, each part in a scope of its own."""
+    """The arm resolved alone, each part in a scope of its own."""
     complaints, scopes = Complaints(), list[Scope]()
     definitions = scope.definitions.reporting_to(complaints)
 
@@ -174,7 +174,7 @@ def _alone(scope: Scope, definition: Definition) -> SharedArm | None:
 
 
 def _is_as_written(scope: Scope, shared: SharedPart) -> bool:
-    """True where no sweep and nothing set from outside changes a number of the part, or what one is made of."""
+    """True where neither a sweep nor a setting from outside changes a number of the part, or a name in one."""
     given = {*scope.varied, *scope.settings}
     if not given:
         return True
@@ -240,7 +240,7 @@ def _resolved(
 
 
 def check_arm(scope: Scope, definition: Definition) -> None:
-    """Report what is wrong with an arm by itself, without payloads."""
+    """Report the mistakes of an arm alone, without payloads."""
     arm = resolve_arm(scope, definition)
     if arm is not None and arm.free_of_errors:
         check_moved(scope, arm.links, arm.joints)
@@ -345,7 +345,7 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str,
 
 
 def _limits(scope: Scope, owner: Owner, body: MergedBlock) -> tuple[str, ...]:
-    """The names of the joint's limits that are written, with their numbers entered."""
+    """The names of the joint's written limits, with their numbers entered."""
     written = {wanted: item for wanted in JOINT_LIMITS if (item := body.get(wanted.name)) is not None}
     if owner.joint == "fixed":
         for wanted, item in written.items():
@@ -370,7 +370,7 @@ def _limits(scope: Scope, owner: Owner, body: MergedBlock) -> tuple[str, ...]:
 
 
 def _frame(scope: Scope, owner: Owner, kind: str, body: MergedBlock) -> None:
-    """The joint's frame as `at`, `rpy` and `axis` say."""
+    """The joint's frame from `at`, `rpy` and `axis`."""
     for wanted in (AT, RPY):
         scope.vector(owner, wanted, body.get(wanted.name))
     _axis(scope, owner, kind, body.get("axis"))
@@ -472,7 +472,7 @@ def _named_axis(value: Expression | None) -> tuple[float, float, float] | None:
 
 
 def check_tree(scope: Scope, name: str, links: list[Link], joints: list[Joint], *, complete: bool = True) -> None:
-    """Every link has one joint to its parent, and every chain of parents ends at the base.
+    """Check that every link has one joint to its parent, and every chain of parents ends at the base.
 
     complete  all joints are there; else a link without one says nothing
     """
@@ -524,5 +524,5 @@ def _complain_loop(scope: Scope, loop: list[Joint]) -> None:
 
 
 def _place(joint: Joint) -> Place:
-    assert joint.place is not None  # joints that come from a deck have one
+    assert joint.place is not None  # joints from a deck have one
     return joint.place

@@ -1,4 +1,4 @@
-"""Checks that links can be bodies: their inertia, and that whatever a joint moves has mass.
+"""Checks that links can be bodies: their inertia, and the mass that each joint moves.
 
 A link of `mass = 0 kg` is a frame: it has no inertia. Fixed to a body it is a place on it, between two joints it is
 where they meet. An inertia of zeros is a point's, one of 0 and two that are alike is a thin rod's, as the shape `rod`
@@ -25,8 +25,8 @@ from met.trace import Real
 def check_body(
     scope: Scope, owner: Owner, kind: str, name: str, item: Item | None, inertia: tuple[Real, ...], mass: Real | None
 ) -> None:
-    """The inertia is a body's, in every case. item: the inertia as written, None where it follows from a shape; kind:
-    what it is in words."""
+    """Check that the inertia is a body's, in every case. item: the inertia as written, None where it follows from a
+    shape; kind: in words"""
     helps = [
         f"inertia is about the centre of mass, in {kind} axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2",
         "products have the sign of -sum(m x y)",
@@ -54,7 +54,7 @@ def check_body(
 
 
 def _is_plainly_a_body(inertia: Sequence[Real], mass: Real | None) -> bool:
-    """True for numbers that no case varies, without products of inertia: their moments are what is written."""
+    """True for numbers that no case varies, without products of inertia: their moments are the written ones."""
     if not all(isinstance(each, float) and math.isfinite(each) for each in (*inertia, 1.0 if mass is None else mass)):
         return False
     least, middle, most = sorted(float(each) for each in inertia[:3])
@@ -62,12 +62,13 @@ def _is_plainly_a_body(inertia: Sequence[Real], mass: Real | None) -> bool:
 
 
 def written_elsewhere(scope: Scope, place: Place) -> bool:
-    """Return True if a place is in a file that an arm is made from: a deck can override it there, not change it."""
+    """Return True if a place is in a file from which an arm is made: a deck can override it, but not change it
+    there."""
     return any(source.name == place.file for source in scope.definitions.robot_files.sources)
 
 
 def _not_a_body(values: np.ndarray, kind: str) -> tuple[np.ndarray, list[str]]:
-    """The rows [n, 7], moments and mass, that are no rigid body's, as a mask, and why in words.
+    """The rows [n, 7], moments and mass, that no rigid body has, as a mask, and the reason in words.
 
     The tolerance, 1e-9 of the largest moment, is for rounding alone: published tables have ten digits at most. With a
     moment of 0 the other two are alike, for neither may be above the sum of 0 and the other.
@@ -97,8 +98,8 @@ def _not_a_body(values: np.ndarray, kind: str) -> tuple[np.ndarray, list[str]]:
 
 
 def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint], payloads: Sequence[Payload] = ()) -> None:
-    """Every joint that moves carries a link with mass, or a payload that is carried throughout, in every case; where
-    one does not, those behind it are not reported.
+    """Check that every moving joint carries a link with mass, or a permanent payload, in every case; behind one that
+    does not, none is reported.
 
     The joints make a tree.
     """
@@ -163,7 +164,7 @@ Loads = dict[str, list[tuple[str, Real]]]
 
 
 def carried_loads(scope: Scope, payloads: Sequence[Payload]) -> tuple[Loads, dict[str, list[str]]]:
-    """By link: path and mass of the payloads that it carries throughout, and labels for those that come or go."""
+    """By link: path and mass of its permanent payloads, and labels for those that come or go."""
     loads: Loads = {}
     passing: dict[str, list[str]] = {}
     for payload in payloads:

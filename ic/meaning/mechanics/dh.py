@@ -43,8 +43,8 @@ Three = tuple[Real, Real, Real]
 
 @frozen
 class JointFrame:
-    """A joint in a plan's words: origin (m) and turns about fixed x, y, z (rad) of the link's frame at q = 0, in the
-    parent's; the axis, a unit vector, and a point of it (m), both in the link's frame at q = 0."""
+    """The frame of a joint as in a plan: origin (m) and turns about fixed x, y, z (rad) of the link's frame at q = 0,
+    in the parent's; the axis, a unit vector, and a point of it (m), both in the link's frame at q = 0."""
 
     at: Three
     rpy: Three
@@ -75,7 +75,7 @@ CONVENTIONS: dict[str, Callable[[Real, Real, Real, Real], JointFrame]] = {"class
 
 
 def _turn(angle: Real) -> tuple[Real, Real]:
-    """Cosine and sine; 0 where that is meant."""
+    """Cosine and sine of an angle, with rounding noise at right angles set to 0."""
     if isinstance(angle, Scalar):
         return cos(angle), sin(angle)
     parts = (math.cos(angle), math.sin(angle))
@@ -83,7 +83,7 @@ def _turn(angle: Real) -> tuple[Real, Real]:
 
 
 def use_dh(scope: Scope, owner: Owner, kind: str, item: Item, body: MergedBlock) -> None:
-    """Enters the joint's frame from its Denavit-Hartenberg numbers, which are reached as `JOINT.dh.a`."""
+    """Enter the joint's frame from its Denavit-Hartenberg numbers, whose paths are `JOINT.dh.a` and so on."""
     _refuse_others(scope, owner, item, body)
     convention = _convention(scope, item)
     if convention is None:
@@ -109,7 +109,7 @@ def use_dh(scope: Scope, owner: Owner, kind: str, item: Item, body: MergedBlock)
 
 
 def _refuse_others(scope: Scope, owner: Owner, item: Item, body: MergedBlock) -> None:
-    """Report what says the joint's frame beside `dh`, and why what `dh` makes of it cannot vary by itself."""
+    """Report other entries for the joint's frame beside `dh`; and note why results of `dh` cannot vary directly."""
     for name in INSTEAD:
         other = body.get(name)
         if other is not None:
@@ -127,12 +127,12 @@ def _refuse_others(scope: Scope, owner: Owner, item: Item, body: MergedBlock) ->
 
 
 def _numbers(owner: Owner) -> list[str]:
-    """The paths of the numbers that a joint's `dh` is made of."""
+    """The paths of the numbers of a joint's `dh`."""
     return [owner.join(f"dh.{wanted.name}") for wanted in NUMBERS]
 
 
 def _convention(scope: Scope, item: Item) -> str | None:
-    """Name of the convention; None where it is none or its numbers have no names (already reported)."""
+    """Name of the convention; None where it is unknown or its numbers have no names (already reported)."""
     name = word_of(item.value)
     if name in CONVENTIONS:
         if isinstance(item.value, Call) and item.value.positional:

@@ -1,4 +1,4 @@
-"""Joints that other formats have and MET has not: what is said of them, and what to do."""
+"""Joints of other formats that MET does not have: their messages and remedies."""
 
 from __future__ import annotations
 

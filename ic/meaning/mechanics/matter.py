@@ -19,11 +19,11 @@ from met.trace import Real
 MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 Shape = tuple[str, tuple[tuple[str, float], ...]]
-"""A shape as a plan has it: kind, and numbers in SI."""
+"""A shape as in a plan: kind, and numbers in SI."""
 
 
 def use_matter(scope: Scope, owner: Owner, kind: str, name: str, body: MergedBlock) -> Shape | None:
-    """Mass, centre and inertia, entered as parameters and checked to be a body's; its shape, where it has one.
+    """Enter mass, centre and inertia as parameters, and check that they are a body's; returns its shape, if it has one.
 
     kind  what it is in words: "link" or "payload"
     """

@@ -102,7 +102,7 @@ def _payload(scope: Scope, item: Item, arm: ResolvedArm, taken: Collection[str])
 
 
 def _link(scope: Scope, owner: Owner, item: Item | None, arm: ResolvedArm) -> str | None:
-    """The link that carries it, as written; None where it is none of the arm's (already reported)."""
+    """The carrying link, as written; None where the arm has no such link (already reported)."""
     known = [BASE, *(link.name for link in arm.links if link.name != BASE)]
     if item is None:
         scope.complaints.missing(
@@ -132,7 +132,7 @@ def _link(scope: Scope, owner: Owner, item: Item | None, arm: ResolvedArm) -> st
 
 
 def _check_unused(scope: Scope, item: Item, body: MergedBlock, grappled: bool) -> None:
-    """Report what has no meaning for a payload that is held from the start, or that is caught where it flies."""
+    """Report entries without meaning for a payload that is held from the start, or that is caught in flight."""
     for name in ("rpy",) if grappled else tuple(each.name for each in FLIGHT):
         written = body.get(name)
         if written is None:
@@ -175,7 +175,7 @@ def _check_order(scope: Scope, item: Item, times: list[Real | None], place: Plac
 
 
 def _check_solid(scope: Scope, owner: Owner, payload: Payload, item: Item) -> None:
-    """Check that a payload that flies has mass, and resists a turn about every axis."""
+    """Check that a flying payload has mass, and inertia about every axis."""
     paths = [owner.join("mass"), *(owner.join(f"inertia.{entry}") for entry in INERTIA)]
     settled = [scope.parameters.get(path) for path in paths]
     if any(each is None or isinstance(each.value, str | tuple) for each in settled):
@@ -203,7 +203,7 @@ def _not_in_order(pairs: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 
 def _not_solid(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """The rows [n, 7], mass and moments, of bodies that cannot fly, as a mask, and why in words."""
+    """The rows [n, 7], mass and moments, of bodies that cannot fly, as a mask, and the reason in words."""
     mass, xx, yy, zz, xy, xz, yz = values.T
     least, _, most = np.linalg.eigvalsh(np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=-1).reshape(-1, 3, 3)).T
     bad = ~((mass > 0.0) & (least > 1e-9 * most))
@@ -215,7 +215,7 @@ def _not_solid(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 
 def _remark_time(scope: Scope, payload: Payload, event: str, time: float, structure: Structure, place: Place) -> None:
-    """Report events after the run's end, and times that are no instant of the dynamics."""
+    """Report events after the run's end, and times between the instants of the dynamics."""
     schedule = structure.schedule
     does = f"payload `{payload.name}` is {event}d"
     if time > schedule.duration:

@@ -13,9 +13,9 @@ OF_JOINT = (*JOINT.keys, "pivot")
 
 
 def in_run(definitions: Definitions, block: MergedBlock, item: Item, rates: tuple[str, ...]) -> list[str]:
-    """The remedy for a path that stands in a run's block as an entry; none where it names nothing that is known.
+    """The remedy for a path that stands in a run's block as an entry; none where it names nothing known.
 
-    block  the run's;  rates: the names of those that a run has
+    block the run's; rates: the names of a run's rates
     """
     joints, links, arm = _of_arm(definitions, block)
     value = spell(item.value) if item.value is not None else "..."
@@ -55,7 +55,7 @@ def in_arm(item: Item, known: list[str]) -> list[str]:
 
 
 def _write(item: Item, entry: str) -> Help:
-    """The help which says to write an entry in place of the item's, where that has a value to write there."""
+    """The help that says to write an entry in place of the item's, with its value if there is one."""
     return write(entry, where="entry") if item.value is not None and not item.appended else Help(f"write `{entry}`")
 
 
@@ -64,7 +64,7 @@ def _in_arm(arm: str, thing: str, key: str, value: str) -> list[str]:
 
 
 def _of_arm(definitions: Definitions, block: MergedBlock) -> tuple[list[str], list[str], str]:
-    """The joints, the links and the name of the run's arm; nothing where it has none."""
+    """The joints, the links and the name of the run's arm; empty where it has none."""
     named = block.get("arm")
     arm = definitions.of_kind("arm").get(word_of(named.value) or "") if named is not None else None
     body = definitions.block(arm) if arm is not None else None

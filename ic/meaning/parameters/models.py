@@ -1,4 +1,4 @@
-"""Uses of models checked against their declarations: keys, what is missing, units, ranges, words, lists."""
+"""Checks of uses of models against their declarations: keys, missing parameters, units, ranges, words, lists."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from met.parameter import Only, Parameter, is_present
 
 
 def word_of(expression: Expression | None) -> str | None:
-    """The one word that an expression is, or calls; None where it is something else."""
+    """The one word that an expression is, or calls; None for other expressions."""
     if isinstance(expression, Call):
         expression = expression.name
     if isinstance(expression, Name) and len(expression.path) == 1:
@@ -35,13 +35,13 @@ def value_place(item: Item) -> Place:
 
 
 def overriding_place(item: Item) -> Place | None:
-    """The place of the first entry of a block put upon an entry's value, of the block where it is empty; None where
-    there is none."""
+    """The place of the first entry of a block over an entry's value, of the block where it is empty; None where there
+    is none."""
     return next((each.place for each in item.body.items.values()), item.upon) if item.body is not None else None
 
 
 def words_chosen(parameters: Sequence[Parameter], body: MergedBlock) -> tuple[tuple[str, str], ...]:
-    """The words that a body writes for these parameters, defaults left out."""
+    """The words that a body writes for these parameters, without defaults."""
     found = ((each.name, word_written(each, body)) for each in parameters)
     defaults = {each.name: each.default for each in parameters}
     return tuple((name, word) for name, word in found if word != defaults[name])
@@ -57,7 +57,8 @@ def word_written(wanted: Parameter, body: MergedBlock) -> str:
 def _check_unused(
     scope: Scope, owner: Owner, wanted: Parameter, only: Only, body: MergedBlock, words: Mapping[str, str]
 ) -> None:
-    """Report a parameter that its word leaves out, unless that word was written over another, which may have had it."""
+    """Report a parameter that is absent under its word, unless that word was written over another, which may have had
+    it."""
     item, word = body.get(wanted.name), body.get(only[0])
     if item is None or (word is not None and word.overrides):
         return
@@ -73,7 +74,7 @@ def _check_unused(
 
 
 def refuse_values(scope: Scope, expression: Expression | None, names: Iterable[str]) -> bool:
-    """Report values without a name, of which nobody can say what they are for; return True if there are any."""
+    """Report values without a name, whose parameter is unknown; return True if there are any."""
     if not isinstance(expression, Call) or not expression.positional:
         return False
     name = word_of(expression)
@@ -91,9 +92,9 @@ def check_keys(
     owner: Owner,
     others: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
-    """Report every entry of the body that is none of the known plain keys, and note the key it was meant for.
+    """Report every entry of the body that is not a known plain key, and note the key that was probably meant.
 
-    others  what to say of keys one expects
+    others messages about keys one expects
     """
     known = list(known)
     for item in body.items.values():
@@ -209,7 +210,8 @@ def use_model(
 
 
 def body_of(scope: Scope, item: Item | None) -> MergedBlock:
-    """The block of an entry; an empty one where there is none, or a value in its place, which is reported."""
+    """The block of an entry; an empty one where there is none, or where a value stands in its place, which is
+    reported."""
     if item is None:
         return MergedBlock()
     if item.body is None or item.value is not None:

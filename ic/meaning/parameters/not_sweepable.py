@@ -1,4 +1,4 @@
-"""Why a path of a run cannot vary over numbers, nor be set by itself, and what to write instead: as data."""
+"""Reasons why a path of a run cannot vary over numbers, or be set alone, and the text to write instead, as data."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ class NotSweepable:
 
     @property
     def is_choice(self) -> bool:
-        """Return True if a sweep may choose among values of it, each of which makes a program of its own."""
+        """Return True if a sweep may choose among its values, each of which makes a program of its own."""
         return not self.sweep and not self.one_of
 
     def to_vary(self, path: str) -> str:
-        """The help for who would vary it."""
+        """The help for varying it."""
         if self.one_of:
             return f"it {self.reason}; vary {self.one_of}"
         return f"it {self.reason}: {self.sweep or f'write `vary {path} = [...];`'}"
 
     def to_set(self) -> str:
-        """The help for who would set it from the command line."""
+        """The help for setting it from the command line."""
         if self.one_of:
             return f"it {self.reason}; set {self.one_of}"
         return f"it {self.reason}: write it in the deck, with a `let` that can be set"
@@ -59,12 +59,12 @@ def several(paths: Sequence[str]) -> NotSweepable:
 
 
 def follows(other: str, paths: Sequence[str]) -> NotSweepable:
-    """The reason for a path that follows from another, which is made of numbers that have these paths."""
+    """The reason for a path that follows from another one, made of numbers with these paths."""
     return NotSweepable(f"follows from `{other}`", one_of=f"one of: {_listed(paths)}")
 
 
 def model(kind: str, path: str) -> NotSweepable:
-    """A model, `kind` in words, whose parameters vary."""
+    """The reason for a model, `kind` in words, whose parameters vary."""
     return NotSweepable(f"is {kind}", f"vary a parameter of it, `{path}.PARAMETER`")
 
 

@@ -1,4 +1,4 @@
-"""The owner of parameters, such as a joint's servo, and a parameter that is settled."""
+"""The owner of parameters, such as a joint's servo, and resolved parameters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ XYZ = ("x", "y", "z")
 
 @frozen
 class Owner:
-    """The thing that parameters belong to: in words, its place, and the first part of its parameters' paths.
+    """The owner of parameters: its name in words, its place, and the first part of its parameters' paths.
 
     homes    definitions under which a parameter that nobody wrote is reached
     local    first part of the path under a definition's name
@@ -40,7 +40,7 @@ class Owner:
     short: str = ""  # the parameter that a path may leave out: `environment.gravity.x` for `environment.gravity.g.x`
 
     def as_written_in(self, homes: Sequence[str]) -> Owner:
-        """The same for a value that the first of these definitions writes, and the others take over with `like`: its
+        """The owner of a value that the first of these definitions writes, and the others inherit with `like`: its
         label names the one that writes it."""
         label = self.label
         if homes and self.homes and homes[0] != self.homes[-1]:
@@ -86,7 +86,7 @@ class Settled:
     expression: Expression | None = None
 
     def __copy__(self) -> Settled:
-        """A copy, a third of the time that `copy` takes by itself: long arms have thousands."""
+        """A copy, in a third of the time of the default `copy`: long arms have thousands."""
         made = object.__new__(Settled)
         made.__dict__.update(self.__dict__)
         return made

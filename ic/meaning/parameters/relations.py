@@ -22,7 +22,7 @@ from met.plan import BASE
 def check_relations(
     scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: MergedBlock, values: Mapping[str, Any]
 ) -> None:
-    """Report parameters that do not go together; names of the arm apart, which `check_names` looks up."""
+    """Report parameters that contradict each other, except names of the arm, which `check_names` checks."""
     for wanted in parameters:
         value, place, path = values[wanted.name], _place(owner, body, wanted.name), owner.join(wanted.name)
         if wanted.direction:
@@ -96,7 +96,8 @@ def check_names(
 
 
 def no_direction(parts: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """The rows [n, 3] that point nowhere, or have a length that no double holds, as a mask, and why in words."""
+    """The rows [n, 3] without a direction, or with a length that no double holds, as a mask, and the reason in
+    words."""
     with np.errstate(over="ignore", under="ignore"):
         length = np.sqrt((parts * parts).sum(axis=1))
     return ~((length > 0.0) & (length < np.inf)), []

@@ -90,7 +90,7 @@ class Scope:
         self.evaluated_settings: dict[str, CommandLineValue | None] = {}
 
     def note_rate(self, code: str, figure: float, case: int) -> None:
-        """Notes a figure that a servo or a sensor gives for itself, and the case that has it."""
+        """Note a figure of a servo or a sensor for itself, and its case."""
         before, cases = self.declared_rates.get(code, (0.0, ()))
         known = self.checks.case_of(case)
         if known is not None:
@@ -101,7 +101,8 @@ class Scope:
         return self.parameters.get(path) or self.auxiliary.get(path)
 
     def depends_on_failed(self, path: str) -> bool:
-        """Return True if nothing can be said of this path, because what it leads to has failed (already reported)."""
+        """Return True if this path cannot be judged, since something that it depends on has failed (already
+        reported)."""
         first, *rest = self.definitions.split(path)
         thing = (rest or [""])[0] if first in ("links", "payloads") else first
         if self.checks.touches_failed(path) or thing in self.failed_parts:
@@ -120,7 +121,7 @@ class Scope:
         value: Value | None = None,
         record: bool = True,
     ) -> Real | None:
-        """The parameter's number; None where it could not be had (already reported).
+        """The parameter's number; None where there is a mistake (already reported).
 
         expression, value  what to take in place of the item's expression
         """
@@ -292,20 +293,21 @@ class Scope:
                 return None
             word = named
             place = place_of(item.value) if item.value else item.place
-            origin = written_origin(place, item.overrides)  # a word is no name that stands for something
+            origin = written_origin(place, item.overrides)  # a word is not a name for a value
         kept = self.parameters if record else self.auxiliary
         kept[path] = Settled(word, "", origin, wanted.doc, item.value if item else None)
         return word
 
     def keep_in_deck(self, path: str, value: str, item: Item) -> None:
-        """Keeps a setting that the deck alone writes, neither a sweep nor `--set`."""
+        """Keep a setting that only the deck writes, neither a sweep nor `--set`."""
         self.keep_setting(path, value, item=item)
         self.not_sweepable[path] = not_sweepable.COMPILED_ALONE
 
     def keep_setting(
         self, path: str, value: Real | str, unit: str = "", item: Item | None = None, note: str = ""
     ) -> None:
-        """Keeps, for who asks where it comes from, what decides the program; item: who wrote it, None for a default."""
+        """Keep a setting that decides the program, for questions about its origin; item: its entry, None for a
+        default."""
         origin = Origin("default", note=note)
         if item is not None:
             place = item.place if item.value is None else place_of(item.value)
@@ -313,8 +315,7 @@ class Scope:
         self.auxiliary[path] = Settled(value, unit, origin, "", item.value if item is not None else None)
 
     def replace_values(self, values: Mapping[str, Real], item: Item) -> None:
-        """Put values in place of settled ones, each made of all that the item writes: what varies one, varies
-        all."""
+        """Replace settled values, each made from the whole item: what varies one, varies all."""
         for path, value in values.items():
             settled = self.parameters[path]
             settled.value = self._plain(value)
@@ -334,7 +335,8 @@ class Scope:
         return self._finish(owner, wanted, name, owner.homes, self._plain(value), origin, owner.place, True)
 
     def copied(self, owner: Owner, wanted: Parameter, of: str, over: Real | None = None) -> Real | None:
-        """A parameter that is another's, of this path, unless a sweep varies it itself; None where the other failed.
+        """A parameter that copies another one, of this path, unless a sweep varies it itself; None where the other
+        failed.
 
         over  a scale: the parameter is then the other's value over it
         """
@@ -370,7 +372,7 @@ class Scope:
         return value
 
     def keep_derived(self, path: str, value: Real, unit: str, item: Item, note: str) -> None:
-        """Keeps a parameter that an item makes of numbers of its own, which are varied in its stead."""
+        """Keep a parameter that an item computes from its own numbers, which vary in its place."""
         place = item.place if item.value is None else place_of(item.value)
         self.parameters[path] = Settled(self._plain(value), unit, Origin("derived", place, item.overrides, note), note)
 
@@ -415,7 +417,7 @@ class Scope:
         removed = self.removed.get(owner.join(wanted.name))
         lacks = removed or owner.place
         if any(self.complaints.is_known_to_lack(place, wanted.name) for place in (lacks, *bases)):
-            return  # already reported: of another use, or of a base, or another word was taken for it
+            return  # already reported: in another use, or in a base, or another word was taken for it
         unit = owner.unit(wanted)[0]
         shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
         shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {unit}"
@@ -525,7 +527,7 @@ class Scope:
         return value
 
     def _check_instead(self, owner: Owner, wanted: Parameter, value: Value, path: str) -> None:
-        """Report a value of the wrong dimension in place of the deck's; path: what has failed then."""
+        """Report a value of the wrong dimension that replaces the deck's; path: the path that has then failed"""
         try:
             self.value_checks.dimension(owner, wanted, value)
         except Problem as problem:
@@ -533,7 +535,7 @@ class Scope:
             self.checks.fail(path)
 
     def _given(self, paths: Iterable[str]) -> list[CommandLineValue]:
-        """The numbers that the run and `--set` give for a parameter of these paths; several where several are set."""
+        """The numbers that the run and `--set` give for a parameter with these paths; several where several are set."""
         found = [path for path in paths if path in self.settings] if self.settings else []
         found.sort(key=lambda path: is_on_command_line(self.settings[path].place))
         for path in found:
@@ -566,14 +568,15 @@ class Scope:
         return [f"or give `{named[1]}` its own `{name}`, which `{named[0]}` does not reach"] if len(named) > 1 else []
 
     def _plain(self, number: Real) -> Real:
-        """A recorded number that turned out to be a constant is one."""
+        """A recorded number as a plain one, if it is constant."""
         if isinstance(number, Scalar):
             known = self.graph.value(number.ref)
             return number if known is None else known
         return float(number)
 
     def quantities(self, *, auxiliary: bool = False) -> tuple[dict[str, Any], list[Scalar]]:
-        """The parameters as a plan holds them, and the scalars of its formulas, in order. auxiliary: the others too."""
+        """The parameters in a plan's form, and the scalars of its formulas, in order. auxiliary: including auxiliary
+        ones"""
         from met.plan import Formula
 
         outputs: list[Scalar] = []
@@ -587,7 +590,7 @@ class Scope:
         return made, outputs
 
     def _origin(self, item: Item, place: Place) -> Origin:
-        """The origin of what an item writes; of a cell of a table with its line and column in the file."""
+        """The origin of an item's value; for a cell of a table with its line and column in the file."""
         name = self.definitions.in_full(item.value) if isinstance(item.value, Name) else None
         note = f"from `{name.text}`" if name is not None else ""
         cells = self.names.cells.get(name.text, ()) if name is not None else ()
@@ -597,5 +600,5 @@ class Scope:
 
 @lru_cache(maxsize=1024)
 def _derived_parameter(name: str, unit: str, doc: str) -> Parameter:
-    """The declaration of a parameter that follows from others: of a hundred links they are the same."""
+    """The declaration of a derived parameter: for a hundred links they are the same."""
     return Parameter(name=name, unit=unit, doc=doc)

@@ -58,7 +58,7 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Merged
 
 
 def report_named_lists(scope: Scope, owner: Owner, lists: list[Parameter], body: MergedBlock) -> bool:
-    """Report a file's name that stands where a list should; return True if one does."""
+    """Report a file's name in place of a list; return True if there is one."""
     found = False
     for each in lists:
         item = body.get(each.name)
@@ -91,7 +91,8 @@ def named_file(owner: Owner, item: Item) -> String:
 def keep_column(
     scope: Scope, owner: Owner, wanted: Parameter, table: CsvTable, column: CsvColumn, label: Label
 ) -> tuple[float, ...]:
-    """A column as the model's list, entered in the scope. Raises Problem D193, D194, D195. label: who wants it."""
+    """A column as the model's list, entered in the scope. Raises Problem D193, D194, D195. label: the part that needs
+    it"""
     text, dimension = owner.unit(wanted)
     numbers = table.numbers(column, text, dimension, label)
     if column.name == TIME:
@@ -104,7 +105,7 @@ def keep_column(
 
 
 def _alike(scope: Scope, owner: Owner, column: CsvColumn, by_column: Mapping[str, Parameter]) -> list[str]:
-    """The columns that this one could be by its unit; all of them where it has none, or one that cannot be read."""
+    """The columns that this one may be, judged by its unit; all of them where it has none, or an unreadable one."""
     try:
         meant = parse_unit(column.unit or "").dimension
     except (ValueError, OverflowError, ZeroDivisionError):

@@ -1,4 +1,4 @@
-"""A value against the parameter that it is for: its dimension, its range, and units that may mean something else."""
+"""Checks of a value against its parameter: its dimension, its range, and units that may mean something else."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class ValueChecks:
     joint_kinds: Mapping[str, set[str]]
 
     def dimension(self, owner: Owner, wanted: Parameter, value: Value) -> None:
-        """Raises D060 for a bare number where there is a dimension, D061 for a wrong one."""
+        """Raise D060 for a bare number where a dimension is needed, D061 for a wrong one."""
         text, dimension = owner.unit(wanted)
         if units.same(value.dimension, dimension):
             self._remark_cycles(owner, wanted, value, text)
@@ -186,7 +186,7 @@ class ValueChecks:
         )
 
     def _of_another_command(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> list[str]:
-        """The remedy where a course's parameter has the unit that it has under another kind of command."""
+        """The remedy where a course's parameter has the unit of another kind of command."""
         if owner.command is None:
             return []
         fits = [
@@ -206,7 +206,7 @@ class ValueChecks:
         ]
 
     def _remark_cycles(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> None:
-        """Report a unit that may mean cycles where radians count, or the reverse."""
+        """Report a unit that may mean cycles in place of radians, or the reverse."""
         if wanted.ticks:
             return
         found = ambiguous_unit(value, text, measure_here(wanted.unit, owner.joint, owner.command, owner.of))
@@ -220,7 +220,7 @@ class ValueChecks:
             )
 
     def _remark_share(self, owner: Owner, wanted: Parameter, value: Value) -> None:
-        """Report a bare number above 1 where a share is meant, which may have been meant in per cent."""
+        """Report a bare number above 1 in place of a share, which may have been meant in per cent."""
         if not wanted.share or not value.bare:
             return
         number = value.number
@@ -244,7 +244,7 @@ class ValueChecks:
         )
 
     def _other(self, owner: Owner, wanted: Parameter, value: Value) -> list[str]:
-        """The one optional parameter of the model that a number with this unit may be meant for."""
+        """The one optional parameter of the model for which a number with this unit may be meant."""
         found = [
             each
             for each in owner.others
@@ -258,7 +258,7 @@ class ValueChecks:
         return [f"`{found[0].name}` is what is in {owner.unit(found[0])[0]}: {found[0].doc}"]
 
     def _of_its_own(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> str:
-        """The remedy where a value is right for the other joints of its servo definition, which move otherwise."""
+        """The remedy where a value fits the other joints of its servo definition, which move differently."""
         other: JointKind = "revolute" if owner.joint == "prismatic" else "prismatic"
         both = [home for home in owner.homes if other in self.joint_kinds.get(home, ())]
         if not both or not units.same(value.dimension, unit_here(wanted.unit, other, owner.command, owner.of)[1]):
@@ -276,7 +276,7 @@ class ValueChecks:
 
 
 def _one_unit_for_all(written: Iterable[str]) -> Help:
-    """The help for a list of bare numbers, which a unit behind its bracket is for."""
+    """The help for a list of bare numbers that needs a unit after its bracket."""
     shown = either(f"[...] {each}" for each in written)
     changes = (TextChange(f" {each}", where="behind") for each in written)
     return Help(f"write {shown}: a unit after the bracket is for all of them", *changes)

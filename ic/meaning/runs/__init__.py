@@ -1,1 +1,1 @@
-"""Runs resolved, each to an experiment of a plan."""
+"""Resolution of runs, each to an experiment of a plan."""

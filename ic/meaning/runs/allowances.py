@@ -19,7 +19,7 @@ ALLOW = "allow"
 def allowances_of(
     definitions: Definitions, run: Definition, complaints: Complaints, sweep: Definition | None = None
 ) -> tuple[Allowance, ...]:
-    """The allowances of a run, or of a sweep of it: a reason of its own takes the place of that of its base."""
+    """The allowances of a run, or of a sweep of it: its own reason replaces that of its base."""
     runs = definitions.of_kind("run")
     bodies = [runs[name].group.body for name in definitions.homes(run)[:-1]]
     bodies += [run.group.body, *([sweep.group.body] if sweep is not None else [])]
@@ -30,7 +30,7 @@ def allowances_of(
 
 
 def _read(body: Iterable[Entry], complaints: Complaints) -> dict[str, Allowance]:
-    """The allowances of the statements of one block, by code; reports each that is wrong, or there twice."""
+    """The allowances in the statements of one block, by code; wrong ones and duplicates are reported."""
     found: dict[str, Allowance] = {}
     for entry in body:
         if not isinstance(entry, Statement) or entry.words[0].text != ALLOW:
@@ -65,7 +65,7 @@ def places_of(allowances: Iterable[Allowance]) -> Mapping[str, Place]:
 
 
 def silence_of_all(allowances: Sequence[tuple[Allowance, ...]], complaints: Complaints) -> None:
-    """Leave out the warnings that are of no single run, such as of a macro, and that all experiments allow.
+    """Leave out warnings that belong to no single run, such as about a macro, if all experiments allow them.
 
     allowances  of each experiment
     """
@@ -82,7 +82,7 @@ def silence_of_all(allowances: Sequence[tuple[Allowance, ...]], complaints: Comp
 def allowed_warnings(
     experiments: Iterable[Experiment], complaints: Complaints
 ) -> tuple[tuple[Diagnostic, Allowance], ...]:
-    """The warnings that are not given, each with what allows it."""
+    """The suppressed warnings, each with its allowance."""
     found = {each.place: each for experiment in experiments for each in experiment.allowances}
     return tuple((warning, found[place]) for warning, place in complaints.allowed.items() if place in found)
 
@@ -90,8 +90,8 @@ def allowed_warnings(
 def warn_of_unneeded(
     definitions: Definitions, checked: Iterable[Definition], experiments: Iterable[Experiment], complaints: Complaints
 ) -> None:
-    """Warn of each `allow` that silenced nothing, where that is certain: the deck itself writes it, no file that it
-    includes, and every run and sweep that it is in force for was checked, those that have it from a base, too."""
+    """Warn about each `allow` that silenced nothing, where that is certain: the deck itself writes it, no included
+    file, and every run and sweep for which it holds was checked, including those that inherit it."""
     unneeded = {
         allowance.place: allowance.code
         for experiment in experiments
@@ -121,7 +121,7 @@ def warn_of_unneeded(
 
 
 def _with_parts(definitions: Definitions, checked: Iterable[Definition]) -> set[str]:
-    """The names of these runs and sweeps, and of those that they are made of."""
+    """The names of these runs and sweeps, including their parts."""
     names: set[str] = set()
     waiting = list(checked)
     while waiting:

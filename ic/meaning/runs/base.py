@@ -1,4 +1,4 @@
-"""The base of a run: fixed, prescribed component by component, or free; and that what a run says goes with that."""
+"""The base of a run: fixed, prescribed component by component, or free; and consistency checks with the run."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ DOCS = {
     "rate": "angular velocity of the base at the start, world axes",
 }
 OTHERS = ("rate", "position", "acceleration", "torque", "force")
-"""Kinds of command, which stand in servos."""
+"""Kinds of command, which belong in servos."""
 NOTHING = (0.0, 0.0, 0.0)
 
 
 def resolve_base(scope: Scope, item: Item | None, arm: ResolvedArm) -> tuple[Base | None, ResolvedArm]:
-    """The base, None where it is fixed or failed (already reported); and the arm, which has it for a link where
-    it moves."""
+    """The base, None where it is fixed or failed (already reported); and the arm, with the base as a link where it
+    moves."""
     scope.not_sweepable[BASE] = not_sweepable.chosen("write `vary base = [fixed, free];`")
     kind = word_of(item.value) if item is not None and item.value is not None else None
     if item is None:
@@ -71,7 +71,7 @@ def resolve_base(scope: Scope, item: Item | None, arm: ResolvedArm) -> tuple[Bas
 def check_base(
     scope: Scope, base: Base | None, structure: Structure, environment: MergedBlock, item: Item | None
 ) -> None:
-    """Report what does not go with the base: a turn without velocity products, a free base without mass."""
+    """Report conflicts with the base: a turn without velocity products, a free base without mass."""
     off = environment.get("velocity_products")
     if base is not None and base.turns and not structure.velocity_products and off is not None and item is not None:
         what = "a free base" if base.kind == "free" else "a base that turns"
@@ -114,7 +114,7 @@ def initial_base(scope: Scope, body: MergedBlock, base: Base | None) -> None:
         wanted = Parameter(name=name, unit=unit, shape="vector", default=NOTHING, doc=DOCS[name])
         if base is not None and base.kind == "free":
             place = item.place if item is not None else base.place
-            assert place is not None  # a base that moves comes from a deck
+            assert place is not None  # a moving base comes from a deck
             scope.vector(Owner("the base", place, f"initial.{BASE}"), wanted, item)
         elif item is not None:
             message = "a fixed base stays at the world's origin"
@@ -127,7 +127,7 @@ def initial_base(scope: Scope, body: MergedBlock, base: Base | None) -> None:
 
 
 def fixed_to(arm: ResolvedArm, payloads: Sequence[Payload]) -> dict[str, str]:
-    """For each link and payload, the body that it is fixed to for good: a link that moves, or the base."""
+    """For each link and payload, the body to which it is permanently fixed: a moving link, or the base."""
     held = {joint.child: joint.parent for joint in arm.joints if joint.kind == "fixed"}
     held |= {payload.name: payload.link for payload in payloads if not payload.flies}
     found = {}
@@ -148,7 +148,7 @@ def remark_ground(
     values: Mapping[str, Any],
     payloads: Sequence[Payload],
 ) -> None:
-    """Report an environment model that acts upon links none of which yields to it."""
+    """Report an environment model that acts only on links that cannot move."""
     if environment.pushed_links is None or (base is not None and base.kind == "free"):
         return
     keys = environment.pushed_links(SimpleNamespace(**values))
@@ -172,7 +172,7 @@ def remark_ground(
 
 
 def _standing(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:
-    """The arm with its base among the links: without matter, where the arm does not say more."""
+    """The arm with its base among the links: without mass, unless the arm gives it some."""
     if any(link.name == BASE for link in arm.links) or BASE in arm.failed:
         return arm
     owner = Owner(f"link `{BASE}`", item.place, f"links.{BASE}")
@@ -246,7 +246,7 @@ def _course(scope: Scope, item: Item) -> str | None:
 
 
 def _check_jumps(scope: Scope, item: Item, model: str, place: Place) -> None:
-    """A base does not jump; where its rate does, the impulse on the arm is left out, with a warning."""
+    """Check that a base does not jump; where its rate does, the impulse on the arm is left out, with a warning."""
     profile, head = models.find("command", model, place), f"{BASE}.{item.name}."
     values = {path.removeprefix(head): each.value for path, each in scope.parameters.items() if path.startswith(head)}
     words: Mapping[str, object] = {name: value for name, value in values.items() if isinstance(value, str)}
@@ -273,7 +273,7 @@ def _check_jumps(scope: Scope, item: Item, model: str, place: Place) -> None:
 
 
 def _smooth() -> Iterable[str]:
-    """Courses that are known never to jump, with the word that says so where one does."""
+    """Courses that never jump, with the word for that where one has it."""
     found = []
     for name, each in models.find_own("command").items():
         words = [(p.name, word) for p in each.parameters for word in p.words]

@@ -1,4 +1,4 @@
-"""The environment of a run: its models, their parameters, and what of them does nothing."""
+"""The environment of a run: its models and their parameters, with warnings about models without effect."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def _environment_use(
     known = {"joint": [joint.name for joint in arm.moving], "link": bodies}
     named = check_names(scope, owner, environment.parameters, body, arm=arm.name, known=known, failed=failed)
     about = next((named[p.name] for p in environment.parameters if p.names == "joint" and p.name in named), None)
-    if about is not None:  # what the unit words `joint` and `effort` mean
+    if about is not None:  # the meaning of the unit words `joint` and `effort`
         kinds = {joint.name: joint.kind for joint in arm.moving}
         if about not in kinds:  # already reported: without its joint, nothing can be said of the model's units
             check_keys(scope, body, [each.name for each in environment.written], owner)

@@ -1,4 +1,4 @@
-"""Expressions of signals: numbers and conditions that a run computes of its channels, of one joint or of every joint.
+"""Expressions of signals: numbers and conditions that a run computes from its channels, of one joint or of every joint.
 
 A condition has a margin, at least 0 where it holds: `a < b` has b - a, `and` the least margin of its parts, `or` the
 greatest, `not` the margin's opposite. This is the robustness of signal temporal logic (met/metrics/always.py names the
@@ -67,7 +67,7 @@ def resolve_signals(scope: Scope, block: MergedBlock, structure: Structure, name
 
 
 def watched(block: MergedBlock) -> list[Expression | None]:
-    """The expressions that the metrics of a run are to watch, as written."""
+    """The expressions for the metrics of a run to watch, as written."""
     bodies = (item.body.get("of") for item in block.of_kind("metric") if item.body is not None)
     return [of.value for of in bodies if of is not None]
 
@@ -90,7 +90,7 @@ class ChannelTable:
         self._values: dict[str, Value] = {}
 
     def enter(self, path: str, item: Item) -> None:
-        """Take in the signal that an item of a run declares."""
+        """Enter the signal that an item of a run declares."""
         expression = item.value
         if expression is None or item.detail or item.body is not None:
             helps = f"write `signal {item.name} = EXPRESSION;`, such as `shoulder.qd - shoulder.servo.command`"
@@ -111,7 +111,7 @@ class ChannelTable:
         self.scope.keep_setting(path, made.text, item=item)
 
     def number(self, expression: Expression, metric: Metric) -> SignalExpression:
-        """The number that a metric watches: of several joints the one that it declares of them."""
+        """The number that a metric watches; for several joints, the one that the metric declares."""
         expression_of = self._expanded(expression)
         joints = self._joints(expression_of)
         if not joints:
@@ -134,7 +134,7 @@ class ChannelTable:
         return self._made(f"{metric.over_joints.word}({spell(expression)})", value, expression)
 
     def condition(self, expression: Expression, metric: Metric) -> SignalExpression:
-        """The margin of a condition: of several joints what the metric declares of theirs."""
+        """The margin of a condition; for several joints, the one that the metric declares."""
         expression_of, name = self._expanded(expression), spell(expression)
         joints = self._joints(expression_of)
         margins = [self._margin(_of_joint(expression_of, joint)) for joint in joints]
@@ -187,7 +187,7 @@ class ChannelTable:
         return made
 
     def _find(self, name: Name) -> Value | ValueList:
-        """The value of a name: a channel, a signal, a parameter of the run, then what any expression may name."""
+        """The value of a name: a channel, a signal, a parameter of the run, or a name that any expression may use."""
         scope = self.scope
         if name.text in self._values:
             return self._values[name.text]
@@ -267,7 +267,7 @@ class ChannelTable:
         return Call(expression.name, tuple(arguments), expression.named, expression.body, expression.place)
 
     def _joints(self, expression: Expression) -> Sequence[str]:
-        """The joints that an expression of every joint is of: those that have all its channels; () of any other."""
+        """The joints of an expression over every joint: those with all its channels; () for other expressions."""
         wild = [name for name in _names(expression) if name.path[0].text == EVERY_JOINT]
         if not wild:
             return ()
@@ -298,7 +298,7 @@ def is_over_time(expression: Expression) -> bool:
 
 
 def _joined(left: ConditionMargin, right: ConditionMargin, least: bool, place: Place) -> ConditionMargin:
-    """The margin of two conditions of which both hold (least), or one."""
+    """The margin of two conditions of which both must hold (least), or one."""
     choose = minimum if least else maximum
     mixed = left.mixed or right.mixed
     if not mixed and units.same(left.dimension, right.dimension):
@@ -308,7 +308,7 @@ def _joined(left: ConditionMargin, right: ConditionMargin, least: bool, place: P
 
 
 def _truth(margin: Real) -> Real:
-    """1 where a condition holds, -1 where it does not; not a number where its margin is none."""
+    """1 where a condition holds, -1 where it does not; not-a-number where its margin is."""
     return where(margin >= 0.0, 1.0, where(margin < 0.0, -1.0, margin))
 
 
@@ -321,7 +321,7 @@ def _names(expression: Expression) -> Iterator[Name]:
 
 
 def _of_joint(expression: Expression, joint: str) -> Expression:
-    """An expression of every joint, of this one."""
+    """An expression over every joint, for this one."""
     if isinstance(expression, Name) and expression.path[0].text == EVERY_JOINT:
         return Name((Word(joint, expression.path[0].place), *expression.path[1:]), expression.place)
     return mapped(expression, lambda part: _of_joint(part, joint))

@@ -25,7 +25,7 @@ from met.plan import Joint
 
 COMMAND: Final = "command"
 KINDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({"q": ("position",), "qd": ("position", "rate")})
-"""The kinds of command that say where a joint begins (q), and how fast (qd)."""
+"""The kinds of command that determine a joint's initial position (q), and rate (qd)."""
 
 _UNITS: Final = MappingProxyType({"revolute": {"q": "rad", "qd": "rad/s"}, "prismatic": {"q": "m", "qd": "m/s"}})
 
@@ -37,7 +37,7 @@ def is_from_command(scope: Scope, item: Item | None) -> bool:
 
 
 def value_of_command(scope: Scope, owner: Owner, wanted: Parameter, item: Item, use: Use | None) -> Value | None:
-    """The initial value that a command gives; None where its parameters failed, or it gives none (`gives`)."""
+    """The initial value from a command; None where its parameters failed, or it gives none (`gives`)."""
     assert item.value is not None
     if use is None or use.command is None or not gives(use, wanted.name):
         return None
@@ -55,19 +55,19 @@ def value_of_command(scope: Scope, owner: Owner, wanted: Parameter, item: Item, 
 
 
 def gives(use: Use | None, name: str) -> bool:
-    """Return True if the joint's own command says its initial value of this name, `q` or `qd`."""
+    """Return True if the joint's own command determines its initial value of this name, `q` or `qd`."""
     return use is not None and use.command is not None and not use.command.guide and use.command.kind in KINDS[name]
 
 
 def _command_is_lost(scope: Scope, use: Use | None) -> bool:
-    """Return True if the joint's servo has a command that is wrong (already reported)."""
+    """Return True if the joint's servo has a faulty command (already reported)."""
     servo = scope.definitions.of_kind("servo").get(use.definition) if use is not None and use.command is None else None
     block = scope.definitions.block(servo) if servo is not None else None
     return block is not None and block.get(COMMAND) is not None
 
 
 def report_others(scope: Scope, name: str, item: Item, joints: Iterable[Joint], uses: Mapping[str, Use]) -> None:
-    """Reports joints for which the deck asks an initial value of commands that have none to give."""
+    """Report joints for which the deck asks an initial value from commands that have none."""
     others = [
         joint
         for joint in joints

@@ -22,7 +22,7 @@ from met.units import PURE
 
 
 def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Sequence[Use]) -> None:
-    """Settle the initial state of all joints. uses: their servos, whose commands it may be taken from."""
+    """Settle the initial state of all joints. uses: their servos, whose commands may give it"""
     servos = {use.joint: use for use in uses}
     known = dict.fromkeys(("q", "qd"), "")
     known |= {f"{joint.name}.{name}": "" for joint in arm.moving for name in ("q", "qd")}
@@ -88,7 +88,7 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
 
 
 def check_balanced(scope: Scope, item: Item | None, uses: Sequence[Use], balanced: bool) -> None:
-    """Warn where servos are to begin balanced and none of them can. item: who wrote it."""
+    """Warn where servos should begin balanced and none of them can. item: the entry that asks for it"""
     if balanced and item is not None and not any(use.servo.balance for use in uses):
         able = [name for name, model in models.available("servo").items() if model.balance]
         scope.complaints.remark(
@@ -100,7 +100,8 @@ def check_balanced(scope: Scope, item: Item | None, uses: Sequence[Use], balance
 
 
 def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: ResolvedArm) -> bool:
-    """Return True, with an error, if the value for all joints lacks this joint's unit, as others move otherwise."""
+    """Return True, with an error, if the value for all joints lacks this joint's unit, since others move
+    differently."""
     if len({joint.kind for joint in arm.moving}) < 2:
         return False
     with scope.complaints.gather():

@@ -1,4 +1,4 @@
-"""Keys of a run that a plan keeps as one word or number each: read by their declarations, one like the other."""
+"""Keys of a run that a plan keeps as one word or number each, all read by their declarations."""
 
 from __future__ import annotations
 

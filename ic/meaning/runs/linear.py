@@ -29,7 +29,7 @@ from met.trace import Scalar
 ONE_INSTANT = NotSweepable("is one for the whole sweep", "write a `linear` block for each instant")
 
 EQUILIBRIUM = "equilibrium"
-"""The word for an arm that stands still, in place of an instant."""
+"""The word for an arm at rest, in place of an instant."""
 
 NO_PLACE = "no servo here has a computer that ticks: a law that is continuous is a part of the arm"
 
@@ -132,7 +132,7 @@ def _position(scope: Scope, owner: Owner, joint: Joint, value: Value) -> float:
 
 
 def _names(scope: Scope, item: Item, key: str) -> Iterator[Name]:
-    """The names that an entry lists: one, or several in brackets, and those that `+=` adds."""
+    """The names in an entry: one, or several in brackets, including those added by `+=`."""
     for expression in (item.value, *item.appended):
         for each in expression.items if isinstance(expression, List) else (expression,):
             if isinstance(each, Name):
@@ -144,7 +144,7 @@ def _names(scope: Scope, item: Item, key: str) -> Iterator[Name]:
 
 
 def _is_known(scope: Scope, name: Name, key: str, structure: Structure, known: Mapping[str, InputSignal]) -> bool:
-    """Return True if this is a signal of the kind that a key takes; report it otherwise."""
+    """Return True if this is a signal of the kind that a key takes; otherwise it is reported."""
     failed = scope.failed_servos | scope.failed_parts
     if failed and (name.path[0].text in failed or "servo" in (word.text for word in name.path)):
         return False

@@ -1,4 +1,4 @@
-"""The metrics of a run: their models, what they watch, their parameters."""
+"""The metrics of a run: their models, watched channels, and parameters."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from met.plan.linear_uses import FIGURES
 def resolve_metrics(
     scope: Scope, block: MergedBlock, signals: ChannelTable
 ) -> tuple[tuple[MetricUse, ...], tuple[SignalExpression, ...]]:
-    """The metrics that are gathered as the run goes, and the expressions that they watch, which are no channels of the
-    run so far."""
+    """The metrics that are computed during the run, and the watched expressions that are not yet channels of the
+    run."""
     made: dict[str, SignalExpression] = {}
     own = (item for item in block.of_kind("metric") if not is_figure_metric(item))
     found = (_metric(scope, item, signals, made) for item in own)

@@ -60,7 +60,7 @@ def metrics_over_time(scope: Scope, block: MergedBlock) -> tuple[MergedBlock, Ma
 
 
 def _check_name(block: MergedBlock, statement: Statement) -> None:
-    """Raises D040 where a metric has the requirement's name."""
+    """Raise D040 where a metric has the requirement's name."""
     metric = block.get(f"metric {statement.name.text}") if statement.name is not None else None
     if metric is not None and statement.name is not None:
         message = f"`{metric.name}` is a metric, and a requirement"
@@ -69,7 +69,7 @@ def _check_name(block: MergedBlock, statement: Statement) -> None:
 
 
 def _with_metrics(expression: Expression, statement: Statement, metric_of: MetricOf) -> Expression:
-    """The expression with names in the place of calls of metrics; itself where there is none."""
+    """The expression with names in place of calls of metrics; unchanged where there are none."""
     if isinstance(expression, Call) and (is_over_time(expression) or is_figure(expression)):
         return metric_of(statement, expression)
     made = mapped(expression, lambda part: _with_metrics(part, statement, metric_of))
@@ -77,7 +77,7 @@ def _with_metrics(expression: Expression, statement: Statement, metric_of: Metri
 
 
 def _of_figure(call: Call) -> str:
-    """The name of the linear answers that a figure is of. Raises D376 where it is not written as it has to be."""
+    """The name of a figure's linear answers. Raises D376 for other forms."""
     of = call.positional[0] if len(call.positional) == 1 else None
     if not isinstance(of, Name) or len(of.path) > 1 or call.named or call.body is not None:
         message = f"`{call.name.text}` takes the name of a `linear` block"
@@ -95,7 +95,7 @@ def _figure_metric(name: str, call: Call, statement: Statement) -> Item:
 
 
 def _metric(name: str, call: Call, statement: Statement) -> Item:
-    """The metric of a call. Raises D355 where it is not written as it has to be."""
+    """The metric of a call. Raises D355 for other forms."""
     metric: Metric = models.find("metric", call.name.text)
     order = ["of", *(each.name for each in metric.parameters if each.default is None)]
     if not call.positional or len(call.positional) > len(order):

@@ -1,4 +1,4 @@
-"""The rates of a run, and the schedule that they make."""
+"""The rates of a run, and their schedule."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from met import models
 from met.diagnostic import Help, Label, did_you_mean, write
 from met.plan import Schedule
 
-ANY_RATE = 1000  # Hz, where the deck's could not be had
+ANY_RATE = 1000  # Hz, where the deck's rate has a mistake
 
 
 def resolve_rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate]:
@@ -62,7 +62,7 @@ def resolve_rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate
 
 
 def _add(rates: Item, entry: str, text: str = "") -> Help:
-    """The help to add an entry to `rates`: where these are a base's, a run has blocks of its own for that."""
+    """The help to add an entry to `rates`, or where these are a base's, a block of the run's own."""
     text = text or f"write `{entry}`"
     return write(entry, text, where="inside") if len(rates.homes) == 1 else Help(text)
 
@@ -76,7 +76,8 @@ def resolve_schedule(
     ticking: Sequence[Ticking],
     duration: float | None,
 ) -> tuple[Schedule, dict[str, Ticks], dict[str, int]]:
-    """The schedule, when each servo's law acts, and base ticks a tick of guides and of links' sensors, by path."""
+    """The schedule, the ticks of each servo's law, and the base ticks between ticks of guides and of links' sensors, by
+    path."""
     dynamics = rates.get("dynamics")
     rates_item = block.get("rates")
     body = rates_item.body if rates_item is not None else None

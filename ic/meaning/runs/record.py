@@ -1,4 +1,4 @@
-"""The channels that a run records; what is said of a name that is none."""
+"""The channels that a run records, and messages about unknown names."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from met.plan import Recorded, Structure
 from met.plan.channel import FAMILIES, Channel, carries, recordable
 
 COMPUTED = (Binary, Call, Unary, WithUnit)
-"""Expressions that a signal could be."""
+"""Expressions that could be a signal."""
 
 OF_SERVO = frozenset({"servo", "bed", "law"})
 """Heads of channels that a joint has only with a servo, or with its motor on a bed."""
@@ -45,7 +45,7 @@ def resolve_record(
     names = {name.text for name in asked}
     known = recordable(structure, known=channels, wanted=names)
     if not names <= known.keys():
-        known = recordable(structure, known=channels)  # what may have been meant
+        known = recordable(structure, known=channels)  # for suggestions
     found: dict[str, tuple[Recorded, Place]] = {}
     for name in asked:
         made = known.get(name.text)
@@ -74,7 +74,7 @@ def resolve_record(
 
 
 def names_in_record(item: Item | None) -> list[str]:
-    """The names that a record has, as far as it is a list of names."""
+    """The names in a record, as far as it is a list of names."""
     lists = [] if item is None else [item.value, *item.appended]
     return [name.text for each in lists if isinstance(each, List) for name in each.items if isinstance(name, Name)]
 
@@ -116,8 +116,8 @@ def _names(scope: Scope, item: Item, expression: Expression | None) -> Iterator[
 
 
 def nearest_channels(name: Name, known: dict[str, tuple[Recorded, ...]], structure: Structure) -> list[str]:
-    """Why there is none; or what was meant, and what there is: of the same joint or link, else of all; vectors and
-    families as a whole."""
+    """The remedy for an unknown channel: why there is none, or similar channels of the same joint or link, else of all;
+    vectors and families as a whole."""
     why = _why_none([word.text for word in name.path], structure)
     if why:
         return [why]
@@ -152,8 +152,7 @@ def _did_you_mean(name: Name, near: str) -> Help:
 
 
 def _why_none(words: list[str], structure: Structure) -> str:
-    """Why a fixed joint has no channel, a servo not this one, and a joint none of a link that it does not carry; ""
-    where that is not it."""
+    """The reason why a fixed joint, a servo or a joint has no such channel; "" where that is not the cause."""
     if words[0] in {joint.name for joint in structure.joints if joint.kind == "fixed"}:
         return (
             f"joint `{words[0]}` is fixed: its two links move as one body, and nothing is computed between them; "
@@ -171,7 +170,7 @@ def _why_none(words: list[str], structure: Structure) -> str:
 
 
 def _under_a_word(words: list[str], structure: Structure) -> str:
-    """Under which word of its model a servo would have this channel; "" where under none."""
+    """The word of its model under which a servo would have this channel; "" where there is none."""
     for use in structure.servos:
         model = models.find("servo", use.model, use.place)
         parts = (part for group in models.HELD for part in getattr(model, group, ()) if part.name == words[-1])
@@ -183,7 +182,7 @@ def _under_a_word(words: list[str], structure: Structure) -> str:
 
 
 def not_one(name: Name, structure: Structure) -> tuple[str, list[str]]:
-    """The message and remedies for a name that is no single channel: which ones it stands for, or what was meant."""
+    """The message and remedies for a name of several channels: the channels, or a similar name."""
     known = recordable(structure, [name.text])
     if name.text not in known:
         return f"no channel `{name.text}`", nearest_channels(name, known, structure)

@@ -31,8 +31,8 @@ from met.trace import Scalar
 SHARE = Parameter(name="share", unit="1", doc="the share of all cases", share=True, above=0.0, at_most=1.0)
 CONFIDENCE = Parameter(name="confidence", unit="1", doc="the confidence", share=True, above=0.0, below=1.0)
 PERCENTILE = "percentile"
-"""The function that may stand in a metric's place: `percentile(volts, 99 %) < 40 V` says the same as `volts < 40 V in
-99 % of cases`, and `percentile(volts, 1 %) > 3 V` as `volts > 3 V in 99 % of cases`."""
+"""The function that may replace a metric: `percentile(volts, 99 %) < 40 V` means the same as `volts < 40 V in 99 % of
+cases`, and `percentile(volts, 1 %) > 3 V` as `volts > 3 V in 99 % of cases`."""
 
 
 @frozen
@@ -146,7 +146,7 @@ def _is_metric(expression: Expression, metrics: set[str]) -> bool:
 
 
 def _write(statement: Statement, requirement: str) -> Help:
-    """The help which says to write this requirement in place of a statement."""
+    """The help that says to write this requirement in place of a statement."""
     name = f" {statement.name.text}:" if statement.name is not None else ""
     return write(f"require{name} {requirement};", f"write `require {requirement};`", where="entry")
 
@@ -176,7 +176,7 @@ def _of_percentile(scope: Scope, call: Expression, share: Expression | None) -> 
 
 
 def share_metrics(structure: Structure) -> set[str]:
-    """The metrics that are a share of something, such as an overshoot."""
+    """The metrics that are a share of a quantity, such as an overshoot."""
     return {use.name for use in structure.metrics if models.find("metric", use.model, use.place).share}
 
 
@@ -235,7 +235,7 @@ def _owner(each: WrittenRequirement, what: str) -> Owner:
 
 
 def _constant(scope: Scope, owner: Owner, wanted: Parameter, expression: Expression) -> float | None:
-    """The number of an expression of a requirement, SI; None where it is none or varies (reported)."""
+    """The number of an expression of a requirement, SI; None where it is not a number or varies (reported)."""
     item = Item("", wanted.name, (), expression, None, place_of(expression))
     number = scope.number(owner, wanted, item, record=False)
     if isinstance(number, Scalar):

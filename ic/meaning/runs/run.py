@@ -1,4 +1,5 @@
-"""A run resolved: arm, servos, environment, initial state, schedule, metrics and record, in SI, ready for a plan."""
+"""Resolution of a run: arm, servos, environment, initial state, schedule, metrics and record, in SI, ready for a
+plan."""
 
 from __future__ import annotations
 
@@ -80,7 +81,7 @@ class Resolved:
 
 
 def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
-    """The run; None where something of it is wrong (already reported)."""
+    """The run; None where it has a mistake (already reported)."""
     block = scope.definitions.block(definition)
     if block is None:
         return None
@@ -123,7 +124,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         check_rest(scope, use)
         check_start(scope, use)
     schedule, ticks, others = resolve_schedule(scope, run, block, rates, uses, [*guides, *sensors], duration)
-    # else a mistake in one of them is reported: checks that depend on it are left out, all others are made
+    # else a part has a mistake: checks that depend on it are left out, all others are made
     known = integrator is not None and "dynamics" in rates
     integrator = integrator or models.find_own("integrator")["modified_euler"]
     check_ticks(scope, substitutions, ticks, schedule)
@@ -151,7 +152,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         for use in uses
     )
     structure = Structure(
-        arm=arm.name.rpartition(".")[2],  # as its own deck calls it, whoever uses that
+        arm=arm.name.rpartition(".")[2],  # as its own deck calls it
         links=arm.links,
         joints=arm.joints,
         servos=servos,
@@ -205,7 +206,7 @@ def _check_steps(
     integrator: Any,
     dynamics: Rate,
 ) -> None:
-    """Check that the integrator's steps can follow what servos and sensors declare of themselves.
+    """Check that the integrator's steps can follow the declared rate constants of servos and sensors.
 
     on_beds  joints whose motor is on a bed, and so no part of the step
     """
@@ -230,7 +231,7 @@ def _check_steps(
 def _keep_settings(
     scope: Scope, block: MergedBlock, arm: ResolvedArm, integrator: Any, rates: Mapping[str, Rate], schedule: Schedule
 ) -> None:
-    """Keep a run's settings for `met explain`; `Scope.constant` and `Scope.word` have kept some."""
+    """Keep a run's settings for `met explain`, besides those kept by `Scope.constant` and `Scope.word`."""
     scope.keep_setting("arm", arm.name, item=block.get("arm"))
     scope.keep_setting("integrator", integrator.name, item=block.get("integrator"))
     if "rates.base" not in scope.auxiliary:

@@ -1,4 +1,5 @@
-"""Limits on errors by the step: `require step_error(settle) < 1 %;`, beside the requirements on metrics themselves."""
+"""Limits on errors due to the step: `require step_error(settle) < 1 %;`, beside the requirements on metrics
+themselves."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ from met.trace import Scalar
 from met.units import PURE
 
 FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
-"""What a comparison is, read from the right."""
+"""Comparisons with their sides exchanged."""
 
 STEP_ERROR = "step_error"
 

@@ -91,7 +91,7 @@ def _tolerance(scope: Scope, item: Item, structure: Structure, known: dict[str, 
 
 
 def _nearest(item: Item, structure: Structure, known: dict[str, tuple[str, ...]]) -> list[str]:
-    """The remedy for a tolerance of something unknown: how it is written, or what was meant."""
+    """The remedy for a tolerance of an unknown quantity: the syntax, or a similar name."""
     name = item.name
     found = recordable(structure).get(name, ())
     variables = [each.name for each in found]
