@@ -1,11 +1,11 @@
-"""A deck checked definition by definition, for an editor: what each one means, without the audit of programs.
+"""Checks of a deck, definition by definition, for an editor, without the audit of programs.
 
-Each arm, each servo, and each run or sweep is checked by itself, so its findings follow from what it can see: its own
-entries, those that it is like or of, arms, servos and `let`s, each with its places. Their digest is the findings' key.
-Who keeps findings under their keys, and brings them along next time, need not have them found again; nothing says
-when they are out of date, since another text has another key.
+Each arm, each servo, and each run or sweep is checked by itself, so its findings depend only on what it can see: its
+own entries, those that it is like or of, arms, servos and `let`s, each with its places. Their digest is the findings'
+key. Findings that are kept under their keys are reused in the next check; they never expire, since another text has
+another key.
 
-What takes a program to be built (`DeckSource.audited`) is left to `ic.driver.compile.check`, which decides in the end.
+Checks that need a program (`DeckSource.audited`) are left to `ic.driver.compile.check`, whose verdict is final.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ class KnownFindings:
 
 
 Known = Mapping[bytes, KnownFindings]
-"""Findings by the digest of all that they follow from."""
+"""Findings by the digest of everything that they depend on."""
 
 Check = Callable[[Definitions, Complaints], tuple[tuple[Allowance, ...], ...]]
 
 
 class DefinitionChecks:
-    """The checks of a deck's definitions: those that are known already at once, the others one by one."""
+    """The checks of a deck's definitions: known findings at once, the others one by one."""
 
     def __init__(self, deck: Deck, known: Known) -> None:
         self._deck = deck
@@ -72,11 +72,11 @@ class DefinitionChecks:
 
     @property
     def to_come(self) -> int:
-        """The number of definitions of which nothing is known yet."""
+        """The number of definitions without findings yet."""
         return len(self._waiting)
 
     def check_next(self) -> None:
-        """Check one of them."""
+        """Check one more definition."""
         n = self._waiting.pop(0)
         complaints = self._complaints.apart()
         allowances: tuple[tuple[Allowance, ...], ...] = ()
@@ -93,13 +93,13 @@ class DefinitionChecks:
 
     @property
     def findings(self) -> Known:
-        """The findings to be brought along next time. Nothing where files are looked for whose texts no key has."""
+        """The findings to keep for the next check. Empty where files are searched whose texts are in no key."""
         if self._definitions.csv_files.asked or self._definitions.robot_files.asked:
             return {}
         return {key: self._found[n] for n, key in enumerate(self._keys) if key is not None and n in self._found}
 
     def diagnostics(self) -> tuple[tuple[Diagnostic, ...], Mapping[str, str]]:
-        """All that is found so far, in the order of the text, and every file's text by name."""
+        """All findings so far, in the order of the text, and every file's text by name."""
         complaints = self._complaints.copied()
         found = [self._found[n] for n in range(len(self._units)) if n in self._found]
         for each in found:
@@ -112,7 +112,7 @@ class DefinitionChecks:
         return in_order(complaints.all, sources), {source.name: source.text for source in sources}
 
     def _check_names(self) -> None:
-        """Check what is no definition's own: `let`s, `param`s, and how definitions are merged."""
+        """Check `let`s, `param`s, and the merging of definitions, which belong to no single definition."""
         complaints, definitions = self._complaints, self._definitions
         try:
             with complaints.gather():
@@ -129,7 +129,7 @@ class DefinitionChecks:
             )
 
     def _all(self) -> Iterator[tuple[Definition, Check]]:
-        """Every definition that is checked, with its check, in the order in which `met check` has them."""
+        """Every definition with its check, in the order of `met check`."""
         definitions = self._definitions
         for kind in EXPERIMENTS:
             for definition in definitions.of_kind(kind).values():
@@ -167,7 +167,7 @@ def _servo(definition: Definition, definitions: Definitions, complaints: Complai
 
 
 class _Keys:
-    """Digests of all that a definition's findings follow from."""
+    """Digests of everything on which a definition's findings depend."""
 
     def __init__(self, deck: Deck, definitions: Definitions, complaints: Complaints) -> None:
         self._known = {name: each for kind in EXPERIMENTS for name, each in definitions.of_kind(kind).items()}
@@ -195,7 +195,7 @@ class _Keys:
         }
 
     def of(self, definition: Definition) -> bytes | None:
-        """The digest; None where it is not known what all it follows from."""
+        """The digest; None where its dependences are not all known."""
         seen: dict[int, bytes] = {}
         waiting = [definition]
         while waiting:
@@ -220,7 +220,7 @@ class _Keys:
 
 
 def _chooses_macros(entries: Iterable[Entry]) -> bool:
-    """True for a sweep over macros, which reads the deck again: of the text that is left out then nothing is known."""
+    """True for a sweep over macros, which reads the deck again: then nothing is known about text that is left out."""
     return any(
         any(word.text == "macro" for word in getattr(each, "words", ()))
         or (isinstance(each, Group) and _chooses_macros(each.body))

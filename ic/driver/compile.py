@@ -1,4 +1,4 @@
-"""Compiles a deck to a plan: the runs and sweeps that were asked for, each as an experiment."""
+"""Compilation of a deck to a plan: the requested runs and sweeps, each as an experiment."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ TOO_DEEP = error("D078", "this deck's values are nested too deeply", help="build
 class Compiled:
     """A plan, None where an error stands in its way; all diagnostics, warnings too; every file's text by name.
 
-    allowed  the warnings that are not among the diagnostics, for a run allows them, each with what does
+    allowed  the warnings that are not among the diagnostics, since a run allows them, each with the allowing entry
     units    those that the deck declares
     """
 
     plan: Plan | None
     diagnostics: tuple[Diagnostic, ...]
     sources: Mapping[str, str] = field(default_factory=dict)
-    scopes: tuple[Scope, ...] = field(default=(), repr=False)  # one for each experiment: what `explain` looks into
+    scopes: tuple[Scope, ...] = field(default=(), repr=False)  # one for each experiment, for `explain`
     allowed: tuple[tuple[Diagnostic, Allowance], ...] = ()
     units: Mapping[str, Measure] = field(default_factory=dict)
 
@@ -149,7 +149,7 @@ def compile_deck(
         source.effects.report(complaints, [definition.name for definition in asked])
         blocks = [definitions.block(definition) for definition in definitions.of_kind("run").values()]
         loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
-        for arm in definitions.of_kind("arm").values():  # with a payload its joints may move what has mass
+        for arm in definitions.of_kind("arm").values():  # with a payload its joints may move a mass
             (resolve_arm if loaded else check_arm)(Scope(definitions, complaints), arm)
         for name in definitions.of_kind("servo"):
             with complaints.gather():
@@ -184,7 +184,7 @@ def compile_deck(
 
 
 def _remark_unused_rows(definitions: Definitions, scopes: Iterable[Scope], complaints: Complaints) -> None:
-    """Warn of rows of tables that no run uses, of tables of which the deck says that all are to be used."""
+    """Warn about rows of tables that no run uses, in tables whose deck says that all should be used."""
     used = {path for scope in scopes for path in scope.names.cells}
     for name, let in definitions.lets.items():
         found = definitions.row_table(let.value).unused(name, used) if is_row_table(let.value) else None
@@ -193,7 +193,7 @@ def _remark_unused_rows(definitions: Definitions, scopes: Iterable[Scope], compl
 
 
 def _with_settings(deck: Deck, settings: Sequence[str], complaints: Complaints) -> tuple[Deck, tuple[Setting, ...]]:
-    """The deck with the text of what is set among its sources, and the entries of that; wrong ones are reported."""
+    """The deck with the text of its settings among its sources, and their entries; wrong ones are reported."""
     if not settings:
         return deck, ()
     before = "".join(source.text for source in deck.sources if source.name == COMMAND_LINE)

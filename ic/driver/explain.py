@@ -1,4 +1,4 @@
-"""The origin of a value: who wrote it, what it overrode, through which macros and names it came."""
+"""The origin of a value: who wrote it, what it overrode, and the macros and names that it came through."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from met.plan import Experiment, Formula, Origin, Quantity
 from met.plan.columns import FormulaColumn, span
 from met.trace import Formulas, Scalar
 
-DEEPEST = 16  # names behind names that are followed
+DEEPEST = 16  # depth to which names in names are followed
 
 
 @frozen
@@ -82,7 +82,7 @@ def explain(
 
 
 def with_all_settings(compiled: Compiled, number: int = 0) -> Experiment:
-    """An experiment of a deck, with settings and what parameters are made of as if these were parameters."""
+    """An experiment of a deck, with its settings and the names in its values as if these were parameters."""
     assert compiled.plan is not None
     experiment, scope = compiled.plan.experiments[number], compiled.scopes[number]
     parameters, outputs = scope.quantities(auxiliary=True)
@@ -100,7 +100,7 @@ def with_all_settings(compiled: Compiled, number: int = 0) -> Experiment:
 
 
 def explanations_of(compiled: Compiled, target: str) -> Iterator[Explanation]:
-    """The explanations of a deck that is compiled."""
+    """The explanations of a compiled deck."""
     assert compiled.plan is not None
     for experiment, scope in zip(compiled.plan.experiments, compiled.scopes, strict=True):
         paths = dict.fromkeys((target, *scope.known.get(target, ())))
@@ -118,7 +118,7 @@ def explanations_of(compiled: Compiled, target: str) -> Iterator[Explanation]:
 
 
 def _let(scope: Scope, name: str) -> Settled | None:
-    """A `let` as if it were a parameter; None where it is none, or no number or list of numbers."""
+    """A `let` as if it were a parameter; None where it is not one, or is neither a number nor a list of numbers."""
     let = scope.definitions.lets.get(name)
     if let is None:
         return _cells(scope, name)
@@ -139,7 +139,7 @@ def _let(scope: Scope, name: str) -> Settled | None:
 
 
 def _cells(scope: Scope, path: str) -> Settled | None:
-    """The value of a table by row name that the run asked for, `bodies.boom.mass`; None where it asked for none."""
+    """The value of a table by row name that the run requested, `bodies.boom.mass`; None where it requested none."""
     cells, table = scope.names.cells.get(path), scope.names.row_table(scope.definitions.split(path)[0])
     if cells is None or table is None:
         return None
@@ -175,7 +175,7 @@ def _explanation(experiment: Experiment, scope: Scope, path: str, settled: Settl
 
 
 def _names(scope: Scope, expression: Expression) -> Iterator[Label]:
-    """Every let that the expression uses, and what those use, with what it was written as."""
+    """Every let that the expression uses, and those that these use, with their expressions."""
     seen: set[str] = set()
     level = [expression]
     for _ in range(DEEPEST):

@@ -1,7 +1,7 @@
-"""A run whose parameters get their values from outside, for many cases at once: as if a sweep of the deck varied them.
+"""A run whose parameters get values from outside, for many cases at once, as if a sweep of the deck varied them.
 
-`GivenRun` is of one run; `vary` compiles it as a sweep over some paths. The experiment that comes of it has one case;
-the same program runs any others, whose values are checked by `VariedRun.errors` as those of a sweep are.
+`GivenRun` is of one run; `vary` compiles it as a sweep over some paths. The resulting experiment has one case; the same
+program runs any others, whose values are checked by `VariedRun.errors` like those of a sweep.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from met.unit_parser import parse_unit
 from met.units import Measure, same
 
 GIVEN = "(given)"
-"""The name of the text, in messages, that varies what is given."""
+"""The name, in messages, of the text that varies the given values."""
 
 VARY = "vary "
-"""What stands before a path in it."""
+"""Prefix of a path in that text."""
 
 
 @frozen
@@ -53,19 +53,19 @@ class VariedRun:
     sources: Mapping[str, str]
 
     def check(self, columns: Mapping[str, CaseValues], count: int) -> None:
-        """Raise Problem where one of so many cases has a value that its parameter cannot have. columns: SI, by path."""
+        """Raise Problem where one of `count` cases has a value that its parameter cannot have. columns: SI, by path"""
         found = () if self.checks is None else self.checks.errors(columns, count)
         if found:
             raise Problem(found, self.sources)
 
     def broken(self, columns: Mapping[str, np.ndarray], count: int) -> np.ndarray:
-        """For each of so many cases whether `check` refuses it, [n]."""
+        """A truth for each of `count` cases: whether `check` refuses it, [n]."""
         return np.zeros(count, bool) if self.checks is None else self.checks.broken(columns, count)
 
 
 @frozen
 class GivenRun:
-    """A run of a deck, compiled once as the deck has it, and again for each set of paths that are given.
+    """A run of a deck, compiled once unchanged, and again for each set of given paths.
 
     settings  `PATH=VALUE`, as of `--set`
     """
@@ -78,18 +78,18 @@ class GivenRun:
 
     @property
     def experiment(self) -> Experiment:
-        """The run as the deck has it."""
+        """The run as in the deck."""
         assert self.compiled.plan is not None
         return self.compiled.plan.experiments[0]
 
     def unit(self, path: str) -> str | None:
-        """The SI unit of what a path sets, `gearbox.kp` or a `let`; None where it sets nothing, "" for a word."""
+        """The SI unit of a path's value, `gearbox.kp` or a `let`; None for an unknown path, "" for a word."""
         found = next(explanations_of(self.compiled, path), None)
         return None if found is None else found.unit if not isinstance(found.value, str) else ""
 
     def written_in(self, path: str) -> tuple[str, Measure]:
-        """The unit in which the deck writes a parameter, the first of its dimension in its value or in the `let`s that
-        stand there; its SI unit where there is none."""
+        """The unit in which the deck writes a parameter: the first of its dimension in its value or in the `let`s that
+        occur there; its SI unit where there is none."""
         (scope,) = self.compiled.scopes
         settled = scope.settled(path)
         si = "1" if settled is None else settled.unit
@@ -108,8 +108,8 @@ class GivenRun:
         return si, wanted
 
     def vary_most(self, values: Mapping[str, tuple[float | str, str]]) -> tuple[VariedRun, tuple[str, ...]]:
-        """The run over as many of these paths as can vary together, and those that are left out, for they have no
-        effect, or decide the program. Raises Problem where the deck has a mistake."""
+        """The run over as many of these paths as can vary together, and those left out, since they have no effect, or
+        decide the program. Raises Problem where the deck has a mistake."""
         kept: dict[str, tuple[float | str, str]] = {}
         run = VariedRun(self.experiment, None, self.compiled.sources)
         waiting = [dict(values)]
@@ -132,7 +132,7 @@ class GivenRun:
         return run, tuple(path for path in values if path not in kept)
 
     def sets(self, path: str) -> bool:
-        """True where the settings have just this path."""
+        """True where the settings contain exactly this path."""
         return any(_path(each) == path for each in self.settings)
 
     def vary(
@@ -149,7 +149,7 @@ class GivenRun:
         """
         if not values and repeat == 1:
             return VariedRun(self.experiment, None, self.compiled.sources)
-        words = {**self._set_around(values), **(words or {})}  # a `--set` of what is varied within would be refused
+        words = {**self._set_around(values), **(words or {})}  # a `--set` around a varied path is refused
         settings = [each for each in self.settings if _path(each) not in (*words, *values)]
         name = f"{self.name}_given"
         while name in _names(self.deck):
@@ -179,7 +179,7 @@ class GivenRun:
         return VariedRun(experiment, scope.checks.of_other_cases(), compiled.sources)
 
     def _set_around(self, values: Iterable[str]) -> dict[str, str]:
-        """The settings of what these paths are parts of, by path: a command, of which the value is given."""
+        """The settings of things of which these paths are parts, by path: a command with one of its values given."""
         return {
             _path(each): each.partition("=")[2]
             for each in self.settings
@@ -210,7 +210,7 @@ def _given(deck: Deck, name: str, defines: tuple[str, ...], settings: tuple[str,
 
 
 def _name_of(definitions: Definitions, run: str | None, deck: Deck) -> str:
-    """The name of the run that is asked for. Raises Problem E433 where it is a sweep, or none can be told."""
+    """The name of the requested run. Raises Problem E433 where it is a sweep, or there is no unique one."""
     runs, sweeps = definitions.of_kind("run"), definitions.of_kind("sweep")
     sources = {source.name: source.text for source in deck.sources}
     if run is None:
@@ -255,13 +255,13 @@ def _errors(compiled: Compiled) -> list[Diagnostic]:
 
 
 def _names(deck: Deck) -> set[str]:
-    """All that a definition of the deck may be called."""
+    """All names of the deck's definitions."""
     return {word.text for entry in deck.entries for word in (*getattr(entry, "words", ()), *getattr(entry, "path", ()))}
 
 
 def _sweep(head: str, varied: Iterable[tuple[str, float | str, str]], repeat: int) -> str:
-    """The text of a sweep over paths with these values and units. What a caller gave stands in lines of its own, as
-    messages show lines; `VARY`, which is not his, `_shown` takes out."""
+    """The text of a sweep over paths with these values and units. A caller's texts are on lines of their own, since
+    messages show lines; `_shown` removes `VARY`, which is not the caller's."""
     lines = [f"sweep {head} {{"]
     for path, value, unit in varied:
         shown = value if isinstance(value, str) else repr(value)
@@ -271,12 +271,12 @@ def _sweep(head: str, varied: Iterable[tuple[str, float | str, str]], repeat: in
 
 
 def _shown(text: str) -> str:
-    """The text of such a sweep as messages show it, each word at its place."""
+    """The text of such a sweep for messages, each word at its place."""
     return re.sub(f"^{VARY}", " " * len(VARY), text, flags=re.MULTILINE)
 
 
 def _without_parts(errors: Sequence[Diagnostic], words: Mapping[str, str], text: str) -> list[Diagnostic]:
-    """The errors without those of values that are parts of a word that has one itself: they follow from it."""
+    """The errors without those of values that are parts of a word with an error of its own, from which they follow."""
     lines = _shown(text).split("\n")
 
     def line(found: Diagnostic) -> str:
@@ -295,7 +295,7 @@ def _given_paths(errors: Iterable[Diagnostic], values: Mapping[str, tuple[float 
 
 
 def _entries(text: str) -> tuple[Entry, ...]:
-    """The entries of a text that needs no preprocessor. Raises Problem."""
+    """The entries of a text without preprocessor lines. Raises Problem."""
     source = Text(GIVEN, text)
     tokens = [token for line in logical_lines(source) for token in line if token.kind != SPACE]
     entries, found = parse([*tokens, Token(END, "", source, len(text.rstrip()), 1)])

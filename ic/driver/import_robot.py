@@ -24,7 +24,7 @@ Mimic = Literal["free", "fixed"]
 
 
 def import_robot(path: str, mimic: Mimic | None = None) -> str:
-    """The deck's text. mimic: what joints that follow others do instead. Raises Problem, with the file's text."""
+    """The text of the deck. mimic: treatment of joints that follow others. Raises Problem, with the file's text."""
     files = Files()
     try:
         found = FoundFile(path, os.path.normpath(path))
@@ -44,7 +44,7 @@ def import_robot(path: str, mimic: Mimic | None = None) -> str:
 
 
 def without_mimics(robot: Robot, mimic: Mimic) -> Robot:
-    """The robot with joints that follow others let go, or fixed where they are at 0; `print_deck` says which."""
+    """The robot with the joints that follow others freed, or fixed where they are at 0; `print_deck` names them."""
 
     def changed(joint: Joint) -> Joint:
         if joint.mimic is None:
@@ -56,7 +56,7 @@ def without_mimics(robot: Robot, mimic: Mimic) -> Robot:
 
 
 def _check(made: ArmEntries) -> None:
-    """Raises Problem where the arm of these entries is none."""
+    """Raise Problem where these entries do not make an arm."""
     place = made.robot.root.name.place
     words = (Word("arm", place), Word(arm_name(made), place))
     complaints = Complaints()

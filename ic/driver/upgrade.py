@@ -1,9 +1,9 @@
 """`met fmt --upgrade`: decks rewritten to the latest edition of the language, and the proof that they mean the same.
 
-What edition 1 warns of (D392) gets the brackets that mean the same in both, and the file its line `deck 2;`. That is a
-guess until it is proved: every deck has the same tree before and after, and all its runs and sweeps have the same plans
-and keys. A file that is no deck by itself is proved by those that include it. What cannot be proved stays as it is, and
-so does a file that a deck beside it, which nobody named, would take for something else.
+Texts about which edition 1 warns (D392) get brackets that mean the same in both editions, and the file its line `deck
+2;`. The result counts only once it is proved: every deck has the same tree before and after, and all its runs and
+sweeps have the same plans and keys. A file that is not a deck alone is proved by decks that include it. A file without
+a proof is not changed, and neither is one that an unnamed deck beside it would read differently.
 """
 
 from __future__ import annotations
@@ -31,29 +31,31 @@ from met.plan.columns import ComputedColumn
 from met.plan.keys import case_ids, inputs, structure_key
 
 CODE = "D392"
-"""The warning of what the next edition reads otherwise; the first change of its help means the same in both."""
+"""The warning about text that the next edition reads differently; the first change of its help means the same in
+both."""
 
 DECK = ".ic"
 
 MOST_BESIDE = 1_000
-"""Decks beside those to be upgraded that are looked into."""
+"""Largest number of decks beside those to be upgraded that are read."""
 
 _INCLUDED = re.compile(r'^[ \t]*(?:#[ \t]*include|use)\b[ \t]*["<]([^">\n]+)[">]', re.MULTILINE)
 
 MOST_ROWS = 10_000
-"""Rows of a case table that are compared at either end; all of it follows from the tree, which is compared whole."""
+"""Number of rows of a case table that are compared at either end; all of it follows from the tree, which is compared
+whole."""
 
 
 @frozen
 class Upgrades:
-    """The new texts of files, by path, and of those that stay as they are why."""
+    """The new texts of files, by path, and the reasons why others are not changed."""
 
     texts: Mapping[str, str]
     refused: Mapping[str, Problem]
 
 
 def upgrades(paths: Sequence[str]) -> Upgrades:
-    """The texts that `met fmt --upgrade` makes of these files, but of those of the latest edition."""
+    """The texts that `met fmt --upgrade` makes of these files, without those of the latest edition."""
     found: dict[str, str] = {}
     before: dict[str, Compiled] = {}
     refused: dict[str, Problem] = {}
@@ -105,7 +107,7 @@ def _compiled(path: str, unsaved: Unsaved = NOTHING_UNSAVED) -> Compiled:
 def _decks_beside(reals: Iterable[str], named: Collection[str]) -> Iterator[str]:
     """The decks that include files by name, also through others, and are not among those that are named.
 
-    Looked for in the files' folders and in those around and inside of these.
+    The files' folders and those around and inside of these are searched.
     """
     folders = {os.path.dirname(each) for each in reals}
     around = sorted({*folders, *map(os.path.dirname, folders), *(each for f in folders for each in _folders_in(f))})
@@ -185,7 +187,8 @@ def _depends_on_its_decks(text: str) -> bool:
 
 
 def _difference(path: str, before: Compiled, new: Mapping[str, str], parts: str = "") -> Problem | None:
-    """Why a deck with these texts is not what it was; None where it is. parts: the files it is about, if not all."""
+    """The reason why a deck with these texts differs from before; None where it does not. parts: the files concerned,
+    if not all"""
     after = _compiled(path, new)
     if after.plan is None:
         found = next(each for each in after.diagnostics if each.severity == "error")
@@ -211,7 +214,7 @@ def _left(path: str, why: str, found: Diagnostic | None = None, *, parts: str = 
 
 
 def _not_proved(path: str, compiled: Compiled) -> Problem:
-    """Why a file that no deck proves stays: it cannot be read, does not compile, or has no run."""
+    """The reason why a file that no deck proves is not changed: it cannot be read, does not compile, or has no run."""
     first = next((each for each in compiled.diagnostics if each.severity == "error"), None)
     at = Label(first.at.place, f"{first.code}, {first.message}") if first is not None and first.at is not None else None
     include = "name a deck that includes it, too: `met fmt --upgrade DECK PART`; or write the line by hand"
@@ -233,14 +236,14 @@ def _is_readable(path: str) -> bool:
 
 
 def _meaning(experiment: Experiment) -> object:
-    """All that a run or sweep is, and its keys; not where it is written."""
+    """Everything that defines a run or sweep, and its keys, without places in files."""
     rows = range(min(experiment.cases.count, MOST_ROWS))
     keys = structure_key(experiment.structure, inputs(experiment)), case_ids(experiment, rows)
-    return placeless(replace(experiment, notes=())), keys  # notes are words for a reader, with lines in them
+    return placeless(replace(experiment, notes=())), keys  # notes are words for a reader, with line numbers in them
 
 
 def placeless(value: Any) -> Any:
-    """A part of a plan or of a tree, to be compared: without places and origins."""
+    """A part of a plan or of a tree without places and origins, for comparison."""
     if isinstance(value, Place | Origin):
         return None
     if isinstance(value, np.ndarray):

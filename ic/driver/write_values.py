@@ -1,7 +1,7 @@
-"""Values written into a deck's text: where they stand, or as an entry of the definition that is to have them.
+"""Values written into a deck's text, at their former places or as new entries of their definitions.
 
-An edit is a guess until it is proved: the deck with the values written must mean the same, to the bit, as the deck with
-the values set from outside (`--set`). What cannot be proved is refused.
+An edit counts only once it is proved: the deck with the written values must mean the same, to the bit, as the deck with
+the values set from outside (`--set`). An edit without a proof is refused.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from met.plan.keys import structure_key
 from met.unit_parser import parse_unit, written
 
 REMARK = "// chosen "
-"""Beginning of the comment on a line that a value was written to; the next value takes its place."""
+"""Beginning of the comment on a line with a written value; the next value replaces it."""
 
 LONGEST = 120
-"""Characters of a line with a remark at its end, at most."""
+"""Largest length of a line with such a comment at its end."""
 
 _COMMENTS = ("//", "/*", "*/")
 _LITERAL = re.compile(r"[-+]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*(?P<unit>\S.*)?")
@@ -87,7 +87,7 @@ def with_values(
 
 
 class _Copy:
-    """A copy of the deck in a folder of its own, where its text may be changed and compiled."""
+    """A copy of the deck in a folder of its own, where its text can be changed and compiled."""
 
     def __init__(self, path: Path, folder: Path, defines: tuple[str, ...]) -> None:
         self.path, self.folder, self.defines = path, folder, defines
@@ -108,12 +108,12 @@ class _Copy:
         return read(self.path, (self.folder,), self.defines)
 
     def is_own(self, place: Place | None) -> bool:
-        """True for a place in the deck's own text that came there through no macro."""
+        """True for a place in the deck's own text that did not come there through a macro."""
         return place is not None and Path(place.file) == self.path and not place.expansions
 
 
 def _run_of(deck: Deck, name: str) -> str:
-    """The run that a sweep is of, and that its sweep is of. Raises Problem E397 for a sum of sweeps."""
+    """The run of a sweep, or of the sweep that it is of. Raises Problem E397 for a sum of sweeps."""
     groups = {each.words[-1].text: each for each in deck.entries if isinstance(each, Group) and _word(each) != "arm"}
     for _ in groups:
         if name in groups and _word(groups[name]) == "run":
@@ -127,7 +127,7 @@ def _run_of(deck: Deck, name: str) -> str:
 
 
 def _meaning(compiled: Compiled, run: str) -> object:
-    """All that the results of a run follow from."""
+    """Everything on which the results of a run depend."""
     assert compiled.plan is not None
     return [
         (
@@ -141,12 +141,12 @@ def _meaning(compiled: Compiled, run: str) -> object:
 
 
 def _written_in(copy: _Copy, text: str, value: WrittenValue, run: str, remark: str) -> str:
-    """The text with one value more; as it is where the run has that value already."""
+    """The text with one more value; unchanged where the run has that value already."""
     compiled = copy.compiled(text, (run,))
     found = list(explanations_of(compiled, value.path))
     places = {each.place for each in found}
     if found and all(each.value == value.si for each in found):
-        return text  # it has it, in its author's words
+        return text  # the run has the value already, in its author's words
     if not places:
         raise _by_hand(value, f"`{run}` has no such parameter")
     place = places.pop() if len(places) == 1 else None
@@ -167,8 +167,8 @@ def _written_in(copy: _Copy, text: str, value: WrittenValue, run: str, remark: s
 
 
 def _may_own(entry: Entry, home: str, run: str) -> bool:
-    """True for an entry of the deck in which a value may be replaced: the definition or `let` that the path begins
-    with, else an arm, or the run itself, but no run that it is like."""
+    """True for an entry of the deck in which a value may be replaced: the definition or `let` at the beginning of the
+    path, else an arm, or the run itself, but not a run that it is like."""
     if isinstance(entry, Let):
         return entry.name.text == home
     if not isinstance(entry, Group):
@@ -214,7 +214,7 @@ def _offset(source: Text, place: Place) -> int:
 
 
 def _extent(source: Text, entry: Entry) -> tuple[int, int]:
-    """From the first character of an entry to its last one, a brace or a semicolon, not itself."""
+    """The range from the first character of an entry to its last one, a brace or a semicolon, exclusive."""
     first, depth = _offset(source, entry.place), 0
     for token in _tokens(source):
         if token.offset < first:
@@ -234,7 +234,7 @@ def _replaced(source: Text, place: Place, value: WrittenValue, remark: str) -> s
 
 
 def _in_unit(value: WrittenValue, unit: str) -> str:
-    """The value in the unit in which it was written so far, where that gives the same bits; else in its own."""
+    """The value in its former unit, where that gives the same bits; else in its own."""
     try:
         measure, own = parse_unit(unit or "1"), parse_unit(value.unit or "1")
     except ValueError:
@@ -259,8 +259,8 @@ def _added(source: Text, brace: int, parameter: str, value: WrittenValue, remark
 
 
 def _with_remark(text: str, at: int, remark: str) -> str:
-    """The text with the remark at the end of the line at an offset, or on a line above it where that is too long; in
-    the place of an earlier one. A line that has another comment keeps it, and so has one that a backslash joins."""
+    """The text with the remark at the end of the line at an offset, or on a line above it where that is too long,
+    replacing an earlier remark. A line that has another comment, or that a backslash joins, is not changed."""
     first, end = text.rfind("\n", 0, at) + 1, text.find("\n", at)
     end = len(text) if end < 0 else end
     line, mark, _ = text[first:end].partition(REMARK)

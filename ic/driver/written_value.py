@@ -1,4 +1,4 @@
-"""A value that is to be written into a deck."""
+"""A value to be written into a deck."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from met.unit_parser import written
 
 @frozen
 class WrittenValue:
-    """A value that a deck is to have: its path, SI value, and a unit to write it in ("" or "1": none)."""
+    """A value for a deck: its path, SI value, and a unit to write it in ("" or "1": none)."""
 
     path: str
     si: float
@@ -16,10 +16,10 @@ class WrittenValue:
 
     @property
     def text(self) -> str:
-        """The value as a deck would write it."""
+        """The value in a deck's syntax."""
         return written(self.si, self.unit)
 
     @property
     def setting(self) -> str:
-        """`PATH=VALUE`, as `--set` takes it."""
+        """The setting `PATH=VALUE`, for `--set`."""
         return f"{self.path}={self.text}"

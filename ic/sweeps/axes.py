@@ -1,4 +1,4 @@
-"""A sweep's block, read: what varies over which values, in the order written.
+"""Reading of a sweep's block: its varied paths and values, in the order written.
 
 Every `vary`, `zip`, `from` and `sample` is an axis. The cases are the product of the axes, in the order written: the
 first is the outermost and the last varies fastest, as digits of a number do; `repeat` is the innermost of all.
@@ -51,8 +51,8 @@ Column = VariedPath | ChoiceColumn
 @frozen
 class SweepAxis:
     """Columns of one length that vary together. note: how they were made, for `met cases`; design: of the sample that
-    drew them, "" where they were written; until_shown: where it is written that no more of them are run than decide
-    what is required, if it is."""
+    drew them, "" where they were written; until_shown: place where it is written that cases are run only until the
+    requirements are decided."""
 
     columns: tuple[Column, ...]
     note: str = ""
@@ -95,13 +95,13 @@ class Sweep:
 
     @property
     def designs(self) -> dict[str, Design]:
-        """The design of the sample that drew each path; without those that were not drawn."""
+        """The design of the sample that drew each path, for drawn ones."""
         drawn = {column.path: axis.design for axis in self.axes if axis.design for column in axis.columns}
         return drawn | dict(self.borne)
 
     @property
     def early_axis(self) -> SweepAxis | None:
-        """The axis of which no more cases are run than decide what is required, if there is one."""
+        """The axis whose cases are run only until the requirements are decided, if there is one."""
         return next((axis for axis in self.axes if axis.until_shown is not None), None)
 
     @property
@@ -170,12 +170,12 @@ def read_sweep(
 
 
 def _product(reader: _SweepReader) -> int:
-    """The cases of what is read so far."""
+    """The number of cases so far."""
     return math.prod((*(axis.size for axis in reader.axes), reader.repeat))
 
 
 class _SweepReader:
-    """Entry after entry of a sweep's block."""
+    """Reader of a sweep's block, entry after entry."""
 
     def __init__(
         self, definitions: Definitions, complaints: Complaints, definition: Definition, graph: Graph, seed: int
@@ -192,7 +192,7 @@ class _SweepReader:
         self.base = definition.group.of.text if definition.group.of is not None else "RUN"
         self.paths = {path: place for entry in definition.group.body for path, place in _paths(definitions, entry)}
         self.run_seed = seed
-        for entry in definition.group.body:  # first of all: what is drawn needs it, wherever it stands
+        for entry in definition.group.body:  # first of all: draws need it, wherever it stands
             if isinstance(entry, Setting) and _is(entry, "seed"):
                 with complaints.gather():
                     self.seed = whole_number(definitions, entry.value, "a seed", least=0)
@@ -273,7 +273,7 @@ class _SweepReader:
             self.axes.append(SweepAxis(tuple(columns)))
 
     def file(self, statement: Statement) -> None:
-        """`from "cases.csv";`: a row of the file a case, or a value of the axis; its columns are paths."""
+        """Read `from "cases.csv";`: a row of the file is a case, or a value of the axis; its columns are paths."""
         if not isinstance(statement.value, String):
             raise Problem(
                 error(
@@ -407,7 +407,7 @@ class _SweepReader:
 def varied_path(
     graph: Graph, path: str, place: Place, numbers: CaseValues, like: Value, unit: Unit | None
 ) -> VariedPath:
-    """A column of numbers in SI. like: a value of its dimension; unit: the one that the deck wrote."""
+    """A column of numbers in SI. like: a value of its dimension; unit: the one that the deck wrote"""
     unit, scale = unit_of_plan(unit), 1.0
     if unit is not None and measure_of(unit).dimension == like.dimension:
         scale = measure_of(unit).scale
@@ -435,7 +435,7 @@ def whole_number(definitions: Definitions, expression: Expression, what: str, *,
 
 
 def _paths(definitions: Definitions, entry: object) -> list[tuple[str, Place]]:
-    """Paths that an entry of the sweep varies, and where."""
+    """Paths that an entry of the sweep varies, with their places."""
     if isinstance(entry, Setting):
         return [(".".join(word.text for word in entry.path), path_place(entry))]
     if isinstance(entry, Group):
@@ -454,7 +454,7 @@ def varied_paths(definitions: Definitions, definition: Definition) -> set[str]:
 
 
 def _refuse(entry: object, words: list[str], base: str) -> None:
-    """Report that an entry has no business in a sweep."""
+    """Report that an entry is not allowed in a sweep."""
     place = entry.place  # type: ignore[attr-defined]  # every entry has one
     if isinstance(entry, Setting) and not words and len(entry.path) == 1 and entry.path[0].text in ("repeat", "sample"):
         usage = {"repeat": "repeat 5;", "sample": "sample lhs(200) { PATH = uniform(a, b) UNIT; }"}

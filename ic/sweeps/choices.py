@@ -34,12 +34,12 @@ MACRO = "macro"
 OF_RUN, OF_JOINT, OF_SERVO = choices(""), choices("JOINT"), choices("SERVO")
 SENSOR = "sensor"
 ONE_OF_TWO = tuple(f"{head}.{name}" for head in ("environment", "initial") for name in choices(head))
-"""Paths of words that a sweep chooses from."""
+"""Paths of words among which a sweep may choose."""
 
 
 @frozen
 class Option:
-    """One choice: as text, as an entry's value, and where it is written."""
+    """One choice: its text, its value, and its place."""
 
     text: str
     expression: Expression
@@ -68,7 +68,7 @@ Choices = tuple[tuple[ChoiceColumn, Option], ...]
 
 
 def decides_structure(definitions: Definitions, path: str, values: Expression, names: Names) -> bool:
-    """Return True if this path names something that decides the structure; a model's words do."""
+    """Return True if this path decides the structure; a model's words do."""
     first, *rest = definitions.split(path)
     if path in definitions.lets:
         return False
@@ -93,7 +93,7 @@ def _are_words(values: Expression, names: Names) -> bool:
 
 
 def word_in(listed: Expression, names: Names) -> Name | String | None:
-    """The first item of a list of texts, or of names that have no value and are like none that has."""
+    """The first item of a list that is a text, or a name without a value and without a similar one."""
 
     def is_word(item: Expression) -> bool:
         if not isinstance(item, Name):
@@ -106,7 +106,7 @@ def word_in(listed: Expression, names: Names) -> Name | String | None:
 
 
 def refuse_words(path: str, place: Place, values: Expression, names: Names) -> None:
-    """Raises Problem D122 for words, models and lists where numbers vary. place: of the path."""
+    """Raise Problem D122 for words, models and lists where numbers vary. place: of the path"""
     if path == "record":
         raise Problem(error("D122", "`record` cannot vary", place, help="record all that any case needs"))
     items = values.items if isinstance(values, List) else ()
@@ -149,7 +149,7 @@ def path_place(entry: Setting) -> Place:
 
 
 def check_constant(path: str, entry: Setting, names: Names, varied: Mapping[str, Place]) -> None:
-    """Raises Problem D121 where the values were computed from what varies. varied: all paths of the sweep."""
+    """Raise Problem D121 where the values were computed from varied ones. varied: all paths of the sweep"""
     for other in names.followed:
         if other == path:
             raise Problem(
@@ -201,13 +201,13 @@ def choice_column(path: str, entry: Setting, names: Names) -> ChoiceColumn:
 
 
 def _option(item: Expression, names: Names, unit: Unit | None) -> Option:
-    """A list's item; one that is a number is named by its value, however it is written."""
+    """The option of a list's item; one that is a number is named by its value, however it is written."""
     place = place_of(item.inner if isinstance(item, WithUnit) and unit is not None else item)
     is_model = isinstance(item, Call) and item.name.text not in FUNCTIONS
     if not is_model and not isinstance(item, String) and not (isinstance(item, Name) and not names.is_value(item)):
         found = names.evaluate(item)
         if isinstance(found, Value):
-            if isinstance(item, WithUnit) and unit is not None:  # whose unit stands behind the list
+            if isinstance(item, WithUnit) and unit is not None:  # whose unit stands after the list
                 item = WithUnit(item.inner, replace(unit, place=place), place)
             return Option(_number(found, unit or found.unit).text, item, place)
     return Option(spell(item), item, place)
@@ -238,7 +238,7 @@ def _number(value: Value, unit: Unit | None) -> Option:
 
 
 def with_choices(definitions: Definitions, run: Definition, choices: Choices) -> tuple[Definitions, Definition]:
-    """The deck's definitions and the run, changed to what is chosen (macros apart, which make another deck)."""
+    """The deck's definitions and the run with these choices (except macros, which make another deck)."""
     tree: dict[str, Any] = {}
     servos: list[Definition] = []
     chosen_values = []
@@ -277,7 +277,7 @@ def with_choices(definitions: Definitions, run: Definition, choices: Choices) ->
 
 
 def keys_of(first: str, rest: Sequence[str], run: MergedBlock | None) -> tuple[str, ...]:
-    """The keys in a run's block under which the path's value is written. run: that block, as it is so far."""
+    """The keys in a run's block under which the path's value is written. run: that block so far"""
     if rest and rest[0] == "servo":
         servos = run.get("servos") if run is not None else None
         use = servos.body.get(first) if servos is not None and servos.body is not None else None

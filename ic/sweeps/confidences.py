@@ -1,4 +1,4 @@
-"""Requirements with a confidence: whether the cases of a sweep are drawn as a confidence needs it, and how many do."""
+"""Requirements with a confidence: checks that a sweep's cases are drawn suitably, and the number of cases needed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from met.statistics import confidence, sequential
 from met.statistics.design_points import design_points
 
 OF_CASES = "cases for a confidence: "
-"""How the notes on the number of cases begin."""
+"""The beginning of the notes on the number of cases."""
 
 
 def check_confidences(complaints: Complaints, sweep: Sweep, experiment: Experiment) -> tuple[str, ...]:
@@ -99,7 +99,7 @@ def _has_noise(experiment: Experiment) -> bool:
 
 
 def _fewest_of_a_point(experiment: Experiment) -> int:
-    """The number of cases of the design point that has the fewest."""
+    """The number of cases of the smallest design point."""
     cases = experiment.cases
     chosen = [each.values for each in cases.coordinates if not each.design]
     if not chosen:
@@ -110,7 +110,8 @@ def _fewest_of_a_point(experiment: Experiment) -> int:
 
 
 def _fewest_of_a_choice(chosen: Sequence[AxisColumn]) -> int:
-    """The same of a long table, whose values are told by their axes: equal ones are one value of an axis."""
+    """The size of the smallest design point of a long table, whose values are compared by their axes: equal ones are
+    one value of an axis."""
     rows, axes = chosen[0].rows, sorted({values.axis for values in chosen})
     found = np.zeros(math.prod(rows.sizes[axis] for axis in axes), np.int64)
     for piece in blocks(rows.count):

@@ -42,7 +42,7 @@ UNTIL_SHOWN, AT_MOST = "until_shown", "at_most"
 """Words in place of a number of samples."""
 
 MOST_LISTED = 1_000_000
-"""Samples of a design that is drawn as a whole; those of `random` are computed one by one."""
+"""Largest number of samples of a design that is drawn as a whole; those of `random` are computed one by one."""
 
 DESIGNS: tuple[Design, ...] = ("lhs", "sobol", "random", "saltelli")
 DISTRIBUTIONS: Mapping[str, tuple[str, ...]] = {
@@ -53,7 +53,7 @@ DISTRIBUTIONS: Mapping[str, tuple[str, ...]] = {
 
 @frozen
 class DrawnParameter:
-    """One parameter that is drawn: its distribution, with arguments in SI. low: the first of them as written."""
+    """One drawn parameter: its distribution, with arguments in SI. low: the first of them as written."""
 
     path: str
     place: Place
@@ -71,15 +71,15 @@ class DrawnParameter:
         return drawn_values(self.distribution, self.arguments, self.measure, points)
 
     def independent(self, count: int, seed: int, number: int) -> CaseValues:
-        """So many draws without regard to one another, those of a long sample computed where they are asked for."""
+        """Independent draws, `count` of them; those of a long sample are computed on demand."""
         unit = self.unit.text if self.unit is not None else ""
         return listed(DrawnColumn(count, seed, self.path, number, self.distribution, self.arguments, unit))
 
 
 @frozen
 class SampleDesign:
-    """A `sample` statement as read. warning: message, place and help of one about it; until_shown: where it is written
-    that no more cases are run than decide what is required, if it is: then `count` is the most."""
+    """A `sample` statement as read. warning: message, place and help of one about it; until_shown: place where it is
+    written that cases are run only until the requirements are decided: then `count` is the most."""
 
     design: Design
     count: int
@@ -97,7 +97,7 @@ class SampleDesign:
         return f"sample {self.design}({count}), seed {self.seed}{about}"
 
     def draw(self, number: int) -> list[CaseValues]:
-        """The values of each part. number: of the sample in its sweep, from 1. Raises Problem where they are one."""
+        """The values of each part. number: of the sample in its sweep, from 1. Raises Problem where two are equal."""
         found: list[CaseValues]
         if self.design == "random":  # a stream for each path, so that more samples or parameters change no old value
             found = [part.independent(self.count, self.seed, number) for part in self.parts]
@@ -136,8 +136,8 @@ def _saltelli(found: Sequence[CaseValues]) -> list[CaseValues]:
 
 
 def _points(design: str, count: int, parts: int, seed: int, number: int) -> np.ndarray:
-    """Points of the open unit cube, [count, parts], each with regard to the others; of `saltelli` twice as many, all
-    first points of pairs before all second ones."""
+    """Points of the open unit cube, [count, parts], which depend on each other; for `saltelli` twice as many, all first
+    points of pairs before all second ones."""
     from scipy.stats import qmc  # takes most of a second to import
 
     stream = np.random.Generator(np.random.PCG64([seed, number]))
@@ -316,7 +316,7 @@ def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> DrawnPara
 
 
 def in_unit(expression: Expression, unit: Unit | None) -> Expression:
-    """An expression with the unit that stands behind all of a call."""
+    """An expression with the unit after a call."""
     return expression if unit is None else WithUnit(expression, unit, place_of(expression))
 
 

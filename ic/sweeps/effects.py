@@ -1,4 +1,4 @@
-"""Checks that what `--set`, or a run itself, sets does something in one of the runs and sweeps that are asked for.
+"""Checks that each setting of `--set`, or of a run itself, has an effect in one of the requested runs and sweeps.
 
 Each run is resolved once more with what was set in question. A number becomes an input of the program, and
 `met.analysis.audit` says whether anything is computed from it. Anything else becomes a name that nothing has: reading
@@ -36,7 +36,7 @@ MOST_NAMED = 4
 
 
 class Effects:
-    """The effects of what is set: whether each setting did something, and the runs in which that was checked."""
+    """The effects of settings: whether each had one, and the runs in which that was checked."""
 
     def __init__(self, settings: Settings) -> None:
         self.waiting = {path_of(entry): entry for entry in settings.entries}
@@ -45,7 +45,7 @@ class Effects:
         self.complete = True  # all of them could
 
     def note_run(self, scope: Scope, run: Definition) -> None:
-        """Notes what a run has."""
+        """Note the paths of a run."""
         self.scopes.append(scope)
         for path, entry in self.waiting.items():
             if destination(scope.definitions, entry) == "run" and applies_to(scope.definitions, run, entry):
@@ -54,7 +54,7 @@ class Effects:
     def examine(
         self, scope: Scope, run: Definition, made: Experiment, memo: AnalysisMemo, sweep: Sequence[Entry] = ()
     ) -> None:
-        """Looks for effects in a run that was resolved without a mistake. sweep: the block of the sweep of it."""
+        """Look for effects in a run that was resolved without a mistake. sweep: the block of its sweep"""
         if not self.waiting or scope.complaints.errors:
             return
         named = _named(scope.definitions, sweep)
@@ -76,8 +76,8 @@ class Effects:
             del self.waiting[path]
 
     def report(self, complaints: Complaints, asked: Sequence[str], *, idle: bool = True) -> None:
-        """Report all that is set to no effect. asked: names of runs and sweeps; idle: also what is there, and does
-        nothing."""
+        """Report all settings without an effect. asked: names of runs and sweeps; idle: also known paths without an
+        effect"""
         shown = [f"`{name}`" for name in asked]
         where = ", ".join(shown[:MOST_NAMED]) + (f" and {len(shown) - MOST_NAMED} more" * (len(shown) > MOST_NAMED))
         for path, entry in self.waiting.items():
@@ -111,7 +111,7 @@ class Effects:
             self._report_unknown(complaints, scope, path, entry, where)
 
     def _report_idle(self, complaints: Complaints, scope: Scope, path: str, entry: Setting, where: str) -> None:
-        if complaints.errors:  # of which each may be why
+        if complaints.errors:  # any of which may be the cause
             return
         first = entry.path[0].text
         lets, servos = scope.definitions.lets, scope.definitions.of_kind("servo")
@@ -184,7 +184,7 @@ def _used(scope: Scope, run: Definition, settings: Mapping[str, Setting], memo: 
     if found is not None:
         return [path for path in there if path not in found]
     used = []
-    for path, entry in there.items():  # what cannot be an input decides the program, which the others need not
+    for path, entry in there.items():  # one that cannot be an input decides the program; the others need not
         one = _idle(scope, run, {path: entry}, memo)
         if one is None or path not in one:
             used.append(path)
@@ -210,7 +210,7 @@ def _idle(scope: Scope, run: Definition, settings: Mapping[str, Setting], memo: 
     cases = Cases(1, tuple(Coordinate(path, "1", 1.0, each.values[:1], ()) for path, each in varied.items()))
     made = experiment(trial, run.name, run.place, resolved, cases)
     zero = tuple(replace(each, values=np.zeros(1)) for each in cases.coordinates)
-    asked = replace(made, cases=replace(cases, coordinates=zero))  # the program's answer, whatever the values are
+    asked = replace(made, cases=replace(cases, coordinates=zero))  # the program's answer, independent of the values
     return memo.answer("idle settings", asked, lambda: without_effect(made))
 
 
@@ -222,7 +222,7 @@ def _resolved(trial: Scope, run: Definition) -> Resolved | None:
     return None
 
 
-# What is no number
+# Settings other than numbers
 
 
 def _is_looked_at(scope: Scope, run: Definition, entry: Setting) -> bool:
@@ -235,7 +235,7 @@ def _is_looked_at(scope: Scope, run: Definition, entry: Setting) -> bool:
 
 
 def _has_noise(scope: Scope, made: Experiment) -> bool:
-    """Return True if a seed changes something: there is noise, or a value is drawn."""
+    """Return True if a seed has an effect: there is noise, or a value is drawn."""
     if any(varied.drawn for varied in scope.varied.values()):
         return True
     return SEED not in without_effect(replace(made, cases=replace(made.cases, seeds="independent")))
@@ -245,7 +245,7 @@ def _has_noise(scope: Scope, made: Experiment) -> bool:
 
 
 def _named(definitions: Definitions, entries: Sequence[Entry]) -> set[str]:
-    """Paths that a sweep's block names in its lists and conditions, and what the values of those name."""
+    """Paths that a sweep's block names in its lists and conditions, including those in the values of names."""
     waiting = list(_expressions(entries))
     found: set[str] = set()
     while waiting:

@@ -1,4 +1,4 @@
-"""Case tables from CSV files: each column is a path of the run, its numbers in the unit that its head names."""
+"""Case tables from CSV files: each column is a path of the run, its numbers in the unit of its head."""
 
 from __future__ import annotations
 

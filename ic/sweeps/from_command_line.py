@@ -1,4 +1,4 @@
-"""The sweep that `--vary` asks for, made as if the deck said `sweep RUN_varied of RUN { vary PATH = VALUES; ... }`."""
+"""The sweep of `--vary`, made as if the deck contained `sweep RUN_varied of RUN { vary PATH = VALUES; ... }`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from met.settings import varied_name
 def command_line_sweep(
     definitions: Definitions, asked: Sequence[Definition], entries: tuple[Setting, ...]
 ) -> Definition:
-    """The sweep of the run that is asked for, over these entries, `vary PATH = VALUES`. Raises Problem D288."""
+    """The sweep of the requested run over these entries, `vary PATH = VALUES`. Raises Problem D288."""
     place = entries[0].place
     runs = list(definitions.of_kind("run"))
     if len(asked) != 1:

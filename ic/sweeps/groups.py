@@ -40,7 +40,7 @@ from met.trace import Formulas, Graph, Scalar
 
 ScopedExperiment = tuple[Experiment, Scope]
 Reread = Callable[[Sequence[str]], Deck]
-"""The deck read again with further macros, `NAME=VALUE`. Raises Problem."""
+"""A function that reads the deck again with further macros, `NAME=VALUE`. Raises Problem."""
 
 
 @frozen
@@ -71,7 +71,7 @@ class DeckSource:
 
 
 def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExperiment]:
-    """The experiments of a run or sweep; none where something of it is wrong (already reported)."""
+    """The experiments of a run or sweep; none where it has a mistake (already reported)."""
     if definition.kind == "run":
         definitions, run = source.settings.in_run(source.definitions, definition)
         allowances = allowances_of(definitions, run, source.complaints)
@@ -120,7 +120,7 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
 
 @frozen
 class _Read:
-    """A sweep as it is read with some macros: the deck's definitions, its own, that of its run, axes over a graph."""
+    """A sweep as read with some macros: the deck's definitions, its own, that of its run, axes over a graph."""
 
     definitions: Definitions
     definition: Definition
@@ -130,7 +130,7 @@ class _Read:
 
 
 class _Sweep:
-    """One sweep on its way to experiments."""
+    """One sweep during its conversion to experiments."""
 
     def __init__(self, source: DeckSource, definition: Definition) -> None:
         self.source, self.definition = source, definition
@@ -210,7 +210,7 @@ class _Sweep:
     def _group(
         self, sweep: Sweep, choices: Choices, rows: SweptRows
     ) -> tuple[tuple[ScopedExperiment, SweptRows] | None, list[tuple[Place, int]]] | None:
-        """The cases of one structure, with their rows of the product; and how many each `exclude when` drops."""
+        """The cases of one structure, with their rows of the product; and the number that each `exclude when` drops."""
         read = self._with_macros(sweep, choices)
         definitions, run = with_choices(read.definitions, read.base, choices)
         allowances = allowances_of(definitions, run, self.complaints, read.definition)
@@ -226,7 +226,7 @@ class _Sweep:
         rows: SweptRows,
         allowances: tuple[Allowance, ...],
     ) -> tuple[tuple[ScopedExperiment, SweptRows] | None, list[tuple[Place, int]]] | None:
-        """The same, of what was read and chosen for this structure."""
+        """The cases of one structure, from the definitions and choices made for it."""
         there = read.sweep
         scope = Scope(
             definitions,
@@ -287,7 +287,7 @@ class _Sweep:
         return ((made, scope), rows), dropped
 
     def _with_macros(self, sweep: Sweep, choices: Choices) -> _Read:
-        """The deck as it is with the macros that are chosen."""
+        """The deck read with the chosen macros."""
         macros = tuple(f"{column.macro}={option.text}" for column, option in choices if column.macro)
         if macros not in self.read_so_far:
             definitions = self.source.definitions_with(macros)
@@ -329,7 +329,7 @@ class _Sweep:
                 self.complaints.remark("D138", "this excludes no case", place, help="the sweep is the same without it")
 
     def _report_idle_choices(self, sweep: Sweep, groups: Sequence[ScopedExperiment]) -> None:
-        """A choice of which every option makes the same program of the same numbers is none."""
+        """Report a choice whose options all make the same program with the same numbers."""
         for column in sweep.chosen:
             same: dict[tuple[str, ...], list[str]] = {}
             for made, _ in groups:
@@ -348,7 +348,7 @@ class _Sweep:
 
 
 def _what_varies(sweep: Sweep) -> list[list[list[str]]]:
-    """Axis by axis the paths, and what is chosen; numbers may differ."""
+    """The paths and choices of each axis, without numbers."""
     return [
         [[column.path, *(option.text for option in getattr(column, "options", ()))] for column in axis.columns]
         for axis in sweep.axes
@@ -357,7 +357,7 @@ def _what_varies(sweep: Sweep) -> list[list[list[str]]]:
 
 def _base(definitions: Definitions, definition: Definition, complaints: Complaints) -> Definition:
     of = definition.group.of
-    assert of is not None  # a sweep without one is no definition
+    assert of is not None  # a sweep without one is not a definition
     if len(of.path) > 1:
         raise Problem(
             error(
@@ -371,7 +371,7 @@ def _base(definitions: Definitions, definition: Definition, complaints: Complain
 
 
 def _seed_of(definitions: Definitions, run: Definition) -> int:
-    """The run's seed, for what the sweep draws; mistakes in it are reported with the run."""
+    """The run's seed, for the sweep's draws; mistakes in it are reported with the run."""
     block = definitions.block(run)
     item = block.get("seed") if block is not None else None
     try:
@@ -429,7 +429,8 @@ def _all_of(groups: Sequence[SweptRows]) -> RowBits | None:
 
 
 def _slugs(groups: Sequence[Experiment]) -> list[str]:
-    """A short name for each group: what is chosen otherwise in others, in letters that a file's group may have."""
+    """A short name for each group: its choices that differ from other groups', in letters that are allowed in an
+    archive's group."""
     rows = [[choice.value for choice in group.cases.choices] for group in groups]
     differ = [n for n, column in enumerate(zip(*rows, strict=True)) if len(set(column)) > 1]
     heads = [[value.partition(" {")[0] for value in row] for row in rows]  # of a model, without its parameters
@@ -487,7 +488,7 @@ def _sum(source: DeckSource, definition: Definition, within: tuple[str, ...]) ->
             again = np.flatnonzero(
                 np.any([np.zeros(len(ids), bool), *(np.isin(ids, each) for each, _ in before)], axis=0)
             )
-            if len(again) and not source.complaints.errors:  # parts that are wrong may be the same until mended
+            if len(again) and not source.complaints.errors:  # faulty parts may be equal until they are corrected
                 there = next(part for each, part in reversed(before) if ids[again[0]] in each)
                 position = int(group.cases.table[again[0]])
                 message = f"case #{position} of `{named.text}` is in `{there}` too"

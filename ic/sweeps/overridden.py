@@ -1,4 +1,4 @@
-"""Entries of a run that count for nothing, since the same run, or one that it is like, sets what they write by `with`.
+"""Entries of a run without effect, since the same run, or one that it is like, sets their values by `with`.
 
 An entry of a run that is further out, and a general one of which other parameters take their value (`q = 0 rad;` and
 `with initial.hinge.q = 1 rad;`), may stand.
@@ -19,7 +19,7 @@ from met.diagnostic import Label, Place
 
 
 def check_overridden(scope: Scope, run: Definition, made_here: Settings) -> None:
-    """Report what the run writes in vain (D232). run: with what is set of its structure; made_here: by itself."""
+    """Report the run's entries without effect (D232). run: with the settings of its structure; made_here: by itself"""
     if not made_here.entries:
         return
     runs = scope.definitions.of_kind("run")
@@ -48,7 +48,7 @@ def check_overridden(scope: Scope, run: Definition, made_here: Settings) -> None
 
 
 def _replaced_by(place: Place, block: MergedBlock) -> Iterator[Place]:
-    """The places of what an entry at this place has replaced in a block."""
+    """The places that an entry at this place has replaced in a block."""
     for item in block.items.values():
         if item.place == place:
             yield from item.overrides
@@ -57,7 +57,7 @@ def _replaced_by(place: Place, block: MergedBlock) -> Iterator[Place]:
 
 
 def _places(entries: Iterable[Entry]) -> Iterator[Place]:
-    """The places of all that these entries write, but for what `with` sets."""
+    """The places of all values that these entries write, except those set by `with`."""
     for entry in entries:
         if isinstance(entry, Group):
             yield from _places(entry.body)

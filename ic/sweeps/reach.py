@@ -14,7 +14,7 @@ from met.plan.columns import CaseValues
 
 
 def check_coordinates(scope: Scope, *, complete: bool) -> None:
-    """Every coordinate sets something.
+    """Check that every coordinate sets something.
 
     complete  all of the run was resolved; else nothing is said of what hangs on the rest, reported already
     """
@@ -69,7 +69,7 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
 
 
 def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
-    """Places of a definition's or a let's value that exists but that no parameter of the run takes."""
+    """Places of an existing value of a definition or a let that no parameter of the run takes."""
     let = scope.definitions.lets.get(first)
     if let is not None and not rest:
         return [Label(let.name.place, "defined here")]
@@ -80,7 +80,7 @@ def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
 
 
 def no_scale(path: str) -> list[str]:
-    """The remedy for a scale of a bed that has none."""
+    """The remedy for a missing scale of a bed."""
     joint, found, _ = path.partition(".bed.scale.")
     return [f"its bed has no scale: `scale {{ }}` in `substitute {joint}` gives it one"] if found else []
 
@@ -91,7 +91,7 @@ def first_words(scope: Scope) -> list[str]:
 
 
 def paths_ending_in(scope: Scope, path: str) -> list[str]:
-    """The remedy that lists parameters whose last word the path is: `kp` where `motor.kp` was meant."""
+    """The remedy that lists parameters with this last word: `kp` where `motor.kp` was meant."""
     found = [known for known in scope.known if known.endswith(f".{path}")]
     return [known_words(f"there is `{path}` of", (known.removesuffix(f".{path}") for known in found))] if found else []
 
@@ -113,7 +113,7 @@ def plan_coordinates(
     columns: dict[str, CaseValues],
     dependents: dict[str, list[str]],
 ) -> tuple[Coordinate, ...]:
-    """The coordinates as a plan holds them. dependents: parameters whose formulas need each coordinate."""
+    """The coordinates in a plan's form. dependents: parameters whose formulas need each coordinate"""
     made, designs = [], sweep.designs
     for varied in sweep.varied:
         direct = [path for path in scope.targets.get(varied.path, ()) if path in scope.parameters]
@@ -133,14 +133,15 @@ def plan_coordinates(
 
 
 def without_effect(experiment: Experiment, memo: AnalysisMemo | None = None) -> tuple[str, ...]:
-    """Inputs of the experiment's program that change nothing. Raises Problem where a model cannot be recorded."""
+    """Inputs of the experiment's program without effect. Raises Problem where a model cannot be recorded."""
     from met.analysis.audit import idle_inputs
 
     return idle_inputs(experiment, memo)
 
 
 def check_effects(complaints: Complaints, sweep: Sweep, experiment: Experiment, memo: AnalysisMemo) -> None:
-    """Every coordinate changes something in the program, and so do repeats: else cases would be equal in silence."""
+    """Check that every coordinate changes something in the program, and so do repeats: otherwise cases would silently
+    be equal."""
     if not experiment.cases.coordinates and not experiment.cases.noise:
         return
     places = {varied.path: varied.place for varied in sweep.varied}

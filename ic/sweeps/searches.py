@@ -37,18 +37,19 @@ from met.plan.swept import SweptRows
 from met.trace import Graph, Scalar
 
 RANGES = {"between": False, "logbetween": True}
-"""How ends are written, and whether equal ratios between them are equal steps."""
+"""Words for bounds; True where equal ratios between them are equal steps."""
 
 CHOOSE, AGAINST, GRADIENTS = "choose", "against", "gradients"
 SWITCHED = {"on": True, "off": False}
 GOALS = {"maximise": True, "minimise": False}
 MOST_CORNERS = 8
-"""Parameters of which all ends are looked at together, each with each; of more, one after the other."""
+"""Largest number of parameters whose bounds are combined with each other; with more, they are examined one after the
+other."""
 
 
 @frozen
 class _Chosen:
-    """A parameter that is chosen. low: its lower end as written."""
+    """A parameter that the search chooses. low: its lower bound as written"""
 
     parameter: SearchedParameter
     place: Place
@@ -132,7 +133,7 @@ def read_search(
 
 
 class _SearchReader:
-    """Entry after entry of the block of a search or a tuning."""
+    """Reader of the block of a search or a tuning, entry after entry."""
 
     def __init__(self, definitions: Definitions, complaints: Complaints, definition: Definition) -> None:
         self.definitions, self.complaints, self.definition = definitions, complaints, definition
@@ -150,7 +151,7 @@ class _SearchReader:
 
     @property
     def usage(self) -> str:
-        """An example of a parameter that is chosen, as a deck writes it."""
+        """An example of a chosen parameter in a deck's syntax."""
         return f"{f'{CHOOSE} ' * self.tunes}PATH = between(LOW, HIGH) UNIT;"
 
     def enter(self, entry: object) -> None:
@@ -184,7 +185,7 @@ class _SearchReader:
                 self._refuse(entry, words)
 
     def check(self, failed: bool) -> None:
-        """Report what is missing. failed: whether something of the block was wrong, so that it may be that."""
+        """Report missing entries. failed: True where the block had a mistake, which may be the cause"""
         name = self.definition.name
         if not any(goal in self._written for goal in GOALS) and not failed:
             usage = "minimise METRIC;" if self.tunes else "maximise METRIC;"
@@ -337,8 +338,8 @@ def _against(
     seed: int,
     fixed: Collection[str],
 ) -> Sweep | None:
-    """The sweep that a tuning is held against; None where it has mistakes, which are reported. Raises Problem D364
-    where it is none that it can be held against."""
+    """The sweep against which a tuning is judged; None where it has mistakes, which are reported. Raises Problem D364
+    where it is unsuitable."""
     name = reader.against
     assert name is not None
     known, place = definitions.of_kind("sweep"), name.place
@@ -407,12 +408,12 @@ def _plants(sweep: Sweep | None) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(row) for row in np.stack(table, axis=1).tolist())
 
 
-# Looked at with the run
+# Checked with the run
 
 
 def with_corners(search: Search, columns: Mapping[str, CaseValues]) -> tuple[dict[str, np.ndarray], int]:
-    """The cases of the first generation, then others that may come: at the ends of what is chosen, and with each plant;
-    and how many they are in all. What holds for these is taken to hold for what lies between."""
+    """The cases of the first generation, then others that may occur: at the bounds of the chosen parameters, and with
+    each plant; and their total number. Results for these are assumed to hold in between."""
     ends = [(each.low, each.high) for each in search.parameters]
     if len(ends) <= MOST_CORNERS:
         corners = list(itertools.product(*ends))
@@ -429,7 +430,7 @@ def with_corners(search: Search, columns: Mapping[str, CaseValues]) -> tuple[dic
 
 
 def check_goal(complaints: Complaints, name: str, search: Search, metrics: Sequence[MetricUse]) -> None:
-    """Report a goal that is no metric of the run."""
+    """Report a goal that is not a metric of the run."""
     known = [use.name for use in metrics]
     if search.metric not in known:
         missing = ["a run has one by `metric NAME = MODEL { of = ...; }`"] if not known else []
@@ -443,8 +444,8 @@ def check_goal(complaints: Complaints, name: str, search: Search, metrics: Seque
 
 
 def each_case(requirements: tuple[Requirement, ...]) -> tuple[tuple[Requirement, ...], list[str]]:
-    """The requirements as a search has them, of each case by itself, and notes on those that are of shares of cases:
-    cases that are chosen show nothing of a share."""
+    """The requirements for a search, each applied to every case, with notes on those over shares of cases: chosen cases
+    show nothing about a share."""
     from dataclasses import replace
 
     notes = [

@@ -1,5 +1,5 @@
-"""Settings of the command line, `--set PATH=VALUE`, and of a run, `with PATH = VALUE;`: the deck's definitions as if
-they said so.
+"""Settings of the command line, `--set PATH=VALUE`, and of a run, `with PATH = VALUE;`, applied to the deck's
+definitions.
 
 What the command line sets counts before what a run sets. A path is one that `vary` takes, or the seed. Where its value
 goes is where the deck would say it:
@@ -51,7 +51,7 @@ class Settings:
         return tuple(entry for entry in self.entries if destination(definitions, entry) == where)
 
     def in_definitions(self, definitions: Definitions) -> Definitions:
-        """The deck's definitions with what is set of lets and of servos."""
+        """The deck's definitions with the settings of lets and servos."""
         lets = []
         for entry in self.for_destination(definitions, "let"):
             let = definitions.lets[path_of(entry)]
@@ -66,7 +66,7 @@ class Settings:
         return definitions.replacing(*servos.values(), lets=lets)
 
     def of_run(self, definitions: Definitions, run: Definition) -> Settings:
-        """The settings that the run makes itself, or takes over from what it is like, without those made here."""
+        """The settings that the run makes itself, or inherits, without those made here."""
         here = {path_of(entry) for entry in self.entries}
         return Settings(tuple(entry for entry in _made_by(definitions, run) if path_of(entry) not in here))
 
@@ -77,15 +77,15 @@ class Settings:
         return Settings(tuple(replace(entry, overrides=over.get(path_of(entry), ())) for entry in self.entries))
 
     def in_run(self, definitions: Definitions, run: Definition) -> tuple[Definitions, Definition]:
-        """The definitions and the run with what is set here, and by the run itself."""
+        """The definitions and the run with the settings made here, and by the run itself."""
         own = self.of_run(definitions, run)
         for entry in self._over_those_of(definitions, run).for_destination(definitions, "let"):
-            let = definitions.lets[path_of(entry)]  # which has the value that is set here already
+            let = definitions.lets[path_of(entry)]  # which has the new value already
             definitions = definitions.replacing(lets=[replace(let, overrides=(*entry.overrides, *let.overrides))])
         return self._in_structure(*own._in_structure(own.in_definitions(definitions), run))
 
     def _in_structure(self, definitions: Definitions, run: Definition) -> tuple[Definitions, Definition]:
-        """The definitions and the run with what is set of its structure; a whole before a part of it."""
+        """The definitions and the run with the settings of its structure; a whole before a part of it."""
         for entry in sorted(self.for_destination(definitions, "run"), key=lambda entry: len(entry.path)):
             if applies_to(definitions, run, entry):
                 first, *rest = (word.text for word in entry.path)
@@ -95,12 +95,12 @@ class Settings:
         return definitions, run
 
     def numbers(self, definitions: Definitions, run: Definition) -> dict[str, Setting]:
-        """By path, what is settled in place of what the run settles: what it sets itself, then what is set here."""
+        """By path, numbers that replace the run's: those set by itself, then those set here."""
         both = (self.of_run(definitions, run), self._over_those_of(definitions, run))
         return {path_of(entry): entry for each in both for entry in each.for_destination(definitions, "number")}
 
     def check_lets(self, definitions: Definitions, complaints: Complaints) -> None:
-        """Report lets that would get another dimension. definitions: the deck's own."""
+        """Report lets whose dimension would change. definitions: the deck's own"""
         names, changed = Names(definitions, {}), Names(self.in_definitions(definitions), {})
         for entry in self.for_destination(definitions, "let"):
             let = definitions.lets[path_of(entry)]
@@ -114,14 +114,14 @@ class Settings:
         return any(path_of(entry) == SEED for entry in self.entries)
 
     def fixed_in(self, sweep: Sweep) -> Sweep:
-        """The sweep without what is set, which no longer varies."""
+        """The sweep without paths that are set, which no longer vary."""
         paths = {path_of(entry) for entry in self.entries}
         axes = (_without(axis, paths) for axis in sweep.axes)
         return replace(sweep, axes=tuple(axis for axis in axes if axis.columns))
 
     def check_sweep(self, sweep: Sweep, complaints: Complaints, definitions: Definitions) -> None:
-        """Report what is set of a structure that the sweep chooses itself, so that it would be set in vain."""
-        for entry in self.for_destination(definitions, "run"):  # else it is a number of what the sweep chooses
+        """Report settings of a structure that the sweep chooses itself, which would have no effect."""
+        for entry in self.for_destination(definitions, "run"):  # else it is a number within a choice of the sweep
             path = path_of(entry)
             found = [column for column in sweep.chosen if path.startswith(f"{column.path}.")]
             for column in found[:1]:
@@ -135,7 +135,7 @@ class Settings:
 
 
 def _made_by(definitions: Definitions, run: Definition) -> list[Setting]:
-    """The settings that a run makes itself, or takes over from what it is like, each with those that it replaced."""
+    """The settings that a run makes itself, or inherits, each with those that it replaced."""
     block = definitions.block(run)
     runs = definitions.of_kind("run")
     bodies = [run.group.body, *(runs[name].group.body for name in definitions.homes(run) if name in runs)]
@@ -150,8 +150,8 @@ def _made_by(definitions: Definitions, run: Definition) -> list[Setting]:
 
 
 def check_params(definitions: Definitions, complaints: Complaints) -> None:
-    """Report each `param` that an including deck gives another dimension than its own file, which is then taken with
-    the value of that: what needs it is not to blame. definitions: the deck's own."""
+    """Report each `param` with another dimension from an including deck than in its own file; the file's value is then
+    used, so that no other errors follow. definitions: the deck's own"""
     names = Names(definitions, {})
     for name, let in tuple(definitions.lets.items()):
         if let.default is not None:
@@ -164,14 +164,14 @@ def check_params(definitions: Definitions, complaints: Complaints) -> None:
 
 
 def _check_alike(complaints: Complaints, name: str, old: Value | ValueList, new: Value | ValueList, at: Place) -> None:
-    """Report a value of another dimension than the one that it overrides, which is given at a place."""
+    """Report a value of another dimension than the one that it overrides, given at a place."""
     if isinstance(old, Value) and isinstance(new, Value) and not units.same(old.dimension, new.dimension):
         complaints.add(*_of_another_dimension(name, old, new, at).diagnostics)
 
 
 def _without(axis: SweepAxis, paths: Collection[str]) -> SweepAxis:
-    """The axis without the columns of these paths; of rows that were written and are equal then, the first, and so of
-    Saltelli's, of which some differ in one column alone."""
+    """The axis without the columns of these paths; of written rows that become equal, the first is kept, and so of
+    Saltelli's, some of which differ in only one column."""
     columns = [column for column in axis.columns if column.path not in paths]
     if len(columns) == len(axis.columns) or axis.design not in ("", "saltelli") or not columns:
         return replace(axis, columns=tuple(columns))
@@ -206,7 +206,7 @@ def destination(definitions: Definitions, entry: Setting) -> Destination:
 
 
 def applies_to(definitions: Definitions, run: Definition, entry: Setting) -> bool:
-    """Return True if the run has what the path of its structure names, or if that cannot be said."""
+    """Return True if the run has the path's part of its structure, or if that is not known."""
     path, first = path_of(entry), entry.path[0].text
     block = definitions.block(run)
     if block is None or path in (*OF_RUN, *ONE_OF_TWO, SEED) or first == "rates":

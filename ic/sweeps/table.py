@@ -1,4 +1,4 @@
-"""The case table: rows of the product of a sweep's axes, parted by structure, less those that are excluded."""
+"""The case table: rows of the product of a sweep's axes, grouped by structure, without excluded ones."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from met.unit_parser import parse_unit
 
 MOST_NAMED = 4
 MOST_STRUCTURES = 256
-ROUNDING = 1e-12  # relative: some thousand roundings, and far below what anyone means to tell apart
+ROUNDING = 1e-12  # relative: some thousand roundings, and far below intended differences
 
 
 def columns(sweep: Sweep, rows: SweptRows) -> dict[str, CaseValues]:
-    """Values of the numbers that vary, by path, in these rows of the product."""
+    """Values of the varied numbers, by path, in these rows of the product."""
     return {
         column.path: listed(AxisColumn(rows, number, column.values))
         for number, axis in enumerate(sweep.axes)
@@ -45,7 +45,7 @@ def repeats(sweep: Sweep, rows: SweptRows) -> CaseValues | None:
 
 
 def structures(sweep: Sweep) -> list[tuple[Choices, SweptRows]]:
-    """The structures that a sweep is of: what is chosen, and the rows of the product; in order of first appearance.
+    """The structures of a sweep: the choices, and the rows of the product; in order of first appearance.
 
     What is chosen on an axis goes with some of its values, whatever the others are. Raises Problem D229 where there are
     too many structures.
@@ -77,7 +77,7 @@ def structures(sweep: Sweep) -> list[tuple[Choices, SweptRows]]:
 
 
 def _by_choice(axis: SweepAxis) -> list[np.ndarray | None]:
-    """The places of an axis' values that share what is chosen with them; None: all of them."""
+    """The places of an axis' values with the same choices; None: all of them."""
     chosen = [column for column in axis.columns if isinstance(column, ChoiceColumn)]
     if not chosen:
         return [None]
@@ -91,15 +91,15 @@ def _by_choice(axis: SweepAxis) -> list[np.ndarray | None]:
 
 
 PIECE = 1 << 18
-"""Rows for which conditions are asked together."""
+"""Number of rows for which conditions are evaluated together."""
 
 
 def kept(
     scope: Scope, sweep: Sweep, rows: SweptRows, choices: Choices, structure: Structure
 ) -> tuple[SweptRows, list[int]]:
-    """Those of the rows that no `exclude when` drops, and how many each drops; warns where rounding decides.
+    """The rows that no `exclude when` drops, and the number that each drops; warns where rounding decides.
 
-    choices    what the rows have in common;  structure: theirs
+    choices those that the rows share; structure: theirs
     """
     if not sweep.excludes:
         return rows, []
@@ -199,7 +199,8 @@ class _Truths(Truths):
                 )
 
     def _find(self, name: Name) -> Value | ValueList:
-        """Names in `exclude when`: coordinates, parameters of the run, then what any expression may name."""
+        """The value of a name in `exclude when`: coordinates, parameters of the run, then names that any expression may
+        use."""
         scope = self.scope
         if scope.checks.failed(name.text):
             raise Problem(())  # already reported
