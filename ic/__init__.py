@@ -77,7 +77,7 @@ def compile(
 
 
 def _settings(given: Mapping[str, object] | Iterable[str]) -> Iterable[str]:
-    """Texts `PATH=VALUE`; several values as the deck's list of them."""
+    """The settings as texts `PATH=VALUE`; several values as the deck's list of them."""
     if not isinstance(given, Mapping):
         return (given,) if isinstance(given, str) else given
     return [f"{path}={_as_written(value)}" for path, value in given.items()]

@@ -1,4 +1,4 @@
-"""The commands check, plan, cases, explain, doc and dump: faces over `ic.check`, the plan and the printing of it."""
+"""The commands check, plan, cases, explain, doc and dump, on top of `ic.check`, the plan and its printing."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def _print_verdict(checked: _Checked, verbose: bool) -> None:
 
 
 def _complain_together(found: Iterable[_Checked], form: str) -> None:
-    """Print the messages of several files as one, for programs: what decks have in common is told once."""
+    """Print the messages of several files as one, for programs: those that decks share are printed once."""
     from ic.printing.codes import titles
 
     diagnostics: dict[object, Diagnostic] = {}
@@ -143,8 +143,8 @@ def _complain_together(found: Iterable[_Checked], form: str) -> None:
 
 
 def _whoever_includes(part: object) -> object:
-    """The words of a message and its place, but for the files that include the one that it is in: two that are equal
-    are the same mistake, found by way of two decks."""
+    """The words of a message and its place, without the files that include its file: equal ones are the same mistake,
+    found by way of two decks."""
     if isinstance(part, tuple):
         return tuple(map(_whoever_includes, part))
     if is_dataclass(part):
@@ -266,7 +266,7 @@ def explain(
     names = (name,) if name else ()
     if deck.endswith(".json"):
         sources: Sources = [lambda: (_plan_in_file(deck, names), None)]
-    else:  # what only another run of the deck knows is explained for that one
+    else:  # a path that only another run of the deck has is explained for that one
         selections: list[Any] = [names] if names else [None, "all"]
         sources = [partial(_source, deck, include_dirs, defines, settings, selection) for selection in selections]
     if form == "json":
@@ -404,7 +404,7 @@ def _compiled(
     settings: tuple[str, ...],
     select: tuple[str, ...] | Literal["all"] | None,
 ) -> Compiled:
-    """A deck with its plan. Raises Problem where it has none."""
+    """A deck with its plan. Raises Problem where there is none."""
     import ic
     from ic.find import find
 
@@ -445,7 +445,7 @@ def _print(lines: Iterable[str]) -> None:
 
 
 def _print_text(lines: Iterable[str]) -> None:
-    """Lines of text, filled to the width of a terminal."""
+    """Print lines of text, filled to the width of a terminal."""
     from ic.printing.wrapping import fitted, terminal_width
 
     _print(fitted(lines, width=terminal_width()))

@@ -1,4 +1,4 @@
-"""The command fmt: a face over `ic.formatting`."""
+"""The command fmt, on top of `ic.formatting`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command import: a face over `ic.driver.import_robot`."""
+"""The command import, on top of `ic.driver.import_robot`."""
 
 from __future__ import annotations
 

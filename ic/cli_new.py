@@ -1,4 +1,4 @@
-"""The command new: a face over `ic.beginnings`."""
+"""The command new, on top of `ic.beginnings`."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def new(kind: str, name: str, output: str | None, force: bool, quiet: bool, verb
 
 
 def _next(kind: str, name: str, paths: list[str]) -> list[tuple[str, str]]:
-    """The commands to type next, each with what it does."""
+    """The commands to type next, each with its effect."""
     deck = shlex.quote(next(path for path in paths if kind == "deck" or path.endswith(".ic")))
     run = (f"met run {deck}", "simulates it and shows what came of it")
     if kind == "deck":

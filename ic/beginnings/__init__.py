@@ -1,1 +1,1 @@
-"""Decks and models that run as they are, to begin from: the files that `met new` writes."""
+"""Decks and models that run unchanged, as starting points: the files that `met new` writes."""

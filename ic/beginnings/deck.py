@@ -1,4 +1,4 @@
-"""The deck to begin from: an arm of two links under gravity, moved by two servos, with a sweep."""
+"""The initial deck: an arm of two links under gravity, moved by two servos, with a sweep."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The files that `met new` writes: their names, their texts, and what stands in the way of writing them."""
+"""The files that `met new` writes: their names, their texts, and checks before writing."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PARTS = [each.name for each in dataclasses.fields(Beginning)]
 
 
 def deck(name: str, path: str | None) -> dict[str, str]:
-    """A deck, by its path. Raises Problem E343 where nothing may be called so."""
+    """A deck, by its path. Raises Problem E343 where the name is not possible for a deck."""
     check_name("an arm", name)
     return {path or f"{name}.ic": Template(DECK).substitute(name=name)}
 
@@ -48,7 +48,7 @@ def model(kind: str, name: str, folder: str | None) -> dict[str, str]:
 
 
 def check_name(what: str, name: str) -> None:
-    """Raises Problem E343 where no arm, or no model, may have this name."""
+    """Raise Problem E343 where no arm, or no model, may have this name."""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         near = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_").lstrip("0123456789_")
         helps = [f"`{near}` would do"] if near and not _meaning(what, near) else []
@@ -59,14 +59,14 @@ def check_name(what: str, name: str) -> None:
 
 
 def _meaning(what: str, name: str) -> str:
-    """The thing that already has this name, in words, so that nothing new may take it; "" where the name is free."""
+    """The meaning, in words, of a name that is already taken; "" where the name is free."""
     if units.is_unit(name):
         return f"that is the unit {units.UNITS[name].word}"
     return "with that word paths of a run begin" if what == "an arm" and name in HEADS else ""
 
 
 def write(texts: Mapping[str, str], *, force: bool) -> None:
-    """Writes the files, by path. Raises Problem E344, and writes none, where one is there and `force` is not given."""
+    """Write the files, by path. Raises Problem E344, and writes none, where one exists and `force` is not given."""
     there = [path for path in texts if os.path.lexists(path)]
     if there and not force:
         raise Problem(error("E344", _there(there), help="--force writes over it; -o writes to another place"))
@@ -77,8 +77,8 @@ def write(texts: Mapping[str, str], *, force: bool) -> None:
 
 
 def put(path: str, text: str) -> None:
-    """Writes a new file in the place of what has its name; a link there is not followed. Raises Problem E338 where the
-    system refuses; what was not there before is not there then."""
+    """Write a new file in place of one of the same name; a link there is not followed. Raises Problem E338 where the
+    system refuses; then no new file is left."""
     there = os.path.lexists(path)
     if os.path.exists(path) and not os.path.isfile(path):
         raise Problem(error("E338", f"cannot write `{path}`: it is not a regular file"))

@@ -1,4 +1,4 @@
-"""Models to begin from: a Python file with the declaration, and the parts of a small deck that uses it."""
+"""Initial models: a Python file with the declaration, and the parts of a small deck that uses it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from met.frozen import frozen
 
 @frozen(kw_only=True)
 class Beginning:
-    """A model to begin from. In its texts $name stands for its name.
+    """An initial model. In its texts $name stands for its name.
 
     group        of entry points in which it is offered
     declaration  what the entry point gives of the file

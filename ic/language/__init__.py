@@ -1,7 +1,7 @@
-"""The deck language, declared: every block, and what may stand in it.
+"""The declaration of the deck language: every block with its entries.
 
 The compiler's checks and suggestions, `met doc`, the tables of docs/deck.md, the grammars for editors and the paths of
-sweeps are made of these declarations. A key more is an `Entry` more, and the code that carries it out.
+sweeps are made of these declarations. A new key needs an `Entry`, and the code that carries it out.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ EXPERIMENTS = ("run", *OF_A_RUN)
 """The definitions that have cases to run; they share one space of names."""
 
 NAMED = ("JOINT", "SERVO")
-"""Placeholders that stand for a name of the deck's at the start of a declared path."""
+"""Placeholders at the start of a declared path, which stand for a name of the deck's."""
 
 HEADS = tuple(
     sorted(
@@ -54,12 +54,12 @@ HEADS = tuple(
         }.difference(NAMED)
     )
 )
-"""The first words of paths in a run, which are no names of joints, arms or servos."""
+"""The first words of paths in a run that are not names of joints, arms or servos."""
 
 
 def choices(head: str) -> tuple[str, ...]:
-    """The entries that a sweep chooses under this first word of a path, such as `JOINT`, `SERVO` or `rates`; under ""
-    whole paths of one word."""
+    """The entries that a sweep may choose under this first word of a path, such as `JOINT`, `SERVO` or `rates`; under
+    "", whole paths of one word."""
     found = (entry for block in BLOCKS.values() for entry in block.entries if entry.varies == "choice")
     split = (entry.path.rpartition(".") for entry in found)
     return tuple(last for first, _, last in split if first == head)

@@ -10,8 +10,8 @@ from met.parameter import Parameter
 from met.plan.run_keys import RunKey
 
 Varies = Literal["number", "choice", "never"]
-"""The ways in which a sweep may vary an entry: over numbers, over choices (each makes a program of its own), or not
-at all; entries inside a block or a model may vary by themselves all the same."""
+"""The ways in which a sweep may vary an entry: over numbers, over choices (each makes a program of its own), or not at
+all; entries inside a block or a model may vary all the same."""
 
 
 @frozen(kw_only=True)
@@ -39,7 +39,8 @@ class Entry:
 
     @staticmethod
     def of_plan(key: RunKey, written: str, *, varies: Varies = "choice") -> Entry:
-        """An entry that a plan keeps as one word or number; name, type, default and meaning are declared there."""
+        """The declaration of an entry that a plan keeps as one word or number, whose name, type, default and meaning
+        are declared there."""
         wanted = key.parameter
         default = (
             f"`{wanted.default}`" if wanted.shape == "word" else f"{wanted.default} {wanted.unit}".removesuffix(" 1")
@@ -95,7 +96,7 @@ class BlockDeclaration:
 
     @property
     def named(self) -> tuple[str, ...]:
-        """The words of what has a name of the deck's in it, in order."""
+        """The words of its entries with names of the deck's, in order."""
         return tuple(self._of("named"))
 
     @property

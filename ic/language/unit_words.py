@@ -1,4 +1,4 @@
-"""Units as declarations write them, `joint/s`, put in the words of one use, `rad/s`."""
+"""Units of declarations, such as `joint/s`, in the words of one use, `rad/s`."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from met.units import PURE, Dimension
 
 
 def in_degrees(unit: str) -> tuple[str, ...]:
-    """The ways to write a unit that most would choose from: `deg/s`, `rad/s`; of a unit without an angle that alone."""
+    """The usual ways to write a unit: `deg/s`, `rad/s`; for a unit without an angle only one."""
     return (unit.replace("rad", "deg", 1), unit) if re.fullmatch(r"rad(/s(\^\d)?)?", unit) else (unit,)
 
 
 def either(texts: Iterable[str]) -> str:
-    """`30 deg` or `30 rad`, each in the quotes of what a deck writes."""
+    """Two texts in words, `30 deg` or `30 rad`, each in the quotes of deck text."""
     return " or ".join(f"`{text}`" for text in texts)
 
 
@@ -30,14 +30,14 @@ def units_of(dimension: Dimension) -> list[str]:
 
 @lru_cache(maxsize=4096)
 def measure_here(written: str, joint: JointKind, command: str | None, of: str | None) -> units.Measure:
-    """The SI measure of a declared unit where `joint`, `effort`, `command` and `of` mean this."""
+    """The SI measure of a declared unit, with these meanings of `joint`, `effort`, `command` and `of`."""
     names = {} if of is None else {"of": parse_unit(of)}
     return parse_unit(joint_unit(written, Joint("", joint, "", ""), command), names)
 
 
 @lru_cache(maxsize=4096)
 def unit_here(written: str, joint: JointKind, command: str | None, of: str | None) -> tuple[str, Dimension]:
-    """A declared unit where `joint`, `effort`, `command` and `of` mean this: in SI, as text and as dimension."""
+    """A declared unit with these meanings of `joint`, `effort`, `command` and `of`: in SI, as text and as dimension."""
     text = joint_unit(written, Joint("", joint, "", ""), command)
     measure = measure_here(written, joint, command, of)
     if measure.dimension == PURE:

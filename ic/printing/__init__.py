@@ -1,1 +1,1 @@
-"""Decks, plans and models as the terminal shows them."""
+"""Decks, plans and models as text for the terminal."""

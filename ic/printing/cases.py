@@ -53,7 +53,7 @@ def print_cases(groups: Sequence[Experiment], *, everything: bool = False) -> It
 
 
 def _structures(groups: Sequence[Experiment]) -> Iterator[str]:
-    """For each group of a sweep, its choices, its number of cases, and how much one case records."""
+    """For each group of a sweep, its choices, its number of cases, and the size of a case's record."""
     paths = list(dict.fromkeys(choice.path for group in groups for choice in group.cases.choices))
     rows = [["group", *paths, "cases", "a case"]]
     for group in groups:
@@ -64,7 +64,7 @@ def _structures(groups: Sequence[Experiment]) -> Iterator[str]:
 
 
 class _Rows:
-    """The rows of all groups of a sweep, by position in its table, or those at some positions, which rise."""
+    """The rows of all groups of a sweep, by position in its table, or those at some ascending positions."""
 
     def __init__(self, groups: Sequence[Experiment], positions: Sequence[int] | None = None) -> None:
         rows = [np.arange(g.cases.count) if positions is None else _rows_at(g, positions) for g in groups]
@@ -95,7 +95,7 @@ class _Rows:
         return 0 if repeats is None else int(repeats[self.rows[position]])
 
     def shown(self, position: int) -> list[str]:
-        """Cells of the row behind its id."""
+        """Cells of the row after its id."""
         made = [self.chosen(position).get(path, "") for path in self.choices]
         found = [self.value(position, path) for path, _ in self.coordinates]
         made += ["" if value is None else number(value[0] / value[1]) for value in found]
@@ -103,7 +103,7 @@ class _Rows:
 
 
 def _rows_at(group: Experiment, positions: Sequence[int]) -> np.ndarray:
-    """The rows of a group at these positions of its sweep's table, those that it has."""
+    """The rows of a group at these positions of its sweep's table, as far as it has them."""
     rows = [row_at(group.cases.table, position) for position in positions]
     return np.array([row for row in rows if row is not None], np.int64)
 
@@ -140,7 +140,7 @@ def cases_json(groups: Sequence[Experiment]) -> dict[str, Any]:
 
 
 def _short(groups: Sequence[Experiment], ids: list[str]) -> list[str]:
-    """The beginnings of these ids that tell all cases apart; the whole of them where there are very many."""
+    """The beginnings of these ids that distinguish all cases; whole ids where there are very many."""
     total = sum(group.cases.count for group in groups)
     if len(ids) == total:
         return prefixes(ids)
@@ -148,17 +148,17 @@ def _short(groups: Sequence[Experiment], ids: list[str]) -> list[str]:
         return ids
     numbers = np.sort(np.concatenate([keys.id_numbers(group).astype(np.uint64) for group in groups]))
     apart = numbers[1:] ^ numbers[:-1]
-    least = int(apart[apart > 0].min(initial=2**64 - 1))  # of the two that are alike for longest
+    least = int(apart[apart > 0].min(initial=2**64 - 1))  # of the two with the longest common beginning
     shared = (64 - least.bit_length()) // 4
     return [each[: max(SHORTEST, 1 + shared)] for each in ids]
 
 
 def prefixes(names: list[str]) -> list[str]:
-    """The shortest beginnings, all of one length, that tell the names apart."""
+    """The shortest beginnings, all of one length, that distinguish the names."""
     length = 1 + max((_shared(a, b) for a, b in pairwise(sorted(names)) if a != b), default=0)
     return [name[: max(SHORTEST, length)] for name in names]
 
 
 def _shared(a: str, b: str) -> int:
-    """The number of characters that both begin with."""
+    """The length of the common beginning."""
     return next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))

@@ -21,8 +21,8 @@ def notes(plan: Plan) -> Iterator[str]:
 
 
 def verdict(plan: Plan, diagnostics: Sequence[Diagnostic], allowed: int = 0) -> str:
-    """`two_link.ic: 1 run, 1 sweep, 37 cases: no errors, 1 warning allowed`; the cases are those of all of
-    them, of a search as many as it may run. allowed: the number of warnings that are not given."""
+    """The verdict, `two_link.ic: 1 run, 1 sweep, 37 cases: no errors, 1 warning allowed`; the cases are those of all
+    experiments, for a search the most that it may run. allowed: number of suppressed warnings"""
     varying = [experiment for experiment in plan.experiments if experiment.varies]
     sweeps = len({experiment.name_in_deck for experiment in varying if experiment.search is None})
     kinds = [each.search.kind for each in varying if each.search is not None]
@@ -39,5 +39,5 @@ def verdict(plan: Plan, diagnostics: Sequence[Diagnostic], allowed: int = 0) -> 
 
 
 def _cases(experiment: Experiment) -> int:
-    """The number of an experiment's cases, at most."""
+    """The number of an experiment's cases, or for a search the largest."""
     return experiment.cases.count if experiment.search is None else experiment.search.at_most

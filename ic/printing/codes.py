@@ -1,4 +1,4 @@
-"""The meaning of a message's code: its entry on the page docs/diagnostics.md, for the terminal."""
+"""The entry of a message's code on the page docs/diagnostics.md, for the terminal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ic.text.codes import PAGE
 from met.diagnostic import Problem, did_you_mean, error
 
 _ENTRY = re.compile(r"^### ([A-Z]\d{3}): .*?(?=^##)", re.MULTILINE | re.DOTALL)
-_ROW = re.compile(r"^\| ([A-Z]\d{3}) \| (.*?) \|", re.MULTILINE)  # of codes that no deck brings about
+_ROW = re.compile(r"^\| ([A-Z]\d{3}) \| (.*?) \|", re.MULTILINE)  # of codes that no deck causes
 _HIDDEN = re.compile(r"<!-- .*?-->\n?", re.DOTALL)
 
 
@@ -19,7 +19,7 @@ def is_code(word: str) -> bool:
 
 
 def titles() -> dict[str, str]:
-    """The subject of each code in a line, as the page's headings have it; empty where the page is not installed."""
+    """The subject of each code in a line, from the page's headings; empty where the page is not installed."""
     if not PAGE.is_file():
         return {}
     page = PAGE.read_text(encoding="utf-8")
@@ -28,7 +28,7 @@ def titles() -> dict[str, str]:
 
 
 def print_code(word: str) -> Iterator[str]:
-    """The entry of a code. Raises Problem D171 where there is none, or no page."""
+    """The entry of a code. Raises Problem D171 where it or the page is missing."""
     code = word[0].upper() + word[1:].zfill(3)
     if not PAGE.is_file():
         help = "the entry of every code is in docs/diagnostics.md of a checkout"
@@ -43,7 +43,7 @@ def print_code(word: str) -> Iterator[str]:
 
 
 def in_plain_text(text: str) -> str:
-    """Markdown as the terminal shows it: blocks of code are set in, links are their words, bold type is plain."""
+    """Markdown as text for the terminal: code blocks are indented, links are their words, bold type is plain."""
     lines = [""]
     code = False
     for line in text.splitlines():

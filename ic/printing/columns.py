@@ -1,4 +1,4 @@
-"""Numbers and tables as the terminal shows them."""
+"""Numbers and tables as text for the terminal."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 
 def columns(rows: Sequence[Sequence[str]], *, right: Iterable[int] = (), indent: str = "  ") -> list[str]:
-    """The rows as lines with their cells below one another; those numbered in `right` are set flush right."""
+    """The rows as lines with aligned columns; those with numbers in `right` are flush right."""
     flush = frozenset(right)
     count = max((len(row) for row in rows), default=0)
     widths = [max((_width(row[i]) for row in rows if i < len(row)), default=0) for i in range(count)]
@@ -21,34 +21,34 @@ def columns(rows: Sequence[Sequence[str]], *, right: Iterable[int] = (), indent:
 
 
 def number(value: float) -> str:
-    """A number to six digits, without what its last binary digits add: `0.3`, `1e-05`, `-0` as `0`."""
+    """A number to six digits, without rounding noise: `0.3`, `1e-05`, `-0` as `0`."""
     return f"{value + 0.0:.6g}"
 
 
 def exactly(value: float) -> str:
-    """A number in as few digits, six or more, as read back the same: `0.1`, `3.986004418e+14`."""
+    """A number in the fewest digits, but at least six, that read back the same: `0.1`, `3.986004418e+14`."""
     texts = (f"{value + 0.0:.{digits}g}" for digits in range(6, 17))
     return next((text for text in texts if float(text) == value), f"{value + 0.0:.17g}")
 
 
 def quantity(value: float, unit: str) -> str:
-    """A number and its unit, which a pure number has not."""
+    """A number with its unit, if it has one."""
     return number(value) if unit in ("1", "") else f"{number(value)} {unit}"
 
 
 def vector(values: Iterable[float], unit: str) -> str:
-    """`[2, 0, 0] m`."""
+    """A vector with its unit: `[2, 0, 0] m`."""
     text = f"[{', '.join(number(value) for value in values)}]"
     return text if unit in ("1", "") else f"{text} {unit}"
 
 
 def count(n: int, thing: str, things: str = "") -> str:
-    """`1 case`, `37 cases`, `1,200 cases`."""
+    """A number of things: `1 case`, `37 cases`, `1,200 cases`."""
     return f"{n:,} {thing if n == 1 else things or thing + 's'}"
 
 
 def size(n: int) -> str:
-    """Bytes, in the units that `met run` counts them in: `593 KiB`."""
+    """A size in bytes, in the units of `met run`: `593 KiB`."""
     value, units = float(n), ["B", "KiB", "MiB", "GiB", "TiB", "PiB"]
     while value >= 1024.0 and len(units) > 1:
         value /= 1024.0
@@ -57,7 +57,7 @@ def size(n: int) -> str:
 
 
 def _width(text: str) -> int:
-    """Columns that a terminal gives a text."""
+    """The width of a text in a terminal's columns."""
     if text.isascii():
         return len(text)
     import unicodedata

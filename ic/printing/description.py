@@ -1,6 +1,6 @@
 """The whole language as one JSON object, `met doc language --format json`: for editors, generators and checkers.
 
-It is made of the declarations that the compiler itself goes by, models of other packages among them.
+It is made from the declarations that the compiler uses, including models of other packages.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from met.version import VERSION
 
 SCHEMA = "met.language"
 VERSION_OF_SCHEMA = 1
-"""Raised where a key goes or gets another meaning; new keys come without that."""
+"""Version of the schema; raised where a key is removed or changes its meaning, but not for new keys."""
 
 
 def description() -> dict[str, Any]:
@@ -86,18 +86,18 @@ def description() -> dict[str, Any]:
 
 
 def _taken_names(edition: int) -> list[str]:
-    """The names that no value may have in an edition."""
+    """The names that cannot name a value in an edition."""
     of_units = [name for name in units.UNITS if name.isidentifier()] if edition == FIRST else []
     return [*CONSTANTS, *RESERVED, *of_units]
 
 
 def parameter_json(parameter: Any) -> dict[str, Any]:
-    """A parameter with all that is declared of it; bounds are in SI."""
+    """A parameter with its whole declaration; bounds are in SI."""
     return {field: getattr(parameter, field) for field in FIELDS}
 
 
 def print_overview() -> Iterator[str]:
-    """The parts of the description with how much is in each, for a terminal."""
+    """The parts of the description with their sizes, for a terminal."""
     found = description()
     yield f"language: all of it, for programs: `met doc language --format json`, {SCHEMA} {VERSION_OF_SCHEMA}"
     yield ""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from met.plan import Plan
 
 GROUP = "met.stages"
-ORDER = ("tokens", "syntax", "model", "plan", "program", "kernel", "assembly")  # that of the way; others come after
+ORDER = ("tokens", "syntax", "model", "plan", "program", "kernel", "assembly")  # others come after
 WRITTEN = ("tokens", "syntax", "model")  # stages before anything is set from outside of the deck
 
 
@@ -35,7 +35,7 @@ class DumpRequest:
     settings: tuple[str, ...] = ()
 
     def plan(self) -> Plan:
-        """The plan, compiled, or read where the deck is a plan file. Raises Problem."""
+        """The plan, compiled, or read from a plan file. Raises Problem."""
         import ic
 
         if self.deck.endswith(".json"):
@@ -51,7 +51,7 @@ Stage = Callable[[DumpRequest], Iterator[str]]
 
 
 def stage_names() -> list[str]:
-    """All stages, in the order of the way."""
+    """All stages, in their order."""
     names = {point.name for point in offered(GROUP)}
     return [name for name in ORDER if name in names] + sorted(names - set(ORDER))
 
@@ -68,7 +68,7 @@ def find_stage(name: str) -> Stage:
 
 
 def tokens(asked: DumpRequest) -> Iterator[str]:
-    """Tokens behind the preprocessor: place, kind, text, and the macros that a token came through."""
+    """Tokens after the preprocessor: place, kind, text, and the macros that a token came through."""
     from ic.text.preprocess import preprocess
 
     read = preprocess(asked.deck, asked.include_dirs, asked.defines)
@@ -81,7 +81,7 @@ def tokens(asked: DumpRequest) -> Iterator[str]:
 
 
 def syntax(asked: DumpRequest) -> Iterator[str]:
-    """The tree of what was written, entry by entry."""
+    """The syntax tree, entry by entry."""
     from ic.read import read
 
     for entry in read(asked.deck, asked.include_dirs, asked.defines).entries:
@@ -104,7 +104,7 @@ def model(asked: DumpRequest) -> Iterator[str]:
     for kind in DEFINITIONS:
         for definition in definitions.of_kind(kind).values():
             head = f"{'default ' if definition.default else ''}{kind} {definition.name}"
-            if definition.group.of is not None:  # a sweep is not merged: its entries are as written
+            if definition.group.of is not None:  # a sweep is not merged: its entries are the written ones
                 yield f"{head} of {definition.group.of.text} {{{_written(definition.place)}"
                 for entry in definition.group.body:
                     yield from _entry(entry, "    ")
@@ -162,7 +162,7 @@ def _entries(body: Sequence[Entry], indent: str) -> Iterator[str]:
 
 
 def _value(value: Any, named_apart: bool = False) -> tuple[str, Sequence[Entry]]:
-    """A value as text, and the body that it may have: `settling_time { of = shoulder.qd; }`.
+    """A value as text, with its body if it has one: `settling_time { of = shoulder.qd; }`.
 
     named_apart: what a call names is shown elsewhere.
     """

@@ -40,7 +40,7 @@ MOST_IN_FULL = 3  # parameters; of more a line each
 
 
 def with_settings(experiment: Experiment) -> Experiment:
-    """The experiment with the settings of its run as if they were parameters, so that they can be asked for."""
+    """The experiment with the settings of its run as if they were parameters, so that they can be explained."""
     return replace(
         experiment,
         parameters={
@@ -51,7 +51,7 @@ def with_settings(experiment: Experiment) -> Experiment:
 
 
 def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[str]] = NO_MORE) -> list[str]:
-    """The parameters that a deck's path means. Raises Problem D170 with what was probably meant.
+    """The parameters of a deck's path. Raises Problem D170 with a similar path.
 
     also: further paths with the parameters that they mean.
 
@@ -219,12 +219,12 @@ def _in_short(experiment: Experiment, name: str) -> tuple[str, ...]:
 
 
 def _note(origin: Origin) -> str:
-    """A note on a value's origin; that of a varied value is about the entry that the sweep overrides."""
+    """A note on a value's origin; for a varied value, it is about the entry that the sweep overrides."""
     return "" if origin.kind == "case" else origin.note
 
 
 def _is_vector(experiment: Experiment, names: list[str]) -> bool:
-    """Return True if these are the three parts of a vector that was written at once."""
+    """Return True if these are the three parts of a vector that was written as one."""
     found = [experiment.parameters[name] for name in names]
     together = [name.rpartition(".")[2] for name in names] == ["x", "y", "z"]
     return together and all(isinstance(q.value, float) and q.origin == found[0].origin for q in found)
@@ -262,7 +262,7 @@ def _one(
 def _written_at(place: Place, sources: Mapping[str, str]) -> str:
     """The entry, or the value, that begins at a place: up to its semicolon, or the end of its line.
 
-    Not past a bracket or comma of what holds it, as in `classic(a = l2, d = 0 m)`; in a URDF file, the place itself.
+    It ends at a bracket or comma around it, as in `classic(a = l2, d = 0 m)`; in a URDF file, the place itself.
     """
     lines = sources.get(place.file, "").split("\n")
     rest = lines[place.line - 1][place.column - 1 :] if place.line <= len(lines) else ""
@@ -286,7 +286,7 @@ def _end(rest: str) -> int:
 
 
 def _with_source(place: Place, said: str, also: tuple[Label, ...], sources: Mapping[str, str]) -> Iterator[str]:
-    """The place with its line, macros and includes, as a diagnostic shows them, without head and count."""
+    """The place with its line, macros and includes, in the form of a diagnostic without head and count."""
     text = render.render([Diagnostic("", "", Label(place, said), also, severity="note")], sources)
     yield from text.splitlines()[1:-2]
 
@@ -312,7 +312,7 @@ def _varied_by(experiment: Experiment, name: str) -> list[Coordinate]:
 
 
 def _series_of(coordinate: Coordinate) -> str:
-    """A coordinate's values in the unit of the deck; of a long table its ends."""
+    """A coordinate's values in the deck's unit; for a long table its ends."""
     values = coordinate.values
     if isinstance(values, np.ndarray):
         return _series(values / coordinate.scale)

@@ -1,4 +1,4 @@
-"""The origin of a value in each structure of a run or sweep, and in other runs where these do not know it."""
+"""The origin of a value in each structure of a run or sweep, or in other runs where these do not have the path."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from met.frozen import frozen
 from met.plan import Experiment, Plan
 
 Source = tuple[Plan, Compiled | None]
-"""A plan, and the deck that it was compiled from; None for that of a plan file."""
+"""A plan, and the deck from which it was compiled; None for a plan file."""
 
 Sources = Sequence[Callable[[], Source]]
-"""Plans in which to look for a path, in order; each is made only where those before do not know the path."""
+"""Plans in which to look for a path, in order; each is made only where those before lack the path."""
 
 
 @frozen
 class ExplainedExperiment:
-    """An experiment that knows what is asked, in full. alone: whether all of the first source's experiments do."""
+    """An experiment that has the path, with its settings. alone: True if all of the first source's experiments have
+    it."""
 
     experiment: Experiment
     plan: Plan
@@ -42,7 +43,7 @@ class ExplainedExperiment:
 
 
 def print_explained(sources: Sources, path: str) -> Iterator[str]:
-    """Line by line; once where all experiments say the same. Raises Problem where none knows the path."""
+    """The explanation line by line; once where all experiments agree. Raises Problem where none has the path."""
     said: dict[tuple[str, ...], list[ExplainedExperiment]] = {}
     for found in _found(sources, path):
         texts = {source.name: source.text for source in found.plan.sources}
@@ -57,7 +58,7 @@ def print_explained(sources: Sources, path: str) -> Iterator[str]:
 
 
 def explained_json(sources: Sources, path: str) -> list[dict[str, Any]]:
-    """The explanations for programs; of several experiments each names its own."""
+    """The explanations for programs; with several experiments each names its own."""
     found = _found(sources, path)
     several = len(found) > 1 or not found[0].alone
     return [
@@ -73,7 +74,7 @@ def _found(sources: Sources, path: str) -> list[ExplainedExperiment]:
         try:
             plan, compiled = source()
         except Problem:
-            if problem is not None:  # of the other runs something else is wrong
+            if problem is not None:  # another run has other mistakes
                 raise problem from None
             raise
         made = []
@@ -89,12 +90,12 @@ def _found(sources: Sources, path: str) -> list[ExplainedExperiment]:
         if made:
             alone = n == 0 and len(made) == len(plan.experiments)
             return [replace(each, alone=alone) for each in made]
-    assert problem is not None  # each source has an experiment, and none knew the path
+    assert problem is not None  # each source has an experiment, and none had the path
     raise problem
 
 
 def _of_unit(path: str, compiled: Compiled | None) -> Problem | None:
-    """The error that a path is a unit, the deck's or the language's; None where it is none."""
+    """The error that a path is a unit, the deck's or the language's; None where it is not."""
     declared = compiled.units.get(path) if compiled is not None else None
     known = units.ALL_UNITS.get(path)
     if declared is not None:

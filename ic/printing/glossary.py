@@ -1,4 +1,4 @@
-"""The meaning of a word of MET's, as docs/glossary.md has it, for the terminal."""
+"""The meaning of a word of MET's from docs/glossary.md, for the terminal."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _ROW = re.compile(r"^\| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
 
 @cache
 def entries() -> dict[str, tuple[str, str]]:
-    """The row of each word, (its words, their meaning), in plain text; none where the page is not installed.
+    """The row of each word, (its words, their meaning), in plain text; empty where the page is not installed.
 
-    A row of several words explains each of them, and a word in bold type within its meaning, too.
+    A row of several words explains each of them, and also a word in bold type within its meaning.
     """
     if not PAGE.is_file():
         return {}
@@ -34,7 +34,7 @@ def entries() -> dict[str, tuple[str, str]]:
 
 
 def meaning(word: str) -> Iterator[str]:
-    """Return the glossary's meaning of a word, in one line; nothing where it does not know the word."""
+    """Return the glossary's meaning of a word, in one line; empty for an unknown word."""
     found = entries().get(word) or entries().get(word.removesuffix("s"))
     if found is not None:
         yield f"{found[0]}: {found[1]}"

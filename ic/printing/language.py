@@ -1,4 +1,4 @@
-"""Blocks of the deck language, as declared: pages of `met doc`, and the tables of docs/deck.md.
+"""Declared blocks of the deck language as pages of `met doc` and tables of docs/deck.md.
 
 `python -m ic.printing.language` writes the tables of docs/deck.md anew.
 """
@@ -17,7 +17,7 @@ from met.parameter import Parameter
 
 PAGE = Path(__file__).parents[2] / "docs" / "deck.md"
 MARK = "<!-- table of {} -->"
-"""The comment above a table of docs/deck.md that is made here, with the block's name."""
+"""The comment above a generated table of docs/deck.md, with the block's name."""
 
 
 def print_block(block: BlockDeclaration) -> Iterator[str]:
@@ -45,7 +45,7 @@ def print_block(block: BlockDeclaration) -> Iterator[str]:
 
 
 def print_entries(word: str) -> Iterator[str]:
-    """The entries of blocks that begin with this word, such as `allow`, for a terminal; nothing where there is none."""
+    """The entries of blocks that begin with this word, such as `allow`, for a terminal; empty where there are none."""
     for block in BLOCKS.values():
         for each in block.entries:
             if each.name.split()[0] == word:
@@ -123,7 +123,7 @@ def _an(name: str) -> str:
 
 
 def with_tables(text: str) -> str:
-    """The page with each table that has a mark above it made anew. Raises KeyError where a mark names no block."""
+    """The page with each table that has such a mark generated anew. Raises KeyError where a mark names no block."""
 
     def made(match: re.Match[str]) -> str:
         return f"{match[1]}\n" + "".join(f"{line}\n" for line in table(BLOCKS[match[2]]))

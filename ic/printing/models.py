@@ -58,7 +58,7 @@ UNIT_WORDS = {
 
 
 def selected_models(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
-    """The models that `met doc` is asked for: all, those of a kind, one of a kind, or all of one name. Raises D171."""
+    """The models of a request to `met doc`: all, those of a kind, one of a kind, or all of one name. Raises D171."""
     everything = [(kind, model) for kind in KINDS for model in models.available(kind).values()]
     if not words:
         return everything
@@ -93,7 +93,7 @@ def print_list(found: list[tuple[models.Kind, Any]]) -> Iterator[str]:
 
 
 def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
-    """All that a model declares."""
+    """The whole declaration of a model."""
     yield f"{kind} {model.name}"
     width = terminal_width()
     doc = paragraphs(textwrap.dedent(model.doc).strip(), width=None if width is None else width - 2)
@@ -115,7 +115,7 @@ def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
 
 
 def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
-    """All that a model declares, for programs."""
+    """The whole declaration of a model, for programs."""
     record: dict[str, Any] = {"kind": kind, "name": model.name, "doc": textwrap.dedent(model.doc).strip()}
     record["parameters"] = [{field: getattr(p, field) for field in FIELDS} for p in models.written(model)]
     for words in ("commands", "unit", "order", "real_limit"):
@@ -127,13 +127,13 @@ def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
 
 
 def rows(parameters: Iterable[Parameter]) -> list[tuple[str, str, str, str, str]]:
-    """A table of parameters, its head first."""
+    """A table of parameters with its head first."""
     rows = [(p.name, unit_in_words(p.unit), default(p), range_(p), meaning(p)) for p in parameters]
     return [("name", "unit", "default", "range", "meaning"), *rows]
 
 
 def where_written(kind: models.Kind, model: Any) -> str:
-    """The place in a deck where this model is written, in words."""
+    """The place of this model in a deck, in words."""
     usage = WHERE_WRITTEN[kind]
     if kind == "sensor":
         usage = IN_SERVO if model.measures is None else ON_LINK
@@ -184,14 +184,14 @@ def declared_facts(kind: models.Kind, model: Any) -> Iterator[str]:
 
 
 def words_in(kind: models.Kind, parameters: tuple[Parameter, ...]) -> Iterator[tuple[str, str]]:
-    """The words in units that the use decides, and what they stand for."""
+    """The unit words that depend on the use, with their meanings."""
     used = {word for p in parameters for word in UNIT_WORDS if word in re.split(r"\W+", p.unit)}
     meanings = {**UNIT_WORDS, "of": MEANING_OF_OF.get(kind, UNIT_WORDS["of"])}
     return ((word, text) for word, text in meanings.items() if word in used)
 
 
 def summary(model: Any) -> str:
-    """The first sentence of a model's own words."""
+    """The first sentence of a model's description."""
     first = " ".join(model.doc.strip().split("\n\n")[0].split())
     return re.split(r"(?<!\beq)\. ", first)[0].rstrip(".:")
 
@@ -217,7 +217,7 @@ def default(parameter: Parameter) -> str:
 
 
 def range_(parameter: Parameter) -> str:
-    """The bounds in SI, or the words that are possible."""
+    """The bounds in SI, or the allowed words."""
     if parameter.names:
         return " | ".join((f"a {parameter.names}", *parameter.words))
     if parameter.words:
@@ -230,7 +230,7 @@ def range_(parameter: Parameter) -> str:
 
 
 def meaning(parameter: Parameter) -> str:
-    """A parameter's description, with its shape and the word that it depends on."""
+    """A parameter's description, with its shape and the word on which it depends."""
     only = "" if parameter.only is None else f"; only with {parameter.only[0]} = {' or '.join(parameter.only[1])}"
     shape = {"vector": "three numbers; ", "list": "a list; ", "text": "a text in quotes; "}.get(parameter.shape, "")
     shape = "the same in all cases; " if parameter.decides else shape
@@ -238,7 +238,7 @@ def meaning(parameter: Parameter) -> str:
 
 
 def sources(parameters: Iterable[Parameter]) -> list[str]:
-    """Where parameters and their numbers come from, a line for each source: `Source of kp, ki: ...`."""
+    """The sources of parameters, a line for each: `Source of kp, ki: ...`."""
     named: dict[str, list[str]] = {}
     for each in parameters:
         if each.source and each.name not in named.setdefault(each.source, []):

@@ -1,4 +1,4 @@
-"""A plan in words: the arm as a tree, what runs when, what is recorded, how many cases, how much is written."""
+"""A plan in words: the arm as a tree, rates, records, number of cases, and sizes."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from met.substitution import bed_scale
 
 CHOSEN = 88  # columns, of parameters that stand in one cell
 FIXED_SPACE = "\u00a0"  # no line ends at one
-COUNTED = 1_000_000  # drawn values at most that are told apart
-STEP_SIZE = "step size: "  # how the compiler's note on it begins
+COUNTED = 1_000_000  # largest number of drawn values that are compared
+STEP_SIZE = "step size: "  # beginning of the compiler's note on the step size
 
 
 class _Values:
-    """The parameters of an experiment, those that vary by their first, least and largest value."""
+    """The parameters of an experiment; varied ones by their first, least and largest value."""
 
     def __init__(self, experiment: Experiment) -> None:
         self._experiment, self._parameters = experiment, experiment.parameters
 
     def array(self, path: str) -> np.ndarray | None:
-        """The value; three of what varies; None where the plan has no number of that name."""
+        """The value; three values of a varied parameter; None where the plan has no number of that name."""
         found = self._parameters.get(path)
         if found is None or isinstance(found.value, (str, tuple)):
             return None
@@ -187,7 +187,7 @@ def _bodies(experiment: Experiment) -> Iterator[str]:
 
 
 def _base(experiment: Experiment, base: Base) -> Iterator[str]:
-    """The motion of the base: where it begins, or the courses of its components."""
+    """The motion of the base: its initial state, or the courses of its components."""
     values = _Values(experiment)
     if base.kind == "free":
         yield "Base: moves freely, at the start with"
@@ -243,7 +243,7 @@ def _given(experiment: Experiment, prefix: str, parameters: Iterable[Parameter])
 
 
 def passive(structure: Structure) -> list[str]:
-    """The joints that move and have no servo."""
+    """The moving joints without a servo."""
     driven = {use.joint for use in structure.servos}
     return [joint.name for joint in structure.moving if joint.name not in driven]
 
@@ -295,7 +295,7 @@ def _schedule(experiment: Experiment) -> Iterator[str]:
 
 
 def _substitutions(experiment: Experiment) -> Iterator[str]:
-    """Motors on beds, with what was chosen of each bed and law: neither the default nor the servo's."""
+    """Motors on beds, with the chosen values of each bed and law: those that are neither defaults nor the servo's."""
     values, parameters = _Values(experiment), experiment.parameters
     joints = ", ".join(use.joint for use in experiment.structure.substitutions)
     motors = "motor" if len(experiment.structure.substitutions) == 1 else "motors"

@@ -39,7 +39,7 @@ number.
 
 
 def page() -> Iterator[str]:
-    """The lines of the page, of MET's own models."""
+    """The lines of the page, about MET's own models."""
     yield from HEAD.splitlines()
     yield ""
     yield f"- [Blocks of a deck](#blocks-of-a-deck): {', '.join(f'[{name}](#block-{name})' for name in BLOCKS)}"
@@ -203,18 +203,18 @@ def _cell(text: str) -> str:
 
 
 def _code(text: str) -> str:
-    """A usage of `where_written`: what a deck writes as code, and the words behind it."""
+    """The text of `where_written` with its deck code marked as code."""
     code, where, words = text.partition(", in a ")
     return f"`{code}`{where}{words}"
 
 
 def _prose(doc: str) -> Iterator[str]:
-    """A docstring: what is set in by four blanks stays as it is, and all else is text."""
+    """A docstring as Markdown: lines indented by four blanks are kept, all else is text."""
     for line in textwrap.dedent(doc).strip().splitlines():
         yield line if line.startswith("    ") else _escaped(line)
 
 
 def _escaped(text: str) -> str:
-    """Text in which Markdown finds no marks of its own, but for code between backticks."""
+    """Text without accidental Markdown marks, except code between backticks."""
     parts = re.split(r"(`[^`]*`)", text)
     return "".join(part if part.startswith("`") else re.sub(r"([*<\[\]])", r"\\\1", part) for part in parts)

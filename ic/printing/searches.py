@@ -1,4 +1,4 @@
-"""A search or a tuning of a plan in words: its goal, the ends of what it chooses, and what it is held against."""
+"""A search or a tuning of a plan in words: its goal, the bounds of its parameters, and its plants."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from met.plan.searches import Search
 
 
 def budget(search: Search) -> str:
-    """`maximise effort, in at most 2,000 cases`."""
+    """The goal with the number of cases: `maximise effort, in at most 2,000 cases`."""
     return f"{search.goal}, in at most {count(search.at_most, 'case')}"
 
 
 def search_lines(experiment: Experiment, search: Search) -> Iterator[str]:
-    """Line by line: what is looked for, and what of."""
+    """The search in lines: its goal and its parameters."""
     each = experiment.structure.history_bytes
     histories = f"; {size(each)} of histories a case" if each else ""
     yield f"{search.kind.capitalize()}: {budget(search)}{histories}"

@@ -1,4 +1,4 @@
-"""Settings of a run besides its parameters, under the names of a deck: `rates.dynamics`, `elbow.servo.model`."""
+"""Settings of a run besides its parameters, under their deck names: `rates.dynamics`, `elbow.servo.model`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from met.plan.run_keys import RunKey, run_keys
 
 
 def kept_keys(experiment: Experiment) -> list[tuple[RunKey, str | float]]:
-    """The keys of a run that the plan keeps as one word or number each, with what a deck would say, in SI."""
+    """The keys of a run that the plan keeps as one word or number each, with a deck's value, in SI."""
     holders = ((Structure, experiment.structure), (Experiment, experiment))
     return [(key, key.in_deck(getattr(holder, field))) for cls, holder in holders for field, key in run_keys(cls)]
 

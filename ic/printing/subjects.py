@@ -86,7 +86,7 @@ def print_channels() -> Iterator[str]:
 
 
 def words_of(found: list[dict[str, str]]) -> list[tuple[str, str]]:
-    """The words in the units of channels that the joint decides, and what they stand for."""
+    """The words in the units of channels that depend on the joint, with their meanings."""
     used = {word for each in found for word in each["unit"].replace("*", "/").split("/")}
     return [(word, text) for word, text in {**UNIT_WORDS, **MORE_WORDS}.items() if word in used]
 
@@ -175,7 +175,7 @@ def figures_json() -> list[dict[str, Any]]:
 
 
 def unit_table() -> list[dict[str, Any]]:
-    """Every unit: its name, its word, and what one of it is in SI."""
+    """Every unit: its name, its word, and its size in SI."""
     return [
         {"name": name, "word": unit.word, "scale": unit.measure.scale, "si": units.text(unit.measure.dimension)}
         for name, unit in units.ALL_UNITS.items()
@@ -191,7 +191,7 @@ def print_units() -> Iterator[str]:
 
 
 def in_si(unit: Mapping[str, Any]) -> str:
-    """`0.001 m`; of a share `0.01`."""
+    """The size of a unit in SI: `0.001 m`; for a share `0.01`."""
     return f"{exactly(unit['scale'])} {unit['si']}" if unit["si"] != "1" else exactly(unit["scale"])
 
 
@@ -211,4 +211,4 @@ SUBJECTS: Mapping[str, Subject] = MappingProxyType(
         "substitute": (print_substitute, partial(block_json, BLOCKS["substitute"])),
     }
 )
-"""By the word that `met doc` takes: what it prints, and the same for programs."""
+"""By the word of `met doc`: the functions that print a subject, for people and for programs."""

@@ -16,7 +16,7 @@ from ic.sweeps.designs import AT_MOST, DESIGNS, DIGITS, DISTRIBUTIONS, UNTIL_SHO
 from met.frozen import frozen
 
 Row = tuple[str, str, str]
-"""A name, how it is written, what it is."""
+"""A name, its syntax, and its meaning."""
 
 OF_FUNCTIONS: Mapping[str, str] = MappingProxyType({
     "sqrt": "square root of a value and of its unit",
@@ -84,7 +84,7 @@ def _distributions() -> list[Row]:
 
 @frozen
 class Subject:
-    """A page: what it is about, how that stands in a deck, a row for each word, and what holds for all of them."""
+    """A page: its subject, its syntax in a deck, a row for each word, and facts about all of them."""
 
     what: str
     example: str

@@ -1,8 +1,8 @@
 """The grammar of decks for editors, docs/editors/met.tmLanguage.json, from the language's own tables.
 
-An editor colours what stands on a line; it knows no meaning. So a word that the language knows is coloured as such
-where it stands as such: a unit behind a number, a key before `=` or `{`, a function before `(`. The expressions are
-those that Oniguruma and Python read alike.
+An editor colours what stands on a line; it knows no meaning. So a word of the language is coloured where its position
+fits: a unit behind a number, a key before `=` or `{`, a function before `(`. The expressions are those that Oniguruma
+and Python read alike.
 
 `python -m ic.printing.textmate` writes the files anew.
 """
@@ -50,7 +50,7 @@ WORDS = (BASE, "faults", *BASE_KINDS[1:], *(word for wanted in _DECLARED for wor
 NAME = r"[A-Za-z_][A-Za-z0-9_]*"
 BRACES = r"\{[A-Za-z0-9_(+-][A-Za-z0-9_ +*/%()-]*\}"
 IN_LOOPS = rf"(?:[A-Za-z_]|{BRACES})(?:[A-Za-z0-9_]|{BRACES})*"
-"""A name as it may stand in a loop: `seg_{i}`."""
+"""A name in a loop, with or without braces: `seg_{i}`."""
 
 PATH = rf"{NAME}(?:\s*\.\s*{NAME})*"
 NUMBER = r"(?<![A-Za-z0-9_.])(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
@@ -103,12 +103,12 @@ def _patterns(*patterns: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _any(words: Iterable[str]) -> str:
-    """One of these words, the longest that fits."""
+    """A pattern of these words, the longest match first."""
     return "(?:" + "|".join(re.escape(word) for word in sorted(set(words), key=lambda word: (-len(word), word))) + ")"
 
 
 def _preprocessor() -> dict[str, Any]:
-    """A directive up to the end of its line, and of those that a backslash joins to it."""
+    """A directive up to the end of its line, including lines that a backslash joins to it."""
     named = ("define", "undef", "ifdef", "ifndef")
     end = r"(?<!\\)(?=\n)|(?=//|/\*)"
     keyword = {
@@ -148,7 +148,7 @@ def _preprocessor() -> dict[str, Any]:
 
 
 def _unit() -> str:
-    """A unit, with brackets one deep, as they are written: `N*m/(rad/s)^2`."""
+    """A unit as written, with brackets one deep: `N*m/(rad/s)^2`."""
     letters = _any(name for name in units.ALL_UNITS if name.isalpha())
     one = rf"(?:{letters}(?![A-Za-z0-9_])(?!\s*[.{{])(?:\s*\^\s*(?:-?[0-9]|\(\s*-?[0-9]\s*\)))?|%)"
     joined = rf"{one}(?:\s*[*/]\s*{one})*"

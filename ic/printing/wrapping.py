@@ -1,4 +1,4 @@
-"""Text of `met doc` wrapped to the width of a terminal; output that goes elsewhere keeps a line for each row."""
+"""Text of `met doc` wrapped to the width of a terminal; other output keeps a line for each row."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from ic.printing.columns import columns
 
 NARROWEST = 40
-"""Fewest characters of a column of text; a narrower one is written below its row."""
+"""Smallest width of a column of text; a narrower one is written below its row."""
 
 
 _SHORT_CODE = re.compile(r"`[^`]{1,40}`")
 _BLANK = "\0"
-"""In the place of a blank that is not to be broken at."""
+"""Stands for a blank at which no line is broken."""
 
 
 def terminal_width() -> int | None:
-    """The columns of the terminal that standard output goes to; None where it goes elsewhere."""
+    """The columns of the terminal of standard output; None where it is not a terminal."""
     return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
 
 

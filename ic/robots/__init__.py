@@ -1,1 +1,1 @@
-"""Robots described elsewhere: a URDF file read, placed, and turned into the entries that a deck would hold."""
+"""Robots described elsewhere: reading a URDF file, with places, and its conversion to a deck's entries."""

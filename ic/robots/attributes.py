@@ -45,7 +45,7 @@ def required_child(element: Element, tag: str, usage: str) -> Element:
 
 
 def word(element: Element, attribute: str, usage: str) -> Written:
-    """The text of an attribute that must be there. Raises Problem D205; D203 where xacro would have made it."""
+    """The text of a required attribute. Raises Problem D205; D203 where xacro would have made it."""
     text = element.attributes.get(attribute, "").strip()
     if not text:
         raise Problem(
@@ -91,7 +91,7 @@ def numbers(element: Element, attribute: str, count: int) -> Numbers | None:
 
 
 def number(element: Element, attribute: str) -> Numbers:
-    """One number, which must be there. Raises Problem D205, D206."""
+    """One required number. Raises Problem D205, D206."""
     found = numbers(element, attribute, 1)
     if found is None:
         raise Problem(
@@ -106,15 +106,14 @@ def number(element: Element, attribute: str) -> Numbers:
 
 
 def number_or_none(element: Element, attribute: str) -> float | None:
-    """A number that nothing is computed from; None where there is none."""
+    """A number that is not used in computations; None where there is none."""
     text = element.attributes.get(attribute, "").strip()
     value = float(text) if _NUMBER.fullmatch(text) else math.inf
     return value + 0.0 if math.isfinite(value) else None
 
 
 def refuse_unknown(element: Element, attributes: Iterable[str]) -> None:
-    """Raises Problem D208 for an attribute that is none of these, unless all of it is 0: it might say where something
-    is, or how heavy."""
+    """Raise Problem D208 for any other attribute, unless all of it is 0: it might give a position or a mass."""
     names = list(attributes)
     for each, text in element.attributes.items():
         if each not in names and not _NOTHING.fullmatch(text):

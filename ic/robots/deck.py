@@ -1,4 +1,4 @@
-"""A robot as a deck to go on with: its arm entry by entry, what the file says besides as comments, and runs to begin.
+"""A robot as an initial deck: its arm entry by entry, other data of the file as comments, and first runs.
 
 What is printed of the arm are the entries themselves, so the deck's arm is the one that `from urdf(...)` makes, number
 for number. The first run holds the arm; where the file has damping or friction, another lets it fall under these.
@@ -18,7 +18,7 @@ from ic.robots.robot import MOVING, Inertial, Joint
 from ic.text.edition import EDITION_WORD, LATEST
 
 WIDE = 100  # columns of a block on one line
-WIDEST = 120  # with what is said of it behind
+WIDEST = 120  # with its comment
 FREE = "follows `{}` in the file{}; here it moves by itself"
 HELD = "follows `{}` in the file{}; here it is held at 0"
 
@@ -77,7 +77,8 @@ def _block(part: RobotEntry, notes: list[str]) -> Iterator[str]:
 
 
 def _rows(settings: list[tuple[str, str]]) -> list[list[tuple[str, str]]]:
-    """The settings of a block, by line: what a joint holds on what, and its limits, each on one if that is short."""
+    """The settings of a block, by line: a joint's parent and child, and its limits, each on one line if that is
+    short."""
     limited = [each for each in settings if each[0] in LIMITS.values()]
     ends = [each for each in settings if each[0] in ("parent", "child")]
     others = [[each] for each in settings if each not in ends and each not in limited]
@@ -174,12 +175,12 @@ def _fall(
 
 
 def pose(joint: Joint) -> float:
-    """The position at which a joint is held: 0, or the middle of its range where 0 is not within it."""
+    """The position at which a joint is held: 0, or the middle of its range where that excludes 0."""
     found = limits(joint)
     lower, upper = found.get("lower", -1.0), found.get("upper", 1.0)
     if lower <= 0.0 <= upper:
         return 0.0
-    middle = lower / 2.0 + upper / 2.0  # the sum might be beyond all numbers
+    middle = lower / 2.0 + upper / 2.0  # the sum might overflow
     short = float(f"{middle:.4g}")
     return short if lower <= short <= upper else middle
 
@@ -189,7 +190,7 @@ def _at(value: float, slides: bool) -> str:
 
 
 def _free(name: str, taken: Collection[str]) -> str:
-    """The name, with underscores behind it while it is a joint's or a link's."""
+    """The name, with underscores appended while it is a joint's or a link's."""
     while name in taken:
         name += "_"
     return name

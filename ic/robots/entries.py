@@ -1,4 +1,4 @@
-"""A robot as the entries that a deck would hold for its arm, each with its place in the URDF file.
+"""A robot as the entries of a deck's arm, each with its place in the URDF file.
 
     link upper { mass = 2 kg; com = [0, 0, 0.1] m; inertia = [...] kg*m^2; }
     joint elbow revolute { parent = upper; child = lower; at = [...] m; rpy = [...] rad; axis = z; }
@@ -29,7 +29,7 @@ UNITS = {
     "N*m": (("N", 1), ("m", 1)),
 }
 LIMITS = {"lower": "q_min", "upper": "q_max", "velocity": "qd_max", "effort": "tau_max"}
-"""Limits of a URDF file's joint, and what they are in a deck."""
+"""Limits of a URDF file's joint, with their names in a deck."""
 NOISE = 1e-15  # of sines and cosines of right angles, whose size is 1: cos(pi/2) is 6e-17 in doubles
 
 
@@ -43,7 +43,7 @@ class RobotEntry:
 
 @frozen
 class ArmEntries:
-    """A robot's arm: its entries, links and then joints, in the file's order, and what its names are in decks."""
+    """A robot's arm: its entries, links and then joints, in the file's order, with the names in decks."""
 
     robot: Robot
     names: DeckNames
@@ -84,7 +84,7 @@ def moments(inertial: Inertial) -> Numbers:
 
 
 def _turned(found: tuple[float, ...], rpy: tuple[float, ...]) -> tuple[float, ...]:
-    """R I R' with R = Rz(yaw) Ry(pitch) Rx(roll): the same inertia in axes that are turned back."""
+    """R I R' with R = Rz(yaw) Ry(pitch) Rx(roll): the same inertia in axes rotated back."""
     xx, yy, zz, xy, xz, yz = found
     inertia = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
     R = rotation(*rpy)
@@ -104,7 +104,7 @@ def rotation(roll: float, pitch: float, yaw: float) -> tuple[tuple[float, float,
 
 
 def _turn(angle: float) -> tuple[float, float]:
-    """Cosine and sine; 0 where that is meant."""
+    """Cosine and sine of an angle, with rounding noise at right angles set to 0."""
     c, s = math.cos(angle), math.sin(angle)
     return (0.0 if abs(c) < NOISE else c), (0.0 if abs(s) < NOISE else s)
 
@@ -131,7 +131,7 @@ def _joint(joint: Joint, names: DeckNames) -> Group:
 
 
 def limits(joint: Joint) -> dict[str, float]:
-    """The limits that the joint has: none of position where it is continuous, and what is zero or less says nothing."""
+    """The limits of the joint: none of position where it is continuous; values of zero or less count as none."""
     if joint.type.text not in MOVING:
         return {}
     lower, upper = joint.limits.get("lower", 0.0), joint.limits.get("upper", 0.0)
@@ -192,6 +192,6 @@ def _name(text: str, place: Place) -> Name:
 
 
 def spelled(value: float) -> str:
-    """The shortest text that a deck reads as this very number."""
+    """The shortest text that a deck reads as this exact number."""
     text = repr(value)
     return text.removesuffix(".0")

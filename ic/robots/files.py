@@ -1,4 +1,4 @@
-"""URDF files that a deck's arms are made from: found as CSV files are, each read once."""
+"""URDF files for a deck's arms, found like CSV files, each read once."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ class RobotFiles(NamedFiles["ArmEntries"]):
 
     @property
     def roots(self) -> set[str]:
-        """Names of the links that are `base` in arms."""
+        """Names of the links that are called `base` in arms."""
         return {each.robot.root.name.text for each in self.loaded}
 
     def arm_entries(self, made_from: Call) -> ArmEntries:
-        """The robot that `urdf("FILE")` names. Raises Problem."""
+        """The robot of `urdf("FILE")`. Raises Problem."""
         return self.get(_file_named(made_from))
 
     def remarks(self, made_from: Call) -> Iterator[Diagnostic]:
-        """Warnings of what the arm leaves out of its file, which was read."""
+        """Warnings about the parts of the file, which was read, that the arm leaves out."""
         from ic.robots.warnings import warnings_of
 
         return warnings_of(self.arm_entries(made_from), _file_named(made_from).place)
@@ -50,7 +50,7 @@ def load(name: str, text: str) -> ArmEntries:
 
 
 def _file_named(made_from: Call) -> String:
-    """Raises Problem D214 for what is not `urdf("FILE")`."""
+    """Raise Problem D214 for anything but `urdf("FILE")`."""
     name = made_from.name.text
     if name not in MODELS:
         raise Problem(

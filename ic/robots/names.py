@@ -1,4 +1,4 @@
-"""Names of a robot as a deck can hold them, no two alike.
+"""Unique names of a robot's parts that are valid in a deck.
 
 The root is `base`. Another name stays as it is where a deck can write it: letters, digits and `_`, not a digit first.
 Else, in this order:
@@ -30,7 +30,7 @@ _MACRO = re.compile(r"__\w+__")  # __LINE__ and its like: the preprocessor's
 
 @frozen
 class ChangedName:
-    """A name that is another in decks."""
+    """A name that differs in decks."""
 
     kind: str  # "link", "joint"
     written: Written
@@ -56,7 +56,7 @@ def deck_names(robot: Robot) -> DeckNames:
 
 
 def word(text: str, kind: str) -> str:
-    """One name by itself: rules 1 and 2."""
+    """A single name: rules 1 and 2."""
     made = _OTHER.sub("_", text)[:LONGEST]
     made = made if _PLAIN.fullmatch(made) else f"_{made}"
     return f"{made}_{kind}" if _means_something(made, kind) else made
@@ -66,7 +66,7 @@ def _named(written: Sequence[Written], kind: str, taken: set[str]) -> dict[str, 
     """taken: names of other kinds."""
     names: dict[str, str] = {}
     others, taken = taken, set(taken)
-    for each in sorted(written, key=lambda name: word(name.text, kind) != name.text):  # those that can stay first
+    for each in sorted(written, key=lambda name: word(name.text, kind) != name.text):  # unchanged ones first
         made = word(each.text, kind)
         if made in others and kind == "joint":
             made = f"{made}_joint"

@@ -1,4 +1,4 @@
-"""A robot as its URDF file says it: links, joints, and what the file says besides, each with its place.
+"""A robot as in its URDF file: links, joints, and the file's other data, each with its place.
 
 Names, numbers and frames are the file's own: SI, turns `rpy` about fixed x, y, z in that order, as in a deck. `None`
 stands for what the file leaves out.
@@ -18,7 +18,7 @@ TYPES = (*MOVING, "fixed")
 
 @frozen
 class Written:
-    """A word of the file and where it stands."""
+    """A word of the file with its place."""
 
     text: str
     place: Place
@@ -26,7 +26,7 @@ class Written:
 
 @frozen
 class Numbers:
-    """Numbers of an attribute, or of several of one element, and where they stand; each: its own place."""
+    """Numbers of an attribute, or of several of one element, with their place; each: its own place"""
 
     values: tuple[float, ...]
     place: Place
@@ -86,7 +86,7 @@ class Joint:
 
 @frozen
 class Robot:
-    """root: the link that no joint carries, which is the arm's base. dropped: what was not read, by its name."""
+    """A robot. root: the link that no joint carries, which is the arm's base; dropped: names of what was not read"""
 
     file: str
     name: str
@@ -97,5 +97,5 @@ class Robot:
 
     @property
     def carried(self) -> tuple[Link, ...]:
-        """The links of the arm: all but the root."""
+        """The links of the arm, without the root."""
         return tuple(link for link in self.links if link is not self.root)

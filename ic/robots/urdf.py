@@ -1,7 +1,7 @@
 """The text of a URDF file to a `Robot`.
 
 Links, joints and inertia are read; what else the file holds is counted by name, so that none of it is dropped in
-silence. Joints that MET has not are read too: an arm made from the file may remove or change them.
+silence. Joints of kinds that MET does not have are read too: an arm made from the file may remove or change them.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _FORMATS = {"sdf": "SDF", "mujoco": "MuJoCo's MJCF", "svg": "a drawing", "html":
 
 
 def read(name: str, text: str) -> Robot:
-    """The robot of a file. Raises Problem with all that is wrong with it."""
+    """The robot of a file. Raises Problem with all its errors."""
     root = parse(name, text)
     for element in _within(root):
         if element.tag.startswith("xacro:"):
@@ -102,7 +102,7 @@ def _within(root: Element) -> Iterator[Element]:
 
 
 def _drop(element: Element, dropped: dict[str, list[Place]]) -> None:
-    """Counts what is inside and not read."""
+    """Count the elements inside that are not read."""
     for child in element.children:
         if child.tag not in _READ[element.tag]:
             dropped.setdefault(child.tag, []).append(child.place)
@@ -172,7 +172,7 @@ def _joint(element: Element, dropped: dict[str, list[Place]]) -> Joint:
 
 
 def _friction(dynamics: Element | None) -> dict[str, float]:
-    """Damping and friction. Raises Problem D206 for one below 0."""
+    """Damping and friction. Raises Problem D206 for a negative one."""
     found = {}
     for name in FRICTION:
         given = None if dynamics is None else numbers(dynamics, name, 1)
@@ -198,7 +198,7 @@ def _check_names(named: Sequence[Link] | Sequence[Joint], kind: str, complaints:
 
 
 def _check_ends(links: Sequence[Link], joints: Sequence[Joint], complaints: Complaints) -> None:
-    """Every joint is between links that are there."""
+    """Check that every joint is between existing links."""
     names = {link.name.text for link in links}
     for joint in joints:
         for end in (joint.parent, joint.child):

@@ -1,4 +1,4 @@
-"""Warnings of a URDF file's arm: what it leaves out, a line for each kind; and the names that it changes."""
+"""Warnings about a URDF file's arm: omitted parts, a line for each kind; and changed names."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MOST_JOINTS = 4  # in a line; of more the first and the last
 
 
 def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
-    """named: where the deck names the file."""
+    """The warnings. named: where the deck names the file"""
     labels = list(_left_out(body))
     if labels:
         yield Diagnostic(

@@ -1,7 +1,7 @@
 """XML as a tree of elements that know their places: by the standard library's expat, within limits.
 
-What expands is refused: a document type and entities of the file's own. So a hostile file costs no more than its
-length. Text between elements is left alone, as URDF has none.
+A document type and entities of the file's own are refused, so a hostile file cannot expand beyond its length. Text
+between elements is left alone, as URDF has none.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _REMEDY = "URDF needs neither: write the values out"
 
 
 class XmlSource:
-    """A file's name and bytes, and where in its text a byte stands."""
+    """A file's name and bytes, with the places of bytes in its text."""
 
     def __init__(self, name: str, text: str) -> None:
         self.name = name
@@ -44,7 +44,7 @@ class XmlSource:
 
 
 class Element:
-    """An element: its tag, the text of its attributes, and what is inside it, in order."""
+    """An element: its tag, the text of its attributes, and its contents, in order."""
 
     __slots__ = ("_at", "_source", "attributes", "children", "tag")
 
@@ -82,9 +82,9 @@ class Element:
 
 
 def parse(name: str, text: str) -> Element:
-    """The outermost element. Raises Problem D200 for what is no XML, D201 for what expands, D202 beyond a limit."""
+    """The outermost element. Raises Problem D200 for invalid XML, D201 for expansions, D202 beyond a limit."""
     source = XmlSource(name, text)
-    parser = expat.ParserCreate(encoding="utf-8")  # that is what the text is, whatever the file's first line says
+    parser = expat.ParserCreate(encoding="utf-8")  # the text's encoding, whatever the file's first line says
     open_: list[Element] = []
     root: list[Element] = []
     count = 0
@@ -162,7 +162,7 @@ def _not_xml(source: XmlSource, at: int, code: int, open_: list[Element]) -> Dia
 
 
 def _of_token(data: bytes, at: int) -> str:
-    """The remedy for a token that may not stand where it does."""
+    """The remedy for a misplaced token."""
     if data.rfind(b"<!--", 0, at) > data.rfind(b"-->", 0, at):
         return "`--` stands in a comment at its end only, as `-->`"
     if re.search(rb"&\w*\Z", data[max(0, at - SHOWN) : at]):
