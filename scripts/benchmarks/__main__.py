@@ -1,4 +1,4 @@
-"""`scripts/benchmark`: takes the figures that are asked for, prints them as tables, writes and compares them."""
+"""`scripts/benchmark`: takes the requested figures, prints them as tables, writes and compares them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ SUBJECTS = (
     simulations,
     differences,
 )
-"""In the order of the report: ratios first, since they change least with machine and load."""
+"""Benchmarks in the order of the report: ratios first, since they depend least on machine and load."""
 
 TURNS, QUICK = 15, 3
 
@@ -88,7 +88,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def _legend() -> list[str]:
-    """What the arms' names in the names of figures mean."""
+    """The meanings of the arms' names in the names of figures."""
     return [f"{arm.name:13}{arm.doc}" for arm in (*arms.ARMS, arms.CHAIN)]
 
 

@@ -1,4 +1,4 @@
-"""The arms that are measured. All joints turn about their z axes, so that the peer may use its fastest joint, too."""
+"""The measured arms. All joints turn about their z axes, so that the peer can use its fastest joint, too."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _robots() -> tuple[Body, ...]:
 
 @cache
 def _general() -> tuple[Body, ...]:
-    """A random tree, no angle of it right: each joint hangs from one of the three before it."""
+    """A random tree without right angles: each joint hangs from one of the three before it."""
     rng = np.random.default_rng(31)
     made = []
     for i in range(30):
@@ -82,7 +82,7 @@ GENERAL = Arm("30R-general", "a random tree of 30 joints, no angle right", _gene
 CHAIN = Arm("100R", "a chain of 100 joints", _chain)
 
 ARMS = (TWO, SEVEN, THIRTY, GENERAL)
-"""Those that are timed; of a chain of 100 only how long it takes to compile is asked."""
+"""The arms that are timed; for a chain of 100 joints only the compile time is measured."""
 
 
 def _deck(name: str) -> tuple[Body, ...]:
@@ -114,7 +114,7 @@ def _deck(name: str) -> tuple[Body, ...]:
 
 
 def _body(rng: np.random.Generator, number: int, parent: int, at: Sequence[float], rpy: Sequence[float]) -> Body:
-    """A revolute joint about z and a link of no symmetry at all, of matter that could be."""
+    """A revolute joint about z and an asymmetric but physical link."""
     spread = rng.standard_normal((3, 3)) * 0.1
     second = spread @ spread.T
     J = np.trace(second) * np.eye(3) - second

@@ -38,7 +38,7 @@ from met.run import prepare
 TITLE = "a Panda at 1 kHz with its shoulder's motor on a bed, us and counts; no hard real time"
 
 SECONDS, STARTS = 60.0, 30
-"""Of the loop's figures; and how often it is begun at most."""
+"""Duration of the loop's measurement, s, and the largest number of starts."""
 
 DECK = """#include <panda.ic>
 run one like reach {{
@@ -57,7 +57,7 @@ def experiment(seconds: float) -> Experiment:
 
 
 def _step(share: float) -> Callable[[], float]:
-    """us of a step, of which this share of all takes no longer; the clock's, so with whatever comes between."""
+    """The percentile of a step's time, us, for this share of all steps; wall-clock time, so including interruptions."""
     made = experiment(5.0)
     prepared = prepare(made, wire=True, late=1, lanes=LANES)
     clock = time.perf_counter_ns
@@ -115,7 +115,7 @@ def _at(line: str, made: Experiment) -> Iterator[str]:
 
 @cache
 def _kept(line: str) -> tuple[Timing, int]:
-    """What the loop made of a minute, and how often it was stopped."""
+    """The results of a minute of the loop, and the number of times it was stopped."""
     made = experiment(SECONDS)
     plan = plan_file.dumps(Plan("", (made,)))
     wanted, found, hz = round(SECONDS * pace_of(made).hz), [], 0.0
@@ -136,7 +136,7 @@ def _kept(line: str) -> tuple[Timing, int]:
 
 
 def _loop(line: str) -> tuple[Benchmark, ...]:
-    """Of a minute over a line."""
+    """The loop's figures for a minute over a line."""
 
     def one(name: str, doc: str, unit: str, figure: Callable[[Timing, int], float]) -> Benchmark:
         def take() -> Callable[[], float]:

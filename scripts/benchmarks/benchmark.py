@@ -1,4 +1,4 @@
-"""What a benchmark is, how its figures are taken, and how one is told."""
+"""Benchmarks, their measurement, and figures."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any, Literal
 
 
 class Untaken(Exception):
-    """A figure that cannot be taken here; the text says why."""
+    """Raised where a figure cannot be measured here; the text says why."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """What a figure's best should be: `at_most` a number or `at_least` it."""
+    """The target of a figure's best value: `at_most` a number or `at_least` it."""
 
     bound: float
     side: Literal["at_most", "at_least"] = "at_most"
@@ -44,7 +44,7 @@ class Benchmark:
 
 @dataclass(frozen=True)
 class Derived:
-    """One figure that follows from others, by name: from their bests its best, from their medians its median."""
+    """A figure computed from others, by name: its best from their bests, its median from their medians."""
 
     name: str
     doc: str
@@ -55,16 +55,17 @@ class Derived:
 
 
 def ratio(name: str, doc: str, *, over: str, under: str, target: Target | None = None) -> Derived:
-    """How many times one figure is another."""
+    """The ratio of two figures."""
     return Derived(name, doc, "", (over, under), lambda a, b: a / b, target)
 
 
 Figure = dict[str, Any]
-"""As in the JSON of a report: name, doc, unit, best, median, largest, turns, target, met; or `untaken`, why not."""
+"""A figure as in the JSON of a report: name, doc, unit, best, median, largest, turns, target, met; or `untaken`, the
+reason."""
 
 
 def with_sources(asked: Sequence[str], known: Mapping[str, Benchmark | Derived]) -> list[str]:
-    """The names that were asked for and those that they follow from, in the order of `known`."""
+    """The requested names and those from which they are computed, in the order of `known`."""
     wanted = set(asked)
     for name in asked:
         one = known[name]
@@ -77,8 +78,8 @@ def take(
 ) -> list[Figure]:
     """All figures, in the order of `benchmarks`.
 
-    Every turn takes each of them once, so that whatever else the machine does hits all alike. One turn before the
-    first warms up and is not counted.
+    Every turn measures each of them once, so that the machine's other load hits all alike. One turn before the first
+    warms up and is not counted.
     """
     measures: dict[str, Callable[[], float]] = {}
     untaken: dict[str, str] = {}
@@ -120,7 +121,7 @@ def _derived(one: Derived, values: Mapping[str, Sequence[float]], untaken: Mappi
 
 
 def _told(one: Benchmark | Derived, best: float, median: float, largest: float, turns: int) -> Figure:
-    """The best decides whether a target is met: what else a machine does only ever adds to a time."""
+    """A figure's data. The best decides whether a target is met: other load of the machine only adds to a time."""
     target = None if one.target is None else {one.target.side: one.target.bound}
     return {
         "name": one.name, "doc": one.doc, "unit": one.unit, "best": best, "median": median, "largest": largest,

@@ -1,4 +1,4 @@
-"""Decks of the arms that are measured; every joint has a `rigid_gearbox` with friction that sticks, or another."""
+"""Decks of the measured arms; every joint has a `rigid_gearbox` with friction that sticks, or another servo."""
 
 from __future__ import annotations
 

@@ -53,14 +53,14 @@ class Pair:
 MILLION = Pair("million", "a million cases, 1,000 histories", 1000, 1000, "every:1000")
 HISTORIES = Pair("histories", "10,000 cases, all histories", 100, 100, "all")
 SMALL = Pair("small", "28 cases, all histories", 7, 4, "all")
-"""Its processes are over before they have begun: what they take is their start."""
+"""A pair whose processes are so short that they measure the start."""
 
 STATES = {"same": "the same bytes", "few": "a few values differ", "all": "every number differs in its last bit"}
 
 
 @cache
 def _folder() -> tempfile.TemporaryDirectory[str]:
-    """Where the archives lie as long as this process runs."""
+    """The folder of the archives during this process."""
     return tempfile.TemporaryDirectory(prefix="met-benchmark-")
 
 
@@ -79,11 +79,11 @@ def archives(pair: Pair, state: str) -> tuple[Path, Path]:
 
 
 FEW = 3
-"""So many cases of each metric and of each signal differ in a pair of a few."""
+"""Number of cases of each metric and of each signal that differ in a pair with few changes."""
 
 
 def plant(path: Path, *, few: bool) -> None:
-    """Change the numbers of metrics and signals to the next that there is: of a few cases, or of all."""
+    """Change the numbers of metrics and signals to the next double: in a few cases, or in all."""
     import h5py
 
     with h5py.File(path, "r+") as file:
@@ -97,7 +97,7 @@ def plant(path: Path, *, few: bool) -> None:
 
 
 BLOCK = 4096
-"""Cases that are changed at a time."""
+"""Number of cases that are changed at a time."""
 
 
 # The page cache
@@ -117,7 +117,7 @@ def resident(path: Path) -> int:
 
 
 def drop(path: Path) -> None:
-    """Take what is known of a file out of the page cache; raises Untaken where that cannot be done."""
+    """Drop a file from the page cache; raises Untaken where that cannot be done."""
     for _ in range(DROPS):
         with path.open("rb") as file:
             os.fsync(file.fileno())
@@ -131,7 +131,7 @@ def drop(path: Path) -> None:
 
 
 DROPS = 5
-"""Times that it is tried: what is just being written or read stays."""
+"""Number of tries: pages that are being written or read stay."""
 
 
 # What is measured
@@ -158,7 +158,7 @@ def _xarray() -> list[str | Path]:
 TOOLS: dict[str, Callable[[], Sequence[str | Path]]] = {"met": _met, "h5diff": _h5diff, "xarray": _xarray}
 
 TELLS = {"met": "different; no tolerance was given", "h5diff": "", "xarray": "AssertionError"}
-"""What each says of a pair that differs."""
+"""The expected output of each tool for a pair that differs."""
 
 
 def compared(command: Sequence[str | Path], tool: str, pair: Pair, state: str) -> Used:
@@ -197,7 +197,7 @@ def _pair(pair: Pair, state: str, target: Target | None) -> list[Benchmark | Der
 
 
 def _cold() -> Callable[[], float]:
-    """Pages of the pair of a million that are in memory at a start: none, or it is refused."""
+    """Pages of the pair of a million that are in memory at a start: none, or the measurement is refused."""
     paths = archives(MILLION, "same")
 
     def measure() -> float:

@@ -30,7 +30,7 @@ BETWEEN = 0.2
 """Seconds from one letter to the next."""
 
 WORDS = 5
-"""That are written again, in each deck."""
+"""Number of words that are typed again in each deck."""
 
 JOINTS, ROW, LINES = 150, 50, 1895
 
@@ -86,7 +86,7 @@ def keystrokes(text: str, words: int, seed: int = 1) -> Iterator[str]:
 
 
 class _Ended(BaseException):
-    """Raised in a check of which something was told, when the next letter is typed."""
+    """Raised in a check with a first report, when the next letter is typed."""
 
 
 def _end(_signal: int, _frame: object) -> None:
@@ -146,7 +146,7 @@ def _at(share: float, which: int, name: str) -> Callable[[], float]:
 
 @cache
 def _warm_up() -> None:
-    """Import what an audit imports, as the process that checks has it."""
+    """Import the modules of an audit, as in the checking process."""
     compiled_with_reply(_request(_text("two_link"), {}))
 
 
@@ -162,7 +162,7 @@ def _audit(name: str) -> Callable[[], float]:
 
 
 def _audit_again(name: str) -> Callable[[], float]:
-    """The audit behind another one, of the deck with a line before it and another duration of its last run."""
+    """The second audit, of the deck with a new first line and another duration of its last run."""
     kept: list[FoundAnswers] = []
     compiled_with_reply(_request(_text(name), {}), kept.append)
     head, last, tail = _text(name).rpartition("duration = ")
@@ -181,7 +181,7 @@ def _text(name: str) -> str:
 
 
 DECKS = {"two_link": 0.1, "station_arm": 0.1, "long": 0.25}
-"""Decks, with the time in which something is to be told, s."""
+"""Decks, with the time limit of the first report, s."""
 
 BENCHMARKS: tuple[Benchmark | Derived, ...] = tuple(
     benchmark

@@ -29,10 +29,10 @@ from met.trace.program import Phase, Program, RunPhase, Tape
 TITLE = "forward dynamics, ns per evaluation and case, one core, many cases"
 
 CASES = 512
-"""A whole number of blocks of any width, many more than a core holds at once."""
+"""Number of cases: whole blocks of any width, many more than a core holds at once."""
 
 TICKS = {"2R": 8000, "7R": 1200, "30R": 200, "30R-general": 150}
-"""Evaluations of a case that are timed together: some 20 ms at the targets, long against Python's share."""
+"""Number of evaluations of a case that are timed together: some 20 ms at the targets, long against Python's share."""
 
 STEP = 1e-9  # s, of the step that ties each evaluation to the one before
 ROTOR = 0.3  # kg m^2 behind each joint, N^2 J_m: some servo of a robot's
@@ -102,7 +102,7 @@ def _ours(arm: Arm, dynamic: bool, cpu: str | None) -> Callable[[], float]:
 
 
 def _peers(arm: Arm) -> Callable[[], float]:
-    """The peer's, over a batch as large as ours."""
+    """The peer's evaluations, over a batch as large as ours."""
     n = len(arm.joints)
     inputs = states(arm, peer.BATCH)
     return peer.evaluations(arm, inputs[:, :n], inputs[:, n : 2 * n], inputs[:, 2 * n :])

@@ -39,13 +39,13 @@ TITLE = "derivatives, one core, many cases"
 
 CASES = evaluation.CASES
 TICKS = 200
-"""Jacobians of a case that are timed together."""
+"""Number of Jacobians of a case that are timed together."""
 
 ABREAST = 128
-"""Cases whose periods are linearised together."""
+"""Number of cases whose periods are linearised together."""
 
 STEPS = 1000
-"""Steps of the Panda's run that are timed together."""
+"""Number of steps of the Panda's run that are timed together."""
 
 
 def program(arm: Arm, *, jacobian: bool) -> Program:
@@ -103,7 +103,7 @@ def _dynamics(arm: Arm, jacobian: bool) -> Callable[[], float]:
 
 
 def _compiling(arm: Arm) -> Callable[[], float]:
-    """Seconds of the core from the recorded program to machine code, without the cache."""
+    """CPU seconds from the recorded program to machine code, without the cache."""
     from met.backends.llvm import machine
 
     recording, here = record(program(arm, jacobian=True)), machine.machine(None)
@@ -125,7 +125,7 @@ def _panda() -> engine.Prepared:
 
 
 def _period(*, abreast: bool) -> Callable[[], float]:
-    """Milliseconds of the core for the map of a period of a case."""
+    """CPU milliseconds for the map of a period of a case."""
     experiment = _panda().experiment
     laws = [each for each in input_signals(experiment.structure) if each.is_output]
     program = PeriodProgram(experiment, laws)

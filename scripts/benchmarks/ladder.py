@@ -1,4 +1,4 @@
-"""What each model adds to a step: the Panda under gravity, 512 cases, modified Euler and servos at 10 kHz.
+"""The time that each model adds to a step: the Panda under gravity, 512 cases, modified Euler and servos at 10 kHz.
 
 Every joint has the same servo. What servos add is over a step with `ideal` ones; what all else adds is over the same
 step with `rigid_gearbox`. Differences are of figures that were taken in the same turns. Time is the core's.
@@ -93,7 +93,7 @@ OTHERS: Mapping[str, Variant] = {
     "payload grappled, base free": Variant(base="free;", payload=f"{_LOAD}  {_FLYING}"),
     "space": Variant(_ELASTIC, base="free;", payload=_LOAD),
 }
-"""What else there is, over rigid gearboxes on a fixed base. space: elastic gears on a free base, with a load."""
+"""Other models, over rigid gearboxes on a fixed base. space: elastic gears on a free base, with a load."""
 
 
 def _step(variant: Variant) -> Callable[[], float]:

@@ -1,4 +1,4 @@
-"""What figures were measured on, and with which MET."""
+"""The machine and the version of MET of a measurement."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def machine() -> dict[str, Any]:
 
 
 SAME = ("processor", "code_for", "avx512", "cores")
-"""What two reports must have in common for their figures to be compared as one machine's."""
+"""Entries that must be equal in two reports for their figures to be from one machine."""
 
 
 def told(here: dict[str, Any]) -> str:
@@ -54,7 +54,7 @@ def _processor() -> str:
 
 
 def _has_flag(name: str) -> bool:
-    """Whether the processor says that it has this; other architectures than x86 list other words."""
+    """True where the processor has this feature; architectures other than x86 list other words."""
     for line in Path("/proc/cpuinfo").read_text().splitlines():
         key, _, value = line.partition(":")
         if key.strip() == "flags":
@@ -63,7 +63,7 @@ def _has_flag(name: str) -> bool:
 
 
 def _git(*words: str) -> str:
-    """What git says of the checkout; nothing where there is no git, or no checkout of it."""
+    """The output of git about the checkout; empty without git or a checkout."""
     try:
         done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True)
     except OSError:

@@ -15,7 +15,7 @@ from benchmarks.arms import GRAVITY, Arm
 from benchmarks.benchmark import Untaken
 
 BATCH = 4096
-"""States that one call takes: a few thousand, so that a call's own cost is nothing."""
+"""Number of states in one call: a few thousand, so that the call's own cost is negligible."""
 
 
 def pinocchio() -> Any:
@@ -28,7 +28,7 @@ def pinocchio() -> Any:
 
 
 def model(arm: Arm) -> Any:
-    """The arm as Pinocchio has it; bodies behind fixed joints are appended to what carries them."""
+    """The arm as a Pinocchio model; bodies behind fixed joints are merged into their parents."""
     pin = pinocchio()
     made = pin.Model()
     made.gravity.linear = np.array(GRAVITY)
@@ -63,7 +63,8 @@ def accelerations(arm: Arm, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> n
 
 
 def evaluations(arm: Arm, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> Callable[[], float]:
-    """What takes the ns of an evaluation, over this batch [case, joint], on one thread; nothing is allocated then."""
+    """A function that returns the ns of an evaluation, over this batch [case, joint], on one thread, without
+    allocations."""
     pin, made = pinocchio(), model(arm)
     pool = pin.ModelPool(made, 1)
     columns = [np.asfortranarray(x[:, _order(made, arm)].T) for x in (q, qd, tau)]

@@ -1,4 +1,4 @@
-"""A report: figures as a table, as JSON, and against another report's."""
+"""A report of figures as a table, as JSON, and compared with another report."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from benchmarks.machine import SAME
 FORMAT = "met benchmarks 1"
 
 PLACEMENT = 0.12
-"""Share by which a figure may differ though nothing is slower: where code comes to lie moves it by that much."""
+"""Relative difference of a figure that may be due to the placement of code alone."""
 
 
 class Unreadable(Exception):
-    """A file that is no report; the text says why."""
+    """Raised for a file that is not a report; the text says why."""
 
 
 def write(path: Path, here: dict[str, Any], turns: int, figures: Sequence[Figure]) -> None:
@@ -43,7 +43,7 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def table(figures: Sequence[Figure]) -> list[str]:
-    """A line a figure: name, best, median, target and whether it is met, what it is."""
+    """The table: a line for each figure with name, best, median, target, whether it is met, and description."""
     rows = [["", "best", "median", "target", "", ""]]
     for figure in figures:
         bound = _bound(figure)
