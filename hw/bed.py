@@ -69,7 +69,7 @@ class Capability(enum.IntFlag):
     COASTS = 1 << 16
     """Its safe state is outputs that are off: the shaft is not braked."""
     ARMATURE = 1 << 17
-    """Its drive takes torques, and is told what an armature would take from the voltage that the bed is sent."""
+    """Capability: its drive takes torques, so it is sent the torque of an armature at the requested voltage."""
 
 
 class InterlockReason(enum.IntFlag):
@@ -93,8 +93,7 @@ class InterlockReason(enum.IntFlag):
 
 @frozen
 class Scales:
-    """The quantity that one count stands for: voltage V, current A, rate rad/s, angle rad, drive current A,
-    acceleration rad/s^2."""
+    """The quantity of one count: voltage V, current A, rate rad/s, angle rad, drive current A, acceleration rad/s^2."""
 
     voltage: float
     current: float
@@ -219,11 +218,11 @@ class BedDriver(ABC):
         """Stop, and let `time` s pass. A bed in lock-step advances as far as that."""
 
     def line_time(self, about: About) -> float:
-        """Time that the bytes of an exchange take on the line, s; 0 where the line's speed is not what counts."""
+        """Time of an exchange's bytes on the line, s; 0 where the line's speed does not matter."""
         return 0.0
 
     def account(self) -> tuple[str, ...]:
-        """Lines for people about what was driven since the bed was armed, once it is stopped."""
+        """Lines for people about the exchanges since the bed was armed, once it is stopped."""
         return ()
 
     def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> BedSample:
@@ -232,7 +231,7 @@ class BedDriver(ABC):
 
     @abstractmethod
     def stop(self) -> bool:
-        """Bring the bed into the safe state. This is asked for again until the bed confirms it or the line is dead.
+        """Bring the bed into the safe state, with repeated requests until the bed confirms it or the line is dead.
         Returns True where it was confirmed."""
 
     @abstractmethod

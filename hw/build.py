@@ -68,7 +68,7 @@ _CROSS: Mapping[Kind, str] = {"arm": "arm/lm3s6965.ld", "pico": "pico/rp2040.ld"
 
 @frozen(kw_only=True)
 class Shaft:
-    """A bed's shaft as its data sheets have it: by these a tachometer is found dead or reversed.
+    """A bed's shaft by its data sheets, from which a dead or reversed tachometer is detected.
 
     kt, resistance, tau_max   of the drive motor, N m/A, ohm, N m;  kt_load: of the load motor, N m/A
     inertia, f_c, f_v         of the shaft with both rotors, kg m^2, N m, N m s/rad
@@ -123,8 +123,8 @@ TOLERANCE = 0.25
 at 0.39 % a kelvin."""
 
 CHANGE = 0.01
-"""Share of the limit of rate by which the rate must surely change before the guard judges: above a tachometer's
-noise, below what does harm. At least 16 counts."""
+"""Share of the limit of rate by which the rate must certainly change before the guard judges: above a tachometer's
+noise, below harmful rates. At least 16 counts."""
 
 LAG = 3.0
 """Time for which the tachometer's filter remembers, in units of its delay sqrt(2)/(2 pi f_cut): a twentieth is left."""
@@ -136,7 +136,7 @@ GUARD_BITS = 24
 """Bits behind the point in the guard's fractions; fewer where a tick of a light shaft is many fine counts."""
 
 _BEYOND = 2.0**62
-"""The number that stands for any larger one: none of this size is accepted."""
+"""The number for any larger one: none of this size is accepted."""
 
 
 class Uncountable(ValueError):
@@ -265,7 +265,7 @@ def counted(config: Config) -> tuple[dict[str, int], Limits, float]:
     deadman = counts["deadman"] / hz
     if not 0.010 - 1e-9 <= deadman <= 0.020 + 1e-9:
         raise Uncountable(f"a deadman of {deadman:g} s, in whole ticks, is not 0.010 to 0.020 s", "another rate")
-    deadman = min(max(deadman, 0.010), 0.020)  # but for what rounding has left beyond them
+    deadman = min(max(deadman, 0.010), 0.020)  # rounding may leave it just outside
     announced = Limits(
         voltage=counts["voltage"] * s.voltage,
         current=counts["current"] * s.current,
@@ -297,7 +297,7 @@ def _check_above_0(what: str, value: float, *, or_0: bool = False) -> None:
 
 
 def _whole(value: float) -> int:
-    """A number rounded down to a whole one, where what rounding took off a whole number does not count."""
+    """A number rounded down to a whole one, with an allowance for rounding just below a whole number."""
     return math.floor(min(value, _BEYOND) * (1.0 + 1e-12))
 
 
@@ -333,7 +333,7 @@ def guard(config: Config) -> dict[str, int]:
         256.0 * found["most"],
         256.0 * load,
         found["friction"],
-        # what may be sure in a tick, summed while a rate is waited for
+        # the certain change in a tick, summed while a rate is awaited
         (found["most"] + load + viscous) * (lag + 2.0),
     )
     if not all(each <= _ROOM // 8 for each in products):

@@ -32,7 +32,7 @@ from met.run import prepare
 
 @frozen
 class CaseRequest:
-    """The case that the process is to drive.
+    """The request to the process to drive a case.
 
     plan         plan of one experiment, as text (met.plan.file);  row: of its case table
     ports        by joint;  lock_step: True where the beds have no time of their own;  baud: of serial lines
@@ -115,7 +115,7 @@ def run(request: CaseRequest) -> loop.LoopEnd:
 
 
 def _rest(beds: Sequence[BedDriver], time: float, stop_requested: Callable[[], bool]) -> None:
-    """Let all beds rest for `time` s at once, or until the host is asked to stop."""
+    """Let all beds rest for `time` s at once, or until a stop is requested."""
     for _ in range(math.ceil(time / process.PAUSE - 1e-6)):
         if stop_requested():
             return
@@ -139,7 +139,7 @@ def _greeted(bed: BedDriver, joint: str, experiment: Experiment, request: CaseRe
 
 
 def _check_drive(about: About, experiment: Experiment, joint: str) -> None:
-    """Raise Problem E438 where a bed's drive is told another quantity than the deck's bed model has it."""
+    """Raise Problem E438 where a bed's drive is commanded another quantity than in the deck's bed model."""
     use = next(each for each in experiment.structure.substitutions if each.joint == joint)
     told = models.find("bed", use.bed, use.place).drive
     if told != about.drive:
@@ -159,7 +159,7 @@ def _check_time(abouts: Sequence[About], lock_step: bool) -> None:
 
 
 def _check_ticks(abouts: Sequence[About], of: Pace, lock_step: bool) -> None:
-    """Raise Problem E405 where a bed reads its sensors less often than it is asked. Clocks may be off by 1 %."""
+    """Raise Problem E405 where a bed reads its sensors less often than they are requested. Clocks may be off by 1 %."""
     for about in abouts:
         if not lock_step and about.tick_hz < 0.99 * of.hz:
             message = f"bed `{about.name}` ticks at {about.tick_hz:g} Hz, and would be spoken to at {of.hz:g} Hz"

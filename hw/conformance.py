@@ -99,7 +99,7 @@ class Conformance:
         self.is_safe(bed)
         again = bed.exchange(0.0, 0.0)
         assert again is not None and again.refused and again.state == BedState.STOPPED
-        assert bed.connect() and bed.read().faults & ~Fault.WATCHDOG == fault  # latched, whoever greets it
+        assert bed.connect() and bed.read().faults & ~Fault.WATCHDOG == fault  # latched, whoever greets the bed
         with refused("E406"):
             bed.arm()
         bed.rest(3.0)

@@ -40,7 +40,7 @@ class CaseKernel:
         self.last = schedule.ticks // self.divisor
         """The servos' last tick."""
         self._rates = [self.block.inputs[program.inputs.index(f"wire:{joint}.rate")] for joint in self.joints]
-        self._outputs = [  # what the drive is told, and the load's current
+        self._outputs = [  # the drive's command, and the load's current
             [self.block.outputs[at] for at, name in enumerate(program.outputs) if name.startswith(f"wire:{joint}.")]
             for joint in self.joints
         ]

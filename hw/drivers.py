@@ -41,8 +41,8 @@ def opened(port: Port, experiment: Experiment | None, joint: str, row: int, peri
 
 
 def check_model(name: str, experiment: Experiment, joint: str) -> None:
-    """Raises Problem E429, at the deck's `substitute`, where the bed model of a joint lacks a parameter that the driver
-    at a port reads, and what the driver itself says of a deck that is for another bed."""
+    """Raise Problem E429, at the deck's `substitute`, where the bed model of a joint lacks a parameter that the driver
+    at a port reads, or the driver itself rejects a deck made for another bed."""
     kind = kind_of(name)
     kind.check(name.partition(":")[2], experiment, joint)
     if not kind.needs:
@@ -62,8 +62,8 @@ def in_lock_step(name: str, requested: bool) -> bool:
 
 
 def same_bed(one: str, other: str) -> bool:
-    """True where what was driven at one port may be gone on with at the other: serial lines may get another name,
-    simulated beds and transcripts are told apart by theirs."""
+    """True where work at one port may go on at the other: serial lines may get another name, while simulated beds and
+    transcripts are distinguished by name."""
     kinds = kind_of(one), kind_of(other)
     if any(kind.simulated or kind.replays for kind in kinds):
         return one == other

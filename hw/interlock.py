@@ -9,8 +9,8 @@ from hw.bed import Capability, Scales
 from met.frozen import frozen
 
 SPAN = 0.064
-"""Time over which encoder and tachometer are compared, s: some ten times a tachometer's filter is late, and short
-against what a shaft takes to run away."""
+"""Time over which encoder and tachometer are compared, s: some ten times the delay of a tachometer's filter, and short
+against the time in which a shaft runs away."""
 
 EARLY, LATE = 0.5, 1.5
 """Shares of a tick between which the next one has to come, by another clock."""
@@ -51,8 +51,8 @@ class Interlock:
 def interlock_counts(
     lock: Interlock, tick_hz: float, scales: Scales, slow: int, capabilities: Capability
 ) -> dict[str, int | str]:
-    """The fields of `interlock_config` but for its port, by name. slow: counts of rate at which the brake may close.
-    Raises ValueError for a number that cannot be counted."""
+    """The fields of `interlock_config` except its port, by name. slow: counts of rate at which the brake may close.
+    Raises ValueError for a number that does not fit in counts."""
     least, most = lock.angle or (1.0, 0.0)
     compared = lock.f_cut is not None and Capability.ENCODER in capabilities
     delay = math.sqrt(2.0) / (2.0 * math.pi * lock.f_cut) if lock.f_cut is not None else 0.0

@@ -79,7 +79,7 @@ class BenchPart:
 
 @frozen
 class PartsList:
-    """The motors and benches of some files, and what a bench needs besides, by name."""
+    """The motors, benches and further parts of some files, by name."""
 
     motors: Mapping[str, MotorPart]
     benches: Mapping[str, Bench]

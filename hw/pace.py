@@ -38,8 +38,8 @@ class Pace:
         return LOCK_STEP_PATIENCE if lock_step else max(self.period, SHORTEST_PATIENCE)
 
     def late(self, lock_step: bool) -> int:
-        """The least number of servo ticks from reading a rate to acting on it: a bed with a time of its own is told
-        at the next exchange, one in lock-step at once."""
+        """The smallest number of servo ticks from reading a rate to acting on it: a bed with a time of its own is
+        commanded at the next exchange, one in lock-step at once."""
         return 0 if lock_step or self.repeats > 1 else 1
 
 

@@ -1,4 +1,5 @@
-"""The image of a Raspberry Pi Pico: what `met bed firmware --board pico` writes, a file that is dragged onto the board.
+"""The image of a Raspberry Pi Pico, the output of `met bed firmware --board pico`: a file that is dragged onto the
+board.
 
 UF2 is blocks of 512 bytes, each with 256 bytes of the flash and where they go (github.com/microsoft/uf2). The image
 depends on the bench and the sources alone: the same bench gives the same bytes, in any folder.
@@ -30,7 +31,7 @@ def pico_image(bench: PicoBench) -> bytes:
 
 
 def pico_simulation(config: Config, plant_c: str) -> bytes:
-    """The same with a simulated plant in place of pins, for an emulator of the chip. plant_c: as of hw.build.build."""
+    """The image with a simulated plant in place of pins, for an emulator of the chip. plant_c: as for hw.build.build"""
     return flash_of(build("pico", config, plant_c, texts={"wiring.c": wiring_c(lock_step_wiring(config.tick_hz))}))
 
 

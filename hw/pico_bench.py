@@ -1,4 +1,4 @@
-"""A bench on a Raspberry Pi Pico as its file in TOML has it: the bed's configuration, and the port's numbers.
+"""A bench on a Raspberry Pi Pico from its TOML file: the bed's configuration, and the port's numbers.
 
 The file is data: bounded, each figure a number with a unit of its kind, above zero. `hw/firmware/pico/bench.toml` is
 the one that is taken where none is given, and says what each means.

@@ -1,4 +1,4 @@
-"""Ports: the places where a bed is, `--port` on the command line, and what a driver declares of those it reaches.
+"""Ports: the places of beds, `--port` on the command line, and the declaration of a driver's ports.
 
 A driver is a file in hw/beds with a `PortKind`, and a line in `PORTS` of hw/beds/__init__.py; `hw.drivers` finds the
 one of a port. docs/bed.md, "A driver of your own", is an example.
@@ -74,12 +74,12 @@ class Opening:
         return bed_values(self.simulated(), self.joint, self.row)
 
     def transcript(self) -> Callable[[bytes], object] | None:
-        """Takes the bytes of a transcript, in a new file; None where none is to be kept. Raises Problem E409."""
+        """The writer of a transcript, to a new file; None where none is kept. Raises Problem E409."""
         return None if self.port.transcript is None else TranscriptFile(self.port.transcript)
 
 
 def as_requested(name: str, requested: bool) -> bool:
-    """The `lock_step` of a port whose bed may be either: what the user says with `--lock-step`."""
+    """The `lock_step` of a port whose bed may be either: the user's choice by `--lock-step`."""
     return requested
 
 

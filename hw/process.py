@@ -48,7 +48,7 @@ def listening() -> Callable[[], bool]:
         if number == signal.SIGTERM or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, lambda which, _: heard.append(which))
     realtime.end_with_parent(signal.SIGTERM)
-    if os.environ.get(_STARTED_BY, str(os.getppid())) != str(os.getppid()):  # who started it was gone before
+    if os.environ.get(_STARTED_BY, str(os.getppid())) != str(os.getppid()):  # its parent was gone before
         os.kill(os.getpid(), signal.SIGTERM)
     return lambda: bool(heard)
 
@@ -65,7 +65,7 @@ def about_as_json(about: About) -> dict[str, Any]:
 
 
 def warnings(bed: BedDriver) -> None:
-    """Say what may make exchanges with a bed late, or a bench another one than the deck takes it for."""
+    """Report conditions that may make exchanges with a bed late, or differences of a bench from the deck."""
     for warning in bed.warnings:
         place = warning.at.place if warning.at else None
         said = warning.message if place is None else f"{place.file}:{place.line}: {warning.message}"
@@ -73,13 +73,13 @@ def warnings(bed: BedDriver) -> None:
 
 
 def precedence() -> None:
-    """Take precedence over other processes, and say what was not allowed."""
+    """Take precedence over other processes, and report what was not allowed."""
     for refused in realtime.take_precedence():
         say(said=refused)
 
 
 def answer(question: Callable[..., Question], do: Callable[[Question], Mapping[str, Any]]) -> None:
-    """The whole of the process: read the question, do it, and say the result, or what is wrong."""
+    """The whole of the process: read the question, carry it out, and print the result, or the error."""
     try:
         found = do(question(**json.loads(sys.stdin.readline())))
     except Problem as problem:

@@ -1,6 +1,5 @@
-"""Measures by which the host wakes in time, where they are allowed: a process that is scheduled first, memory that is
-not swapped, and no collection of garbage. It is not hard real time: what was late is counted.
-"""
+"""Measures by which the host wakes in time, where they are allowed: scheduling priority, locked memory, and no garbage
+collection. It is not hard real time: lateness is counted."""
 
 from __future__ import annotations
 
@@ -18,7 +17,8 @@ _PR_SET_PDEATHSIG = 1
 
 
 def take_precedence() -> list[str]:
-    """Take precedence for this process. Returns what the system did not allow, in words, each with its remedy."""
+    """Take precedence for this process. Returns measures that the system did not allow, in words, each with its
+    remedy."""
     gc.collect()
     gc.freeze()
     gc.disable()

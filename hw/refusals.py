@@ -81,7 +81,7 @@ _REASONS = {
 
 
 def words(faults: Fault) -> str:
-    """Faults in words: what happened."""
+    """Faults in words."""
     return "; ".join(_FAULTS[fault][0] for fault in Fault if fault in faults)
 
 
@@ -95,7 +95,7 @@ def interlocked(reasons: InterlockReason | None) -> list[tuple[str, str]]:
 
 
 def refused(about: About, what: str, sample: BedSample) -> Problem:
-    """The error for a bed that did not do what was asked (`arm`, `clear` ...), as its answer says."""
+    """The error for a bed that did not carry out a request (`arm`, `clear` ...), from its answer."""
     latched = sample.faults & ~Fault.WATCHDOG
     slow = about.limits.arming_rate
     locked = interlocked(sample.interlock)
@@ -148,7 +148,7 @@ def other_version(version: int) -> Problem:
 
 
 def no_greeting(name: str, sent: bytes, came: bytes) -> Problem:
-    """The error for a bed that does not answer HELLO: what was sent, and what came instead of an answer."""
+    """The error for a bed that does not answer HELLO: the question, and the bytes that came in place of an answer."""
     message = f"nobody answers HELLO on {name}"
     asked, decoder = set(sent.split(b"\0")) - {b""}, Decoder()
     ours = sum(frame in asked for frame in came.split(b"\0"))
@@ -168,8 +168,7 @@ def no_greeting(name: str, sent: bytes, came: bytes) -> Problem:
 
 
 def silent(name: str, asked: str) -> Problem:
-    """The error for a question without an answer: one that was asked again and again, or a STEP, which is asked
-    once."""
+    """The error for a question without an answer: one that was repeated, or a STEP, which is sent once."""
     message = f"bed `{name}` does not answer {asked}"
     return Problem(error("E402", message, help="it was there before: look at its supply and at the line"))
 

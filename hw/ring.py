@@ -44,13 +44,13 @@ class Ring:
         _COUNT.pack_into(self._memory, 0, self._put)
 
     def take(self) -> Iterator[bytes]:
-        """Take the records that are there, each once. A record counts as taken when the next is asked for."""
+        """Take the present records, each once. A record counts as taken when the next is asked for."""
         there = _COUNT.unpack_from(self._memory, 0)[0]
         while self._taken < there:
             at = 2 * _HEAD + self._taken % self.room * SIZE
             record = self._memory[at : at + SIZE]
             if zlib.crc32(record[:-4]) != int.from_bytes(record[-4:], "little"):
-                return  # not all of it is to be seen from here yet
+                return  # it is not completely visible from here yet
             yield record
             self._taken += 1
             _COUNT.pack_into(self._memory, _HEAD, self._taken)
@@ -61,8 +61,7 @@ class Ring:
 
 
 def make(room: int) -> Ring:
-    """A ring with room for so many records, in memory without a name: it is gone with the last process that has it
-    open."""
+    """A ring for `room` records, in memory without a name: it is gone with the last process that has it open."""
     file = os.memfd_create("met-bed-records")
     os.ftruncate(file, 2 * _HEAD + room * SIZE)
     return Ring(file, room)

@@ -1,6 +1,5 @@
-"""A serial line, or what pyserial makes one of: a device, socket://, rfc2217://. And unix://PATH, a socket of this
-machine, such as an emulator's.
-"""
+"""A serial line, or a pyserial substitute: a device, socket://, rfc2217://; and unix://PATH, a socket of this machine,
+such as an emulator's."""
 
 from __future__ import annotations
 
@@ -39,7 +38,7 @@ LOST = (
     "the bed stops itself when it hears nothing for the time of its deadman",
     "look at the cable and the bed's supply, then start again: nothing goes on by itself",
 )
-"""What to do where the line to a bed was lost."""
+"""Remedy where the line to a bed was lost."""
 
 
 class SerialLine:
@@ -53,7 +52,7 @@ class SerialLine:
         local = "://" not in url
         try:
             self._port: Any = _opened(url, baud)
-        except (OSError, ValueError, KeyError, re.error) as reason:  # the last two are pyserial's, of what a URL says
+        except (OSError, ValueError, KeyError, re.error) as reason:  # the last two are pyserial's, about a URL
             raise _not_opened(url, reason) from None
         try:
             self._file: int | None = self._port.fileno()
@@ -114,7 +113,7 @@ def _opened(url: str, baud: int) -> Any:
     if url.startswith(_UNIX):
         return _UnixSocket(url.removeprefix(_UNIX))
     _check_address(url)
-    import serial  # only who drives a bed pays for it
+    import serial  # imported only to drive a bed
 
     own = {} if "://" in url else {"exclusive": True}
     return serial.serial_for_url(url, baudrate=baud, timeout=0, write_timeout=_WRITE_TIMEOUT, **own)
@@ -156,7 +155,7 @@ class _UnixSocket:
         self._line.sendall(data)
 
     def read(self, size: int) -> bytes:
-        """Read what is there, without waiting."""
+        """Read pending bytes, without waiting."""
         try:
             data = self._line.recv(size)
         except BlockingIOError:

@@ -18,8 +18,8 @@ _QUANTITY = re.compile(r"\s*(-?[\d.]+(?:[eE][+-]?\d+)?)\s*(\S.*?)\s*")
 
 
 def quantity(value: Any, unit: str, *, signed: bool = False) -> float:
-    """The number in SI of a text such as "1.5 N*m", of the dimension of this unit, finite, and above zero unless it is
-    signed. Raises ValueError where the value is none."""
+    """The number in SI of a text such as "1.5 N*m", of this unit's dimension, finite, and above zero unless it is
+    signed. Raises ValueError for other texts."""
     match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
     if match is None:
         raise ValueError

@@ -69,10 +69,10 @@ class TranscriptWriter:
 
 
 class TranscriptFile:
-    """A new file, written without a buffer in this process, so that what was put outlives it."""
+    """A new file, written without a buffer in this process, so that its contents outlive it."""
 
     def __init__(self, path: str | Path) -> None:
-        """Make the file, and its folder where there is none."""
+        """Make the file, and its folder if it does not exist."""
         try:
             with contextlib.suppress(FileExistsError):  # no folder: then no file can be made in it
                 Path(path).parent.mkdir(parents=True, exist_ok=True)
@@ -94,8 +94,8 @@ class TranscriptFile:
 
 
 class TranscribedLine:
-    """A line with a transcript of what goes over it. Where the transcript cannot be written, that is raised once,
-    and the line goes on without it."""
+    """A line with a transcript of its traffic. If the transcript cannot be written, that is raised once, and the line
+    goes on without it."""
 
     def __init__(self, line: BedLine, writer: TranscriptWriter) -> None:
         self._line, self._writer = line, writer

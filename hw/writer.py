@@ -1,4 +1,4 @@
-"""The process that puts records on the disk while the loop runs, and outlives it: what was recorded is never lost.
+"""The process that writes records to the disk while the loop runs, and outlives it, so that no record is lost.
 
     python -m hw.writer RING ROOM PIPE PATH < head
 
@@ -32,7 +32,7 @@ PAUSE = 0.005
 
 
 def write(through: Ring, pipe: int, path: Path, head: bytes) -> None:
-    """Write what comes through the ring, until the pipe ends. head: JSON, as it stands before the records."""
+    """Write the records from the ring, until the pipe ends. head: JSON, written before the records"""
     with path.open("xb", buffering=0) as file:
         file.write(records.MAGIC + len(head).to_bytes(8, "little") + head)
         ended = False

@@ -45,7 +45,7 @@ STALE = 0.05
 """Longest time since a drive has said its state, s; an answer that is more than that behind does not count."""
 
 QUIET = 1e-3
-"""Time for which what is still to come is taken before drives are asked outside of a run, s."""
+"""Time for which pending input is read before drives are asked outside of a run, s."""
 
 DISAGREED = 5
 """Answers in a row in which the drives disagree, after which the bed stops."""
@@ -206,14 +206,14 @@ class CanBed(BedDriver):
         return (*sides, ("bus", f"{bus['interface']} {bus['channel']}: {most}"), ("filter", filter))
 
     def _of_torque(self) -> tuple[Diagnostic, ...]:
-        """A warning where the drive's own largest torque is less than the file's and than what the deck believes."""
+        """A warning where the drive's own largest torque is below the file's and below the deck's."""
         own, files = self._sides[0].facts.torque_max, self._bench.drive.figures["torque_max"]
         if min(files, self._torque_believed) <= own * (1.0 + 1e-6):
             return ()
         return (can_deck.torque_warning(self._drives[0].words, own, self._torque_believed),)
 
     def _of_loop(self) -> tuple[Diagnostic, ...]:
-        """A warning where the drive's rate loop is not what the deck takes it for."""
+        """A warning where the drive's rate loop differs from the deck's."""
         own = self._sides[0].facts.rate_loop
         if own is None or self._believed is None:
             return ()
@@ -225,7 +225,7 @@ class CanBed(BedDriver):
     def limit(self, limits: Mapping[str, float]) -> None:
         about = self._there()
         tighter = greeting.tighter(about, limits)
-        if self._kind == "rate" and "rate" in limits:  # what it is told is a rate, too
+        if self._kind == "rate" and "rate" in limits:  # its command is a rate, too
             told = greeting.counts(limits["rate"], about.scales.voltage)
             tighter["voltage"] = min(told, tighter.get("voltage", told))
         if self._state != BedState.DISARMED:
@@ -250,7 +250,7 @@ class CanBed(BedDriver):
         begin_driving(self._talk)
         self._settle(FEED)
         for drive in self._drives:
-            drive.owed.clear()  # what it was asked while the shaft was at rest, and has not answered
+            drive.owed.clear()  # questions while the shaft was at rest, without answers yet
         self._state, self.confirmed = BedState.ARMED, False
         self._hold(0, 0, self._talk.line.now())
         return self._sample()
@@ -406,7 +406,7 @@ class CanBed(BedDriver):
         return True
 
     def _settle(self, longest: float) -> None:
-        """Take what comes until neither drive owes an answer, or for the longest time, s."""
+        """Read until neither drive owes an answer, or for the longest time, s."""
         line = self._talk.line
         self._talk.pump(line.now() + longest, lambda: not any(drive.owes(line.now()) for drive in self._drives))
 
@@ -440,7 +440,7 @@ class CanBed(BedDriver):
         return all(drive.reading is not None and drive.reading.time >= since for drive in self._drives)
 
     def _follow(self) -> None:
-        """Keep what both drives answered last: angle, rate, and the rate behind the filter."""
+        """Keep the last answers of both drives: angle, rate, and the rate after the filter."""
         side = self._sides[0]
         before, time = side.rate, side.time
         for each, reading in zip(self._sides, self._readings(), strict=True):
@@ -482,8 +482,8 @@ class CanBed(BedDriver):
         return self._there().scales
 
     def _told(self, sent: float) -> float:
-        """What the drive under test is told, N m: what was sent, or the torque of an armature at it, V; of one that is
-        told rates the rate that was sent, rad/s, which is within its limit."""
+        """The command for the drive under test, N m: the value sent, or the torque of an armature at it, V; for a rate
+        drive the rate sent, rad/s, which is within its limit."""
         if self._kind == "rate":
             return sent
         if self._kind == "torque":
@@ -496,8 +496,8 @@ class CanBed(BedDriver):
         self._volts, self._amperes, self._told_at = volts, amperes, at
 
     def _warm(self, now: float) -> None:
-        """Let the load's heat, A^2 s, follow what it held until now, and stop where it is too much; sum up the energy
-        that the drives gave back."""
+        """Update the load's heat, A^2 s, from the command so far, and stop where it is too much; sum up the energy that
+        the drives returned."""
         about = self._there()
         passed, self._warmed = now - self._warmed, now
         held = self._amperes * about.scales.current

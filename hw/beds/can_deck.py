@@ -1,4 +1,4 @@
-"""A bench of two drives held against a deck: what its file and its drives say otherwise than the deck believes."""
+"""Checks of a bench of two drives against a deck: differences of its file and its drives from the deck's model."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RATE_LOOP_TOLERANCE = 0.1
 """Share of its gains by which a drive's rate loop may differ from the deck's before it is said."""
 
 WEAKER = "beyond it the drive gives less than the law believes, and the run is one of neither motor"
-"""Why a drive that is weaker than the deck's motor is told of."""
+"""The reason for a warning about a drive that is weaker than the deck's motor."""
 
 
 def bench_at(path: str) -> TwoDrives:
@@ -27,8 +27,8 @@ def bench_at(path: str) -> TwoDrives:
 
 
 def check_deck(path: str, experiment: Experiment, joint: str) -> None:
-    """Raise Problem E438 where the drive under test cannot be told what the deck's bed model sends, E444 where the
-    filter of the rate, or the load's torque constant, is not what the deck believes."""
+    """Raise Problem E438 where the drive under test cannot take the commands of the deck's bed model, E444 where the
+    filter of the rate, or the load's torque constant, differs from the deck's."""
     bench = bench_at(path)
     _check_told(path, bench, _use(experiment, joint))
     held = (
@@ -63,7 +63,7 @@ def _check_told(path: str, bench: TwoDrives, use: Substitution) -> None:
 
 
 def warnings(bench: TwoDrives, path: str, opening: Opening) -> tuple[Diagnostic, ...]:
-    """Warnings of what the bench is otherwise than the deck believes, and may be: E444."""
+    """Warnings about permissible differences of the bench from the deck: E444."""
     if opening.experiment is None:
         return ()
     found = []
@@ -93,7 +93,7 @@ def believed_torque(opening: Opening) -> float:
 
 
 def torque_warning(who: str, own: float, believed: float) -> Diagnostic:
-    """The warning that a drive's own largest torque is less than that of the deck's motor, both N m. who: it, in
+    """The warning that a drive's own largest torque is below that of the deck's motor, both N m. who: the drive in
     words"""
     message = f"the {who} gives {own:.4g} N*m at most by its own limits, and the motor of the deck {believed:g} N*m"
     helps = (WEAKER, "larger limits in the drive, if it and the shaft bear them, or a smaller `tau_max` in the deck")
@@ -124,7 +124,7 @@ def believed_loop(opening: Opening) -> BelievedLoop | None:
 
 
 def loop_warning(who: str, gain: float, integral: float, believed: BelievedLoop) -> Diagnostic | None:
-    """A warning where the rate loop of a drive is not the one that the deck takes for it.
+    """A warning where the rate loop of a drive differs from the deck's.
 
     who  the drive in words;  gain: N m s/rad;  integral: N m/rad
     """
@@ -148,7 +148,7 @@ def _use(experiment: Experiment, joint: str) -> Substitution:
 
 
 def _value(opening: Opening, name: str, default: float | None = None) -> float:
-    """A number of the joint in the case that is opened, SI; the default where there is none."""
+    """A number of the joint in the opened case, SI; the default where there is none."""
     experiment, path = opening.simulated(), f"{opening.joint}.{name}"
     if path not in experiment.parameters and default is not None:
         return default

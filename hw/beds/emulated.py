@@ -48,7 +48,7 @@ class SteppedPlant(Protocol):
         rate, rad/s."""
 
     def tick(self, voltage: float, current: float) -> float:
-        """Advance one tick under what the amplifiers hold, V and A. Returns the filtered rate after it, rad/s."""
+        """Advance one tick with the amplifiers' held outputs, V and A. Returns the filtered rate after it, rad/s."""
 
     @property
     def shaft_angle(self) -> float: ...

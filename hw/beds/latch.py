@@ -1,4 +1,4 @@
-"""Faults that a bed has latched: it forgets them when it is told to, once its shaft is slow, and at no other time."""
+"""Latched faults of a bed: it clears them on command, once its shaft is slow, and at no other time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bed that answers from a transcript what was answered then, and demands to be asked what was asked then."""
+"""A bed that replays the answers of a transcript, and requires the same questions."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class ReplayBed(WireBed):
 
 
 class _ReplayedLine:
-    """The line of a transcript: its clock stands at what was last sent or received."""
+    """The line of a transcript: its clock is at the time of the last message sent or received."""
 
     def __init__(self, transcript: Transcript, name: str) -> None:
         self._records, self._name, self._at = transcript.records, name, 0
@@ -82,7 +82,7 @@ class _ReplayedLine:
         return b""  # then it did not come in time
 
     def sleep(self, seconds: float) -> None:
-        """Do nothing: what came meanwhile is in the records."""
+        """Do nothing: messages of that time are in the records."""
 
     def close(self) -> None:
         """Do nothing: no line is held."""
@@ -139,7 +139,7 @@ def is_transcript(name: str) -> bool:
 
 
 def _was_in_lock_step(name: str, requested: bool) -> bool:
-    """True where a transcript has a STEP: its bed had no time of its own, whatever is asked now."""
+    """True where a transcript has a STEP: its bed had no time of its own, whatever is requested now."""
     sent = (unframed(each.data[:-1]) for each in read(name).records if each.kind == SENT)
     return any(payload is not None and payload[0] == messages.StepMessage.kind for payload in sent)
 

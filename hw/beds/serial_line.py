@@ -1,4 +1,4 @@
-"""A bed on a serial line, or on what stands for one (hw/serial_port.py)."""
+"""A bed on a serial line, or on a substitute for one (hw/serial_port.py)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """A bed at the other end of a line: the host's side of docs/protocol.md, whatever the line is.
 
-What is safe to ask again is asked again, with a new number; a command never is. Nothing here connects anew by itself.
+Questions that are safe to repeat are repeated, with a new number; commands never are. There is no automatic
+reconnection.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ _GREETED, _REFUSED = 1 << 2, 1 << 13
 _FAULTS, _REASONS = sum(Fault), sum(InterlockReason)
 
 _WAITS = (0.05, 0.15, 0.5)
-"""s to wait for an answer, each time that a question is asked: first three times the latency of a slow USB adapter,
-then longer for a busy machine."""
+"""s to wait for an answer, for each try of a question: first three times the latency of a slow USB adapter, then longer
+for a busy machine."""
 
 _BOOT = (0.05,) * 10 + (0.2,) * 5 + (0.5,) * 3
 """s to wait for each answer to HELLO, 3 s together, for some boards boot when their line is opened."""

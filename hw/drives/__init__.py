@@ -27,4 +27,4 @@ REFUSED: Mapping[str, Sequence[str]] = {
         "RobStride and Damiao have motors of that kind, with a watchdog: `robstride`, `damiao`",
     )
 }
-"""Dialects that are known, and why their drives are not driven: what is said of them, and help."""
+"""Known dialects whose drives are not driven: the message, and help."""

@@ -6,7 +6,7 @@ from hw.drives.drive import DriveState, Talk
 from met.diagnostic import Problem, error
 
 TO_ARM, TO_IDLE = 1.0, 0.1
-"""Longest time for a drive to begin to drive, and to stop when it is told to, s."""
+"""Longest time for a drive to begin to drive, and to stop on command, s."""
 
 FEED = 0.002
 """s from one command to the next while drives begin to drive."""
@@ -29,9 +29,9 @@ def begin_driving(talk: Talk) -> None:
 
 
 def prove_watchdogs(talk: Talk, deadman: float) -> tuple[float | None, ...]:
-    """Let both drives drive with nothing commanded, leave them alone, and see that each stops by its watchdog, within
-    deadman (s) and half as much again. Returns after how long each said so, s; None where it says so only when it is
-    asked. Raises Problem E406 where one does not; both are off then."""
+    """Let both drives run with a zero command, leave them alone, and check that each stops by its watchdog, within
+    deadman (s) and half as much again. Returns the time after which each reported it, s; None for one that reports it
+    only when asked. Raises Problem E406 where one does not stop; both are off then."""
     begin_driving(talk)
     began = talk.line.now()
     ended: dict[int, float] = {}
@@ -70,7 +70,7 @@ def prove_watchdogs(talk: Talk, deadman: float) -> tuple[float | None, ...]:
 
 
 def _give_up(talk: Talk) -> None:
-    """Switch both outputs off, and let a drive forget that its watchdog did what it was to do."""
+    """Switch both outputs off, and clear the watchdog error of a drive that has stopped by it."""
     switch_off(talk)
     if all(drive.starved for drive in talk.drives if drive.state == DriveState.FAILED):
         forget(talk)

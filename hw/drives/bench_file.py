@@ -19,7 +19,7 @@ from met.frozen import frozen
 MOST_BYTES = 1 << 16
 
 FDCANUSB = "fdcanusb"
-"""The `interface` that is none of python-can's."""
+"""The `interface` that is not one of python-can's."""
 
 SERIAL, ASCII = "serial", "odrive_ascii"
 """The `interface` of drives on serial lines, one each, and the only dialect there is on them."""
@@ -50,7 +50,7 @@ FIGURES: Mapping[str, Mapping[str, tuple[str, float | None]]] = {
         "watchdog": ("s", 0.020),
     },
 }
-"""The quantities of each table: their SI unit, and what they are where the file does not say; None: it has to."""
+"""The quantities of each table: their SI unit, and the default; None where the file must give it."""
 
 LONGEST_WATCHDOG = 1.0
 """s beyond which no watchdog's time is taken: a bed says how long it may be, and counters of drives end."""

@@ -49,7 +49,7 @@ class PythonCanLine:
         self._message = can.Message
         try:
             self._bus: Any = can.Bus(**settings)
-        except Exception as reason:  # whatever an interface's own library makes of what a file says, or of its absence
+        except Exception as reason:  # its own library may raise anything, or be missing
             helps = ("is the interface up? `ip link set can0 up type can bitrate 1000000`", "`interface` and `channel`")
             message = f"CAN bus {self._name} cannot be opened: {' '.join(str(reason).split()) or type(reason).__name__}"
             raise Problem(error("E400", message, help=helps)) from None
@@ -137,7 +137,7 @@ class SerialPair:
         while True:
             if len(files) == len(self._lines):
                 select.select(files, (), (), max(0.0, until - time.perf_counter()))
-            for number, line in self._lines.items():  # one that cannot be waited for waits a moment by itself
+            for number, line in self._lines.items():  # one that cannot be waited for is polled
                 if data := line.receive(0.0):
                     return CanFrame(number, data, time=time.perf_counter())
             if time.perf_counter() >= until:

@@ -30,7 +30,7 @@ NMT, SYNC, EMERGENCY, TPDO1, RPDO1, TPDO2, SDO_ANSWER, SDO_ASK, HEARTBEAT = (
     0x600,
     0x700,
 )
-"""Identifiers, to which a node's number is added but for the first two."""
+"""Identifiers, to which a node's number is added except for the first two."""
 
 HOST = 127
 """The host's number, under which its heartbeat goes."""
@@ -88,7 +88,7 @@ class Cia402Drive(CanDrive):
         device = self._read(talk, DEVICE, "<I")
         if int(device) & 0xFFFF != PROFILE:
             raise self.other(f"its device profile is {int(device) & 0xFFFF}, and a drive's is 402", "another node?")
-        self._write(talk, CONTROL, "<H", OFF)  # what it was told by somebody else ends before anything is changed
+        self._write(talk, CONTROL, "<H", OFF)  # a former command ends before anything is changed
         if int(self._read(talk, STATUS, "<H")) & 0x6F == 0x27:
             raise self.wrong("it drives, and does not stop when it is told to", "switch it off and on")
         self._mode = RATE_MODE if self.rates else TORQUE_MODE
@@ -169,16 +169,16 @@ class Cia402Drive(CanDrive):
         talk.send([CanFrame(NMT, bytes((START, self.node)))])
 
     def _clear_offsets(self, talk: Talk) -> None:
-        """Set to 0 what a drive adds to the rate and the torque that it is told, where it has such offsets: they may be
-        saved. Raises Problem E404 where it keeps one."""
+        """Set to 0 the offsets that a drive adds to commanded rate and torque, if it has any: they may be saved. Raises
+        Problem E404 where it keeps one."""
         for which, layout in OFFSETS:
             request = struct.pack("<BHB", 0x40, *which)
             if self._sdo(talk, request, _words(which), may_lack=True) and self._read(talk, which, layout) != 0.0:
                 self._set(talk, which, layout, 0)
 
     def _sdo(self, talk: Talk, data: bytes, what: str, *, may_lack: bool = False) -> bytes:
-        """The answer to an SDO of up to four bytes; empty where there is no such object, and may not be. Raises Problem
-        E402 where none comes, E404 where it is refused."""
+        """The answer to an SDO of up to four bytes; empty for a missing object that is optional. Raises Problem E402
+        without an answer, E404 where it is refused."""
         self._answer = None
         asked = data[1:4]
 

@@ -136,7 +136,7 @@ class DamiaoDrive(CanDrive):
         return CanFrame(self.node, data)
 
     def armed(self) -> Sequence[CanFrame]:
-        """No torque is told before it is enabled, and after: no document says whether a drive that is off takes it."""
+        """Send no torque before it is enabled, nor after: no document says whether a drive that is off takes one."""
         return (*self.told(0.0), self._frame(ENABLE), *self.told(0.0))
 
     def told(self, value: float) -> Sequence[CanFrame]:
@@ -151,7 +151,7 @@ class DamiaoDrive(CanDrive):
         return refresh or frame.id == self.node
 
     def idle(self) -> Sequence[CanFrame]:
-        """No torque is told while it still takes it, so that it has none to go on with once it is enabled."""
+        """Send no torque while the drive still takes it, so that none is left when it is enabled."""
         return (*self.told(0.0), self._frame(DISABLE))
 
     def halted(self) -> Sequence[CanFrame]:

@@ -1,4 +1,4 @@
-"""The host's side of one drive on a CAN bus, as far as all dialects have it in common; each is a file of this folder.
+"""The host's side of one drive on a CAN bus: the part that all dialects share; each is a file of this folder.
 
 A drive of a bench is told a torque (N m) or, where its dialect `takes_rates` and the bench wants it so, a rate (rad/s),
 for which it then closes the loop. It says its angle (rad) and rate (rad/s), all of them in the sense of the bench's
@@ -32,18 +32,18 @@ OWED = 0.02
 """Time after a question for which its answer may still come, s: question and answer 10 ms late each."""
 
 TURNS = 0.5
-"""Rate of a shaft, rad/s, above which it is at another angle when it is asked again."""
+"""Rate of a shaft, rad/s, above which its angle has changed by the next question."""
 
 REMEMBERED, SINCE = 64, 0.05
 """Answers of a drive that are remembered, so that an old one is known again, and for how long, s."""
 
 ASKS = 5
-"""How often a question of a greeting is asked: a bus loses frames only where something is wrong with it."""
+"""Number of tries of a question of a greeting: a bus loses frames only when it is faulty."""
 
 
 LATE = 256
-"""Frames that are taken after the time until which they were waited for: what has come meanwhile, and no more, for on a
-bus that is never quiet there is always another."""
+"""Largest number of frames that are taken after the end of a wait: those that have come meanwhile, and no more, since a
+busy bus always has another."""
 
 
 class DriveState(enum.Enum):
@@ -116,7 +116,7 @@ class CanDrive(ABC):
     answers_commands = False
     """True where its answer to a command has its angle, rate and state, so that it need not be asked."""
     takes_rates = False
-    """True where it can be told rates, and close the rate loop by itself."""
+    """True where it can be commanded rates, and closes the rate loop itself."""
 
     def __init__(self, entry: DriveEntry) -> None:
         self.entry, self.node, self.sense = entry, entry.node, entry.sense
@@ -130,17 +130,17 @@ class CanDrive(ABC):
         self.owed = deque[float](maxlen=256)
         self.steps = 0.0, 0.0
         self._said: dict[Hashable, float] = {}
-        """When angle and rate, as its answers had them, were said last, s."""
+        """Time of each pair of angle and rate, as in answers, when it was last sent, s."""
         self._turned = -math.inf
-        """When an answer said last that the shaft turns, s."""
+        """Time of the last answer in which the shaft turns, s."""
 
     @abstractmethod
     def greet(self, talk: Talk) -> DriveFacts:
-        """Find the drive, leave it idle, and read what it is. Raises Problem E402 to E404."""
+        """Find the drive, leave it idle, and read its description. Raises Problem E402 to E404."""
 
     def renew(self, talk: Talk) -> None:
-        """Set again what its greeting has set, where that is not part of its commands, and see that it is: a drive that
-        has begun anew since then has its own mode, limits and watchdog. Raises Problem E402, E404."""
+        """Set the greeting's settings again, where they are not part of commands, and check them: a drive that has
+        restarted since has its own mode, limits and watchdog. Raises Problem E402, E404."""
         return
 
     @abstractmethod
@@ -149,7 +149,7 @@ class CanDrive(ABC):
 
     @abstractmethod
     def told(self, value: float) -> Sequence[CanFrame]:
-        """Frames of a command, N m; rad/s of one that is told rates."""
+        """Frames of a command, N m; or rad/s for a drive that takes rates."""
 
     @abstractmethod
     def asked(self) -> Sequence[CanFrame]:
@@ -187,7 +187,7 @@ class CanDrive(ABC):
         return bool(self.owed)
 
     def forget_answers(self) -> None:
-        """Take none of its answers so far for one that is said again: it is asked anew, outside of a run."""
+        """Forget its answers so far, so that a new one is not taken for a repeated one, outside of a run."""
         self._said.clear()
         self._turned = -math.inf
 
@@ -219,7 +219,7 @@ class CanDrive(ABC):
 
     @property
     def where(self) -> str:
-        """Where it is found, in words."""
+        """The place of the drive, in words."""
         return f"node {self.node}"
 
     @property
@@ -228,7 +228,7 @@ class CanDrive(ABC):
         return f"{self.entry.role} ({self.where})"
 
     def wrong(self, what: str, helps: str | Sequence[str]) -> Problem:
-        """The error for a drive that cannot be driven as it is."""
+        """The error for a drive that cannot be driven in its present state."""
         return Problem(error("E404", f"{self.words} cannot be driven: {what}", help=helps))
 
     def other(self, what: str, helps: str | Sequence[str]) -> Problem:
@@ -237,13 +237,12 @@ class CanDrive(ABC):
 
 
 class Talk:
-    """A line with the drives on it: what comes is given to them all, and it is counted what each is asked and has
-    answered."""
+    """A line with the drives on it: input is given to all of them, and questions and answers of each are counted."""
 
     def __init__(self, line: CanLine, drives: Sequence[CanDrive]) -> None:
         self.line, self.drives = line, drives
         self.strange: dict[int, int] = {}
-        """Frames that no drive has taken, by identifier: what is said where a drive does not answer."""
+        """Frames that no drive has taken, by identifier, for the message about a drive that does not answer."""
 
     def send(self, frames: Iterable[CanFrame]) -> None:
         for frame in frames:
@@ -254,7 +253,7 @@ class Talk:
                     drive.owed.append(now)
 
     def pump(self, until: float, done: Callable[[], bool] = lambda: False) -> bool:
-        """Take what comes until a time of the line's clock, s, or until `done`. Returns whether it is."""
+        """Read until a time of the line's clock, s, or until `done`. Returns True where it is done."""
         late = 0
         while not done():
             frame = self.line.receive(until)
@@ -275,7 +274,7 @@ class Talk:
         return True
 
     def drain(self) -> None:
-        """Take what has come, without waiting."""
+        """Read pending input, without waiting."""
         self.pump(-1.0)
 
     def ask(self, frames: Sequence[CanFrame], done: Callable[[], bool]) -> bool:

@@ -25,13 +25,13 @@ from hw.line import BedLine
 from met.diagnostic import Problem, error
 
 SPEEDS = {"bitrate": "can.bitrate", "data_bitrate": "can.fd_bitrate"}
-"""The adapter's names of what `[bus]` may set."""
+"""The adapter's names of the settings in `[bus]`."""
 
 ANSWERED = 1.0
 """Longest time for an answer while the adapter is opened, s."""
 
 QUIET = 0.05
-"""Time for which the line is to be quiet before the adapter is spoken to, s: what it said before is over."""
+"""Time for which the line must be quiet before the adapter is addressed, s: earlier output has ended."""
 
 TURN = 7e-4
 """Longest time from the `OK` of a command to the frames that answer it, s: four classic frames."""
@@ -43,10 +43,10 @@ OWED = 0.01
 """Time after which an `OK` that has not come never does, s."""
 
 LONGEST_LINE = 512
-"""Bytes of a line beyond which it is none: one of 64 bytes of data has 160."""
+"""Largest length of a line in bytes: one of 64 bytes of data has 160."""
 
 LATE_READS = 16
-"""How often bytes are read that come after the time until which a frame was waited for, where they make none."""
+"""Largest number of reads after the end of a wait, for bytes that do not make a frame."""
 
 LOST = (
     "the drives stop themselves when they hear nothing for the time of their watchdog",
@@ -69,9 +69,9 @@ class FdcanusbLine:
         self._rest, self._lines, self._frames = b"", deque[bytes](), deque[CanFrame]()
         self.refused = 0
         self._sent = deque[float]()
-        """When commands were given that are not answered yet, s."""
+        """Times of commands without an answer yet, s."""
         self._asked = self._taken = 0.0
-        """When the last command that was answered was given, and its answer read, s."""
+        """Times of the last answered command, and of its answer, s."""
         try:
             self._open({name: settings[key] for key, name in SPEEDS.items() if key in settings})
         except BaseException:
@@ -111,10 +111,10 @@ class FdcanusbLine:
         return self._frames.popleft() if self._frames else None
 
     def _keep(self, data: bytes) -> None:
-        """Cut what has come into lines."""
+        """Cut the input into lines."""
         *lines, self._rest = (self._rest + data).split(b"\n")
         self._lines += [each.strip(b"\r") for each in lines if len(each) <= LONGEST_LINE]
-        if len(self._rest) > LONGEST_LINE:  # what follows its end is a line again
+        if len(self._rest) > LONGEST_LINE:  # after its end a new line begins
             self._rest = bytes(LONGEST_LINE + 1)
 
     def _take(self, text: bytes, time: float) -> None:
@@ -136,14 +136,14 @@ class FdcanusbLine:
             self._sent.popleft()
 
     def _came(self, time: float) -> float:
-        """When a frame came whose line was read at a time, s."""
+        """The arrival time of a frame whose line was read at a time, s."""
         if self._taken - self._asked > LATE:
             return self._asked - LATE
         return min(time, self._taken + TURN)
 
     def _open(self, speeds: Mapping[str, int]) -> None:
-        """Set the bus's speeds and enter it. Raises Problem E400 where what is there is no fdcanusb."""
-        self._line.send(b"\n")  # ends what somebody else may have begun
+        """Set the bus's speeds and enter it. Raises Problem E400 where the device is not an fdcanusb."""
+        self._line.send(b"\n")  # ends a line that somebody else may have begun
         end = self.now() + ANSWERED
         while self._line.receive(self.now() + QUIET) and self.now() < end:
             pass
@@ -153,7 +153,7 @@ class FdcanusbLine:
         self._command("can on")
 
     def _command(self, command: str, *also: str) -> None:
-        """Give a command, and see that it is answered by OK, or by what says the same."""
+        """Send a command, and check that the answer is OK or equivalent."""
         self._line.send(f"{command}\n".encode())
         end, came = self.now() + ANSWERED, b""
         while self.now() < end:

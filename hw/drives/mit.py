@@ -18,12 +18,12 @@ def packed(position: int, velocity: int, kp: int, kd: int, torque: int) -> bytes
 
 
 def count_of(value: float, most: float, steps: int) -> int:
-    """The count of a value, or the next one towards 0: what is told is never more than what was asked for, but for
-    half a step where that is less than half a step."""
+    """The count of a value, or the next one towards 0: the command never exceeds the request, except for half a step
+    where the request is below that."""
     scaled = (min(max(value, -most), most) + most) / (2.0 * most) * steps
     return math.floor(scaled) if value >= 0.0 else math.ceil(scaled)
 
 
 def value_of(count: int, most: float, steps: int) -> float:
-    """The value that a count stands for."""
+    """The value of a count."""
     return count * (2.0 * most) / steps - most

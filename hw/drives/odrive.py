@@ -173,7 +173,7 @@ class OdriveDrive(OdriveAxis):
         return (*self.told(0.0), self._frame(SET_STATE, struct.pack("<I", IDLE)))
 
     def halted(self) -> Sequence[CanFrame]:
-        return (self._frame(ESTOP), *self.told(0.0))  # what it is told it would go on with once it is armed again
+        return (self._frame(ESTOP), *self.told(0.0))  # otherwise it would resume its command when armed again
 
     def cleared(self) -> Sequence[CanFrame]:
         return (self._frame(CLEAR, b"\0"), *self.idle())

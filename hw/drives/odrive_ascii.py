@@ -38,7 +38,7 @@ FIRMWARE_NUMBERS = ("fw_version_major", "fw_version_minor", "fw_version_revision
 HARDWARE_NUMBERS = ("hw_version_major", "hw_version_minor", "hw_version_variant")
 
 QUIET = 0.02
-"""Time for which late answers are waited for before a question of a greeting is asked again, s."""
+"""Time to wait for late answers before a question of a greeting is repeated, s."""
 
 SUPPLY_EVERY = 4
 """Exchanges of which one asks for the supply in the place of the state."""
@@ -58,7 +58,7 @@ class OdriveAsciiDrive(OdriveAxis):
     def __init__(self, entry: DriveEntry) -> None:
         super().__init__(entry)
         self._answered: dict[str, str] = {}
-        """What properties are, as was answered last."""
+        """Values of properties, from their last answers."""
         self._state: int | None = None
         """The state that is not that of driving, until it is known why."""
         self._errors: dict[str, int] = {}
@@ -167,7 +167,7 @@ class OdriveAsciiDrive(OdriveAxis):
         return (self._text("f 0"), *(self._text(f"r {path}") for path in (STATE, ACTIVE, REASON)))
 
     def is_asked_by(self, frame: CanFrame) -> bool:
-        return False  # its line asks one question at a time, and knows what is owed
+        return False  # its line asks one question at a time, and knows which answers are due
 
     def idle(self) -> Sequence[CanFrame]:
         return (self._command(0.0), self._text(f"w {REQUESTED} {IDLE}"))
@@ -224,7 +224,7 @@ class OdriveAsciiDrive(OdriveAxis):
 
 
 def _number(text: str) -> float:
-    """A number as it is answered, 1 or 0 of a truth; not a number where it is none."""
+    """The number in an answer, 1 or 0 for a truth; not-a-number for other text."""
     if text.lower() in ("true", "false"):
         return float(text.lower() == "true")
     return float(text) if _NUMBER.fullmatch(text) else math.nan

@@ -61,22 +61,22 @@ CONTROL_MODE, INPUT_MODE = "axis0.controller.config.control_mode", "axis0.contro
 LIMITS = (WATCHDOG_TIMEOUT, WATCHDOG_ENABLED, TORQUE_CONSTANT, CURRENT_MAX, RATE_MAX, SUPPLY_MAX)
 NEEDED = (*LIMITS, CONTROL_MODE, INPUT_MODE, TORQUE_MOST, TORQUE_LEAST)
 NEEDED_FOR_RATES = (RATE_GAIN, RATE_INTEGRAL)
-"""Properties of one that is told rates: its loop's gains, N m s/turn and N m/turn."""
+"""Properties needed with rate commands: the loop's gains, N m s/turn and N m/turn."""
 
 
 class OdriveAxis(CanDrive):
-    """The host's side of an ODrive's axis, but for how it is spoken to."""
+    """The host's side of an ODrive's axis, without its transport."""
 
     takes_rates = True
 
     def __init__(self, entry: DriveEntry) -> None:
         super().__init__(entry)
         self._written: dict[str, float] = {}
-        """Properties that were set, and to what, by path."""
+        """Properties that were set, with their values, by path."""
 
     @property
     def _mode(self) -> int:
-        """The mode of its control: it is told rates, or torques."""
+        """The mode of its control: rate or torque commands."""
         return RATE_CONTROL if self.rates else TORQUE_CONTROL
 
     def renew(self, talk: Talk) -> None:
@@ -89,7 +89,7 @@ class OdriveAxis(CanDrive):
 
     @abstractmethod
     def _put(self, talk: Talk, path: str, value: float) -> None:
-        """Send what sets a property, which nothing answers."""
+        """Send the setting of a property, which has no answer."""
 
     def _write(self, talk: Talk, path: str, value: float) -> None:
         """Set a property, and see that it is set. Raises Problem E404 where it is not."""

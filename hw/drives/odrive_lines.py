@@ -30,16 +30,16 @@ UART_TURN = 2e-4
 """Time that a drive is reckoned to take for an answer on a UART, besides the bits, s."""
 
 LATE = 2.0
-"""Times as long as an answer is reckoned to take, beyond which it does not count: nobody knows when it was so."""
+"""Factor over the expected time of an answer beyond which it does not count, since its sampling time is not known."""
 
 OWED = 4.0
-"""Times as long as an answer counts, after which one that has not come is taken to be lost."""
+"""Factor over that limit after which a missing answer counts as lost."""
 
 SILENCE = 0.01
 """Time without a byte after which nothing is taken to come any more, s."""
 
 LONGEST_LINE = 128
-"""Bytes of a line beyond which it is none."""
+"""Largest length of a line in bytes."""
 
 BITS = 10
 """Bits of a byte on a UART."""
@@ -48,7 +48,7 @@ PULLED = (
     "the drives stop themselves when they hear nothing for the time of their watchdog",
     "look at the drive's supply and its cable, then start again",
 )
-"""What to do where a line was lost."""
+"""Remedy where a line was lost."""
 
 FEEDBACK = b"f "
 PROPERTY = b"r "
@@ -65,7 +65,7 @@ def summed(text: bytes) -> bytes:
 
 
 def checked(line: bytes) -> bytes | None:
-    """The text of a line without its checksum; None where that is wrong, or is none."""
+    """The text of a line without its checksum; None where that is wrong, or missing."""
     text, star, said = line.partition(b"*")
     said = said.strip()
     if not star or not said.isdigit() or len(said) > 3 or int(said) != _sum(text):
@@ -111,13 +111,13 @@ class _Questions:
         self.lost: set[bytes] = set()
         """Kinds of questions whose answers are late or lost, and may still come."""
         self.silent_at = 0.0
-        """When the line will have been silent, s: until then nothing is asked, where both kinds are lost."""
+        """Time until which the line will be silent, s: until then nothing is asked, where both kinds are lost."""
         self.rest = b""
         self.heard = b""
         """The last line that came and was no answer, as it came."""
 
     def give_up(self, now: float) -> None:
-        """Take the answer to what was asked to be lost."""
+        """Count the answer to the last question as lost."""
         assert self.sent is not None
         self.lost.add(kind_of(self.sent))
         self.sent, self.silent_at = None, now + SILENCE
@@ -136,7 +136,7 @@ class _Questions:
         return found
 
     def fits(self, answer: bytes) -> bool:
-        """True where a text can be the answer to what was asked."""
+        """True where a text can be the answer to the last question."""
         if self.sent is None:
             return False
         return (_PAIR.fullmatch(answer) is not None) == self.sent.startswith(FEEDBACK)
@@ -165,7 +165,7 @@ class OdriveLines:
         self._owed = OWED * self.late
         self._fastest: dict[int, float] = {}
         try:
-            for node in nodes:  # ends what somebody else may have begun
+            for node in nodes:  # ends a line that somebody else may have begun
                 wires.send(CanFrame(node, b"\n"))
         except BaseException:
             wires.close()
@@ -204,7 +204,7 @@ class OdriveLines:
     def receive(self, until: float) -> CanFrame | None:
         while not self._frames:
             frame = self._wires.receive(-1.0)
-            if frame is None:  # nothing that has come is unread: what is owed too long is late, and not this host
+            if frame is None:  # no unread input: an overdue answer is late because of the drive
                 now = self.now()
                 for drive in self._drives.values():
                     if drive.sent is not None and now > drive.at + self._owed:
@@ -231,13 +231,13 @@ class OdriveLines:
         return drive.at + self._owed + 1e-6 if drive.waiting else math.inf
 
     def _take(self, frame: CanFrame) -> None:
-        """Cut what has come into lines, and take those that answer what was asked."""
+        """Cut the input into lines, and take the answers to questions."""
         drive = self._drives.get(frame.id)
         if drive is None:
             return
         drive.silent_at = self.now() + SILENCE
         *lines, drive.rest = (drive.rest + frame.data).split(b"\n")
-        if len(drive.rest) > LONGEST_LINE:  # what follows its end is a line again
+        if len(drive.rest) > LONGEST_LINE:  # after its end a new line begins
             drive.rest = bytes(LONGEST_LINE + 1)
         for line in lines:
             answer = checked(line) if len(line) <= LONGEST_LINE else None

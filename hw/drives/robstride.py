@@ -89,10 +89,11 @@ ANSWERS_HZ = 1000.0
 """Rate at which two such drives answer on a bus of 1 Mbit/s."""
 
 ANGLE_TOLERANCE, TIME_TOLERANCE = 0.02, 0.02
-"""By how much its angle in a frame may differ from the parameter read before: rad, at rest; and s of its rate."""
+"""Largest difference of the angle in a frame from the parameter read before, rad, at rest; and the time of its rate,
+s."""
 
 STAYS = 10
-"""Steps of the angle that it has to be told to have turned, where it is told to stand at the end of its range."""
+"""Smallest reported turn, in steps of the angle, that counts where it may stand at the end of its range."""
 
 
 class RobstrideDrive(CanDrive):
@@ -149,7 +150,7 @@ class RobstrideDrive(CanDrive):
         )
 
     def _ranges(self) -> tuple[float, float]:
-        """What its fields of rate (rad/s) and torque (N m) stand for. Raises Problem E404."""
+        """The ranges of its fields of rate (rad/s) and torque (N m). Raises Problem E404."""
         model = self.entry.model
         if model not in MODELS:
             said = f"there is no model `{model}`" if model else "the bench file does not say which model it is"
@@ -172,7 +173,7 @@ class RobstrideDrive(CanDrive):
         raise self.other("it does not say its firmware's version", "put its maker's newest firmware on it")
 
     def _check_angle(self, talk: Talk) -> None:
-        """Raise Problem E403 where an angle in a frame is not what the parameter says that it is."""
+        """Raise Problem E403 where an angle in a frame differs from the parameter."""
         off = most = math.inf
         for _ in range(ASKS):
             angle, self.reading = self.own(self._read(talk, ANGLE)), None
@@ -187,8 +188,8 @@ class RobstrideDrive(CanDrive):
         raise self.other(f"its angle in a frame is {off:.3g} rad off what its parameter says", helps)
 
     def _read(self, talk: Talk, number: int) -> float:
-        """A parameter, read until two answers in a row are the same, but for those that change: a limit is not taken
-        from one frame."""
+        """A parameter, read until two successive answers are equal, unless it changes: a limit is not taken from one
+        frame."""
         before = b""
         for _ in range(ASKS):
             self._answered.pop(number, None)
@@ -226,7 +227,7 @@ class RobstrideDrive(CanDrive):
         return self._frame(WRITE, struct.pack("<HH", number, 0) + struct.pack(LAYOUTS[number], value))
 
     def armed(self) -> Sequence[CanFrame]:
-        """No torque is told before it is enabled, and after: no manual says whether a drive that is off takes it."""
+        """Send no torque before it is enabled, nor after: no manual says whether a drive that is off takes one."""
         self._wanted, self._ran = True, False
         settings = self._writes(TIMEOUT, self._timeout), self._writes(RUN_MODE, OPERATION_MODE)
         return (*settings, *self.told(0.0), self._frame(ENABLE), *self.told(0.0))
@@ -243,7 +244,7 @@ class RobstrideDrive(CanDrive):
         return frame.extended and frame.id & 0xFF == self.node and frame.id >> 24 in (TELL, ENABLE, STOP, WRITE)
 
     def idle(self) -> Sequence[CanFrame]:
-        """No torque is told while it still takes it, so that it has none to go on with once it is enabled."""
+        """Send no torque while the drive still takes it, so that none is left when it is enabled."""
         self._wanted = self._ran = False
         return (*self.told(0.0), self._frame(STOP))
 

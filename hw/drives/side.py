@@ -10,13 +10,13 @@ LONGEST_STEP = 0.05
 """Longest time between two samples of which one is still held against the other, s."""
 
 SKEW = 2e-4
-"""Longest time between the instants at which two drives sampled, besides what their frames' times tell, s."""
+"""Longest time between the samples of two drives, beyond the difference of their frames' times, s."""
 
 APART = 5e-4
 """Longest time between two drives' answers to one question, s."""
 
 FLOAT = 2.0**-23
-"""Relative step of the floats in which angles and rates are told."""
+"""Relative step of the floats for angles and rates."""
 
 
 class Side:
@@ -30,13 +30,13 @@ class Side:
         self.drive, self.facts = drive, facts
         self.angle = self.rate = self.time = self.time_unsure = 0.0
         self.zero_unsure = 0.0
-        """By how much the angle may be off because the shaft turned when it began to count, rad."""
+        """Uncertainty of the angle because the shaft turned at its zero, rad."""
         self._told = 0.0
         """The angle as it was told last, rad."""
 
     @property
     def words(self) -> str:
-        """The drive in words, for whoever asks what the bed is."""
+        """The drive in words, for the bed's description."""
         d, f = self.drive, self.facts
         counts = ((f.torque_count, "N*m"), (f.angle_count, "rad"), (f.rate_count, "rad/s"))
         steps = ", ".join(f"{count:.3g} {unit}" for count, unit in counts if count)
@@ -48,7 +48,7 @@ class Side:
         return "; ".join(said if d.supply is None else [*said, f"supply {d.supply:.4g} V"])
 
     def begin(self, reading: DriveReading, at: float) -> None:
-        """Let the angle count from what it is, by an answer, at a time of the line's clock, s."""
+        """Count the angle from its present value, by an answer, at a time of the line's clock, s."""
         self._told, self.angle, self.rate, self.time = (
             reading.angle,
             -reading.rate * (at - reading.time),
@@ -66,7 +66,7 @@ class Side:
         return self.angle + turned
 
     def follow(self, reading: DriveReading) -> None:
-        """Keep what an answer means."""
+        """Take over the contents of an answer."""
         self.angle, self.rate, self.time = self.angle_of(reading), reading.rate, reading.time
         self.time_unsure = reading.time_unsure
         self._told = reading.angle

@@ -1,4 +1,4 @@
-"""A bed's parameters from moves that it is led through: `met bed identify`.
+"""Identification of a bed's parameters from guided moves: `met bed identify`.
 
 moves    what it is told, within its limits
 driving  the moves driven, in a process of its own; the records of it

@@ -33,7 +33,7 @@ TURNS = 4.0
 
 @frozen
 class MovesRequest:
-    """The moves that the process is to lead a bed through.
+    """The request to the process to lead a bed through the moves.
 
     plan      plan of one experiment, as text (met.plan.file);  row: of its case table;  joint: whose motor is on the
               bed

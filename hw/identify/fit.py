@@ -1,4 +1,4 @@
-"""The parameters under which the model does what a bed did, by least squares of what was read, and how sure they are.
+"""The parameters with which the model fits a bed's readings, by least squares, and their uncertainty.
 
 Intervals come from groups of moves, not from the residual's variance: what is left is neither white nor of one size,
 and as a shaft that stops does so between two substeps, the sum of squares has many small valleys. So each group is
@@ -161,7 +161,7 @@ class _Search:
         return False
 
     def over(self, series: Series, away: np.ndarray, names: Sequence[str]) -> _Search:
-        """The same search over another series, from a place that is `away` from this one in these parameters."""
+        """The same search over another series, from a start `away` from this one in these parameters."""
         found = copy.copy(self)
         free = [PARAMETERS.index(name) for name in names]
         found._series, found.place = series, self.place.copy()
@@ -185,7 +185,7 @@ class _Search:
         return np.column_stack([np.exp(places[:, :count]), places[:, count:] * self._unit])
 
     def _weigh(self) -> None:
-        """Weigh rate and drive current by the inverse of what is left of each."""
+        """Weigh rate and drive current by the inverse of their residuals."""
         if self._series.drive_current is None:
             return
         read = simulated(self._series, self._sets(self.place[None, :]))[:, :, 0]

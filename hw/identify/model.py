@@ -1,5 +1,5 @@
-"""A motor bed under what it was told, for many sets of parameters at once: the model of `emulated`, whose motors may be
-out of line at any angle.
+"""A motor bed under recorded commands, for many sets of parameters at once: the model of `emulated`, whose motors may
+be out of line at any angle.
 
     J w' = tau_m(V, w) + Kt_load i - F_v w - s F_c + e
     e = sin_1 sin(theta) + cos_1 cos(theta) + sin_2 sin(2 theta) + cos_2 cos(2 theta)

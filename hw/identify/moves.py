@@ -1,4 +1,4 @@
-"""The moves that a bed is led through: each begins at rest and ends at rest, so that each stands by itself.
+"""The moves for identifying a bed: each begins and ends at rest, so that each can be analysed alone.
 
 steps      of the voltage, both ways, at several levels, and back to 0 V: inertia, and what brakes the shaft
 loaded     the same under steps of the load's current: the torque that all others are measured by
@@ -21,7 +21,7 @@ STILL = 0.08
 PATIENCE = 3.0
 """Longest time to wait for a shaft to come to rest, s."""
 REST = -1
-"""The number that stands for no move: for what was told after the last one."""
+"""The number for no move: for commands after the last one."""
 
 
 @frozen

@@ -1,7 +1,7 @@
 """Two played drives on a real bus in real time: `python -m hw.players BENCH.toml`, until it is interrupted.
 
-It plays what the bench file says of drive and load, over a shaft with a little friction. It prints `ready`, and each
-time that no drive drives any more, `off` with the time, s of the monotonic clock.
+It plays the drive and the load of the bench file, on a shaft with a little friction. It prints `ready`, and each time
+that all drives have stopped, `off` with the time, s of the monotonic clock.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ F_C, F_V = 0.002, 2e-4
 
 
 def bench_of(bench: TwoDrives, period: float = 5e-4) -> PlayedBench:
-    """Played drives as a bench file has them."""
+    """Played drives from a bench file."""
     figures, most = bench.drive.figures, bench.drive.figures["torque_max"]
     shaft = InertiaShaft(
         inertia=bench.shaft["inertia"],

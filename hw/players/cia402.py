@@ -92,7 +92,7 @@ class PlayedCia402(PlayedDrive):
         self.reboot()
 
     def reboot(self) -> None:
-        """As after its supply came back: what was not saved is gone."""
+        """Restart as after a loss of supply: unsaved values are gone."""
         for _, index, sub, _, value in _OBJECTS:
             self.set_value(index, sub, self.saved.get(index, value))
         self.status, self.torque, self.heard, self.error = 0x40, 0.0, math.inf, 0
@@ -139,7 +139,7 @@ class PlayedCia402(PlayedDrive):
         return ()
 
     def _served(self, data: bytes, now: float) -> Sequence[CanFrame]:
-        """What its SDO server answers."""
+        """The answers of its SDO server."""
         self.set_value(0x6041, 0, self.status)
         which, kept = (data[2] << 8 | data[1], data[3]), b""
         if which[0] in self.refuses:
@@ -155,7 +155,7 @@ class PlayedCia402(PlayedDrive):
         return sent
 
     def _answers(self) -> Sequence[CanFrame]:
-        """Its two PDOs, as they are mapped."""
+        """Its two PDOs, as mapped."""
         turns = 2.0 * math.pi
         per_turn = self.value(0x608F, 1) / self.value(0x608F, 2)
         values = {

@@ -34,7 +34,7 @@ class PlayedDamiao(PlayedDrive):
         self.state, self.torque, self.fed = 0, 0.0, 0.0
 
     def reboot(self) -> None:
-        """As after its supply came back: what was not saved is gone."""
+        """Restart as after a loss of supply: unsaved values are gone."""
         self.state, self.torque = 0, 0.0
 
     def fail(self, state: int) -> None:

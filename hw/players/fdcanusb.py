@@ -32,7 +32,7 @@ class PlayedFdcanusb:
         self._begun = ""
 
     def hears(self, data: bytes) -> tuple[list[CanFrame], bytes]:
-        """Take bytes from the host. Returns the frames that it sends on its bus, and what it answers."""
+        """Take bytes from the host. Returns the frames that it sends on its bus, and its answers."""
         frames, said = [], ""
         *lines, self._begun = (self._begun + data.decode("latin-1")).split("\n")
         for each in lines:
@@ -71,7 +71,7 @@ class PlayedFdcanusb:
         return [], "ERR unknown command"
 
     def says(self, frame: CanFrame) -> bytes:
-        """What it says of a frame that comes on its bus."""
+        """Its output for a frame on its bus."""
         if not self.on:
             return b""
         number = f"{frame.id:X}"
@@ -81,7 +81,8 @@ class PlayedFdcanusb:
 
 
 SpoilText = Callable[[bytes, bool], list[tuple[float, bytes]]]
-"""(a line with its end, whether it comes from the adapter) -> what arrives in its place: seconds later, and bytes."""
+"""A function (a line with its end, whether it comes from the adapter) -> the bytes that arrive in its place, with
+delays in s."""
 
 
 def unspoiled_text(text: bytes, from_adapter: bool) -> list[tuple[float, bytes]]:

@@ -14,8 +14,8 @@ _KINDS = {0: ("b", 1), 1: ("h", 2), 2: ("i", 4), 3: ("f", 4)}
 
 
 def _subframes(data: bytes) -> tuple[dict[int, float], list[tuple[int, int, int]]]:
-    """The values that a frame writes, by register, and its questions: head, first register, how many. IndexError,
-    KeyError and struct.error where it breaks off or is none."""
+    """The values that a frame writes, by register, and its questions: head, first register, number. Raises IndexError,
+    KeyError or struct.error for a truncated or invalid frame."""
     told: dict[int, float] = {}
     asked = []
     at = 0
@@ -52,7 +52,7 @@ class PlayedMoteus(PlayedDrive):
         self.zero = 0.0
 
     def reboot(self) -> None:
-        """As after its supply came back: its position begins at 0 again."""
+        """Restart as after a loss of supply: its position begins at 0 again."""
         self.mode, self.fault, self.torque, self.zero = 0, 0, 0.0, self.angle
 
     def fail(self, fault: int) -> None:
@@ -85,7 +85,7 @@ class PlayedMoteus(PlayedDrive):
         return (CanFrame(self.node << 8 | frame.id >> 8 & 0x7F, answer.ljust(size, b"\x50"), fd=True),)
 
     def _obey(self, told: dict[int, float], now: float) -> None:
-        """Do what a frame has written. Out of a fault, and of the end of a command's time, only stopping leads."""
+        """Carry out a frame's writes. A fault, and the end of a command's time, can only be left by stopping."""
         if not math.isfinite(told.get(0, math.nan)):
             return
         mode = int(told[0])

@@ -1,6 +1,6 @@
 """An ODrive's axis, as firmware 0.6 has it on a CAN bus.
 
-Every frame to it feeds its watchdog, as in the sources of 0.5: what MET relies on is the worse of both.
+Every frame to it feeds its watchdog, as in the sources of 0.5: MET relies on the worse of both behaviours.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class PlayedOdrive(PlayedDrive):
         self._sent = {1: 0.0, 9: 0.0, 0x17: 0.0}
 
     def reboot(self) -> None:
-        """As after its supply came back: what was not saved is gone."""
+        """Restart as after a loss of supply: unsaved values are gone."""
         self.state, self.errors, self.torque, self.rate_told, self.integral = 1, 0, 0.0, 0.0, 0.0
         self.values = dict(self.saved)
         self._sent = dict.fromkeys(self._sent, -math.inf)

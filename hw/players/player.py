@@ -33,7 +33,7 @@ class PlayedDrive(ABC):
 
     @abstractmethod
     def tick(self, now: float) -> Sequence[CanFrame]:
-        """Watch the time, s. Returns the frames that it sends by itself."""
+        """Watch the time, s. Returns the frames that it sends unasked."""
 
     @property
     @abstractmethod
@@ -62,7 +62,7 @@ class PlayedBench:
         """Time of the last tick, s."""
 
     def tick(self) -> list[CanFrame]:
-        """Advance by a tick of the shaft. Returns what the drives send by themselves."""
+        """Advance by a tick of the shaft. Returns the frames that the drives send unasked."""
         shaft = self.shaft
         shaft.step(self.drive.output, self.load.output)
         self.ticked += shaft.period
@@ -75,7 +75,7 @@ class PlayedBench:
         return [answer for drive in self.drives for answer in drive.receive(frame, now)]
 
     def _look(self, ahead: float) -> None:
-        """Let the encoders see the shaft so many seconds after the last tick."""
+        """Let the encoders see the shaft `ahead` seconds after the last tick."""
         angle = self.shaft.angle + self.shaft.rate * ahead
         self.drive.see(angle, self.shaft.rate)
         self.load.see(angle + self.slip, self.shaft.rate)
@@ -87,7 +87,7 @@ class PlayedBench:
 
 
 Spoil = Callable[[CanFrame, bool], list[tuple[float, CanFrame]]]
-"""(frame, whether it comes from a drive) -> what arrives in its place: seconds later, and the frame."""
+"""A function (frame, whether it comes from a drive) -> the frames that arrive in its place, with delays in s."""
 
 
 def unspoiled(frame: CanFrame, from_drive: bool) -> list[tuple[float, CanFrame]]:
@@ -132,7 +132,7 @@ class PlayedLine:
                 return None
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass; what comes meanwhile stays on the line."""
+        """Let time pass; frames of that time stay on the line."""
         end, kept = self._now + seconds, []
         while (frame := self.receive(end)) is not None:
             kept.append(frame)

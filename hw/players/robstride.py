@@ -1,4 +1,4 @@
-"""A RobStride drive, as its maker's manual has it, in its operation mode and on its own protocol."""
+"""A RobStride drive in its operation mode and its own protocol, after its maker's manual."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class PlayedRobstride(PlayedDrive):
         self._said: list[CanFrame] = []
 
     def reboot(self) -> None:
-        """As after its supply came back: what was not saved is gone, and its angle begins within a turn."""
+        """Restart as after a loss of supply: unsaved values are gone, and its angle begins within a turn."""
         self.mode, self.faults, self.torque = 0, 0, 0.0
         self.parameters |= {0x7005: 0, 0x7028: 0}
         self.zero += 2.0 * math.pi * math.floor((self.angle - self.zero) / (2.0 * math.pi))

@@ -27,7 +27,7 @@ class PlayedShaft(Protocol):
     rate: float
 
     def step(self, drive: Output, load: Output) -> None:
-        """Advance by a period under what the two drives do."""
+        """Advance by a period with the torques of the two drives."""
 
 
 class InertiaShaft:

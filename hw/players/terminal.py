@@ -29,13 +29,13 @@ class Terminal:
         os.symlink(os.ttyname(self._near), path)
 
     def read(self) -> bytes:
-        """Take what has come."""
+        """Read pending input."""
         with contextlib.suppress(BlockingIOError):
             return os.read(self.file, 4096)
         return b""
 
     def write(self, data: bytes) -> None:
-        """Say something. Where nobody reads, what does not fit is lost, as in a device."""
+        """Write output. Without a reader, bytes that do not fit are lost, as in a device."""
         with contextlib.suppress(BlockingIOError):
             os.write(self.file, data)
 

@@ -1,6 +1,6 @@
 """The messages of the wire: a class for each, its fields in the order of the wire, in counts.
 
-Fields that the wire has no room for raise `struct.error`: whoever sends checks first.
+Values that do not fit on the wire raise `struct.error`: the sender checks first.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _HEAD = struct.Struct("<BH")
 
 @frozen
 class HelloMessage:
-    """HELLO, the question who is there. version: the highest of the protocol that the host speaks."""
+    """HELLO, the question for a bed's description. version: the highest of the protocol that the host speaks"""
 
     word = "HELLO"
     kind = 0x01
@@ -72,7 +72,7 @@ class DriveMessage:
 
 @frozen
 class StepMessage:
-    """STEP: as DRIVE, for a bed in lock-step, which then advances by so many ticks, 1 to 255."""
+    """STEP: as DRIVE, for a bed in lock-step, which then advances by `ticks` ticks, 1 to 255."""
 
     word = "STEP"
     kind = 0x05
