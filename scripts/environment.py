@@ -155,7 +155,7 @@ def why_not_started(python: Path, made_with: str) -> str | None:
 
 
 def holds(root: Path, marks: Path, purpose: str) -> bool:
-    """Whether the environment was made from this very lock."""
+    """True where the environment was made from this very lock."""
     wanted, made = root / LOCKS[purpose], marks / LOCKS[purpose]
     return made.exists() and filecmp.cmp(wanted, made, shallow=False)
 

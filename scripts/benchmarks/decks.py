@@ -33,7 +33,7 @@ COMMANDS = {
 
 @dataclass(frozen=True)
 class Variant:
-    """What a deck has otherwise.
+    """Differences of a deck from the usual one.
 
     servo        keys of the servo that each joint has, in the stead of the gearbox's
     like         whether these are besides the gearbox's

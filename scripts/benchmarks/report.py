@@ -68,7 +68,7 @@ def missed(figures: Sequence[Figure]) -> list[str]:
 
 
 def verdict(figures: Sequence[Figure]) -> list[str]:
-    """What was missed, or that nothing was; and which targets were not put to the test."""
+    """A sentence on missed targets, or that there are none; and the targets that were not tested."""
     wanted = [figure for figure in figures if figure["target"] is not None]
     lines = [f"MISSED: {line}" for line in missed(figures)] or [f"targets: {len(wanted)}, none missed"]
     untaken = [figure["name"] for figure in wanted if "untaken" in figure]
@@ -120,7 +120,7 @@ def against(then: dict[str, Any], here: dict[str, Any], figures: Sequence[Figure
 
 
 def spread(figure: Figure) -> float:
-    """How far the median lies from the best, as a share of the best."""
+    """The relative distance of the median from the best."""
     return abs(figure["median"] / figure["best"] - 1.0) if figure["best"] else 0.0
 
 

@@ -1,4 +1,5 @@
-"""What a user waits for: whole commands, from the shell's start of the process to its end; and what they need."""
+"""Whole commands as a user waits for them: from the shell's start of the process to its end, with their time and
+memory."""
 
 from __future__ import annotations
 
@@ -33,8 +34,8 @@ def run(*words: str, deck: str = "") -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Used:
-    """What a process needed: wall time (s), memory (MiB), the largest that it had in use at any time, what was read
-    from the disk for it (MiB); and its exit status and what it said."""
+    """The cost of a process: wall time (s), the largest memory in use (MiB), data read from the disk for it (MiB); and
+    its exit status and output."""
 
     seconds: float
     memory: float

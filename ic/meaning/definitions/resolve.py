@@ -24,8 +24,6 @@ from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, erro
 from met.frozen import frozen
 from met.messages.message import shown_place
 
-"""What paths of a run begin with, besides joints."""
-
 
 @frozen
 class Definition:
