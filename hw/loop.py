@@ -68,7 +68,7 @@ def drive(
     stop_requested: Callable[[], bool] = lambda: False,
     armed: bool = True,
 ) -> LoopEnd:
-    """Arm the beds, drive them through so many exchanges after the first sample, and stop them.
+    """Arm the beds, drive them through `exchanges` exchanges after the first sample, and stop them.
 
     lock_step      whether they have no time of their own
     armed          False: they are only read. Where the host is as far behind as would end a run, or a bed as silent,

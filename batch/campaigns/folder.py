@@ -127,7 +127,7 @@ class Folder:
                 _remove(path)
 
     def remove(self) -> None:
-        """Remove the folder, which we have locked or nobody has."""
+        """Remove the folder, which we have locked, or which is not locked."""
         leaving = self.path.with_name(f".{self.path.name}.{os.getpid()}.leaving")
         if self.path.is_symlink():  # the folder that it leads to is its owner's
             self.empty()

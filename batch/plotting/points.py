@@ -201,7 +201,7 @@ def _limits(ax: Any, each: MapMetric) -> None:
 
 
 def marker_scale(count: int) -> float:
-    """The size of a marker among so many, in sizes of one alone; the legend's are not smaller."""
+    """The size of a marker among `count` markers, relative to a single one; the legend's are not smaller."""
     return 1.0 if count < 400 else 1.7 if count < 20_000 else 3.7
 
 

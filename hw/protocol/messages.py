@@ -111,7 +111,7 @@ class ReadMessage:
 
 @frozen
 class PresetMessage:
-    """PRESET, for a simulated plant. which: 0 start anew at so many rad/s, 1 seed of the noise, 2 its repeat."""
+    """PRESET, for a simulated plant. which: 0 start anew at a rate in rad/s, 1 seed of the noise, 2 its repeat."""
 
     word = "PRESET"
     kind = 0x09

@@ -1,5 +1,4 @@
-"""A deck's text as rows, for the formatter: what stands on a line, which bracket it stands in, and what may not be
-touched.
+"""A deck's text as rows, for the formatter: the pieces of a line, its bracket, and parts that must not change.
 
 Nothing is expanded and nothing included. What `#if` surrounds is laid out too where each of its parts closes what it
 opens; else it stays as it is, since text that is left out may be anything.

@@ -1,4 +1,4 @@
-"""The block of a search or a tuning, read: what is chosen between which ends, for which goal, and how many cases.
+"""Reading of the block of a search or a tuning: its chosen parameters with bounds, its goal, and its number of cases.
 
 It becomes a sweep of one axis, of which the values are those of its first generation (met/searches); what comes after
 follows from what that gives.

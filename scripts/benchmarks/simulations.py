@@ -44,7 +44,7 @@ def _values(cases: int) -> dict[str, Any]:
 
 
 def _spent(work: Callable[[], object], times: int = 1) -> Callable[[], float]:
-    """Seconds of this process that work takes, at best of so many times."""
+    """The least CPU time of several runs of the work, s."""
 
     def seconds() -> float:
         found = []

@@ -90,7 +90,8 @@ def _growing(lines: int) -> tuple[Benchmark, Benchmark]:
 
 SHORTEST, LONGEST = 2_500, 10_000
 LINEAR = 5.0
-"""Times that four times the lines may take: 4 where the cost is in proportion, 16 where it grows with the square."""
+"""Largest ratio of the times for four times the lines: 4 where the cost is proportional, 16 where it grows with the
+square."""
 
 
 BENCHMARKS: tuple[Benchmark | Derived, ...] = (

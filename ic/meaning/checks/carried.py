@@ -1,4 +1,4 @@
-"""Pulses of commands and courses of which the instants that sample them make too much or too little.
+"""Pulses of commands and courses whose size is wrong in the samples at their instants.
 
 What is sampled is held until the next instant, or is taken as the mean of a step's two ends: of a pulse between two
 zeros both make the sum of the samples times the interval. The integral of a rate is a way, that of a torque an impulse;

@@ -20,7 +20,7 @@ from met.trace import Scalar
 
 
 def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str, Any], duration: float) -> bool:
-    """Return True, with a warning, if a model does nothing all through the run by its constants as written.
+    """Return True, with a warning, if a model has no effect in the whole run by its written constants.
 
     values  with the bodies that links and payloads are parts of, in the place of their names
     """

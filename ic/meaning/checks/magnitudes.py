@@ -1,4 +1,4 @@
-"""Warnings of numbers and bodies of a size that is not found: nearly always a unit that is missing, or another's.
+"""Warnings about implausible numbers and bodies: nearly always a unit is missing, or wrong.
 
 Nothing is said of what is merely rare. Each bound is beyond what there is by so much that decks of all sorts pass.
 """

@@ -101,8 +101,8 @@ class OpenLoop:
 
     @property
     def searched(self) -> float | None:
-        """Times the gain up to which a limit of it was looked for, and by which down; None where no limit was left out:
-        those of a loop of one rate are eigenvalues."""
+        """The largest factor on the gain up to which, and the smallest down to which, a limit was searched for; None
+        where the search was complete: limits of a loop of one rate are eigenvalues."""
         return FARTHEST if self.margins is None and self.stable and self.returns else None
 
     @property

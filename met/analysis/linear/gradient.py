@@ -69,7 +69,7 @@ class MetricGradients:
 
 @frozen
 class GradientProgram:
-    """An experiment's program with tangents by its coordinates, compiled once for any of its cases.
+    """An experiment's program with tangents by its coordinates, compiled once for all of its cases.
 
     first  by so many of its coordinates alone, the first ones; None: by all
     """

@@ -287,9 +287,9 @@ HUGE = 1e300
 def gain_limits(
     A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, drift: float = STABLE
 ) -> tuple[float | None, float | None]:
-    """Times the gain of all loops at once at which they become unstable, the nearest below and above 1, to 1e-12; None:
-    at none that was tried, or they are already unstable. C x + D u comes back for u put in at the open places; drift:
-    as in `ScalarLoop`."""
+    """The factors on the gain of all loops at once at which they become unstable, the nearest below and above 1, to
+    1e-12; None: at none that was tried, or they are already unstable. C x + D u comes back for u put in at the open
+    places; drift: as in `ScalarLoop`."""
 
     from scipy.optimize import brentq
 
