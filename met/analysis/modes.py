@@ -157,7 +157,7 @@ def _answers(A: np.ndarray, integrator: Integrator, h: float) -> tuple[np.ndarra
 
 
 def of_lane(found: StepMap, lane: int, h: float) -> StepMap:
-    """One lane alone, with a step of h s."""
+    """One lane alone, whose step is of h s."""
     one = slice(lane, lane + 1)
     return replace(
         found,
