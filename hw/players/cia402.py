@@ -87,6 +87,9 @@ class PlayedCia402(PlayedDrive):
         self._network = Network()
         self._node = canopen.LocalNode(node, dictionary)
         self._node.associate_network(self._network)
+        self._values: dict[tuple[int, int], int] = {}
+        """The objects' values as numbers: each tick reads some."""
+        self._node.add_write_callback(self._written)
         self.watches = True
         self.saved: dict[int, int] = {}
         self.reboot()
@@ -101,7 +104,11 @@ class PlayedCia402(PlayedDrive):
 
     def value(self, index: int, sub: int = 0) -> int:
         """An object's value."""
-        return int(_LAYOUT[index, sub].unpack(self._node.get_data(index, sub))[0])
+        return self._values[index, sub]
+
+    def _written(self, index: int, subindex: int, od: object, data: bytes) -> None:
+        """Note what is written into an object, by whomever."""
+        self._values[index, subindex] = _LAYOUT[index, subindex].unpack(data)[0]
 
     def set_value(self, index: int, sub: int, value: int) -> None:
         """Set an object."""

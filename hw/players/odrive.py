@@ -34,6 +34,11 @@ PROPERTIES = (
 )
 FIRST = 201
 FORMATS = {"float": "<f", "bool": "<?", "uint32": "<I", "uint8": "<B"}
+REPEATED = tuple(
+    (command, f"axis0.config.can.{name}_msg_rate_ms")
+    for command, name in ((0x01, "heartbeat"), (0x09, "encoder"), (0x17, "bus_voltage"))
+)
+"""Messages that it sends by itself, and the property that says how often, ms; 0: never."""
 
 
 def endpoints(firmware: str = "0.6.10", hardware: str = "4.4.58") -> dict[str, Any]:
@@ -176,25 +181,28 @@ class PlayedOdrive(PlayedDrive):
         return (self._frame(0x05, struct.pack("<xHx", number) + struct.pack(layout, self.values[path])),)
 
     def tick(self, now: float) -> Sequence[CanFrame]:
+        self._watch(now)
+        out = []
+        for command, name in REPEATED:
+            period = 1e-3 * self.values[name]
+            if period and now - self._sent[command] >= period - 1e-9:
+                data = self._said(command)
+                assert data is not None
+                self._sent[command] = now
+                out.append(self._frame(command, data))
+        return out
+
+    def _watch(self, now: float) -> None:
+        """Watch what stops it, and close its rate loop."""
+        if self.state != 8:
+            self.looped = now
+            return
         timeout = self.values["axis0.config.watchdog_timeout"]
-        if (
-            self.state == 8
-            and self.watches
-            and self.values["axis0.config.enable_watchdog"]
-            and now - self.fed > timeout
-        ):
+        if self.watches and self.values["axis0.config.enable_watchdog"] and now - self.fed > timeout:
             self._failed(1 << 24)
         self._close_loop(now)
         if self.state == 8 and self.values["vbus_voltage"] > self.values["config.dc_bus_overvoltage_trip_level"]:
             self._failed(1 << 8)
-        out = []
-        for command, rate in ((0x01, "heartbeat_msg"), (0x09, "encoder_msg"), (0x17, "bus_voltage_msg")):
-            period = 1e-3 * self.values[f"axis0.config.can.{rate}_rate_ms"]
-            data = self._said(command)
-            if period and data is not None and now - self._sent[command] >= period - 1e-9:
-                self._sent[command] = now
-                out.append(self._frame(command, data))
-        return out
 
     def _failed(self, error: int) -> None:
         self.errors, self.state, self.torque, self.integral = self.errors | error, 1, 0.0, 0.0

@@ -45,7 +45,7 @@ class PlayedOdriveAscii(PlayedOdrive):
         self._begun, self.reason = b"", 0
 
     def tick(self, now: float) -> Sequence[CanFrame]:
-        super().tick(now)  # the messages of a CAN bus are not sent here
+        self._watch(now)
         return ()
 
     def _failed(self, error: int) -> None:

@@ -67,7 +67,7 @@ class PlayedBench:
         shaft.step(self.drive.output, self.load.output)
         self.ticked += shaft.period
         self._look(0.0)
-        return [frame for drive in self.drives for frame in drive.tick(self.ticked)]
+        return [*self.drive.tick(self.ticked), *self.load.tick(self.ticked)]
 
     def receive(self, frame: CanFrame, now: float) -> list[CanFrame]:
         """Frames with which the drives answer a frame that has come at a time, s."""
