@@ -18,6 +18,9 @@ from met.diagnostic import Problem
 SHARE = 0.05
 """Share of frames that a fault befalls."""
 
+SPARED = 6
+"""Answers after an altered one that are not altered, too: those of the other drive to the same question."""
+
 SWUNG = 100.0
 """Largest rate of a shaft, rad/s, for which a bed's limit has to have room, so that it is swung in full."""
 
@@ -32,9 +35,12 @@ class Spoiler:
         self.befell = 0
         self.on = False
         self._kept: list[CanFrame] = []
+        self._sound = SPARED + 1
+        """Answers since the last that was altered."""
 
     def __call__(self, frame: CanFrame, from_drive: bool) -> Spoilt:
         self._kept = [*self._kept[-40:], *([frame] if from_drive else [])]
+        self._sound += from_drive
         if not self.on or self.random.random() >= SHARE:
             return [(0.0, frame)]
         out = FAULTS[self.kind](self, frame, from_drive)
@@ -58,9 +64,10 @@ class Spoiler:
 
     def altered(self, frame: CanFrame, from_drive: bool) -> Spoilt:
         """An answer with bits that are wrong, and a checksum that is right: a controller lets such through once in
-        2^15."""
-        if not from_drive or not frame.data:
+        2^15. Of two drives' answers to one question one at most: two may be wrong alike, and nothing else is asked."""
+        if not from_drive or not frame.data or self._sound <= SPARED:
             return [(0.0, frame)]
+        self._sound = 0
         data = bytearray(frame.data)
         for _ in range(self.random.randint(1, 4)):
             data[self.random.randrange(len(data))] ^= 1 << self.random.randrange(8)
