@@ -169,6 +169,8 @@ def campaign(
     while tally.exchanges < exchanges:
         spoiler.on = False
         line.sleep(0.05)  # a command that is late may still come, and be stopped by the watchdog
+        played.shaft.rate = 0.0  # a hand stops it, which would coast for most of the time, where no fault befalls it
+        line.sleep(0.05)  # what the drives said before has come
         try:
             bed.read()
         except Problem:  # angles have begun anew: whoever greets it begins with what they are
