@@ -9,6 +9,7 @@ that figures are the same each time.
 
 from __future__ import annotations
 
+import functools
 import json
 import tempfile
 from pathlib import Path
@@ -168,6 +169,7 @@ class OnTime(CanBed):
         return super().exchange(voltage, current)
 
 
+@functools.cache
 def compiled(name: str, gains: tuple[float, float] = (1.0, 1.0), hz: int = FAST) -> Experiment:
     """A run of the deck. gains: of its rate loop, over `GAIN` and `INTEGRAL`;  hz: of the fast runs, Hz"""
     with tempfile.TemporaryDirectory() as folder:
@@ -240,12 +242,19 @@ def driven(bed: BedDriver, name: str, hz: int = FAST) -> np.ndarray:
     return found
 
 
+@functools.cache
 def alone(name: str, gains: tuple[float, float] = (1.0, 1.0), hz: int = FAST) -> np.ndarray:
     """Rates of both joints in a run without a bed, rad/s: [time, joint]."""
     run = engine.run(compiled(name, gains, hz))
     assert not run.status.any(), run.cause
     found: np.ndarray = run.signals["qd"][0]
     return found
+
+
+@functools.cache
+def on_serial(name: str, hz: int = FAST) -> np.ndarray:
+    """Rates of both joints in a run of the deck on the serial bed, rad/s: [time, joint]."""
+    return driven(serial(name, hz), name, hz)
 
 
 def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -260,7 +269,7 @@ def errors(dialect: str, name: str) -> tuple[np.ndarray, np.ndarray]:
     with tempfile.TemporaryDirectory() as folder:
         own = name.replace(fast, f"{fast}scaled_", 1) if dialect in SCALED else name
         found = driven(bench(dialect, own, Path(folder)), own, hz)
-    line = driven(serial(f"{fast}volts", hz), f"{fast}volts", hz)
+    line = on_serial(f"{fast}volts", hz)
     return apart(found, alone("fast" if fast else "plain", hz=hz)), apart(found, line)
 
 
@@ -280,7 +289,7 @@ def main() -> None:
                 words = " ".join(f"{each:.3%}" for each in off)
                 print(f"{name} {dialect}, gains {gains} of the deck's: off the run in software {words}", flush=True)
     for fast in ("", "fast_"):
-        line = driven(serial(f"{fast}volts"), f"{fast}volts")
+        line = on_serial(f"{fast}volts")
         off = apart(line, alone("fast" if fast else "plain"))
         print(f"{fast}serial: off the run in software", *(f"{each:.3%}" for each in off), flush=True)
         for dialect in DIALECTS:
