@@ -72,10 +72,11 @@ class PlayedMoteus(PlayedDrive):
         except (IndexError, KeyError, struct.error):
             return ()
         self._obey(told, now)
+        known = self._registers()
         answer = b""
         for head, first, count in asked:
             letter, _ = _KINDS[head >> 2 & 3]
-            values = [self._register(n) for n in range(first, first + count)]
+            values = [float(known.get(n, 0.0)) for n in range(first, first + count)]
             numbered = bytes([first]) if first < 0x80 else bytes([first & 0x7F | 0x80, first >> 7])
             packed = struct.pack(f"<{count}{letter}", *(v if letter == "f" else int(v) for v in values))
             answer += bytes([0x20 | head & 0x0F]) + numbered + packed
@@ -101,18 +102,18 @@ class PlayedMoteus(PlayedDrive):
             self.mode, self.torque = 10, min(max(told.get(0x22, 0.0), -most), most) if loose else 0.0
             self.until = now + told.get(0x27, math.inf)
 
-    def _register(self, register: int) -> float:
+    def _registers(self) -> dict[int, float]:
+        """Values of the registers that it has, by number; others are 0."""
         turns = 2.0 * math.pi
-        values = {
+        return {
             0x00: self.mode,
             0x01: (self.angle - self.zero) / turns,
             0x02: self.rate / turns,
             0x07: self.bridge.value * self.rate,
             0x0D: self.supply,
             0x0F: self.fault,
+            **{0x100 + n: value for n, value in enumerate(self.about)},
         }
-        values |= {0x100 + n: value for n, value in enumerate(self.about)}
-        return float(values.get(register, 0.0))
 
     def tick(self, now: float) -> Sequence[CanFrame]:
         if self.mode == 10 and self.watches and now > self.until:
