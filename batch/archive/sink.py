@@ -26,8 +26,8 @@ def temporary_of(target: Path) -> Path:
 
 
 class Sink:
-    """A new file with the interface that HDF5 needs: seek, then read or write. Raises Busy where it is being written
-    already."""
+    """A new file with the interface that HDF5 needs: seek, then read or write. Raises FileBusy where it is being
+    written already."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

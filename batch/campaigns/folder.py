@@ -92,8 +92,8 @@ class Folder:
     # Who works here
 
     def lock(self, *, together: bool = False) -> None:
-        """Lock the folder, which is made if it does not exist. Raises Busy where somebody works here, unless both do so
-        `together`."""
+        """Lock the folder, which is made if it does not exist. Raises FolderBusy where somebody works here, unless both
+        do so `together`."""
         while self._lock < 0:
             self.path.mkdir(exist_ok=True)
             self._lock = _lock_file(self.path / "lock")

@@ -90,7 +90,7 @@ def write(path: Path, shard: Shard) -> None:
 
 
 def read(path: Path, most: int | None = None) -> Shard:
-    """The shard in a file; its arrays are writable. most: largest number of bytes. Raises Unsound, OSError."""
+    """The shard in a file; its arrays are writable. most: largest number of bytes. Raises UnsoundShard, OSError."""
     with open_regular(path) as file:
         size = os.fstat(file.fileno()).st_size
         if size > (memory() if most is None else most + HEAD_BYTES):
