@@ -1,4 +1,4 @@
-"""Neovim, where it is, driven by the settings of docs/editors.md."""
+"""Neovim, driven by the settings of docs/editors.md."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ import pytest
 from met.host import interpreter
 
 
-@pytest.mark.skipif(shutil.which("nvim") is None, reason="nvim is not here")
+@pytest.mark.slow
 def test_neovim_shows_a_mistake_mends_it_and_renames(tmp_path: Path) -> None:
+    if shutil.which("nvim") is None:
+        pytest.skip("no nvim; on Debian or Ubuntu: apt-get install neovim")
     (tmp_path / "arm.ic").write_text("#include <two_link.ic>\nrun more like nominal { duration = 5; }\n")
     met = tmp_path / "met"
     met.write_text(f'#!/bin/sh\nexec {sys.executable} -P -m met.cli "$@"\n')
