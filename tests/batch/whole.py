@@ -50,7 +50,7 @@ SHORT_TASKS: Mapping[str, float] = {
 # Plans
 
 
-def long(cases: int = 10_000, ticks: int = 60_000) -> Experiment:
+def long(cases: int, ticks: int = 60_000) -> Experiment:
     """A sweep that takes seconds, with histories that take next to nothing: 11 rows of each case."""
     experiment = plans.gains(cases, ticks=ticks)
     schedule = replace(experiment.structure.schedule, record=ticks // 10)

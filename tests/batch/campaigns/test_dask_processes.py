@@ -18,7 +18,7 @@ from met.plan import file as plan_file
 from tests.batch import plans, whole
 
 pytestmark = [pytest.mark.cluster, pytest.mark.slow]
-CASES = 10_000
+CASES = 2_000
 
 
 @pytest.fixture(scope="module")

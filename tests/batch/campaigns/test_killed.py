@@ -14,7 +14,7 @@ import batch
 from met.plan import file as plan_file
 from tests.batch import plans, whole
 
-CASES = 10_000
+CASES = 2_000
 WAYS = (("--threads", "2"), ("--processes", "2"))
 SIGNALS = (("INT", 130, "interrupted"), ("TERM", 143, "terminated"))
 
@@ -94,7 +94,7 @@ def test_a_driver_that_is_killed_again_and_again_comes_to_the_same_end(
 ) -> None:
     """At any time: while it starts, reads shards, runs, writes, merges, or takes its folder away."""
     chance = random.Random(1989)
-    for patience in (1.5, 2.0, 2.5, 3.0, 3.0, 3.0, 3.0, 4.0, 4.0, 4.0, whole.PATIENCE_SECONDS):
+    for patience in (1.0, 1.5, 1.5, 2.0, 2.0, 2.0, 2.5, 2.5, 3.0, 4.0, whole.PATIENCE_SECONDS):
         with whole.started(words(archive, *way), archive.parent, whole.SHORT_TASKS) as process:
             try:
                 process.wait(timeout=chance.uniform(0.5, 1.0) * patience)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -43,12 +44,13 @@ def test_a_second_driver_is_refused(archive: Path, undisturbed: bytes) -> None:
 
 @pytest.mark.slow
 def test_a_second_process_is_refused(archive: Path, tmp_path: Path) -> None:
-    of = plans.plan(whole.long())
+    of = plans.plan(whole.long(2_000))
     cases = of.experiments[0].cases.count
     plan_file.write(of, tmp_path / "p.json")
     words = ["run", str(tmp_path / "p.json"), "-o", str(archive), "--no-picture"]
     with whole.started(words, archive.parent, whole.SHORT_TASKS) as first:
         whole.until(lambda: whole.done(archive, cases), first)
+        first.send_signal(signal.SIGSTOP)  # it is still at work when the last of the others has been refused
         for more in ((), ("--fresh",), ("--processes", "2")):
             second = whole.met([*words, *more], archive.parent)
             assert (second.returncode, second.stderr) == (
@@ -58,6 +60,7 @@ def test_a_second_process_is_refused(archive: Path, tmp_path: Path) -> None:
                 " = help: wait until it is done, or give another name with `-o`\n"
                 "\n1 error\n",
             )
+        first.send_signal(signal.SIGCONT)
         out, err = first.communicate(timeout=whole.PATIENCE_SECONDS)
     assert first.returncode == 0, err
     assert f"{cases:,} of {cases:,} cases reached their end" in out
