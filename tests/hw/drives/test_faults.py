@@ -1,4 +1,7 @@
-"""Whatever befalls the frames of a bus, no answer is taken that is wrong, and no drive is left driving."""
+"""Whatever befalls the frames of a bus, no answer is taken that is wrong, and no drive is left driving.
+
+`python -m tests.hw.drives.campaigns` runs five times as many exchanges of each.
+"""
 
 from __future__ import annotations
 
@@ -35,9 +38,9 @@ def test_no_wrong_answer_is_taken(tmp_path: Path, dialect: str, kind: str) -> No
 @pytest.mark.slow
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("kind", FAULTS)
-def test_no_wrong_answer_of_ten_thousand_is_taken(tmp_path: Path, dialect: str, kind: str) -> None:
-    tally, spoiler = through(tmp_path, dialect, kind, 10_000)
-    assert spoiler.befell >= 30 and tally.answered >= 1000
+def test_no_wrong_answer_of_two_thousand_is_taken(tmp_path: Path, dialect: str, kind: str) -> None:
+    tally, spoiler = through(tmp_path, dialect, kind, 2000)
+    assert spoiler.befell >= 6 and tally.answered >= 200
     assert tally.wrong == 0, tally
 
 
@@ -55,22 +58,3 @@ def test_a_drive_that_has_rebooted_stops_the_bed(tmp_path: Path, dialect: str, f
     tally, spoiler = through(tmp_path, dialect, "reboot", 1000)
     assert spoiler.befell > 5 and tally.stops > 0 and tally.faults == fault
     assert fault != Fault.DRIVE or tally.stops >= spoiler.befell - 1
-
-
-def table(folder: Path, exchanges: int = 10_000) -> None:
-    """Print what comes of each fault: `python -m tests.hw.drives.test_faults`."""
-    for dialect in DIALECTS:
-        for kind in FAULTS:
-            tally, spoiler = through(folder, dialect, kind, exchanges)
-            print(
-                f"{dialect:12} {kind:13} befell {spoiler.befell:6,} answered {tally.answered:6,} wrong {tally.wrong} "
-                f"worst {tally.worst:.3f} rad/s stops {tally.stops} {tally.faults!r}",
-                flush=True,
-            )
-
-
-if __name__ == "__main__":
-    import tempfile
-
-    with tempfile.TemporaryDirectory() as name:
-        table(Path(name))

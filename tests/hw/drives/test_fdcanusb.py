@@ -297,9 +297,9 @@ def test_no_wrong_answer_is_taken_of_lines_that_are_spoilt(tmp_path: Path, kind:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", TEXT_FAULTS)
-def test_no_wrong_answer_is_taken_of_ten_thousand_exchanges(tmp_path: Path, kind: str) -> None:
-    tally, spoiler = through(tmp_path, kind, 10_000)
-    assert spoiler.befell >= 100 and tally.answered >= 1000
+def test_no_wrong_answer_is_taken_of_two_thousand_exchanges(tmp_path: Path, kind: str) -> None:
+    tally, spoiler = through(tmp_path, kind, 2000)
+    assert spoiler.befell >= 20 and tally.answered >= 200
     assert tally.wrong == 0, tally
 
 
@@ -334,24 +334,6 @@ def test_a_player_covers_no_file(tmp_path: Path) -> None:
     with pytest.raises(Problem, match=r"E400: no fdcanusb can be played at .*mine: something is there"):
         PlayedFdcanusbPort(str(path))
     assert path.read_text() == "mine"
-
-
-def table(exchanges: int = 10_000) -> None:
-    """Print what comes of each fault of the text: `python -m tests.hw.drives.test_fdcanusb`."""
-    import tempfile
-
-    for kind in TEXT_FAULTS:
-        with tempfile.TemporaryDirectory() as name:
-            tally, spoiler = through(Path(name), kind, exchanges)
-        print(
-            f"{kind:13} befell {spoiler.befell:6,} answered {tally.answered:6,} wrong {tally.wrong} "
-            f"worst {tally.worst:.3f} rad/s stops {tally.stops} {tally.faults!r}",
-            flush=True,
-        )
-
-
-if __name__ == "__main__":
-    table()
 
 
 class _Babbling:
