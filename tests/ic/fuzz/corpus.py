@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import ast
+import random
 import re
 from collections.abc import Iterator
+from contextlib import chdir
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import get_args
 
 import ic
@@ -87,19 +90,30 @@ def _files_of_page(page: str) -> dict[str, str]:
     return files
 
 
+def sound_deck(rng: random.Random) -> str:
+    """One of those that give a plan with something to run; they are tried by chance until one does."""
+    long = [text for text in decks() if len(text) > 300]
+    return next(text for text in iter(lambda: rng.choice(long), "") if _is_sound(text))
+
+
 @cache
-def sound_decks() -> tuple[str, ...]:
-    """Those that give a plan with something to run, each in the current folder."""
-    return tuple(text for text in decks() if len(text) > 300 and _is_sound(text))
-
-
 def _is_sound(text: str) -> bool:
-    Path("deck.ic").write_text(text, encoding="utf-8", errors="replace")
-    try:
-        compiled = ic.check("deck.ic", select="all")
-    except Exception:  # that is for the fuzzer to find, and to tell
-        return True
-    return compiled.plan is not None and bool(compiled.plan.experiments)
+    with chdir(_folder().name):
+        Path("deck.ic").write_text(text, encoding="utf-8", errors="replace")
+        try:
+            compiled = ic.check("deck.ic", select="all")
+        except Exception:  # that is for the fuzzer to find, and to tell
+            return True
+        return compiled.plan is not None and bool(compiled.plan.experiments)
+
+
+@cache
+def _folder() -> TemporaryDirectory[str]:
+    """A folder with the companions as they are, whatever the fuzzer makes of them elsewhere."""
+    folder = TemporaryDirectory(prefix="met-sound-", ignore_cleanup_errors=True)
+    for name, data in companions():
+        Path(folder.name, name).write_bytes(data)
+    return folder
 
 
 @cache

@@ -22,7 +22,7 @@ def deck(seed: int, number: int) -> bytes:
     if how < 0.04:
         return soup(rng)
     sound = rng.random() < 0.85
-    text = rng.choice(corpus.sound_decks() if sound else corpus.decks())
+    text = corpus.sound_deck(rng) if sound else rng.choice(corpus.decks())
     if not sound and rng.random() < 0.5:
         text += "\n" + rng.choice(corpus.decks())
     if how < 0.1:

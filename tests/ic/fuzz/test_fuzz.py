@@ -43,7 +43,7 @@ def test_half_a_minute_of_decks_that_nobody_would_write_shows_no_fault() -> None
     seed = _seed()
     found = fuzz(seed, 30.0)
     assert not found.faults, told(found, seed)
-    assert found.decks > 50
+    assert found.decks > 20
 
 
 def test_what_was_found_stays_mended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -174,5 +174,5 @@ def test_some_random_sweeps_show_no_fault(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_hundreds_of_random_sweeps_show_no_fault(tmp_path: Path) -> None:
-    assert sweeps.main(f"{_seed()}", 200, tmp_path) == 0
+def test_a_hundred_random_sweeps_show_no_fault(tmp_path: Path) -> None:
+    assert sweeps.main(f"{_seed()}", 100, tmp_path) == 0

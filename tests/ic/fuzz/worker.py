@@ -26,7 +26,7 @@ def main(seed: int, first: int, seconds: float, directory: Path) -> None:
     os.chdir(directory)
     deck = Path("deck.ic")
     _companions(random.Random(0))
-    corpus.sound_decks(), corpus.words()
+    corpus.words()
     deck.write_text("#include <two_link.ic>\n")
     one.fault_of(deck)  # so that what is imported late is there
     one.limit_memory()
