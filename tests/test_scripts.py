@@ -19,7 +19,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 LOCKS = ("requirements.lock", "requirements-test.lock", "requirements-all.lock")
 TOOLS = ("sh", "bash", "readlink", "dirname", "cat", "uname", "env")
-# What `met --version` runs with, `met check` and scripts/test: the locks whole are what .ci/run installs before any test.
+# For `met --version`, `met check` and scripts/test: the locks whole are what .ci/run installs before any test.
 TO_START = {"click", "setuptools"}
 TO_CHECK = TO_START | {"numpy", "pcpp"}
 TO_TEST = TO_START | {
