@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 import re
-import resource
 import shutil
 import subprocess
 from collections.abc import Mapping
@@ -41,9 +40,8 @@ def texts(name: str) -> list[object]:
     return found
 
 
-def _in_little_memory() -> None:
-    """A text that grows without end fails in gcc before it takes the machine's memory."""
-    resource.setrlimit(resource.RLIMIT_AS, (2**30, 2**30))
+IN_LITTLE_MEMORY = ("/bin/sh", "-c", 'ulimit -v 1048576; exec "$@"', "sh")
+"""A text that grows without end fails in gcc before it takes the machine's memory."""
 
 
 def theirs(desk: Desk, text: str, others: Mapping[str, str]) -> list[str] | None:
@@ -53,10 +51,8 @@ def theirs(desk: Desk, text: str, others: Mapping[str, str]) -> list[str] | None
         pytest.skip("gcc's preprocessor is the oracle of this test")
     for name, other in others.items():
         desk.write(other, name)
-    words = [cpp, "-P", "-nostdinc", "-undef", "-std=gnu11", "-Ilibrary", desk.write(text)]
-    done = subprocess.run(
-        words, cwd=desk.directory, capture_output=True, text=True, check=False, timeout=60, preexec_fn=_in_little_memory
-    )
+    words = [*IN_LITTLE_MEMORY, cpp, "-P", "-nostdinc", "-undef", "-std=gnu11", "-Ilibrary", desk.write(text)]
+    done = subprocess.run(words, cwd=desk.directory, capture_output=True, text=True, check=False, timeout=60)
     cut = [t.text for line in logical_lines(Text("", done.stdout)) for t in line if t.text.strip()]
     return None if done.returncode else cut
 
