@@ -159,7 +159,7 @@ def test_after_any_edits_what_was_brought_along_makes_no_difference() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(path.name for path in LIBRARY.glob("*.ic")))
 def test_after_any_edits_of_a_shipped_deck_what_was_brought_along_makes_no_difference(name: str) -> None:
-    compare((LIBRARY / name).read_text(), 7, 60)
+    compare((LIBRARY / name).read_text(), 7, 30)
 
 
 def test_what_is_told_first_is_told_in_the_end() -> None:

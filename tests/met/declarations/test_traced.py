@@ -16,7 +16,7 @@ from tests.met.small_models import EVERY, smallest, uses
 
 pytestmark = pytest.mark.slow
 
-DRAWS = 25
+DRAWS = 10
 """Sets of random numbers for each function, under each kind of command and each choice of words."""
 
 
