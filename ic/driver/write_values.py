@@ -187,8 +187,8 @@ def _why(copy: _Copy, place: Place | None, home: str) -> str:
         return f"it stands in no place of its own, and no `servo {home} {{ ... }}` of this deck can have it"
     if place.macros:
         return f"it comes through the macro {place.macros[0].macro}"
-    if place.turns:
-        return f"it stands in `for {place.turns[0].macro}`, which says it for every turn"
+    if place.iterations:
+        return f"it stands in `for {place.iterations[0].macro}`, which says it for every iteration"
     if Path(place.file) != copy.path:
         return f"it stands in {place.file}, line {place.line}, which other decks may use"
     return f"it stands at line {place.line}, which is of more than this"

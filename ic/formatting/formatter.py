@@ -10,7 +10,7 @@ from ic.formatting.tabs import rows_as_seen
 from ic.text.lexer import SPACE, Text, Token, logical_lines
 from met.diagnostic import Place, Problem, error
 
-MOST_TURNS = 10
+MOST_PASSES = 10
 
 
 def formatted(name: str, text: str, making_strings: Collection[str] = ()) -> str:
@@ -19,7 +19,7 @@ def formatted(name: str, text: str, making_strings: Collection[str] = ()) -> str
     Raises Problem where the text is broken, and E340 where laying it out would change what it says.
     """
     laid = text
-    for _ in range(MOST_TURNS):  # accidental alignments may need a second turn
+    for _ in range(MOST_PASSES):  # accidental alignments may need a second pass
         before = laid
         laid = laid_out(rows_as_seen(Text(name, before), making_strings))
         if laid == before:

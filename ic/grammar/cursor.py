@@ -57,7 +57,7 @@ class Cursor:
         self.peak = 0
         self.misindented: tuple[Token, Token] | None = None
         self.unbalanced = False  # whether a brace is missing somewhere, or a bracket too many
-        self.indices: Mapping[str, str] = {}  # of the loops around: the value of each in this turn
+        self.indices: Mapping[str, str] = {}  # of the loops around: the value of each in this iteration
         self.declared: Mapping[str, Measure] = {}  # units that the deck declares
         self.unsized: set[str] = set()  # those whose declarations are wrong (reported already)
         self.depth = 0  # brackets that are open around the tokens

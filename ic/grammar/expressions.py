@@ -153,7 +153,7 @@ class Expressions(Quantities):
         self.unexpected("a value", help=helps.get(token.text, ()))
 
     def stand_in(self, index: Token) -> Token:
-        """The token for which the index of a loop stands in this turn, at the index's place."""
+        """The token for which the index of a loop stands in this iteration, at the index's place."""
         token = copy(index)
         token.text = self.indices[index.text]
         token.kind = WHOLE if token.text.lstrip("-").isdigit() else NAME

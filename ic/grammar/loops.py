@@ -1,9 +1,9 @@
 """Entries that stand for several: `for i in 1 .. 6 { ... }`, `for side in [left, right] { ... }`, and `[lift, swing] =
 turner;`.
 
-The block of a loop is read anew in each turn. Its tokens know the turn, after the macros that they came through
-(`Expansion.turn`); names with braces are replaced, and so is the index where a value begins. So later stages see plain
-names, and messages know the loop and the value of its index.
+The block of a loop is read anew in each iteration. Its tokens know the iteration (`Expansion.iteration`), after the
+macros that they came through; names with braces are replaced, and so is the index where a value begins. So later
+stages see plain names, and messages know the loop and the value of its index.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ic.grammar.cursor import span, token_in_words
 from ic.grammar.expressions import EVERY_JOINT, Expressions
 from ic.grammar.syntax import Entry, Expression, Group, Setting, Word
 from ic.text.lexer import BAD, END, NAME, Token
-from ic.text.limits import MOST_LOOPED, MOST_TURNS, Findings, GiveUp
+from ic.text.limits import MOST_ITERATIONS, MOST_LOOPED, Findings, GiveUp
 from ic.text.source import UnreadableStretch
 from met import units
 from met.diagnostic import Expansion, Place, did_you_mean
@@ -36,7 +36,7 @@ class Loops(Expressions):
         super().__init__(tokens, findings)
         self.unreadable: list[UnreadableStretch] = []
         self.within: Place | None = None
-        self.looped = [0]  # tokens of all turns so far, of the whole deck
+        self.looped = [0]  # tokens of all iterations so far, of the whole deck
 
     def entries(self, into: list[Entry]) -> None:
         raise NotImplementedError
@@ -57,7 +57,7 @@ class Loops(Expressions):
         return self.following.text == "(" or (self.following.kind == NAME and behind in ("in", "=", ":", "from"))
 
     def loop(self, into: list[Entry]) -> None:
-        """The entries of all turns of a loop."""
+        """The entries of all iterations of a loop."""
         first = self.advance()
         if self.token.kind != NAME or self.following.text != "in":
             self.fail("D283", "this is not how a loop is written", span(first, self.previous), help=USAGE)
@@ -89,7 +89,7 @@ class Loops(Expressions):
                     "D284",
                     f"the loops of this deck make more than {MOST_LOOPED:,} tokens",
                     use,
-                    help="write fewer turns, or a smaller block",
+                    help="write fewer iterations, or a smaller block",
                 )
                 raise GiveUp
             known = {**self.indices, index.text: value}
@@ -99,16 +99,24 @@ class Loops(Expressions):
         self.leave()
 
     def read_turn(self, tokens: Sequence[Token], opening: Token, known: Mapping[str, str], into: list[Entry]) -> None:
-        """The entries of one turn's tokens, the closing brace among these."""
+        """The entries of one iteration's tokens, the closing brace among these."""
         end = Token(END, "", tokens[-1].source, tokens[-1].end, 1)
-        turn = type(self)([*tokens, end], self.findings)
-        turn.indices, turn.looped, turn.within = known, self.looped, self.within
-        turn.declared, turn.unsized, turn.values_of_files = self.declared, self.unsized, self.values_of_files
-        turn.open, turn.depth, turn.operators = [opening], self.depth + len(self.open) - 1, self.operators
-        turn.entries(into)
-        self.unreadable += turn.unreadable
-        self.unbalanced = self.unbalanced or turn.unbalanced
-        self.peak = max(self.peak, turn.peak)
+        body = type(self)([*tokens, end], self.findings)
+        body.indices, body.looped, body.within = known, self.looped, self.within
+        body.declared, body.unsized, body.values_of_files = (
+            self.declared,
+            self.unsized,
+            self.values_of_files,
+        )
+        body.open, body.depth, body.operators = (
+            [opening],
+            self.depth + len(self.open) - 1,
+            self.operators,
+        )
+        body.entries(into)
+        self.unreadable += body.unreadable
+        self.unbalanced = self.unbalanced or body.unbalanced
+        self.peak = max(self.peak, body.peak)
 
     def check_index(self, index: Token) -> None:
         if self.is_reserved(index):
@@ -134,7 +142,7 @@ class Loops(Expressions):
         return at
 
     def counted(self) -> Sequence[str]:
-        """The turns of `1 .. 6 by 2`: both ends are among them where the steps meet the last."""
+        """The iterations of `1 .. 6 by 2`: both ends are among them where the steps meet the last."""
         start = self.at
         first = self.whole()
         if self.token.text != "..":
@@ -154,7 +162,7 @@ class Loops(Expressions):
                 help="leave it out: a step is 1 unless written",
             )
         if (last - first) * step < 0 and (step != 1 or last < first - 1):
-            message = f"this loop goes from {first} to {last} in steps of {step}: that is no turn"
+            message = f"this loop goes from {first} to {last} in steps of {step}: it has no iteration"
             self.fail(
                 "D283",
                 message,
@@ -163,14 +171,14 @@ class Loops(Expressions):
                 if by.text == "by"
                 else (
                     "to count down write `by -1`",
-                    "no turn at all is an end that is 1 below the beginning: `1 .. 0`",
+                    "for no iteration write an end that is 1 below the beginning: `1 .. 0`",
                 ),
             )
-        turns = range(first, last + (1 if step > 0 else -1), step)
-        if len(turns) > MOST_TURNS:
-            message = f"a loop has at most {MOST_TURNS:,} turns, and this one has {len(turns):,}"
+        iterations = range(first, last + (1 if step > 0 else -1), step)
+        if len(iterations) > MOST_ITERATIONS:
+            message = f"a loop has at most {MOST_ITERATIONS:,} iterations, and this one has {len(iterations):,}"
             self.fail("D284", message, place, help="change its ends, or take larger steps: `by 2`")
-        return [str(each) for each in turns]
+        return [str(each) for each in iterations]
 
     def whole(self, help: str = _ENDS) -> int:
         """The whole number that begins here. help: what to write where there is none."""
@@ -189,7 +197,7 @@ class Loops(Expressions):
         return value
 
     def listed(self) -> Sequence[str]:
-        """The turns of `[left, right]`: names, or whole numbers."""
+        """The iterations of `[left, right]`: names, or whole numbers."""
         opening = self.enter()
         values: dict[str, None] = {}
         while self.token.text != "]":
@@ -212,16 +220,16 @@ class Loops(Expressions):
             self.fail(
                 "D283", "this loop goes over nothing", opening, help="write names or whole numbers: `[left, right]`"
             )
-        if len(values) > MOST_TURNS:
+        if len(values) > MOST_ITERATIONS:
             self.fail(
                 "D284",
-                f"a loop has at most {MOST_TURNS:,} turns, and this one has {len(values):,}",
+                f"a loop has at most {MOST_ITERATIONS:,} iterations, and this one has {len(values):,}",
                 opening,
                 help="write two loops",
             )
         return tuple(values)
 
-    # turns
+    # iterations
 
     def pieces(self, start: int, end: int) -> list[tuple[Token, ...]]:
         """The tokens of a loop's block, with a name with braces as one piece; inner loops are not changed."""
@@ -244,8 +252,8 @@ class Loops(Expressions):
             at += length
         return found
 
-    def tokens_of(self, pieces: Sequence[tuple[Token, ...]], turn: Expansion, known: dict[str, str]) -> list[Token]:
-        """The tokens of one turn."""
+    def tokens_of(self, pieces: Sequence[tuple[Token, ...]], at: Expansion, known: dict[str, str]) -> list[Token]:
+        """The tokens of the iteration `at`."""
         through: dict[int, tuple[Expansion, ...]] = {}  # by identity, as of macros
         made: list[Token] = []
         for piece in pieces:
@@ -253,7 +261,7 @@ class Loops(Expressions):
             came = first.expansions
             if id(came) not in through:
                 count = macro_count(came)
-                through[id(came)] = (*came[:count], turn, *came[count:])
+                through[id(came)] = (*came[:count], at, *came[count:])
             token = Token(first.kind, first.text, first.source, first.offset, piece[-1].end - first.offset)
             token.expansions = through[id(came)]
             if len(piece) > 1:

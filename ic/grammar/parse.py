@@ -86,8 +86,8 @@ def parse_on(
     declared: Mapping[str, Measure] = NO_UNITS,
     looped: list[int] | None = None,
 ) -> Parsed:
-    """The deck of these tokens; its errors go into the findings. looped: the tokens of all turns of loops so far, of
-    decks that count together"""
+    """The deck of these tokens; its errors go into the findings. looped: the tokens of all iterations of loops so far,
+    of decks that count together"""
     parser = _Parser(tokens, findings)
     parser.declared = declared
     parser.looped = looped if looped is not None else parser.looped

@@ -367,8 +367,8 @@ def _place_json(place: Place | None) -> dict[str, Any] | None:
         return None
     steps = [{"macro": step.macro, "use": _place_json(step.use)} for step in place.macros]
     made = {"file": place.file, "line": place.line, "column": place.column, "length": place.length, "expansions": steps}
-    if place.turns:
-        made["turns"] = [
-            {"index": step.macro, "value": step.turn, "loop": _place_json(step.use)} for step in place.turns
+    if place.iterations:
+        made["iterations"] = [
+            {"index": step.macro, "value": step.iteration, "loop": _place_json(step.use)} for step in place.iterations
         ]
     return made

@@ -26,8 +26,8 @@ PROVISIONAL = ("D104", "D105", "D249")
 """Codes of a servo's or sensor's own step warnings, which wait for those of the whole arm's step."""
 
 
-MOST_TURNS_SHOWN = 4
-"""Number of further turns of a loop that are named beside a mistake in the first."""
+MOST_ITERATIONS_SHOWN = 4
+"""Number of further iterations of a loop that are named beside a mistake in the first."""
 
 
 MOST_ROOFS_SHOWN = 4
@@ -50,7 +50,7 @@ class DefinitionFindings:
     missing      definitions, and entries that they are known to lack
     of_no_run    those that no run is to blame for
     silenced     warnings that are allowed, each with the place of the `allow`; needed: the places of each that was
-    turns        turns of loops that made the same mistake as the first of them
+    iterations   iterations of loops that made the same mistake as the first of them
     """
 
     diagnostics: tuple[Diagnostic, ...]
@@ -60,7 +60,7 @@ class DefinitionFindings:
     of_no_run: frozenset[Diagnostic]
     silenced: Mapping[Diagnostic, Place]
     needed: frozenset[Place]
-    turns: Mapping[object, tuple[tuple[Expansion, ...], ...]]
+    iterations: Mapping[object, tuple[tuple[Expansion, ...], ...]]
 
 
 class Complaints:
@@ -81,7 +81,8 @@ class Complaints:
         self._allowed: Mapping[str, Place] | None = None  # codes that the run at hand allows; None outside of runs
         self._silenced: dict[Diagnostic, Place] = {}
         self._of_no_run: set[Diagnostic] = set(self._found)
-        self._turns: dict[object, dict[tuple[Expansion, ...], None]] = {}  # by mistake of a loop's body: its turns
+        # of each mistake in a loop's body the iterations that make it
+        self._iterations: dict[object, dict[tuple[Expansion, ...], None]] = {}
         self.needed_allowances: set[Place] = set()  # the places of each `allow` that silenced a warning
         self._lacking: dict[Diagnostic, tuple[Place, str]] = {}
 
@@ -96,7 +97,7 @@ class Complaints:
         for name, value in vars(self).items():
             if isinstance(value, dict | set | list):
                 setattr(made, name, copy(value))
-        made._turns = {mistake: dict(turns) for mistake, turns in self._turns.items()}
+        made._iterations = {mistake: dict(iterations) for mistake, iterations in self._iterations.items()}
         return made
 
     def apart(self) -> Complaints:
@@ -122,7 +123,7 @@ class Complaints:
             frozenset(self._of_no_run),
             dict(self._silenced),
             frozenset(self.needed_allowances),
-            {mistake: tuple(turns) for mistake, turns in self._turns.items()},
+            {mistake: tuple(iterations) for mistake, iterations in self._iterations.items()},
         )
 
     def take(self, found: DefinitionFindings) -> None:
@@ -135,8 +136,8 @@ class Complaints:
             elif found.lacking.get(each) not in self.known_missing:
                 self.add(each)
         self._allowed = before
-        for mistake, turns in found.turns.items():
-            self._turns.setdefault(mistake, {}).update(dict.fromkeys(turns))
+        for mistake, iterations in found.iterations.items():
+            self._iterations.setdefault(mistake, {}).update(dict.fromkeys(iterations))
         for each, place in found.silenced.items():
             self._silenced.setdefault(each, place)
         self.known_missing |= found.missing
@@ -144,9 +145,9 @@ class Complaints:
 
     @property
     def all(self) -> tuple[Diagnostic, ...]:
-        """All findings; of a mistake in several turns of a loop, or under several roofs of a file, only the first,
+        """All findings; of a mistake in several iterations of a loop, or under several roofs of a file, only the first,
         which names the others."""
-        return tuple(once_for_all_roofs(map(self._with_turns, self._found)))
+        return tuple(once_for_all_roofs(map(self._with_iterations, self._found)))
 
     @property
     def errors(self) -> tuple[Diagnostic, ...]:
@@ -169,32 +170,32 @@ class Complaints:
     def _record(self, diagnostic: Diagnostic) -> None:
         self.error_count += diagnostic.severity == "error"
         if (
-            not self.is_of_another_turn(diagnostic)
+            not self.is_of_another_iteration(diagnostic)
             and len(self._found) < MOST_DIAGNOSTICS
             and not self._is_known_at_this_place(diagnostic)
             and not self._follows_from_unreadable(diagnostic)
         ):
             self._found.setdefault(diagnostic)
 
-    def is_of_another_turn(self, diagnostic: Diagnostic) -> bool:
-        """Return True if a turn of a loop made the same mistake in the same place before; this turn is noted."""
-        if diagnostic.at is None or not diagnostic.at.place.turns:
+    def is_of_another_iteration(self, diagnostic: Diagnostic) -> bool:
+        """Return True if an iteration of a loop made the same mistake in the same place before; this one is noted."""
+        if diagnostic.at is None or not diagnostic.at.place.iterations:
             return False
-        turns = diagnostic.at.place.turns
-        known = self._turns.setdefault(_mistake(diagnostic), {turns: None})
-        known[turns] = None
-        return next(iter(known)) != turns
+        iterations = diagnostic.at.place.iterations
+        known = self._iterations.setdefault(_mistake(diagnostic), {iterations: None})
+        known[iterations] = None
+        return next(iter(known)) != iterations
 
-    def _with_turns(self, diagnostic: Diagnostic) -> Diagnostic:
-        if not self._turns or diagnostic.at is None or not diagnostic.at.place.turns:
+    def _with_iterations(self, diagnostic: Diagnostic) -> Diagnostic:
+        if not self._iterations or diagnostic.at is None or not diagnostic.at.place.iterations:
             return diagnostic
-        others = tuple(self._turns.get(_mistake(diagnostic), ()))[1:]
+        others = tuple(self._iterations.get(_mistake(diagnostic), ()))[1:]
         if not others:
             return diagnostic
-        loop = diagnostic.at.place.turns[0]
-        text = f"likewise in {len(others):,} other turn{'s' * (len(others) > 1)}"
-        if all(len(turns) == 1 for turns in others):
-            shown = [turns[0].turn for turns in others[:MOST_TURNS_SHOWN]]
+        loop = diagnostic.at.place.iterations[0]
+        text = f"likewise in {len(others):,} other iteration{'s' * (len(others) > 1)}"
+        if all(len(iterations) == 1 for iterations in others):
+            shown = [iterations[0].iteration for iterations in others[:MOST_ITERATIONS_SHOWN]]
             more = f" and {len(others) - len(shown):,} more" * (len(others) > len(shown))
             text = f"likewise where {loop.macro} = {', '.join(shown)}{more}"
         return replace(diagnostic, also=(*diagnostic.also, Label(loop.use, text)))
@@ -403,7 +404,7 @@ class Complaints:
 
 
 def _mistake(diagnostic: Diagnostic) -> object:
-    """A key that is equal for a mistake in all turns of a loop: the code and the place, without the turn."""
+    """A key that is equal for a mistake in all iterations of a loop: the code and the place, without the iteration."""
     assert diagnostic.at is not None
     place = diagnostic.at.place
     return diagnostic.code, diagnostic.severity, place.file, place.line, place.column, place.macros
@@ -417,7 +418,7 @@ def once_for_all_roofs(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
     key: object
     for each in found:
         place = each.at.place if each.at is not None else None
-        key = (_mistake(each), place.turns) if place is not None and place.used else None
+        key = (_mistake(each), place.iterations) if place is not None and place.used else None
         known = first.setdefault(key, each)
         came_by = known.at.place.included if known.at is not None else ()
         roofs = [place.included[n] for n in place.used if place.included[n] not in came_by] if place and key else []

@@ -30,8 +30,8 @@ MOST_ARGUMENTS = 20_000  # tokens in one macro call
 MACRO_DEPTH = 64  # macros through which one token may come; calls within arguments of calls
 MOST_FROM_ONE_USE = 100_000  # tokens
 MOST_EXPANDED = 500_000  # tokens
-MOST_TURNS = 10_000  # of one loop
-MOST_LOOPED = 500_000  # tokens of all turns of all loops
+MOST_ITERATIONS = 10_000  # of one loop
+MOST_LOOPED = 500_000  # tokens of all iterations of all loops
 MOST_CONDITIONS = 10_000  # that are evaluated
 CONDITION_DEPTH = 100  # of `#if` within each other in one file
 MOST_TERMS = 2_000  # tokens in one condition
@@ -60,7 +60,7 @@ class Findings(Complaints):
         for diagnostic in diagnostics:
             place = diagnostic.at.place if diagnostic.at else None
             key = (diagnostic.code, diagnostic.message, place and (place.file, place.line, place.column))
-            if self.is_of_another_turn(diagnostic) or key in self._told:
+            if self.is_of_another_iteration(diagnostic) or key in self._told:
                 continue
             self._told.add(key)
             super().add(diagnostic)

@@ -64,7 +64,7 @@ def _edit(change: TextChange, place: Place, sources: Mapping[str, str]) -> Edit 
     found = _stretch(change, text, (line_at, line_end), min(first, line_end), last)
     if found is None or text[found[0] : found[1]] == found[2]:  # the new text stands there already
         return None
-    if any(turn.macro in _names(text[found[0] : found[1]]) - _names(found[2]) for turn in place.turns):
+    if any(iteration.macro in _names(text[found[0] : found[1]]) - _names(found[2]) for iteration in place.iterations):
         return None  # it would only concern this turn
     return _between(place.file, starts, *found)
 

@@ -18,7 +18,7 @@ class Place:
     line and column count from 1; a column counts characters, not bytes. `expansions` is not empty for a token
     that a macro or a loop made: the token is then written at this place, in the macro's body, in an argument or in the
     loop's body. Each expansion, innermost first, says through which macro it came and where that macro was used; behind
-    those, likewise, come the turns of loops.
+    those, likewise, come the iterations of loops.
     `included` is the chain of lines that led to the file, innermost first: `#include`, but for those at the positions
     `used`, which `use` it.
     """
@@ -42,37 +42,37 @@ class Place:
 
     @property
     def macros(self) -> tuple[Expansion, ...]:
-        """The steps of macro expansion alone, without turns of loops."""
+        """The steps of macro expansion alone, without iterations of loops."""
         return self.expansions[: macro_count(self.expansions)]
 
     @property
-    def turns(self) -> tuple[Expansion, ...]:
-        """The turns of loops alone, the innermost loop's first."""
+    def iterations(self) -> tuple[Expansion, ...]:
+        """The iterations of loops alone, the innermost loop's first."""
         return self.expansions[macro_count(self.expansions) :]
 
 
 @frozen
 class Expansion:
-    """One step of macro expansion, or one turn of a loop.
+    """One step of macro expansion, or one iteration of a loop.
 
     macro  the macro's name; of a loop, that of its index
     use    the place where the macro was used; the first words of the loop
-    turn   of a loop, what its index stands for in this turn; "" of a macro
+    iteration   of a loop, what its index stands for in this iteration; "" of a macro
     """
 
     macro: str
     use: Place
-    turn: str = ""
+    iteration: str = ""
 
     def __str__(self) -> str:
-        """The text of a turn of a loop in messages: `i = 7`."""
-        return f"{self.macro} = {self.turn}"
+        """The text of an iteration of a loop in messages: `i = 7`."""
+        return f"{self.macro} = {self.iteration}"
 
 
 def macro_count(expansions: tuple[Expansion, ...]) -> int:
-    """The number of steps of macro expansion, which come before the turns of loops."""
+    """The number of steps of macro expansion, which come before the iterations of loops."""
     count = len(expansions)
-    while count and expansions[count - 1].turn:
+    while count and expansions[count - 1].iteration:
         count -= 1
     return count
 

@@ -82,9 +82,9 @@ def _place_json(place: Place) -> dict[str, Any]:
     made: dict[str, Any] = {"file": place.file, "line": place.line, "column": place.column, "length": place.length}
     if place.macros:
         made["expansions"] = [{"macro": step.macro, "use": _place_json(step.use)} for step in place.macros]
-    if place.turns:
-        made["turns"] = [
-            {"index": step.macro, "value": step.turn, "loop": _place_json(step.use)} for step in place.turns
+    if place.iterations:
+        made["iterations"] = [
+            {"index": step.macro, "value": step.iteration, "loop": _place_json(step.use)} for step in place.iterations
         ]
     if place.included:
         made["included"] = [
@@ -148,7 +148,8 @@ def _result(diagnostic: Diagnostic, sources: Mapping[str, str], rule: int) -> di
         place = diagnostic.at.place
         shown = shown_place(place)
         result["locations"] = [_location(shown, diagnostic.at.text)]
-        related = [_location(shown_place(turn.use), f"in `for {turn.macro}`, {turn}") for turn in place.turns] + related
+        loops = [_location(shown_place(each.use), f"in `for {each.macro}`, {each}") for each in place.iterations]
+        related = loops + related
         if shown is not place:
             related.insert(0, _location(place, f"written here, in macro {place.expansions[0].macro}"))
     if related:

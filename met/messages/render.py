@@ -104,10 +104,10 @@ def _one(diagnostic: Diagnostic, lines: Mapping[str, list[str]], paint: _Paint) 
 
 
 def _came_through(place: Place) -> list[str]:
-    """The macros that made a token, and the turns of loops in which it stands, innermost first."""
+    """The macros that made a token, and the iterations of loops in which it stands, innermost first."""
     steps = [f"note: in expansion of macro {step.macro}, used at {step.use}" for step in place.macros]
-    turns = [f"note: in `for {step.macro}` at {shown_place(step.use)}, {step}" for step in place.turns]
-    return _cut(steps, "macros") + _cut(turns, "loops")
+    iterations = [f"note: in `for {step.macro}` at {shown_place(step.use)}, {step}" for step in place.iterations]
+    return _cut(steps, "macros") + _cut(iterations, "loops")
 
 
 def _came_in(place: Place) -> list[str]:

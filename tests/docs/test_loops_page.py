@@ -117,6 +117,6 @@ def test_a_message_in_a_loop_stands_as_well_as_one_in_a_macro(tmp_path: Path) ->
     assert (loop.code, loop.message, loop.help) == (macro.code, macro.message, macro.help)
     assert (
         loop.at is not None
-        and loop.at.place.turns
+        and loop.at.place.iterations
         and [label.text for label in loop.also][-1:] == ["likewise where i = 2, 3, 4, 5 and 2 more"]
     )

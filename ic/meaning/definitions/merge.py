@@ -427,16 +427,17 @@ def defined_twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnos
     if (place.file, place.line, place.column) == (earlier.file, earlier.line, earlier.column):
         once = "its file is included twice: begin that file with `#pragma once`"
         helps = [write("#pragma once\n", once, at=Place(place.file, 1, 1, 0), where="before")]
-        if place.turns != earlier.turns:
-            index = place.turns[0].macro
+        if place.iterations != earlier.iterations:
+            index = place.iterations[0].macro
             stem = name.removesuffix(index) if name.endswith(f"_{index}") else f"{name}_"  # its braces were forgotten
-            helps = [f"each turn writes it: name it by the index, as in `{stem}{{{index}}}`"]
+            helps = [f"each iteration writes it: name it by the index, as in `{stem}{{{index}}}`"]
             if kind == WITH:
                 helps = [
-                    f"each turn writes it: put the index into the path, `{{{index}}}`, or write it outside of the loop"
+                    f"each iteration writes it: put the index into the path, `{{{index}}}`, "
+                    "or write it outside of the loop"
                 ]
             if not kind:
-                helps = [f"each turn writes it: put the loop inside, `{name} {{ for {index} in ... {{ ... }} }}`"]
+                helps = [f"each iteration writes it: put the loop inside, `{name} {{ for {index} in ... {{ ... }} }}`"]
         elif place.macros and place.expansions != earlier.expansions:
             helps = [
                 f"macro `{place.macros[-1].macro}` is used twice here: give it the name as an argument, "

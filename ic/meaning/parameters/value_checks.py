@@ -52,7 +52,7 @@ class ValueChecks:
             wrote: Help | str = f"write a number in {text}"
             if not isinstance(value.number, Scalar):
                 written = f"{value.number:.12g}"
-                stands = (turn.macro for turn in value.place.turns if turn.turn == written)
+                stands = (iteration.macro for iteration in value.place.iterations if iteration.iteration == written)
                 index = next((each for each in stands if each == self.definitions.text_at(value.place)), written)
                 wrote = write_either((f"{index} {each}" for each in in_degrees(text)), where="value")
             read = [value.place, *(label.place for label in self.names.label_of_cell(value.number, value.place))]

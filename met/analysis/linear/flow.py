@@ -236,7 +236,7 @@ class Flow:
                 f"`{experiment.name}` has no derivative here: {what}, t = {time:.6g} s",
                 experiment.place,
                 help=(
-                    "a linear answer is about small moves, of which none is small across an event",
+                    "a derivative describes small changes, and across an event no change is small",
                     "ask at another instant, `--at`, from which nothing changes for a period of the computers, "
                     f"{self.program.seconds:g} s",
                 ),

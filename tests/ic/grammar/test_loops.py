@@ -76,7 +76,7 @@ def test_it_is_the_tree_of_what_it_stands_for(desk: Desk, loop: str, plain: str)
     assert same(desk, loop, plain)
 
 
-def test_an_entry_of_a_loop_is_placed_where_it_is_written_and_knows_its_turns_innermost_first(desk: Desk) -> None:
+def test_an_entry_of_a_loop_is_placed_where_it_is_written_and_knows_its_iterations_innermost_first(desk: Desk) -> None:
     deck = desk.read(
         "arm a {\n  for i in 1 .. 2 {\n    for side in [x, y] {\n      link l_{i}{side} { }\n    }\n  }\n}"
     )
@@ -84,13 +84,13 @@ def test_an_entry_of_a_loop_is_placed_where_it_is_written_and_knows_its_turns_in
     assert isinstance(arm, Group)
     places = [link.words[1].place for link in arm.body if isinstance(link, Group)]
     assert {(place.line, place.column, place.length, place.macros) for place in places} == {(4, 12, 11, ())}
-    assert [[str(turn) for turn in place.turns] for place in places] == [
+    assert [[str(iteration) for iteration in place.iterations] for place in places] == [
         ["side = x", "i = 1"],
         ["side = y", "i = 1"],
         ["side = x", "i = 2"],
         ["side = y", "i = 2"],
     ]
-    assert [(turn.use.line, turn.use.column) for turn in places[0].turns] == [(3, 5), (2, 3)]
+    assert [(iteration.use.line, iteration.use.column) for iteration in places[0].iterations] == [(3, 5), (2, 3)]
 
 
 def test_the_index_in_a_value_is_placed_where_it_stands(desk: Desk) -> None:
@@ -104,18 +104,18 @@ def test_a_loop_in_a_macro_and_a_macro_in_a_loop_keep_both(desk: Desk) -> None:
     first, second = desk.read(text).entries
     for entry, macros in ((first, ["ONE", "ALL"]), (second, ["ONE"])):
         assert [step.macro for step in entry.place.macros] == macros
-        assert [str(turn) for turn in entry.place.turns] == [f"i = {'1' if entry is first else '2'}"]
+        assert [str(iteration) for iteration in entry.place.iterations] == [f"i = {'1' if entry is first else '2'}"]
 
 
-def test_programs_are_told_the_turns_beside_the_macros(desk: Desk) -> None:
+def test_programs_are_told_the_iterations_beside_the_macros(desk: Desk) -> None:
     desk.write("for i in 1 .. 2 { let a_{i} = 3 mm + i; let a_{i} = 1 kgg; }")
     found = read("a.ic", despite_errors=True).warnings
     place = json.loads(to_json(found))["diagnostics"][0]["at"]["place"]
     assert "expansions" not in place
-    assert [(turn["index"], turn["value"], turn["loop"]["line"]) for turn in place["turns"]] == [("i", "1", 1)]
+    assert [(each["index"], each["value"], each["loop"]["line"]) for each in place["iterations"]] == [("i", "1", 1)]
 
 
-def test_two_mistakes_of_one_turn_are_two_and_one_of_two_turns_is_one(desk: Desk) -> None:
+def test_two_mistakes_of_one_iteration_are_two_and_one_of_two_iterations_is_one(desk: Desk) -> None:
     assert desk.codes("for i in 1 .. 9 {\n let a_{i} = 1 kgg;\n let b_{i} = 1 kgg; }") == ["D028:2", "D028:3"]
 
 
@@ -126,25 +126,25 @@ def test_for_may_still_be_a_name(desk: Desk) -> None:
 
 
 def flattened(pick: random.Random, depth: int = 0) -> tuple[str, list[str]]:
-    """A loop whose block has settings and loops, and the settings of all its turns as they are without it."""
+    """A loop whose block has settings and loops, and the settings of all its iterations as they are without it."""
     index = f"i{depth}"
     low, high = sorted(pick.randint(0, 6) for _ in range(2))
     step = pick.choice([1, 1, 2, 3])
-    turns = range(low, high + 1, step)
+    iterations = range(low, high + 1, step)
     parts: list[str] = []
-    made: dict[int, list[str]] = {turn: [] for turn in turns}
+    made: dict[int, list[str]] = {iteration: [] for iteration in iterations}
     for n in range(pick.randint(1, 3)):
         name = f"v{depth}_{n}_{pick.randint(0, 999)}"
         parts.append(f"{name}_{{{index}+3}} = {index} - 2;")
-        for turn in turns:
-            made[turn].append(f"{name}_{turn + 3} = {turn} - 2;")
+        for iteration in iterations:
+            made[iteration].append(f"{name}_{iteration + 3} = {iteration} - 2;")
         if depth < 3 and pick.random() < 0.4:
             text, lines = flattened(pick, depth + 1)
             parts.append(text)
-            for turn in turns:
-                made[turn] += lines
+            for iteration in iterations:
+                made[iteration] += lines
     head = f"for {index} in {low} .. {high}" + (f" by {step}" if step > 1 or pick.random() < 0.3 else "")
-    return f"{head} {{ {' '.join(parts)} }}", [line for turn in turns for line in made[turn]]
+    return f"{head} {{ {' '.join(parts)} }}", [line for iteration in iterations for line in made[iteration]]
 
 
 @pytest.mark.parametrize("seed", range(40))

@@ -120,7 +120,7 @@ def test_the_origin_of_a_value_in_a_loop_is_its_line_and_turn(tmp_path: Path) ->
     assert found.plan is not None
     place = found.plan.experiments[0].parameters["links.right.mass"].origin.place
     assert place is not None
-    assert (place.line, [str(turn) for turn in place.turns], place.macros) == (3, ["side = right"], ())
+    assert (place.line, [str(iteration) for iteration in place.iterations], place.macros) == (3, ["side = right"], ())
 
 
 def test_the_same_joint_twice_is_told_as_ever(tmp_path: Path) -> None:
@@ -146,7 +146,7 @@ error[D040]: let `span` is written twice
   |         ^^^^ again
  ::: deck.ic:2:9  first
  ::: deck.ic:1:1  likewise where i = 3, 4
-  = help: each turn writes it: name it by the index, as in `span_{i}`
+  = help: each iteration writes it: name it by the index, as in `span_{i}`
   = note: in `for i` at deck.ic:1:1, i = 2
 
 1 error
@@ -178,7 +178,7 @@ error[D286]: which value of a list is taken cannot vary
 """)
 
 
-def test_a_mistake_in_some_turns_is_told_of_the_first_of_them(tmp_path: Path) -> None:
+def test_a_mistake_in_some_iterations_is_told_of_the_first_of_them(tmp_path: Path) -> None:
     text = "let spans = [1, 2] m;\nfor i in 0 .. 4 {\n    let x_{i} = spans[i];\n}\n"
     assert (
         told(tmp_path, text)
@@ -197,7 +197,7 @@ error[D286]: `spans` has no value with the index 2
     )
 
 
-def test_a_deck_is_varied_over_the_number_of_its_turns_by_a_macro(tmp_path: Path) -> None:
+def test_a_deck_is_varied_over_the_number_of_its_iterations_by_a_macro(tmp_path: Path) -> None:
     text = "#ifndef COUNT\n#define COUNT 2\n#endif\narm row {\n    for i in 1 .. COUNT {\n"
     text += "        link l_{i} { mass = 1 kg;  shape = rod(length = 1 m, along = x); }\n"
     text += "        joint j_{i} revolute { parent = base;  child = l_{i};  axis = z; }\n    }\n}\n"
@@ -238,7 +238,7 @@ error[D040]: `initial` is written twice
 16 |         initial { j_{side}.q = 1 rad; }
    |         ^^^^^^^ again
   ::: deck.ic:16:9  first
-   = help: each turn writes it: put the loop inside, `initial { for side in ... { ... } }`
+   = help: each iteration writes it: put the loop inside, `initial { for side in ... { ... } }`
    = note: in `for side` at deck.ic:15:5, side = right
 
 1 error

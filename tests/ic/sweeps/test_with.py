@@ -257,7 +257,7 @@ error[D040]: with `links.bar.mass` is written twice
 2 | run it like hold { for i in 1 .. 2 { with links.bar.mass = i * 1 kg; } }
   |                                      ^^^^^^^^^^^^^^^^^^^ again
  ::: deck.ic:2:38  first
-  = help: each turn writes it: put the index into the path, `{i}`, or write it outside of the loop
+  = help: each iteration writes it: put the index into the path, `{i}`, or write it outside of the loop
   = note: in `for i` at deck.ic:2:20, i = 2
 """),
     ("with reach = 2 s;", """\

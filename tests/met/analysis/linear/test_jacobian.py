@@ -163,7 +163,7 @@ def test_the_message_of_an_event_is_whole(tmp_path: Path) -> None:
     assert told.code == "D370"
     assert told.message == "`hold` has no derivative here: `hinge` breaks away, t = 0 s"
     assert told.help == (
-        "a linear answer is about small moves, of which none is small across an event",
+        "a derivative describes small changes, and across an event no change is small",
         "ask at another instant, `--at`, from which nothing changes for a period of the computers, 0.004 s",
     )
 
