@@ -44,7 +44,9 @@ sys.exit(main(sys.argv[2:]))
 SHORT_TASKS: Mapping[str, float] = {
     "batch.campaigns.cutting.WORK_SECONDS": 0.1,
     "batch.campaigns.cutting.FIRST_SECONDS": 0.01,
+    "batch.campaigns.performing.WORTH_SECONDS": 0.1,
 }
+"""Settings of campaigns that are cut as long ones are, and kept when a tenth of a second of work is done."""
 
 
 # Plans
