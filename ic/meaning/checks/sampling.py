@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from types import SimpleNamespace
 from typing import Any
@@ -147,24 +148,25 @@ def _remark(scope: Scope, sampled: SampledContent, found: list[Content], schedul
     if duration <= first.begins < math.inf:
         return _remark_late(scope, sampled, first.begins, schedule, place, " in this run")
     hz = 1.0 / sampled.interval
-    fastest = max(each.frequency for each in found)
+    fastest = min(max(each.frequency for each in found), sys.float_info.max)
     if 2.0 * fastest >= hz * (1.0 - ROUNDING):
-        seen = abs(fastest - round(fastest / hz) * hz)
+        seen = abs(math.remainder(fastest, hz))
         enough = _fitting(ENOUGH * fastest, base)
+        rate = [f"or give what sees it {enough:.6g} Hz, {ENOUGH} instants a swing or more"] if enough < math.inf else []
         scope.complaints.remark(
             "D335",
             f"{sampled.label} swings at {fastest:.6g} Hz, and {sampled.by} at {hz:.6g} Hz: "
             f"what is seen of it swings at {seen:.6g} Hz",
             place,
-            help=f"let it swing slower than {0.5 * hz:.6g} Hz; or give what sees it {enough:.6g} Hz, "
-            f"{ENOUGH} instants a swing or more",
+            help="; ".join([f"let it swing slower than {0.5 * hz:.6g} Hz", *rate]),
         )
     lost = [pulse for each in found for pulse in _lost(each.pulses, sampled.interval, duration)]
     if lost:
         begins, ends = min(lost, key=lambda pulse: pulse[1] - pulse[0])
         before = math.floor(begins * hz)
         times = f"{before * sampled.interval:.9g} s and {(before + 1) * sampled.interval:.9g} s"
-        rate = [f"or give what sees it {_fitting(1.0 / (ends - begins), base):.6g} Hz"] if ends > begins else []
+        enough = _fitting(1.0 / (ends - begins), base) if ends > begins else math.inf
+        rate = [f"or give what sees it {enough:.6g} Hz"] if enough < math.inf else []
         others = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
         scope.complaints.remark(
             "D336",
@@ -209,15 +211,18 @@ def _rates_that_carry(
 
 
 def _fitting(wanted: float, base: float) -> float:
-    """The slowest rate from `wanted` Hz on that divides the base rate, or that the base rate divides, Hz."""
+    """The slowest rate from `wanted` Hz on that divides the base rate, or that the base rate divides, Hz.
+
+    Infinite where it is beyond all numbers.
+    """
     if wanted <= base:
         return base / math.floor(base / wanted * (1.0 + ROUNDING))
-    return base * math.ceil(wanted / base * (1.0 - ROUNDING))
+    times = wanted / base * (1.0 - ROUNDING)
+    return base * math.ceil(times) if times < math.inf else math.inf
 
 
 def _lost(pulses: Iterable[tuple[float, float]], interval: float, duration: float) -> Iterator[tuple[float, float]]:
     """The pulses within the run in which no instant lies."""
     for begins, ends in pulses:
-        after = math.ceil(begins / interval - ROUNDING)
-        if 0.0 <= begins < duration and after > ends / interval + ROUNDING:
+        if 0.0 <= begins < duration and math.ceil(begins / interval - ROUNDING) > ends / interval + ROUNDING:
             yield begins, ends

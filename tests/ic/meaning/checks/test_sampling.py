@@ -41,6 +41,15 @@ what is seen of it swings at 0 Hz
     )
 
 
+@pytest.mark.parametrize("ticks", ["100 Hz", "0.5 Hz"])
+def test_of_a_swing_that_no_rate_would_see_no_rate_is_told(tmp_path: Path, ticks: str) -> None:
+    """What was found: a traceback for a frequency of which ten times is beyond all numbers."""
+    servo = under("rate(sine(amplitude = 1 rad/s, frequency = 1e308 Hz))")
+    said = shown(tmp_path, ARM, servo, changed(RUN, (TICKS[0], TICKS[1].replace("100 Hz", ticks))))
+    assert said.startswith("warning[D335]: the command of servo `drive` swings at 1e+308 Hz, and its servo ticks at ")
+    assert " = help: let it swing slower than " in said and "give what sees it" not in said
+
+
 def test_a_pulse_between_ticks_is_told_with_the_ticks_that_would_see_it(tmp_path: Path) -> None:
     servo = under("rate(table(times = [0.502, 0.503, 0.506, 0.507] s, values = [0, 1, 1, 0] rad/s))")
     assert (
