@@ -103,16 +103,8 @@ class Loops(Expressions):
         end = Token(END, "", tokens[-1].source, tokens[-1].end, 1)
         body = type(self)([*tokens, end], self.findings)
         body.indices, body.looped, body.within = known, self.looped, self.within
-        body.declared, body.unsized, body.values_of_files = (
-            self.declared,
-            self.unsized,
-            self.values_of_files,
-        )
-        body.open, body.depth, body.operators = (
-            [opening],
-            self.depth + len(self.open) - 1,
-            self.operators,
-        )
+        body.declared, body.unsized, body.values_of_files = self.declared, self.unsized, self.values_of_files
+        body.open, body.depth, body.operators = [opening], self.depth + len(self.open) - 1, self.operators
         body.entries(into)
         self.unreadable += body.unreadable
         self.unbalanced = self.unbalanced or body.unbalanced

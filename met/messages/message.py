@@ -55,9 +55,9 @@ class Place:
 class Expansion:
     """One step of macro expansion, or one iteration of a loop.
 
-    macro  the macro's name; of a loop, that of its index
-    use    the place where the macro was used; the first words of the loop
-    iteration   of a loop, what its index stands for in this iteration; "" of a macro
+    macro      the macro's name; of a loop, that of its index
+    use        the place where the macro was used; the first words of the loop
+    iteration  of a loop, what its index stands for in this iteration; "" of a macro
     """
 
     macro: str

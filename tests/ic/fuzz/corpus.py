@@ -92,8 +92,14 @@ def _files_of_page(page: str) -> dict[str, str]:
 
 def sound_deck(rng: random.Random) -> str:
     """One of those that give a plan with something to run; they are tried by chance until one does."""
-    long = [text for text in decks() if len(text) > 300]
-    return next(text for text in iter(lambda: rng.choice(long), "") if _is_sound(text))
+    while not _is_sound(text := rng.choice(_long_decks())):
+        pass
+    return text
+
+
+@cache
+def _long_decks() -> tuple[str, ...]:
+    return tuple(text for text in decks() if len(text) > 300)
 
 
 @cache
