@@ -155,7 +155,7 @@ def remark_ground(
     carriers = {payload.name: payload.link for payload in payloads if not payload.flies}
     links = [carriers.get(values[key], values[key]) for key in keys]
     still = (BASE, WORLD, *ground(arm.links, arm.joints))
-    if any(link not in still for link in links):
+    if any(link not in still for link in links) or set(links) == {WORLD}:  # the latter is refused elsewhere
         return
     key, link = next((key, link) for key, link in zip(keys, links, strict=True) if link != WORLD)
     given = (item.body or MergedBlock()).get(key)

@@ -44,8 +44,16 @@ class Findings:
     slowest: tuple[float, int]
 
 
-def fuzz(seed: int, seconds: float, first: int = 0, tell: Callable[[int, Fault], None] | None = None) -> Findings:
+def fuzz(
+    seed: int,
+    seconds: float,
+    first: int = 0,
+    tell: Callable[[int, Fault], None] | None = None,
+    decks: int = sys.maxsize,
+) -> Findings:
     """Checks decks of the series from number `first` on, in processes of their own that may die.
+
+    Ends after so many seconds of wall time, or after so many decks, whatever comes first.
 
     tell  is called with each fault as it comes, and with the number of its kind, from 0; again with a shorter deck
     """
@@ -59,9 +67,10 @@ def fuzz(seed: int, seconds: float, first: int = 0, tell: Callable[[int, Fault],
             if tell is not None:
                 tell(list(faults).index(fault.name), fault)
 
-    while time.monotonic() < end:
+    while number < first + decks and time.monotonic() < end:
         with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+") as complaints:
-            words = [sys.executable, "-m", "tests.ic.fuzz.worker", str(seed), str(number), str(end - time.monotonic())]
+            stretch = (seed, number, first + decks - number, end - time.monotonic())
+            words = [sys.executable, "-m", "tests.ic.fuzz.worker", *map(str, stretch)]
             last: dict[str, object] = {}
             with subprocess.Popen(
                 [*words, folder], cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=complaints

@@ -1,4 +1,4 @@
-"""The process that checks decks, one after the other: `python -m tests.ic.fuzz.worker SEED FIRST SECONDS DIRECTORY`.
+"""The process that checks decks, one after the other: `python -m tests.ic.fuzz.worker SEED FIRST DECKS SECONDS FOLDER`.
 
 A line of JSON on standard output for each deck that is begun, each fault and the end. What kills this process, or
 makes it hang where Python cannot stop it, is the deck that was begun last; the one that started it sees that.
@@ -22,7 +22,7 @@ BACKSTOP = 6 * one.MOST_SECONDS  # of wall time: a machine may be busy
 TRIES, SECONDS_TO_SHORTEN = 300, 60.0
 
 
-def main(seed: int, first: int, seconds: float, directory: Path) -> None:
+def main(seed: int, first: int, decks: int, seconds: float, directory: Path) -> None:
     os.chdir(directory)
     deck = Path("deck.ic")
     _companions(random.Random(0))
@@ -32,7 +32,7 @@ def main(seed: int, first: int, seconds: float, directory: Path) -> None:
     one.limit_memory()
     end = time.monotonic() + seconds
     number, slowest = first, (0.0, first)
-    while time.monotonic() < end:
+    while number < first + decks and time.monotonic() < end:
         _say(begun=number)
         deck.write_bytes(mutations.deck(seed, number))
         _companions(random.Random(f"{seed}/{number}/companions"))
@@ -100,4 +100,4 @@ def _say(**what: object) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]), Path(sys.argv[4]))
+    main(*map(int, sys.argv[1:4]), float(sys.argv[4]), Path(sys.argv[5]))
