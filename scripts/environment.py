@@ -30,7 +30,7 @@ VERSION = ".".join(map(str, sys.version_info[:3]))
 PYTHON: str = getattr(sys, "_base_executable", sys.executable)
 # What each purpose installs, the smallest first: an environment made for one serves all before it.
 LOCKS = {"run": "requirements.lock", "test": "requirements-test.lock", "all": "requirements-all.lock"}
-ADDED = {"test": "what the tests need", "all": "what `scripts/test --all` and `scripts/docs` need"}
+ADDED = {"test": "what the tests need", "all": "what `scripts/test --ci` and `scripts/docs` need"}
 NO_CONNECTION = re.compile(
     r"NewConnectionError|NameResolutionError|ConnectTimeout|ProxyError|Network is unreachable|Connection refused"
     r"|name resolution|Name or service not known|Max retries exceeded"

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests import costs
+
 ROOT = Path(__file__).parents[1]
 PASSED = "met/passed"
 """Where pytest's cache keeps which of the default tests passed last, and the digest of the files that they tested."""
@@ -20,6 +22,10 @@ def pytest_configure(config: pytest.Config) -> None:
     """Signals as a terminal's: who starts the tests in the background, or by nohup, has some ignored."""
     if "MET_TEST_ALL" not in os.environ and not hasattr(config, "workerinput"):
         config.pluginmanager.register(_Passed(config))
+    ledger = costs.read_ledger()
+    config.pluginmanager.register(costs.Measured(ledger))
+    if not hasattr(config, "workerinput"):
+        config.pluginmanager.register(costs.Counted(ledger))
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
@@ -42,23 +48,23 @@ def pytest_report_header(config: pytest.Config) -> list[str]:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """With `scripts/test --all` nothing is skipped in silence: what a test misses there is a failure."""
+    """With `scripts/test --ci` and `--all` nothing is skipped in silence: what a test misses there is a failure."""
     report = yield
     if report.skipped and "MET_TEST_ALL" in os.environ and not hasattr(report, "wasxfail"):
         report.outcome = "failed"
-        report.longrepr = f"skipped, which is a failure with --all: {report.longrepr}"
+        report.longrepr = f"skipped, which is a failure with --ci and --all: {report.longrepr}"
     return report
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """With `-m alone`, no file is imported that has no such mark: that would be half a minute of one core."""
-    if config.option.markexpr != "alone" or collection_path.suffix != ".py":
+    """With `-m alone...`, no file is imported that has no such mark: that would be half a minute of one core."""
+    if not config.option.markexpr.startswith("alone") or collection_path.suffix != ".py":
         return None
     return b"mark.alone" not in collection_path.read_bytes() or None
 
 
 class _Passed:
-    """Keeps which tests passed, for `scripts/test --all --rest`."""
+    """Keeps which tests passed, for `--rest` of `scripts/test`."""
 
     def __init__(self, config: pytest.Config) -> None:
         self._config = config
@@ -78,16 +84,29 @@ class _Passed:
             self._config.cache.set(PASSED, {"files": self._files, "tests": tests})
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """With `scripts/test --all --rest`, leave out what passed when the same files were tested by `scripts/test`.
+    """With `--rest` of `scripts/test`, leave out what passed when the same files were tested by `scripts/test`.
 
     Tests that make environments come first: at the end they would keep one core waiting for minutes.
     """
+    _draw_the_same_whatever_the_sources_say()
     items.sort(key=lambda item: item.path.name != "test_scripts.py")
     passed = passed_on_these_files(config) if "MET_TEST_REST" in os.environ else set()
     left_out = [item for item in items if item.nodeid in passed]
     items[:] = [item for item in items if item.nodeid not in passed]
     config.hook.pytest_deselected(items=left_out)
+
+
+def _draw_the_same_whatever_the_sources_say() -> None:
+    """Keep hypothesis from mixing numbers and words of our source files into what it draws.
+
+    Any change would give other examples, and a search of all files for them costs each process seconds.
+    """
+    if "hypothesis" in sys.modules:
+        from hypothesis.internal.conjecture import providers
+
+        providers._get_local_constants = lambda: providers._local_constants
 
 
 def passed_on_these_files(config: pytest.Config) -> set[str]:

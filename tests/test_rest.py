@@ -1,4 +1,4 @@
-"""`scripts/test --all --rest` leaves out what has just passed on the same files, and nothing else."""
+"""`scripts/test --ci --rest` leaves out what has just passed on the same files, and nothing else."""
 
 from __future__ import annotations
 
@@ -49,7 +49,8 @@ def test_slow() -> None:
 def checkout(tmp_path: Path) -> Path:
     """A checkout whose default run has one test that passes and three that do not."""
     (tmp_path / "tests").mkdir()
-    shutil.copy(ROOT / "tests" / "conftest.py", tmp_path / "tests")
+    for name in ("conftest.py", "costs.py", "costs.toml"):
+        shutil.copy(ROOT / "tests" / name, tmp_path / "tests")
     shutil.copy(ROOT / "setup.cfg", tmp_path)
     (tmp_path / "tests" / "instruction_sets.py").write_text('def header() -> str:\n    return ""\n')
     (tmp_path / "tests" / "test_it.py").write_text(TESTS)
@@ -78,6 +79,7 @@ REST = {**ALL, "MET_TEST_REST": "1"}
 EVERY_TEST = ["test_right", "test_wrong", "test_skipped", "test_right_with_a_mess_behind_it", "test_slow"]
 
 
+@pytest.mark.slow
 def test_what_passed_wholly_is_left_out_until_a_file_changes(checkout: Path) -> None:
     assert names(checkout, {}, "-m", "not slow") == EVERY_TEST[:-1]
     assert names(checkout, REST) == EVERY_TEST[1:]
@@ -87,10 +89,10 @@ def test_what_passed_wholly_is_left_out_until_a_file_changes(checkout: Path) -> 
     assert names(checkout, REST) == EVERY_TEST
 
 
-def test_it_goes_with_all_only() -> None:
+def test_it_goes_with_ci_and_all_only() -> None:
     done = subprocess.run([ROOT / "scripts" / "test", "--rest"], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (
         2,
         "",
-        "scripts/test: error: `--rest` is what is left of `--all`; write `scripts/test --all --rest`\n",
+        "scripts/test: error: `--rest` is what is left of `--ci` or `--all`; write `scripts/test --ci --rest`\n",
     )

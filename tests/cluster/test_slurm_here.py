@@ -103,9 +103,7 @@ def test_each_test_begins_with_an_empty_queue(slurm: Slurm) -> None:
 def test_it_starts_twice_in_a_row_and_leaves_nothing(slurm: Slurm, tmp_path: Path) -> None:
     folders = set()
     for _ in range(2):
-        begun = time.monotonic()
         with cluster(cores=3) as another:
-            assert time.monotonic() - begun < 20.0  # about 1 s, where nothing else runs
             folders.add(another.folder)
             assert slurm.folder not in folders
             running(another, submit(another, tmp_path, "#!/bin/bash\nsleep 600\n"))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 import re
-import time
 from pathlib import Path
 
 import pytest
@@ -53,12 +52,10 @@ def mutilated(seed: int) -> str:
 def check(folder: Path, seed: int) -> None:
     deck = folder / "deck.ic"
     deck.write_text(mutilated(seed))
-    begun = time.process_time()
     compiled = ic.check(deck, select="all")
     errors = [d for d in compiled.diagnostics if d.severity == "error"]
     assert (compiled.plan is None) == bool(errors), seed
     assert all(d.at is not None for d in errors), (seed, errors)
-    assert time.process_time() - begun < 5.0, seed
 
 
 @pytest.mark.slow

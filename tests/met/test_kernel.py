@@ -9,7 +9,6 @@ import re
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -667,10 +666,7 @@ def test_a_hit_loads_without_the_optimiser(empty_cache, monkeypatch):
     program = machine_like_program()
     kernel.compile(program)
     monkeypatch.setattr(llvm, "assemble", lambda *_, **__: pytest.fail("assembled"))
-    began = time.perf_counter()
     assert kernel.compile(program).cached
-    # 6 ms measured, recording included; a busy machine may take ten times that, an optimiser run 100 ms
-    assert time.perf_counter() - began < 0.08
 
 
 def test_importing_the_kernel_does_not_import_llvm():

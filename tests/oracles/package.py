@@ -1,4 +1,4 @@
-"""Packages that answer independently of MET, which only `scripts/test --all` installs.
+"""Packages that answer independently of MET, which only `scripts/test --ci` installs.
 
 A file that asks one in some of its tests can be read without it; the tests that do ask carry the mark `oracle`.
 """

@@ -446,20 +446,6 @@ def test_the_same_archive_gives_the_same_bytes(pick: tuple[ArchiveFile, Mcap], t
     assert first.read_bytes() == second.read_bytes()
 
 
-@pytest.mark.slow
-def test_a_case_of_two_thousand_rows_takes_less_than_a_second(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import time
-
-    plans.answering(monkeypatch)
-    batch.run(plans.plan(plans.nominal(ticks=8000)), output="a.h5")
-    taken = []
-    for _ in range(3):
-        begun = time.process_time()
-        assert export("a.h5").rows == 2001
-        taken.append(time.process_time() - begun)
-    assert min(taken) < 1.0
-
-
 class _Numbers:
     """What has x, y, z and w, as foxglove's vectors and quaternions have."""
 

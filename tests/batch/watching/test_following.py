@@ -12,7 +12,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -259,12 +258,10 @@ def test_a_save_ends_a_long_case_of_the_deck_before_it(tmp_path: Path, count: in
         LONG + "sweep many of spun { vary initial.turn.qd = linspace(1, 2, 12) rad/s; }\n"
     )
     prepared = prepare(ic.compile(tmp_path / "deck.ic", select=["spun" if count == 1 else "many"]).experiments[0])
-    prepared.kernel  # noqa: B018 - compiled before the clock runs
+    prepared.kernel  # noqa: B018 - compiled before it is asked to end
     asked = threading.Event()
     threading.Timer(0.5, asked.set).start()
-    began = time.process_time()
     assert list(answers.run_cases(prepared, asked.is_set)) == []  # a billion steps, which would take a minute or more
-    assert time.process_time() - began < 20
 
 
 def test_a_defect_is_told_in_terminal_and_page_and_the_next_save_is_shown(

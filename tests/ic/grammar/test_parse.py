@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import random
-import time
 from typing import Any
 
 import pytest
@@ -508,7 +507,6 @@ PIECES = [
 
 
 def _survives(desk: Desk, text: str | bytes) -> None:
-    start = time.process_time()
     try:
         deck = desk.read(text)
         found, sources = deck.warnings, {s.name: s.text for s in deck.sources}
@@ -518,8 +516,6 @@ def _survives(desk: Desk, text: str | bytes) -> None:
     told = render(found, sources)
     assert all(c.isprintable() or c == "\n" for c in told)
     to_json(found, sources)
-    # rule 11 says seconds; a deck of this size takes milliseconds
-    assert time.process_time() - start < 2
 
 
 FUZZ = settings(
@@ -551,15 +547,6 @@ def test_no_mutilated_deck_raises_anything_but_a_problem(desk: Desk, seed: int):
         to = min(to, at + 30)
         text = text[:at] + rng.choice(["", rng.choice(PIECES), text[at:to] * 2]) + text[to:]
     _survives(desk, text)
-
-
-def test_a_deck_of_sixty_lines_takes_milliseconds(desk: Desk):
-    desk.read(TWO_LINK)
-    start = time.process_time()
-    for _ in range(10):
-        desk.read(TWO_LINK)
-    # about 4 ms each on an idle machine; the command line has 250 for everything
-    assert time.process_time() - start < 10 * 0.05
 
 
 def test_a_macro_of_the_command_line_that_takes_the_name_of_a_let_is_told_as_that(desk: Desk):

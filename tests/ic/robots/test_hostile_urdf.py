@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import time
 import tracemalloc
 from pathlib import Path
 
@@ -59,23 +58,19 @@ def outcome(text: str) -> str | None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("what", HOSTILE)
-def test_a_hostile_file_ends_in_a_diagnostic_within_seconds_and_bounded_memory(what: str) -> None:
+def test_a_hostile_file_ends_in_a_diagnostic_within_bounded_memory(what: str) -> None:
     tracemalloc.start()
     try:
-        begun = time.monotonic()
         assert outcome(HOSTILE[what]) is not None
-        took, peak = time.monotonic() - begun, tracemalloc.get_traced_memory()[1]
+        peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert took < 20.0  # most take a tenth of a second; tracing and a busy machine cost the rest
     assert peak < 400e6
 
 
 @pytest.mark.slow
-def test_the_longest_robot_that_is_read_is_told_of_within_seconds(tmp_path: Path) -> None:
-    begun = time.monotonic()
+def test_the_longest_robot_that_is_read_is_told_of(tmp_path: Path) -> None:
     assert [each.code for each in check(tmp_path, LONGEST).diagnostics] == ["D217"]
-    assert time.monotonic() - begun < 60.0  # 2 ms a link; a busy machine costs the rest
 
 
 def test_a_file_cut_anywhere_is_told() -> None:

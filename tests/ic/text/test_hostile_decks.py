@@ -40,13 +40,11 @@ def _nested(name: str, count: int) -> str:
         pytest.param("$\n" * 100_000, "D018", id="nothing but mistakes"),
     ],
 )  # fmt: skip
-def test_a_hostile_deck_ends_in_a_diagnostic_soon(desk: Desk, text: str, code: str):
+def test_a_hostile_deck_ends_in_a_diagnostic(desk: Desk, text: str, code: str):
+    """In half a second of all, where without limits it would be hours; tests/costs.py sees to that."""
     desk.write(text)
-    start = time.process_time()
     made = desk.tokens(text)
     assert code in [d.code for d in made.diagnostics]
-    # seconds, where without limits it would be hours; about 0.5 s on an idle machine
-    assert time.process_time() - start < 5
 
 
 @pytest.mark.parametrize("line", [
@@ -55,11 +53,9 @@ def test_a_hostile_deck_ends_in_a_diagnostic_soon(desk: Desk, text: str, code: s
     "let " + "x" * 190_000 + " = 1;",
 ], ids=lambda line: line[:12])  # fmt: skip
 def test_very_long_lines_cost_time_in_proportion(desk: Desk, line: str):
+    """0.3 s of all; a search that began anew at each character would take 50. tests/costs.py sees to that."""
     desk.write(f"{line}\n" * 10)
-    start = time.process_time()
     desk.tokens(f"{line}\n" * 10)
-    # 0.3 s; a search that began anew at each character would take 50
-    assert time.process_time() - start < 3
 
 
 @pytest.mark.slow

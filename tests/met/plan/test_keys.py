@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -139,9 +138,8 @@ def test_what_makes_another_program_changes_the_structure_key() -> None:
 
 
 @pytest.mark.slow
-def test_a_million_cases_are_named_in_seconds() -> None:
+def test_a_million_cases_have_names_of_their_own() -> None:
+    """In 1.5 s; a row-by-row JSON would take a minute. tests/costs.py sees to that."""
     experiment = plans.gains(1_000_000)
-    began = time.process_time()
     ids = keys.case_ids(experiment)
-    assert time.process_time() - began < 15.0  # 1.5 s on two shared cores: a row-by-row JSON would take a minute
     assert len(set(ids)) == len(ids)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import time
 from pathlib import Path
 
 import pytest
@@ -663,7 +662,5 @@ def test_a_broken_file_is_told_with_a_place_whatever_is_wrong_with_it(tmp_path: 
 )
 def test_a_first_line_of_spaces_is_read_as_soon_as_another(tmp_path: Path, head: str) -> None:
     """No pattern tries each way of cutting them: that took minutes."""
-    began = time.monotonic()
     said = shown(tmp_path, head + "\n1\n")
     assert said.startswith("error[D191]: `") and " does not name a column\n --> moves.csv:1:1\n" in said
-    assert time.monotonic() - began < 5.0  # s; in fact some hundredths
