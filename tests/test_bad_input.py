@@ -216,6 +216,7 @@ error[E305]: cannot write nowhere/deck.h5: nowhere does not exist
     assert [path.name for path in tmp_path.iterdir()] == ["deck.ic"]
 
 
+@pytest.mark.slow
 def test_the_deck_without_a_mistake_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("deck.ic").write_text(DECK)

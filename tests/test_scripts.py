@@ -121,6 +121,7 @@ def test_the_script_adds_little_to_a_start(checkout: Path) -> None:
     assert min(took) < 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["lock", "place", "python", "half", "other"])
 def test_what_no_longer_holds_makes_the_environment_be_asked_for(checkout: Path, what: str) -> None:
     make_ready(checkout)
@@ -168,6 +169,7 @@ def test_a_newer_python_beside_an_old_one_is_found(checkout: Path, tools: Path) 
     assert (done.returncode, done.stdout) == (0, f"made with {tools}/python3.12\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -189,6 +191,7 @@ def test_a_wrong_met_python_is_refused_in_one_line(
     assert (done.returncode, done.stderr) == (2, expected.format(python=python))
 
 
+@pytest.mark.slow
 def test_a_python_without_venv_is_refused_in_one_line(checkout: Path, tmp_path: Path) -> None:
     """As on a Debian without python3-venv: `ensurepip` is missing."""
     without = (
@@ -208,6 +211,7 @@ def test_a_python_without_venv_is_refused_in_one_line(checkout: Path, tmp_path: 
     )
 
 
+@pytest.mark.slow
 def test_an_environment_that_someone_else_made_is_left_alone(checkout: Path) -> None:
     (checkout / ".venv").mkdir()
     (checkout / ".venv" / "mine").write_text("precious")
@@ -243,6 +247,7 @@ def test_a_read_only_checkout_is_refused_in_one_line(checkout: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_python_that_another_user_may_not_run_is_refused_in_one_line(checkout: Path, tmp_path: Path) -> None:
     """As for a second user of a checkout whose environment is made of a Python in its owner's closed home."""
     make_ready(checkout)

@@ -61,6 +61,7 @@ def test_the_puma_falls_as_pinocchio_built_from_the_published_tables(tmp_path: P
     np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-10 * np.abs(wanted).max(), err_msg=f"{SEED=}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("deck", ["puma_560.ic", "stanford_arm.ic"])
 def test_the_decks_run_meets_its_requirements(deck: str) -> None:
     (made,) = ic.compile(deck).experiments

@@ -52,6 +52,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
     return found_at(tmp_path_factory.mktemp("published"), 20_000)
 
 
+@pytest.mark.slow
 def test_all_rows_of_the_publication_are_compared(found: dict[str, np.ndarray]) -> None:
     joints = {"q": 6, "qd": 6, "current": 6, "integral": 6, "capacitor": 6, "spring": 3, "spring_rate": 3}
     assert {name: of.shape for name, of in found.items()} == {name: (4641, count) for name, count in joints.items()}

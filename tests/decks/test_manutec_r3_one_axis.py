@@ -27,6 +27,7 @@ def shares(folder: Path, rate_hz: int) -> dict[str, float]:
     return {name: float(np.abs(of).max() / np.ptp(reference[name])) for name, of in found.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", ["12.5 kHz", "50 kHz"])
 def test_the_published_trajectory_is_met_as_the_page_says(rate: str, tmp_path: Path) -> None:
     """Between the two rates the error falls with the square of the step.

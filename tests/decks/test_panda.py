@@ -110,6 +110,7 @@ def test_the_reach_without_friction_is_that_of_pinocchio_under_the_same_servos(t
     np.testing.assert_allclose(signals["tau"][0], tau, rtol=0.0, atol=1e-10)  # 3e-12 N m found, of 70
 
 
+@pytest.mark.slow
 def test_the_decks_runs_meet_their_requirements_and_its_steps_are_short_enough():
     plan = ic.compile("panda.ic", select=["reach", "swing"])
     for one in plan.experiments:
@@ -119,6 +120,7 @@ def test_the_decks_runs_meet_their_requirements_and_its_steps_are_short_enough()
         assert figure <= 0.5  # of the fastest mode
 
 
+@pytest.mark.slow
 def test_the_payload_sweep_shows_what_a_weak_and_a_strong_gain_cost():
     (payload,) = ic.compile("panda.ic", select=["payload"]).experiments
     result = engine.run(payload, record=False)

@@ -51,6 +51,7 @@ def test_the_figures_of_the_page(case: tuple[str, float]) -> None:
     assert run.metrics["left"][n] < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", FIGURES)
 def test_what_is_asked_stays_within_the_limits_and_no_error_is_hidden(case: tuple[str, float]) -> None:
     run, cases = lines()

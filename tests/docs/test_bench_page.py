@@ -32,6 +32,7 @@ def said(command: str, folder: Path) -> str:
     return "".join(f"{line.rstrip()}\n" for line in out.getvalue().splitlines())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "shown"), _SHOWN.findall(PAGE), ids=lambda each: each.split("\n")[0][:40])
 def test_what_it_shows_is_what_is_said(command: str, shown: str, tmp_path: Path) -> None:
     if shown == "...\n":

@@ -204,6 +204,7 @@ def test_the_deck_that_uses_others_has_each_value_under_its_roof(tmp_path: Path)
     assert [each.path for each in lengths.cases.coordinates] == ["right.reach", "panda.panda_large.ki"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("links", [None, 1, 2])
 def test_the_deck_with_macros_runs_with_and_without_its_switch(links: int | None, tmp_path: Path) -> None:
     (text,) = (text for where, _, text in PIECES if where == "alone")

@@ -60,6 +60,7 @@ def test_the_deck_with_tolerances_compiles(tmp_path: Path) -> None:
     assert [each.of for each in experiment.tolerances] == ["qd", "elbow.q", "settle", "rel", "time"]
 
 
+@pytest.mark.slow
 def test_the_page_says_what_another_limit_makes_of_the_standard_sweep(tmp_path: Path) -> None:
     import batch
     import ic

@@ -81,6 +81,7 @@ def test_the_page_names_commands_and_files_that_there_are() -> None:
     assert used == {"check", "fmt", "lsp", "new"} and used <= set(cli.met.list_commands(None))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_the_hooks_before_a_commit_are_commands_of_met_and_those_that_the_page_names(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

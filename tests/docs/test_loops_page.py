@@ -88,6 +88,7 @@ def test_seven_joints_of_a_loop_are_those_of_a_list_of_macro_calls(tmp_path: Pat
     assert same(of_loop, of_macros)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_a_random_deck_of_loops_is_the_same_deck_without(tmp_path: Path, seed: int) -> None:
     one, other = (

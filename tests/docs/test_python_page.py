@@ -15,6 +15,7 @@ import pytest
 PAGE = (Path(__file__).parents[2] / "docs" / "python.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_page_shows_what_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     session = "\n".join(re.findall(r"```pycon\n(.*?)```", PAGE, re.DOTALL))

@@ -49,6 +49,7 @@ def test_the_deck_made_from_the_file_sweeps_what_hangs_on_it(folder: Path) -> No
         assert (data["status"] == 0).all()
 
 
+@pytest.mark.slow
 def test_explain_prints_the_files_line(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -37,6 +37,7 @@ def test_the_deck_of_the_page_runs(tmp_path: Path) -> None:
     assert abs(shaft[-1] / RATIO / SLOW - 1.0) < 0.01
 
 
+@pytest.mark.slow
 def test_as_many_motors_pass_as_the_page_says(tmp_path: Path) -> None:
     result = engine.run(experiment(tmp_path, MOTORS, "motors"), record=False)
     met = result.met["late < 1.8 s"]
@@ -48,6 +49,7 @@ def test_as_many_motors_pass_as_the_page_says(tmp_path: Path) -> None:
     assert f"--case '#{worst}'" in PAGE
 
 
+@pytest.mark.slow
 def test_the_crane_of_the_page_is_off_by_what_it_says(tmp_path: Path) -> None:
     (tmp_path / "crane.ic").write_text(CRANE, encoding="utf-8")
     names = ("software", "full", "exact", "lab", "faulty", "larger")

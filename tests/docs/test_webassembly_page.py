@@ -38,6 +38,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captu
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_tables_name_all_that_the_file_holds(folder: Path) -> None:
     told = json.loads((folder / "gentle.json").read_text())
     tables = PAGE.split("| key | is |\n")[1:]

@@ -70,6 +70,7 @@ def test_all_mistakes_are_told_in_one_run_and_nothing_else(tmp_path: Path) -> No
     assert told(tmp_path, everything) == expected(everything)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mended", range(len(MISTAKES)), ids=[wrong or "nothing" for _, wrong, _ in MISTAKES])
 def test_to_mend_a_mistake_takes_just_its_message_away(tmp_path: Path, mended: int) -> None:
     others = set(range(len(MISTAKES))) - {mended}

@@ -109,6 +109,7 @@ def test_an_arm_that_is_used_is_the_one_that_is_included(tmp_path: Path) -> None
         assert case_ids(one) == case_ids(other)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "deck", ["panda", "two_link", "puma_560", "shuttle_arm", "stanford_arm", "manutec_r3", "ets_vii"]
 )

@@ -135,6 +135,7 @@ def test_a_problem_is_rendered_once_on_stderr_and_ends_with_2(
     )
 
 
+@pytest.mark.slow
 def test_with_format_json_a_problem_is_json_on_stdout(tmp_path: Path) -> None:
     (tmp_path / "broken.ic").write_text(BROKEN)
     done = met("check", "broken.ic", "--format", "json", cwd=tmp_path)
@@ -200,6 +201,7 @@ def test_a_stream_that_the_shell_has_closed_is_no_defect(closed: str) -> None:
     assert (done.returncode, getattr(done, closed)) == (0, "")
 
 
+@pytest.mark.slow
 def test_a_closed_pipe_ends_quietly() -> None:
     """`met doc | true`: nobody reads what is printed."""
     reader, writer = os.pipe()

@@ -39,6 +39,7 @@ def random_course(name: str, pick: random.Random) -> SimpleNamespace:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 @pytest.mark.parametrize("name", ["ramp", "pulse", "step", "sine", "chirp", "table", "trajectory", "trapezoid"])
 def test_a_course_changes_from_its_beginning_to_its_end_and_not_outside(name: str, seed: int) -> None:
@@ -55,6 +56,7 @@ def test_a_course_changes_from_its_beginning_to_its_end_and_not_outside(name: st
         assert profile.course(p, after)[0] != first or profile.course(p, after + 1e-3)[0] != first
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 @pytest.mark.parametrize("name", ["sine", "chirp"])
 def test_the_fastest_swing_is_that_of_the_course_within_the_run(name: str, seed: int) -> None:

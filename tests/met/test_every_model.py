@@ -59,6 +59,7 @@ def test_a_model_declares_what_its_numbers_are(kind: models.Kind, name: str) -> 
             assert part.only is None or set(part.only[1]) <= set(known[part.only[0]]), part.name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "name"), EVERY)
 def test_it_runs_from_a_small_deck_and_its_bits_depend_on_the_case_alone(
     kind: models.Kind, name: str, tmp_path: Path

@@ -55,6 +55,7 @@ def test_margins_are_those_of_all_samples_in_the_window(seed: int, first: int, l
         np.testing.assert_allclose(worth(name, x, **given), wanted, rtol=CLOSE, atol=CLOSE, err_msg=name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [1, 3, 7, 10, 100])
 @pytest.mark.parametrize("first", [0, 7])
 def test_holds_for_is_met_where_every_sample_of_some_stretch_is(steps: int, first: int) -> None:

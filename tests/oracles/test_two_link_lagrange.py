@@ -76,6 +76,7 @@ def test_two_tolerances_agree_so_the_digits_have_converged():
     np.testing.assert_allclose(coarse.q, fine.q, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_motion_started_from_a_later_servo_tick_is_the_same_motion():
     """Frictionless, under a torque command, whose law remembers nothing."""
     push = Command("torque", lambda t: ((20.0, 0.0), (-5.0, 0.0)))

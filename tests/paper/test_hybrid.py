@@ -48,6 +48,7 @@ def test_both_joints_settle_at_the_commanded_rate(rates, joint):
     assert np.all(np.abs(rate / SLOW - 1.0) < 0.02)  # inside the band in which a joint counts as settled
 
 
+@pytest.mark.slow
 @BOTH
 def test_hybrid_and_pure_runs_agree(rates):
     """Measured rms over the run, as a share of the rate asked: shoulder 0.60 % and 0.33 %, elbow 0.07 % and 0.11 %."""
@@ -60,6 +61,7 @@ def test_hybrid_and_pure_runs_agree(rates):
     assert np.all(off < (0.001, 0.0002))
 
 
+@pytest.mark.slow
 @BOTH
 def test_joint_one_is_noisy_and_only_by_the_faults_of_the_bed(rates):
     """Measured deviation: 0.61 % and 0.28 % of the rate asked; 2e-9 and less without faults."""

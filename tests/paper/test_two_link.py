@@ -113,6 +113,7 @@ def test_friction_keeps_order_two_through_sixty_stops_and_releases():
     np.testing.assert_array_equal(runs[2].signals["qd"][0] == 0.0, exact.qd == 0.0)
 
 
+@pytest.mark.slow
 def test_a_joint_held_below_coulomb_friction_does_not_creep_in_an_hour_at_25_hz():
     pushed = {"dynamics_hz": 25, "servo_hz": 25, "record_hz": 1, "duration": 3600}
     body = "initial { shoulder.qd = 0.01 rad/s; elbow.qd = -0.01 rad/s; }"
@@ -124,6 +125,7 @@ def test_a_joint_held_below_coulomb_friction_does_not_creep_in_an_hour_at_25_hz(
     assert np.all(moved["q"][0, -1] > 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", [0, 1])
 def test_both_joints_settle_at_the_commanded_rate_at_the_papers_rates(joint):
     """Servo 100 Hz, dynamics 25 Hz. What the text says, and the exact motion where figures 5 and 6 are lost."""

@@ -66,6 +66,7 @@ def test_bits_of_hybrid_cases_do_not_depend_on_lanes(
     assert ran(experiment, kernel.from_recording(recording, lanes)).tobytes() == rows.tobytes()
 
 
+@pytest.mark.slow
 def test_bits_of_hybrid_cases_do_not_depend_on_threads_order_or_company_and_come_again(
     recorded: tuple[Experiment, Recording, np.ndarray],
 ) -> None:

@@ -12,6 +12,7 @@ KT = 0.061  # N m/A, table 1
 RANGE = [*R, *np.geomspace(0.1, 18.0, 12).tolist()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "command"), [
     (0.93, "slow"), (1.07, REVERSING),
     pytest.param(0.93, REVERSING, marks=pytest.mark.slow), pytest.param(1.07, "slow", marks=pytest.mark.slow),
@@ -36,6 +37,7 @@ def test_a_run_follows_the_motor_on_the_bed_and_not_its_data_sheet(share: float,
     worst.below(0.5)
 
 
+@pytest.mark.slow
 def test_what_the_motor_does_besides_its_data_sheet_is_found_by_the_observer() -> None:
     """kt 7 % low: at a steady rate the unknown torque is what the servo believes of the torque, less what there is."""
     text = deck(

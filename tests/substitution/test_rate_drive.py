@@ -55,6 +55,7 @@ def rates(bed: str, law: str = "velocity_tracking", more: str = "") -> np.ndarra
     return found
 
 
+@pytest.mark.slow
 def test_with_the_deck_s_own_loop_it_is_the_run_in_software() -> None:
     plain = software()
     assert off(rates("rate_drive()"), plain) < 1e-4
@@ -62,6 +63,7 @@ def test_with_the_deck_s_own_loop_it_is_the_run_in_software() -> None:
     assert off(rates("emulated(delay = 1)"), plain) > 1e-3  # whose servo sees the shaft through a filter
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kp", "ki", "drift", "most"), [(1.2, 1.0, "1e-5", 0.15), (1.0, 1.28, "1e-5", 0.06), (5.0, 8.0, "1e-3", 0.05)]
 )
@@ -77,10 +79,12 @@ def test_it_follows_the_loop_that_the_drive_has_and_not_the_deck_s(
     assert off(found, plain) > 0.9 * off(plain, there)
 
 
+@pytest.mark.slow
 def test_the_law_that_knows_no_torque_needs_none() -> None:
     assert off(rates("rate_drive(delay = 1)", "measured_acceleration"), software()) < 4e-3
 
 
+@pytest.mark.slow
 def test_a_position_loop_of_the_servo_s_tells_the_rate() -> None:
     position = """servos { shoulder { command = position(sine(amplitude = 0.02 rad, frequency = 0.25 Hz));
                                       k_position = 4 1/s; } }"""
@@ -149,6 +153,7 @@ def test_an_integral_is_held_while_its_voltage_is_limited() -> None:
     assert wound(loop, 200.0, -1.0, 0.5) == 199.5
 
 
+@pytest.mark.slow
 def test_on_a_scaled_bed_it_is_the_same_run() -> None:
     full = rates("rate_drive(delay = 1)")
     small = f"rate_drive(delay = 1, kt_load = {0.072 * 2 / 10!r} N*m/A)"
@@ -160,6 +165,7 @@ def turner(folder: Path, law: str, loads: list[float]) -> Experiment:
     return torque_drive.turner(folder, law, loads, "rate_drive(delay = 1, kp = 0.03 V*s/rad)")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["measured_acceleration", "velocity_tracking"])
 def test_a_pole_of_the_whole_program_leaves_the_unit_circle_at_the_limit_of_its_margin(
     law: str, tmp_path: Path
@@ -174,6 +180,7 @@ def test_a_pole_of_the_whole_program_leaves_the_unit_circle_at_the_limit_of_its_
         assert (largest > 1.0 + 1e-7) == grows, (r, largest)
 
 
+@pytest.mark.slow
 def test_at_a_port_it_is_told_rates_and_makes_the_same_bits() -> None:
     deck = bench("rate_drive(faults = typical, delay = 1)").replace("duration = 2 s", "duration = 0.5 s")
     experiment = compiled(deck, "bench")
@@ -214,6 +221,7 @@ def test_the_work_of_its_motors_is_what_shaft_and_friction_take() -> None:
     assert abs(left) < 0.01 * np.trapezoid(np.abs(found.drive[0] * w), found.time)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "backend", ["reference", *(pytest.param(name, marks=pytest.mark.slow) for name in ("c", "wasm"))]
 )

@@ -11,6 +11,7 @@ from tests.substitution.hybrid import R, apart, deck, loads, measured, ran, shaf
 slow = pytest.mark.slow
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["velocity_tracking", pytest.param("torque_balance_observer", marks=slow)])
 def test_a_loop_that_is_up_to_three_ticks_late_stays_within_the_limits_at_1_khz(law: str) -> None:
     """From rest: 0.3 % to r = 5, 0.5 % at 20. What is on its way to the bed is known, and reckoned with."""
@@ -71,6 +72,7 @@ def test_a_drive_at_its_limits_is_followed() -> None:
     worst.below(0.5)
 
 
+@pytest.mark.slow
 def test_a_load_amplifier_at_its_limit_holds_it_and_the_run_goes_on() -> None:
     """1.2 A are enough for r = 0.5 and not for more: there the load is too light, which no law can help."""
     text = deck(command=TURNING, duration=2.0, sweep=loads(R), hybrid=AMPLIFIERS, bed="emulated(i_max = 1.2 A)")

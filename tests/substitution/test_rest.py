@@ -20,6 +20,7 @@ def ran_both(law: str, command: str, duration: float) -> tuple[np.ndarray, np.nd
     return own.signals["qd"][0, :, 0], shaft(ran(text, "bench"), "shoulder")[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["velocity_tracking", pytest.param("torque_balance_observer", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("command", "duration"), [("slow", 5.0), (REVERSING, 5.0), (LONG, 12.0)])
 def test_a_heavy_arm_breaks_away_and_turns_back_as_on_its_own_motor(law: str, command: str, duration: float) -> None:

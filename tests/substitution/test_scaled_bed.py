@@ -89,11 +89,13 @@ def apart(deck: str) -> float:
 LAWS = ["velocity_tracking", "torque_balance_observer", "torque_balance", "bare", "measured_acceleration"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_an_exact_model_of_the_motor_makes_the_same_run_but_for_rounding(law: str) -> None:
     assert apart(text(SCALES, law=law)) < 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("faults", "scales"), [(False, WHOLE), (True, WHOLE | {"rate": 1.0})])
 def test_where_nothing_is_rounded_the_bits_are_the_same(faults: bool, scales: dict[str, float]) -> None:
     """Noise and steps of converters over their scales too: also what goes on inside such a bed is that of the other.
@@ -112,6 +114,7 @@ def test_a_fault_of_once_a_turn_comes_at_another_time_where_rates_are_scaled() -
     assert apart(text(WHOLE, faults=True)) > 1e-4
 
 
+@pytest.mark.slow
 def test_two_joints_on_scaled_beds_are_solved_together_as_on_others() -> None:
     assert apart(text(SCALES, joints=("shoulder", "elbow"))) < 1e-11
 
@@ -121,6 +124,7 @@ def test_scales_of_1_are_no_scales_to_the_bit() -> None:
     assert ran(deck, "full").signals["q"].tobytes() == ran(deck, "lab").signals["q"].tobytes()
 
 
+@pytest.mark.slow
 def test_a_sweep_of_the_scales_gives_each_case_its_own_motor() -> None:
     """What the bed takes from the servo is over each case's scale; the load motor stays, and is strong enough."""
     deck = text(dict.fromkeys(SCALES, 1.0))
@@ -131,6 +135,7 @@ def test_a_sweep_of_the_scales_gives_each_case_its_own_motor() -> None:
         np.testing.assert_allclose(rates, own.signals["shoulder.bed.shaft_rate"][0], rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_a_motor_that_is_no_exact_model_is_followed_for_what_it_is() -> None:
     """A bed's motor of 7 % more torque for a volt stands for a joint's motor of as much more: the run on the bed that
     is scaled is the run on one of the joint's size with that motor."""
@@ -144,6 +149,7 @@ def test_a_motor_that_is_no_exact_model_is_followed_for_what_it_is() -> None:
     assert moved > 1e-5, "and that is another run"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["velocity_tracking", "measured_acceleration"])
 def test_margins_and_poles_are_those_of_the_joint_s_size(law: str) -> None:
     """measured_acceleration has a limit of r; the whole program's poles at an instant say the same."""
@@ -159,6 +165,7 @@ def test_margins_and_poles_are_those_of_the_joint_s_size(law: str) -> None:
     np.testing.assert_allclose(poles[0], poles[1], rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_scaled_bed_is_unstable_where_its_margin_says_so() -> None:
     """At r = 1.37 with three ticks of delay at 100 Hz: the run swings up, on the bed of either size."""
     deck = (
@@ -175,6 +182,7 @@ def test_a_scaled_bed_is_unstable_where_its_margin_says_so() -> None:
         assert not np.isfinite(rates).all() or np.abs(rates).max() > 0.06, "twice what it is commanded"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "backend", ["reference", pytest.param("c", marks=pytest.mark.slow), pytest.param("wasm", marks=pytest.mark.slow)]
 )
@@ -195,6 +203,7 @@ def work(experiment: Experiment) -> ShaftWork:
     return found
 
 
+@pytest.mark.slow
 def test_the_work_of_a_scaled_beds_motors_is_theirs() -> None:
     deck = text(SCALES)
     full, lab = work(compiled(deck, "full")), work(compiled(deck, "lab"))

@@ -56,6 +56,7 @@ def apart(deck: str, other: str) -> float:
     return float(np.sqrt(np.mean((rates[0] - rates[1]) ** 2)) / SLOW)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_a_perfect_drive_makes_the_run_of_a_motor_told_a_voltage(law: str) -> None:
     """It is no further from the run in software. The voltage's torque changes in a tick by back-EMF, of which the drive
@@ -66,6 +67,7 @@ def test_a_perfect_drive_makes_the_run_of_a_motor_told_a_voltage(law: str) -> No
         assert apart(bench("torque_drive(delay = 1)", law), bench("emulated(delay = 1)", law)) < 2e-4
 
 
+@pytest.mark.slow
 def test_what_a_drive_gives_too_much_is_found_as_the_unknown_torque() -> None:
     """7 % of what it is told, and the arm feels it: as a motor of 7 % more torque would move it."""
     deck = bench("torque_drive(delay = 1, gain = 1.07)", "velocity_tracking(drift = 1e-3 N^2*m^2/s)")
@@ -75,6 +77,7 @@ def test_what_a_drive_gives_too_much_is_found_as_the_unknown_torque() -> None:
     assert told.mean() > 0.01
 
 
+@pytest.mark.slow
 def test_on_a_scaled_bed_it_is_the_same_run() -> None:
     kept = "tau_max = 0.144 N*m"
     full = bench(f"torque_drive(delay = 1, bandwidth = 500 Hz, {kept})")
@@ -109,6 +112,7 @@ def test_the_torque_comes_as_a_low_pass_of_order_1(tmp_path: Path) -> None:
     assert plant.shaft_rate == pytest.approx(w, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_no_more_torque_is_told_than_the_drive_gives() -> None:
     found = ran(
         bench("torque_drive(delay = 1, tau_max = 0.025 N*m)"), "shoulder.bed.drive_torque, shoulder.bed.motor_torque"
@@ -127,6 +131,7 @@ def turner(
     return with_loads(made, loads)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["measured_acceleration", "velocity_tracking"])
 def test_a_pole_of_the_whole_program_leaves_the_unit_circle_at_the_limit_of_its_margin(
     law: str, tmp_path: Path
@@ -141,6 +146,7 @@ def test_a_pole_of_the_whole_program_leaves_the_unit_circle_at_the_limit_of_its_
         assert (largest > 1.0 + 1e-7) == grows, (r, largest)
 
 
+@pytest.mark.slow
 def test_at_a_port_it_is_told_torques_and_makes_the_same_bits() -> None:
     deck = bench("torque_drive(faults = typical, delay = 1)").replace("duration = 2 s", "duration = 0.5 s")
     experiment = compiled(deck, "bench")
@@ -172,6 +178,7 @@ def test_at_a_port_it_is_told_torques_and_makes_the_same_bits() -> None:
     assert plant.shaft_rate == inside.signals["shoulder.bed.shaft_rate"][0, -1] != 0.0
 
 
+@pytest.mark.slow
 def test_the_work_of_its_motors_is_what_shaft_and_friction_take() -> None:
     deck = bench("torque_drive(delay = 1)")
     (found,) = shaft_work(compiled(deck, "bench"), "shoulder")
@@ -183,6 +190,7 @@ def test_the_work_of_its_motors_is_what_shaft_and_friction_take() -> None:
     np.testing.assert_allclose(found.voltage, 2.05 / 0.061 * found.drive + 0.061 * found.rate, rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "backend", ["reference", *(pytest.param(name, marks=pytest.mark.slow) for name in ("c", "wasm"))]
 )

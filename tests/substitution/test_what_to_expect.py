@@ -61,6 +61,7 @@ def test_the_shaft_turns_as_the_joint_would_on_its_own_motor(
     worst.below(limit)
 
 
+@pytest.mark.slow
 def test_torque_balance_reverses_within_its_limit_at_the_loads_of_the_table() -> None:
     """Between them it comes to 2.9 % (r = 12), and so does the independent model."""
     worst = Worst("torque_balance, 1 kHz, reversing, %")
@@ -69,6 +70,7 @@ def test_torque_balance_reverses_within_its_limit_at_the_loads_of_the_table() ->
     worst.below(2.5)
 
 
+@pytest.mark.slow
 def test_friction_left_out_of_the_balance_is_too_strong_by_one_plus_r() -> None:
     """`bare` is eq. 10 of the paper as it stands; the figures are the independent model's."""
     found = errors("bare", "1 kHz", "slow", list(R))
@@ -78,6 +80,7 @@ def test_friction_left_out_of_the_balance_is_too_strong_by_one_plus_r() -> None:
     worst.below(0.1)
 
 
+@pytest.mark.slow
 def test_measured_acceleration_is_as_good_while_it_is_stable_and_fails_beyond() -> None:
     found = errors("measured_acceleration", "1 kHz", "slow", list(R))
     print(f"measured_acceleration: {told(found)}; independent 0.13 / 0.13 / 0.13 / unstable")

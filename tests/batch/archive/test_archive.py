@@ -172,6 +172,7 @@ def test_the_bytes_do_not_depend_on_batches_or_the_clock(here: Path, monkeypatch
     assert len(found) == 1
 
 
+@pytest.mark.slow
 def test_a_failed_case_says_why_and_is_not_a_number_from_there(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from functools import partial
 
@@ -202,6 +203,7 @@ def test_a_metric_that_is_not_a_number_leaves_its_requirement_open(here: Path, m
     assert archive.summaries[0].requirements[1].unknown == 1
 
 
+@pytest.mark.slow
 def test_values_of_coordinates_are_what_the_engine_read(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from met import run
 
@@ -215,6 +217,7 @@ def test_values_of_coordinates_are_what_the_engine_read(here: Path, monkeypatch:
         np.testing.assert_array_equal(data["gearbox.kp"], plans.gains(3).cases.coordinates[0].values + 1.0)
 
 
+@pytest.mark.slow
 def test_the_plan_and_the_deck_are_inside(here: Path) -> None:
     plan = plans.plan(plans.nominal(), plans.gains(5))
     batch.run(plan, output="a.h5")

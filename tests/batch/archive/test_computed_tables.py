@@ -33,6 +33,7 @@ def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return batch.run(plan, output=tmp_path / "a.h5", cases=[0, 7, 12_345], histories="all").path
 
 
+@pytest.mark.slow
 def test_the_plan_of_an_archive_computes_the_table_that_was_run(archive: Path) -> None:
     plan = ic.compile(archive.parent / "deck.ic", select=["them"])
     with ArchiveFile(archive) as file:
@@ -42,6 +43,7 @@ def test_the_plan_of_an_archive_computes_the_table_that_was_run(archive: Path) -
         assert np.asarray(mine.values).tobytes() == np.asarray(theirs.values).tobytes()
 
 
+@pytest.mark.slow
 def test_a_case_of_it_can_be_run_again(archive: Path) -> None:
     with ArchiveFile(archive) as file:
         plan = file.plan()

@@ -46,6 +46,7 @@ def group(experiment: Experiment) -> GroupInMemory:
     return GroupInMemory.of_run(experiment, run(prepare(experiment), record=False))
 
 
+@pytest.mark.slow
 def test_it_has_the_values_and_the_attributes_of_an_archive(group: ArchiveGroup, archive: Path) -> None:
     with ArchiveFile(archive) as file:
         stored = file.groups[0]

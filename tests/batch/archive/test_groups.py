@@ -97,6 +97,7 @@ def test_show_finds_a_case_by_its_position_and_a_sweep_by_its_name(
     assert "it.drive" not in shown("--run", "it.brisk")
 
 
+@pytest.mark.slow
 def test_the_verdict_sums_up_the_sweep(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -158,6 +159,7 @@ def test_repeats_feel_noise_of_their_own_and_the_first_is_that_of_the_run_alone(
     assert repeated[0] == alone[0]
 
 
+@pytest.mark.slow
 def test_cases_feel_the_same_noise_unless_seeds_are_independent(tmp_path: Path) -> None:
     """The gear ratio of an unused direction: cases whose motion differs by nothing but noise."""
     body = "sweep it of hold { %s vary initial.hinge.q = [0, 0.5] rad; }"

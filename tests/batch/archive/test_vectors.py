@@ -111,6 +111,7 @@ def test_units_and_frames_are_told(files: dict[str, Path]) -> None:
     assert told["links.sled.position"]["frame"] == "world axes" and "frame" not in told["energy.kinetic"]
 
 
+@pytest.mark.slow
 def test_the_archive_holds_what_the_engine_gave(files: dict[str, Path], tmp_path: Path) -> None:
     (tmp_path / "crane.ic").write_text(DECK)
     run = engine.run(ic.compile(tmp_path / "crane.ic", select=["masses"]).experiments[0])

@@ -58,6 +58,7 @@ def drawn(experiment: Experiment) -> ActingOnArm:
     return acting_on(experiment, arm_scene(experiment, recorded(experiment)), recorded(experiment))
 
 
+@pytest.mark.slow
 def test_a_lever_turns_as_all_arrows_that_are_drawn_would_turn_it(tmp_path: Path) -> None:
     experiment = compiled(tmp_path, LEVER, "pushes")
     found = drawn(experiment)
@@ -128,6 +129,7 @@ run handed like pushed {
 """  # noqa: E501
 
 
+@pytest.mark.slow
 def test_payloads_are_carried_while_the_run_says_so_and_what_is_not_recorded_is_named(tmp_path: Path) -> None:
     experiment = compiled(tmp_path, LEVER + PARCELS, "handed")
     found = drawn(experiment)
@@ -207,6 +209,7 @@ def test_loads_with_more_formulas_than_a_page_should_hold_are_named(
     assert {each.name for each in found.arrows} == {"shove", "gust", "line", "stop", "drag"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for kind, name in EVERY if kind == "environment"])
 def test_every_environment_model_is_drawn_or_told_unless_it_is_no_load_or_gravitation(
     name: str, tmp_path: Path

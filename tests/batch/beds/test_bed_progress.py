@@ -90,6 +90,7 @@ def test_cases_of_an_earlier_run_count_as_well(here: Path) -> None:
     assert [found[joint]["timing"]["trip"]["median"] for joint in ("shoulder", "elbow")] == [5e-6, 11e-6]
 
 
+@pytest.mark.slow
 def test_nothing_of_beds_stands_beside_other_archives(here: Path) -> None:
     batch.run(ic.compile("deck.ic", select=["wired"]), output="a.h5")
     assert "beds" not in json.loads(Path("a.h5.run.json").read_text())

@@ -53,6 +53,7 @@ def sized(met_bed: Bed, *words: str, status: int = 0) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 def test_a_pushed_disk_has_all_its_figures_in_closed_form(met_bed: Bed) -> None:
     found = sized(met_bed, "push", "--joint", "swing", "--margin", "2")
     drive, load = found["drive"]["figures"], found["load"]["figures"]
@@ -88,6 +89,7 @@ def test_a_pushed_disk_has_all_its_figures_in_closed_form(met_bed: Bed) -> None:
     assert found["load"]["curve"]["rate"][-1] == pytest.approx(W, **close)
 
 
+@pytest.mark.slow
 def test_each_figure_is_of_the_case_and_the_instant_where_it_is_largest(met_bed: Bed) -> None:
     """The lightest disk is the fastest, the heaviest asks most of the load."""
     found = sized(met_bed, "heavier", "--joint", "swing")
@@ -98,6 +100,7 @@ def test_each_figure_is_of_the_case_and_the_instant_where_it_is_largest(met_bed:
     assert [one["value"] for one in found["r"]] == pytest.approx([0.6, 2.4], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_bed_of_the_deck_says_the_load_s_current_and_when_it_is_at_its_limit(met_bed: Bed) -> None:
     found = sized(met_bed, "held")
     load = found["load"]["figures"]
@@ -198,6 +201,7 @@ def test_the_rotors_of_both_parts_are_on_the_shaft(pushed: ShaftWork) -> None:
         assert check.asked == pytest.approx(1.5 * abs(rotors - 1e-4 - 0.3 / 2500.0) * 50.0 * 2.0 / 0.55, rel=3e-5)
 
 
+@pytest.mark.slow
 def test_what_a_data_sheet_leaves_out_is_no_fit(met_bed: Bed, here: Path) -> None:
     bare = '[[motor]]\nname = "bare"\nsource = "a sticker"\ntorque_rated = "1 N*m"\nrate_max = "9000 rpm"\n'
     (here / "mine.toml").write_text(bare, encoding="utf-8")
@@ -209,6 +213,7 @@ def test_what_a_data_sheet_leaves_out_is_no_fit(met_bed: Bed, here: Path) -> Non
     assert "load bare: not known, for its source does not give: torque, peak, inertia of its rotor\n" in out
 
 
+@pytest.mark.slow
 def test_of_an_archive_the_cases_that_it_has_are_sized(
     met_bed: Bed, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -220,6 +225,7 @@ def test_of_an_archive_the_cases_that_it_has_are_sized(
     assert [one["value"] for one in found["r"]] == pytest.approx([2.4, 2.4], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_loop_that_is_not_stable_is_said_to_be_so(met_bed: Bed, here: Path) -> None:
     """At 1 kHz with a filter of 50 Hz and no delay `measured_acceleration` is stable up to r = 5.35."""
     (here / "deck.ic").write_text(ON_BED.format(mass=25 * 157.26062, law="measured_acceleration"), encoding="utf-8")
@@ -281,6 +287,7 @@ def test_a_joint_that_no_bed_could_take_is_told(met_bed: Bed, here: Path, run: s
     assert f"error[E440]: the servo of joint `swing` {message}" in err
 
 
+@pytest.mark.slow
 def test_of_several_joints_on_beds_one_is_named(met_bed: Bed, here: Path) -> None:
     deck = """#include <two_link.ic>
 run both like nominal { duration = 0.2 s;  substitute shoulder { }  substitute elbow { } }
@@ -312,6 +319,7 @@ run bare like nominal { servos { remove elbow; } }
     assert "error[E440]: joint `elbow` of `bare` has no servo\n = help: joints that have a servo: shoulder\n" in err
 
 
+@pytest.mark.slow
 def test_a_drive_at_its_largest_torque_is_noted(met_bed: Bed, here: Path) -> None:
     text = PUSHED.replace("tau_max = 10 N*m", "tau_max = 0.03 N*m")
     (here / "deck.ic").write_text(text, encoding="utf-8")
@@ -337,6 +345,7 @@ def test_a_run_that_fails_at_once_has_nothing_to_size(
     )
 
 
+@pytest.mark.slow
 def test_the_range_of_filters_ends_where_the_law_is_unstable(tmp_path: Path) -> None:
     """`measured_acceleration` at 1 kHz is stable up to r = 13.6, 5.35, 2.95 and 1.91 with filters of 20, 50, 100 and
     200 Hz (docs/substitution.md). With r = 2 and a margin of 1.5 that is 3: up to a little below 100 Hz."""
@@ -349,6 +358,7 @@ def test_the_range_of_filters_ends_where_the_law_is_unstable(tmp_path: Path) -> 
     assert max(filter_range(at_two, "swing", [0], (2.0, 5.0), 1.5).good) < 50.0
 
 
+@pytest.mark.slow
 def test_an_arm_that_grows_beyond_all_that_is_searched_of_decks_is_looked_at(tmp_path: Path) -> None:
     """`velocity_tracking` has no limit here: up to 2000 for the arm at the start, and as far as the run's arm asks."""
     deck = compiled(tmp_path, ON_BED.format(mass=2 * 157.26062, law="velocity_tracking"), "bench")
@@ -360,6 +370,7 @@ def test_an_arm_that_grows_beyond_all_that_is_searched_of_decks_is_looked_at(tmp
     assert alone.stable and alone.together == pytest.approx(6365.0, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_search_goes_as_far_as_the_margin_that_is_asked(tmp_path: Path) -> None:
     deck = compiled(tmp_path, ON_BED.format(mass=2 * 157.26062, law="velocity_tracking"), "bench")
     found = filter_range(deck, "swing", [0], (100.0, 100.0), 50.0)
@@ -367,6 +378,7 @@ def test_the_search_goes_as_far_as_the_margin_that_is_asked(tmp_path: Path) -> N
     assert max(found.good) == found.tried[-1][0]
 
 
+@pytest.mark.slow
 def test_what_is_printed_is_laid_out_so(met_bed: Bed) -> None:
     status, out, err = met_bed("size", "deck.ic", "heavier", "--joint", "swing", "--drive", "yaskawa-sgm7j-04a", "-v")
     assert (status, err) == (1, "")

@@ -256,6 +256,7 @@ def stopped(plan: Plan, output: Path, **options: Any) -> str:
 
 @pytest.mark.usefixtures("kept")
 class TestSoManyMayFail:
+    @pytest.mark.slow
     def test_more_stop_it_and_what_is_done_is_kept(self, here: Path) -> None:
         (here / "out").mkdir()
         plan, path = small(here), here / "out" / "a.h5"

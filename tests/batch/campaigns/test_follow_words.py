@@ -90,6 +90,7 @@ def test_a_joint_that_its_brake_holds_is_told_with_the_limit_and_the_brake(tmp_p
     assert warned(tmp_path, "allowed") == []
 
 
+@pytest.mark.slow
 def test_an_unstable_loop_is_told_alone(tmp_path: Path) -> None:
     deck = DECK.replace("servos = 500 Hz", "servos = 50 Hz").replace("kp = 0.05 V*s/rad", "kp = 0.5 V*s/rad")
     (tmp_path / "deck.ic").write_text(deck)
@@ -113,6 +114,7 @@ def test_a_rate_that_is_not_come_to_within_the_run_is_told(tmp_path: Path) -> No
     assert " rad/s off, of 0.5 rad/s that it is told, and `j.servo.tau_max`" in found.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["move", "sagging", "on_its_way", "late", "swinging", "pushed", "let_go", "fastest", "soft"]
 )
@@ -125,6 +127,7 @@ def test_of_a_sweep_the_case_that_is_furthest_off_is_named_once(tmp_path: Path) 
     assert found.message.startswith("joint `j` does not follow its command in case #2: it is 1 rad off")
 
 
+@pytest.mark.slow
 def test_a_path_beyond_the_reach_is_told_of_its_guide_and_not_of_its_joints(tmp_path: Path) -> None:
     [found] = warned(tmp_path, "draw", GUIDED.replace("WAY", "180 cm"))
     assert found.message == "path of guide `pen` is not followed: it is 1.556 m off, of 1.8 m that it leads"

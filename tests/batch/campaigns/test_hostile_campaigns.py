@@ -107,6 +107,7 @@ def test_what_is_no_campaigns_is_not_removed(here: Path, name: str) -> None:
     assert mine.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("nothing", [{"cases": []}, {"cases": np.flatnonzero([False])}, {"experiments": []}])
 def test_a_campaign_of_nothing_replaces_no_archive(here: Path, nothing: dict[str, Any]) -> None:
     before = batch.run(plan(), output="a.h5").path.read_bytes()
@@ -169,6 +170,7 @@ class Undead(Losing):
         return outcomes
 
 
+@pytest.mark.slow
 def test_a_worker_that_was_thought_dead_is_heard(here: Path) -> None:
     archive = batch.run(plans.plan(plans.gains(12)), output="a.h5", histories="every:2", executor=Undead(1, 2))
     calm = batch.run(plans.plan(plans.gains(12)), output="calm.h5", histories="every:2")
@@ -193,6 +195,7 @@ def test_histories_that_are_written_do_not_stay_in_memory(here: Path, monkeypatc
     assert peak < 12 << 20
 
 
+@pytest.mark.slow
 def test_what_decides_whose_histories_are_kept_takes_little_memory(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     peaks = []
     results = merge.results
@@ -244,6 +247,7 @@ def test_who_looks_in_and_leaves_takes_no_submission_along(submitted: Path) -> N
     assert run_job(submitted, "share", "0", str(submitted / "jobs.json")) == 0
 
 
+@pytest.mark.slow
 def test_a_merge_that_comes_too_late_gives_the_verdict(submitted: Path, capsys: pytest.CaptureFixture[str]) -> None:
     archive = batch.run(plan(), output="a.h5")
     assert run_job(submitted, "together") == (0 if archive.ok else 1)
@@ -278,6 +282,7 @@ def test_odd_words_of_the_queue_stop_no_share(
     assert run_job(submitted, "share", str(number), str(submitted / "jobs.json")) in (0, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     [

@@ -112,6 +112,7 @@ def met(folder: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "way",
     [

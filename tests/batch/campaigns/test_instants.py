@@ -59,6 +59,7 @@ def codes(found: Performed) -> list[str]:
     return [each.code for each in found.warned]
 
 
+@pytest.mark.slow
 def test_bristles_that_are_stiff_only_while_they_slide_are_told(tmp_path: Path) -> None:
     found = performed(made(tmp_path, SLIP), tmp_path / "a.h5")
     assert codes(found) == ["D317"]
@@ -166,6 +167,7 @@ def test_memory_on_the_way_changes_no_bit(tmp_path: Path) -> None:
     np.testing.assert_array_equal(memory[:, :, q], history[:, [0, 10, 200], 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [7, 40])
 def test_who_ran_the_cases_does_not_matter(count: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The memory of the run itself, and cases run again: the same words, of cases in the whole table."""
@@ -214,6 +216,7 @@ run folding {
 """
 
 
+@pytest.mark.slow
 def test_a_loop_is_told_that_only_a_folded_arm_makes_unstable(tmp_path: Path) -> None:
     """The pose in which the run begins is quiet, and the check silent; the one in which it ends is not."""
     (tmp_path / "deck.ic").write_text(FOLDS)
@@ -246,6 +249,7 @@ run carrying {
 LATER = "position = [1, 0, 0] m;  grapple = 1 s;"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("servo", "rate", "event", "code"),
     [

@@ -40,6 +40,7 @@ def test_shards_of_a_long_section_lie_in_folders_of_its_stretches(archive: Path)
     assert [path.parent.name for path in in_folders(archive)] == ["00001"] * (len(found) - 2)
 
 
+@pytest.mark.slow
 def test_a_campaign_whose_shards_lie_in_folders_goes_on_to_the_same_bytes(archive: Path, undisturbed: bytes) -> None:
     begun.begin(archive, after=4)
     rest, _ = begun.go_on(archive)
@@ -47,6 +48,7 @@ def test_a_campaign_whose_shards_lie_in_folders_goes_on_to_the_same_bytes(archiv
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_shards_that_an_older_met_wrote_beside_one_another_are_taken_up(archive: Path, undisturbed: bytes) -> None:
     begun.begin(archive, after=4)
     held = len(Folder(beside(archive)).named_tasks(0))

@@ -80,6 +80,7 @@ def offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     models.available.cache_clear()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("does", "how"),
     [

@@ -112,6 +112,7 @@ def test_odd_positions_are_no_cases(here: Path, case: str) -> None:
 class TestTheRealEngine:
     """The plan made by hand, run by the engine: what was faked above is what the engine gives."""
 
+    @pytest.mark.slow
     def test_bits_do_not_depend_on_the_batch(self, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         plan = plans.plan(plans.gains(9))
         found = []

@@ -368,6 +368,7 @@ class TestWhatIsKept:
             path = batch.run(plans.plan(sweep()), output=f"{histories}.h5", histories=histories, float32=single).path
             check_kept(path, kept, kept_whole, single)
 
+    @pytest.mark.slow
     def test_none_that_failed(self, here: Path, kept_whole: Path, single: bool) -> None:
         path = batch.run(plans.plan(sweep()), output="a.h5", histories="failed", float32=single).path
         check_kept(path, [], kept_whole, single)

@@ -129,6 +129,7 @@ def cases_of(archive: Path, number: int = 0) -> int:
 # What it finds
 
 
+@pytest.mark.slow
 def test_the_least_value_is_where_the_closed_form_has_it(place: Path) -> None:
     found = answers(place / "undisturbed.h5")["back"].found
     assert found.value == pytest.approx(-FAR, abs=1e-6)
@@ -137,12 +138,14 @@ def test_the_least_value_is_where_the_closed_form_has_it(place: Path) -> None:
     assert stiffness == pytest.approx(MASS * math.pi**2, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_every_case_of_it_obeys_the_closed_form(place: Path) -> None:
     data = batch.open(place / "undisturbed.h5")["back"]
     stiffness = data["environment.held.stiffness"].values
     assert data["far"].values == pytest.approx(FAR * np.cos(np.sqrt(stiffness / MASS)), abs=1e-8)
 
 
+@pytest.mark.slow
 def test_a_tuning_is_held_against_the_worst_of_its_plants(place: Path) -> None:
     """The lightest load and the heaviest are equally far from the middle where sqrt(k) (1 + 1/sqrt(3)) = pi."""
     answer = answers(place / "undisturbed.h5")["still"].found
@@ -157,6 +160,7 @@ def test_a_tuning_is_held_against_the_worst_of_its_plants(place: Path) -> None:
     assert answer.rooms[0].text == "far > -0.05 m"
 
 
+@pytest.mark.slow
 def test_a_tuning_says_how_far_it_went_along_slopes_and_comes_nearer_than_without(
     place: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -174,6 +178,7 @@ def test_a_tuning_says_how_far_it_went_along_slopes_and_comes_nearer_than_withou
     assert near.value == pytest.approx(least, rel=1e-5) and far.value > 1.001 * least
 
 
+@pytest.mark.slow
 def test_a_tuning_of_what_has_no_slopes_says_why(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A share of samples moves in steps alone."""
     metric = "metric off = share_of_time { of = slide.q < 0 m; }"
@@ -183,6 +188,7 @@ def test_a_tuning_of_what_has_no_slopes_says_why(here: Path, capsys: pytest.Capt
     assert "\n  no slopes to go by: `off`: it moves in steps alone, of a sample or of a count\n" in said
 
 
+@pytest.mark.slow
 def test_a_tuning_that_finds_nothing_says_so_of_what_was_tried_and_that_its_cases_are_spent(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -195,6 +201,7 @@ def test_a_tuning_that_finds_nothing_says_so_of_what_was_tried_and_that_its_case
     assert "\n  its cases are spent, of 60 at most; a larger `at_most` goes on\n" in said
 
 
+@pytest.mark.slow
 def test_a_case_that_fails_hurts_most(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "d.ic").write_text(DECK)
     assert main(["run", "d.ic", "wild", "--no-picture", "-o", "w.h5"]) == 1
@@ -214,6 +221,7 @@ def test_a_case_that_fails_hurts_most(here: Path, capsys: pytest.CaptureFixture[
 # However it is run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "way",
     [{"threads": 2}, {"processes": 2}, pytest.param({"dask": "local"}, marks=pytest.mark.slow)],
@@ -223,6 +231,7 @@ def test_whoever_runs_it_gives_the_same_bytes(here: Path, plan: Plan, undisturbe
     assert batch.run(plan, output="a.h5", **way).path.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_tasks_of_any_size_give_the_same_bytes(
     here: Path, plan: Plan, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -230,6 +239,7 @@ def test_tasks_of_any_size_give_the_same_bytes(
     assert batch.run(plan, output="a.h5").path.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", [1, 4, 9])
 def test_what_was_interrupted_goes_on_to_the_same_bytes(
     here: Path, plan: Plan, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch, after: int
@@ -262,6 +272,7 @@ def test_what_is_killed_at_ten_generations_goes_on_to_the_same_bytes(
     assert (here / "a.h5").read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_a_shard_that_is_damaged_is_made_again(
     here: Path, plan: Plan, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -275,6 +286,7 @@ def test_a_shard_that_is_damaged_is_made_again(
     assert [note for note in again.notes if "is cut short" in note]
 
 
+@pytest.mark.slow
 def test_another_search_is_no_part_of_it(here: Path, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its first generation is the same; what comes after is not."""
     monkeypatch.setattr(performing, "WORTH_SECONDS", 0.0)
@@ -292,6 +304,7 @@ def test_another_search_is_no_part_of_it(here: Path, place: Path, monkeypatch: p
         (here / "a.h5.run.json").unlink()
 
 
+@pytest.mark.slow
 def test_a_tuning_with_another_limit_is_no_part_of_it(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its cases are worth more or less by the limits, so others follow; of a search they are what they were."""
     monkeypatch.setattr(performing, "WORTH_SECONDS", 0.0)
@@ -313,6 +326,7 @@ def test_a_tuning_with_another_limit_is_no_part_of_it(here: Path, monkeypatch: p
 # What is in the archive
 
 
+@pytest.mark.slow
 def test_generations_stand_beside_the_cases(place: Path) -> None:
     data = batch.open(place / "undisturbed.h5")
     for name, at_most in (("back", AT_MOST), ("still", TUNED)):
@@ -339,6 +353,7 @@ def test_the_history_of_the_answer_alone_is_kept(place: Path) -> None:
             assert group.recorded_positions.tolist() == [answer.found.case]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("histories", "kept"), [("all", None), ("none", 0), ("worst:2:top", 2)])
 def test_other_histories_are_kept_where_they_are_asked_for(here: Path, plan: Plan, histories: str, kept: int) -> None:
     done = batch.run(plan, output="a.h5", experiments=["back"], histories=histories)
@@ -347,6 +362,7 @@ def test_other_histories_are_kept_where_they_are_asked_for(here: Path, plan: Pla
         assert group.recorded == (group.count if kept is None else kept)
 
 
+@pytest.mark.slow
 def test_its_cases_are_run_again_to_the_same_bits(here: Path, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     archive = str(place / "undisturbed.h5")
     position = answers(place / "undisturbed.h5")["back"].position
@@ -358,6 +374,7 @@ def test_its_cases_are_run_again_to_the_same_bits(here: Path, place: Path, capsy
     assert main(["diff", archive, "again.h5"]) == 0
 
 
+@pytest.mark.slow
 def test_every_reader_of_archives_reads_it(here: Path, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     archive = str(place / "undisturbed.h5")
     for words in (
@@ -379,6 +396,7 @@ def test_some_of_its_cases_are_no_search(here: Path, place: Path) -> None:
 # What is said
 
 
+@pytest.mark.slow
 def test_it_is_said_beforehand_and_afterwards(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "d.ic").write_text(DECK)
     assert main(["run", "d.ic", "still", "--no-picture"]) == 0, "its answer meets all, whatever was tried on the way"
@@ -487,6 +505,7 @@ def test_results_that_cannot_be_read_back_stop_it(here: Path, plan: Plan, monkey
     assert "what is computed of back cannot be read back from" in stopped.value.diagnostics[0].message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "value"),
     [
@@ -512,6 +531,7 @@ def test_an_archive_that_says_of_a_search_what_none_is_is_no_archive(
 COORDINATE = "environment.held.stiffness"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "at", "value"),
     [

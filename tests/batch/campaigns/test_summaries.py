@@ -93,6 +93,7 @@ def judged(file: ArchiveFile) -> list[tuple[EvidenceRow, int]]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SWEEPS)
 def test_its_evidence_is_that_of_all_rows(here: Path, name: str) -> None:
     archives(name)
@@ -109,6 +110,7 @@ def test_its_evidence_is_that_of_all_rows(here: Path, name: str) -> None:
         assert a == b
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SWEEPS)
 def test_its_outcome_is_that_of_all_rows(here: Path, name: str) -> None:
     archives(name)
@@ -150,6 +152,7 @@ def test_cases_fail_in_these(here: Path) -> None:
     assert 0 < found.failed < found.cases
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", [{"threads": 1}, pytest.param({"processes": 2}, marks=pytest.mark.slow)])
 def test_its_bytes_are_the_same_whoever_ran_it(
     here: Path, more: dict[str, int], monkeypatch: pytest.MonkeyPatch
@@ -161,6 +164,7 @@ def test_its_bytes_are_the_same_whoever_ran_it(
     assert Path("again.h5").read_bytes() == Path("many.summary.h5").read_bytes()
 
 
+@pytest.mark.slow
 def test_its_bytes_are_the_same_where_it_was_interrupted_as_it_was_summed_up(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -178,6 +182,7 @@ def test_its_bytes_are_the_same_where_it_was_interrupted_as_it_was_summed_up(
     assert Path("resumed.h5").read_bytes() == Path("many.summary.h5").read_bytes()
 
 
+@pytest.mark.slow
 def test_cases_in_several_blocks_give_the_same_but_for_rounding(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(merge, "BLOCK", 64)
     batch.run(plan_of("many"), output="blocks.h5", rows="summary", verify="some")
@@ -192,6 +197,7 @@ def test_cases_in_several_blocks_give_the_same_but_for_rounding(here: Path, monk
                 np.testing.assert_array_equal(a.values[name], b.values[name], err_msg=name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("metric", ["volts", pytest.param("settle", marks=pytest.mark.slow)])
 def test_worst_keeps_the_rows_of_the_worst(here: Path, metric: str) -> None:
     batch.run(plan_of("many"), output=f"{metric}.h5", rows=f"worst:12:{metric}", verify="none")
@@ -205,6 +211,7 @@ def test_worst_keeps_the_rows_of_the_worst(here: Path, metric: str) -> None:
             np.testing.assert_array_equal(kept.values(name), all_rows.values(name)[places])
 
 
+@pytest.mark.slow
 def test_a_case_that_it_names_is_computed_again_with_its_history(here: Path) -> None:
     with ArchiveFile("many.summary.h5") as file:
         case = int(file.groups[0].values("case")[3])
@@ -214,6 +221,7 @@ def test_a_case_that_it_names_is_computed_again_with_its_history(here: Path) -> 
         assert file.groups[0].recorded == 1 and file.groups[0].values("case").tolist() == [case]
 
 
+@pytest.mark.slow
 def test_any_other_case_is_computed_from_its_plan(here: Path) -> None:
     with ArchiveFile("many.summary.h5") as file:
         other = next(case for case in range(600) if case not in file.groups[0].values("case"))
@@ -257,6 +265,7 @@ COMMANDS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("what", "command"), COMMANDS, ids=[" ".join(words) for _, words in COMMANDS])
 def test_what_needs_a_row_a_case_is_refused_with_the_remedy(here: Path, what: str, command: tuple[str, ...]) -> None:
     said = met(*command)
@@ -301,6 +310,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", REFUSED)
 def test_a_word_that_is_none_is_refused(here: Path, word: str) -> None:
     said = met("run", "d.ic", "many", "-o", "none.h5", "--rows", word)
@@ -308,6 +318,7 @@ def test_a_word_that_is_none_is_refused(here: Path, word: str) -> None:
     assert not Path("none.h5").exists()
 
 
+@pytest.mark.slow
 def test_histories_all_verified_and_stopping_early_do_not_go_with_it(here: Path) -> None:
     def said(*words: str) -> str:
         return met("run", "d.ic", "many", "-o", "none.h5", "--rows", "summary", *words).text
@@ -355,6 +366,7 @@ UNSOUND = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", UNSOUND)
 def test_a_forged_summary_is_told(here: Path, tmp_path: Path, what: str) -> None:
     name, place, value = UNSOUND[what]

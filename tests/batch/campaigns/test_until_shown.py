@@ -107,6 +107,7 @@ def first_look(missed: np.ndarray, share: float, confidence: float) -> int:
 # Where it stops
 
 
+@pytest.mark.slow
 def test_each_design_point_stops_after_the_first_case_at_which_all_is_decided(place: Path) -> None:
     drawn, kept = batch.open(place / "all.h5"), batch.open(place / "a.h5")
     stops = {}
@@ -122,6 +123,7 @@ def test_each_design_point_stops_after_the_first_case_at_which_all_is_decided(pl
     assert len(set(stops.values())) >= 4 and stops[0.033] == MOST, "the design points stop at different cases"
 
 
+@pytest.mark.slow
 def test_verdicts_are_those_of_the_sequential_test(place: Path) -> None:
     rows = {(row.requirement.text, row.chosen["gearbox.kp"]): row for row in rows_of(place / "a.h5")}
     found = {gain: rows[SETTLE, f"{gain} V·s/rad"] for gain in GAINS}
@@ -149,6 +151,7 @@ def stop_of(folder: Path, gain: float) -> int:
     return int((batch.open(folder / "a.h5")["gearbox.kp"].values == gain).sum())
 
 
+@pytest.mark.slow
 def test_more_cases_at_most_change_none_of_those_that_are_run(place: Path, here: Path) -> None:
     longer = batch.run(read(here, count="until_shown, at_most = 450", gains=[0.03, 0.045]), output="b.h5").open()
     shorter = batch.open(place / "a.h5")
@@ -158,6 +161,7 @@ def test_more_cases_at_most_change_none_of_those_that_are_run(place: Path, here:
             assert (one == other).all()
 
 
+@pytest.mark.slow
 def test_what_excludes_a_draw_leaves_the_next_ones_in_order(here: Path) -> None:
     more = "exclude when links.lower.mass > 30 kg and gearbox.kp < 0.025 V*s/rad;"
     found = batch.run(read(here, more=more, gains=[0.02, 0.03]), output="a.h5").open()
@@ -210,6 +214,7 @@ sweep pushes of open {
 )
 
 
+@pytest.mark.slow
 def test_failures_beyond_the_stop_do_not_count(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (here / "f.ic").write_text(FAILING, encoding="utf-8")
     plan = ic.compile("f.ic", select=["pushes"])
@@ -242,6 +247,7 @@ def test_whoever_runs_it_gives_the_same_bytes(here: Path, plan: Plan, undisturbe
     assert batch.run(plan, output="a.h5", **way).path.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("first", "growth", "task"),
     [
@@ -264,6 +270,7 @@ def test_batches_and_tasks_of_any_size_give_the_same_bytes(
     assert sum(task.cases for task in executor.tasks) >= len(batch.open("a.h5")["case"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", [pytest.param(1, marks=SLOW), 3, pytest.param(6, marks=SLOW)])
 def test_what_was_interrupted_goes_on_to_the_same_bytes(
     here: Path, plan: Plan, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch, after: int
@@ -343,6 +350,7 @@ def test_a_shard_that_is_damaged_between_two_looks_is_made_again(
 # What is kept of it
 
 
+@pytest.mark.slow
 def test_histories_and_shorter_steps_are_of_cases_that_are_kept(place: Path, here: Path, plan: Plan) -> None:
     few = batch.run(plan, output="a.h5", histories=["every:50", "worst:2:late", "#1"], verify="some")
     kept = few.open()
@@ -360,12 +368,14 @@ def test_histories_and_shorter_steps_are_of_cases_that_are_kept(place: Path, her
         assert (one == other).all()
 
 
+@pytest.mark.slow
 def test_the_history_of_a_case_that_is_dropped_is_told_of(here: Path, plan: Plan) -> None:
     told = batch.run(plan, output="a.h5", histories=["#0", "#299"])
     assert "no history of case #299 is kept: what is required was decided without it" in told.notes
     assert told.open()["recorded_case"].values.tolist() == [0]
 
 
+@pytest.mark.slow
 def test_cases_are_run_again_with_the_same_bits(
     place: Path, here: Path, undisturbed: bytes, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -376,6 +386,7 @@ def test_cases_are_run_again_with_the_same_bits(
     assert (here / "b.h5").read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_cases_that_a_user_chooses_are_all_run_and_give_no_confidence(here: Path, plan: Plan) -> None:
     some = batch.run(plan, output="a.h5", cases=list(range(60)))
     assert len(some.open()["case"]) == 60
@@ -400,6 +411,7 @@ def test_a_plan_with_cases_that_show_nothing_is_damaged(here: Path, plan: Plan) 
 # What is said
 
 
+@pytest.mark.slow
 def test_it_is_said_beforehand_and_afterwards_everywhere(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     deck(here)
     assert main(["cases", "d.ic", "built"]) == 0
@@ -424,6 +436,7 @@ def test_it_is_said_beforehand_and_afterwards_everywhere(here: Path, capsys: pyt
     assert "of at most 1,500" in page
 
 
+@pytest.mark.slow
 def test_a_difference_pairs_what_both_have_and_says_how_they_were_chosen(
     place: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -132,6 +132,7 @@ def test_a_run_that_lasts_longer_is_not_identical(ran: Callable[..., Path]) -> N
     assert cli.main(["diff", str(a), str(b), "--require", "identical"]) == cli.NO
 
 
+@pytest.mark.slow
 def test_histories_in_one_alone_are_not_identical(two: Callable[..., tuple[Path, Path]]) -> None:
     batch.run(plans.plan(plans.gains(CASES)), output="few.h5", histories=["#2"])
     found = diff("whole.h5", "few.h5")
@@ -306,6 +307,7 @@ def test_a_requirement_that_other_cases_meet_is_told(two: Callable[..., tuple[Pa
     assert only(found).notes == ["require settle < 10 s is met by as many as before, but by others: 1 no more, 1 now"]
 
 
+@pytest.mark.slow
 def test_a_requirement_whose_limit_is_another_is_a_difference(ran: Callable[..., Path]) -> None:
     whole = diff(ran("a.h5", "bounded"), ran("b.h5", "strict"))
     found = only(whole)
@@ -341,6 +343,7 @@ def test_a_limit_in_another_unit_is_no_difference(ran: Callable[..., Path]) -> N
     ]
 
 
+@pytest.mark.slow
 def test_a_requirement_in_one_alone_is_a_difference(ran: Callable[..., Path]) -> None:
     a, b = ran("a.h5", "bounded"), ran("b.h5", "free")
     for found in (diff(a, b), diff(b, a)):

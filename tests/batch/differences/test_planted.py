@@ -34,6 +34,7 @@ def others_are_identical(found: Diff, *but: str) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_same_cases_in_another_order_are_identical(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     found = diff(*two(monkeypatch, tmp_path, order(1)))
     assert found.verdict == "identical"
@@ -81,6 +82,7 @@ def test_a_late_drift_within_and_beyond_a_tolerance(monkeypatch: pytest.MonkeyPa
     assert diff(a, b, tolerances(["q=4e-6rad"])).verdict == "equivalent"
 
 
+@pytest.mark.slow
 def test_not_a_number(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def plant(run: Run, place: dict[int, int]) -> None:
         if 9 in place:
@@ -92,6 +94,7 @@ def test_not_a_number(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     assert (tau.different, tau.nan, tau.first_beyond) == (1, 1, pytest.approx(0.48))
 
 
+@pytest.mark.slow
 def test_a_case_that_fails_now_is_the_headline(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     from batch.differences.text import diff_lines
 
@@ -125,6 +128,7 @@ def test_missing_and_new_cases(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) 
     assert back.experiments[0].only_b == [17, 18, 200]
 
 
+@pytest.mark.slow
 def test_a_renamed_signal_is_incomparable(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def renamed(experiment: Experiment) -> Experiment:
         record = tuple(replace(r, name="speed") if r.name == "qd" else r for r in experiment.structure.record)
@@ -142,6 +146,7 @@ def test_a_renamed_signal_is_incomparable(monkeypatch: pytest.MonkeyPatch, tmp_p
     }
 
 
+@pytest.mark.slow
 def test_parameters_that_changed_and_one_that_is_new(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def change(experiment: Experiment) -> Experiment:
         parameters = dict(experiment.parameters)
@@ -193,6 +198,7 @@ def test_planted_changes_are_found_and_none_is_invented(
     assert found.cases_different == len(set().union(*there.values(), set()))
 
 
+@pytest.mark.slow
 def test_the_same_answer_for_programs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     import json
 

@@ -52,6 +52,7 @@ def counts(found: Diff) -> tuple[int, int, int]:
     return q.identical, q.equivalent, q.different
 
 
+@pytest.mark.slow
 def test_nothing_is_allowed_unless_it_is_said(archives: Callable[..., tuple[Path, Path]]) -> None:
     found = diff(*archives())
     assert counts(found) == (CASES - 2, 0, 2) and diff_lines(found)[-1] == "different; no tolerance was given"

@@ -20,6 +20,7 @@ from tests.batch.differences.planted import order, two
 from tests.batch.report import archives
 
 
+@pytest.mark.slow
 def test_each_case_is_counted_by_the_worst_of_what_differs_in_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

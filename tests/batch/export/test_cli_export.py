@@ -21,6 +21,7 @@ def archive(here: Path, engine: None) -> Path:
     return Path("a.h5")
 
 
+@pytest.mark.slow
 def test_it_says_what_it_wrote(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["export", "a.h5", "-o", "b.mcap", "--layout"]) == cli.YES
     first, second = capsys.readouterr().out.splitlines()
@@ -29,6 +30,7 @@ def test_it_says_what_it_wrote(archive: Path, capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().out == "" and Path("a.csv").exists()
 
 
+@pytest.mark.slow
 def test_programs_are_told_in_json(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["export", "a.h5", "-o", "b.csv", "--run", "gains", "--case", "#2", "--case", "#0", "--format", "json"]
     assert cli.main(words) == cli.YES

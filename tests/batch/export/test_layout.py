@@ -67,6 +67,7 @@ def test_a_joint_has_one_colour_and_ghosts_are_faint(written: tuple[Mcap, dict[s
     assert [path["label"] for path in plots[0]][4:6] == ["case1 pan", "case0 lift"]
 
 
+@pytest.mark.slow
 def test_units_are_in_the_titles(written: tuple[Mcap, dict[str, Any]]) -> None:
     panels = written[1]["configById"]
     assert panels["Plot!tau"]["foxglovePanelTitle"] == panels["Plot!tau"]["lichtblickPanelTitle"] == "tau (N, N·m)"
@@ -82,6 +83,7 @@ def test_other_signals_are_shown_where_those_are_not(here: Path, monkeypatch: py
     assert (path["value"], path["label"]) == ("/shoulder/servo/voltage.value", "shoulder.servo.voltage")
 
 
+@pytest.mark.slow
 def test_a_layout_that_was_changed_is_kept(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plans.answering(monkeypatch)
     batch.run(plans.plan(), output="a.h5")

@@ -97,6 +97,7 @@ def test_the_clock_is_the_simulated_time_from_zero_in_order(pick: tuple[ArchiveF
         assert {stamp.timestamp.ToNanoseconds() for stamp in stamps} == {message.time}
 
 
+@pytest.mark.slow
 def test_a_signal_is_a_topic_with_a_field_for_each_joint_and_component(pick: tuple[ArchiveFile, Mcap]) -> None:
     file, read = pick
     group = file.groups[0]
@@ -242,6 +243,7 @@ def test_a_size_that_is_varied_by_its_path_is_the_cases_own(tmp_path: Path) -> N
         assert drawn[f"case{case}/boom"].cylinders[0].size.y == pytest.approx(2e-3 * radius, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_file_says_what_made_it(reaches: tuple[ArchiveFile, Mcap]) -> None:
     file, read = reaches
     (name, about), (_, case) = read.metadata[:2]
@@ -441,6 +443,7 @@ def test_a_shape_of_a_later_met_is_drawn_as_none(here: Path, monkeypatch: pytest
     assert [(point.x, point.y, point.z) for point in upper.lines[0].points] == [(0, 0, 0), (2, 0, 0)]
 
 
+@pytest.mark.slow
 def test_the_same_archive_gives_the_same_bytes(pick: tuple[ArchiveFile, Mcap], tmp_path: Path) -> None:
     first, second = (export(pick[0].path, tmp_path / name).path for name in ("a.mcap", "b.mcap"))
     assert first.read_bytes() == second.read_bytes()

@@ -77,6 +77,7 @@ def test_the_frames_of_an_export_move_with_the_base(tmp_path: Path, kind: str) -
             np.testing.assert_allclose(found[:, :3, 3], kept, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_free_base_that_was_not_recorded_is_told(tmp_path: Path) -> None:
     archive = made(tmp_path, changed(SHORT, (RECORD, "record = [q];\n}\n")))
     with pytest.raises(Problem) as caught:
@@ -94,6 +95,7 @@ def test_a_free_base_that_was_not_recorded_is_told(tmp_path: Path) -> None:
     assert caught.value.diagnostics[0].help == told.help[:1]
 
 
+@pytest.mark.slow
 def test_an_archive_says_that_its_base_moves(tmp_path: Path) -> None:
     with batch.open(made(tmp_path, SHORT)) as data:
         assert data.attrs["frame"].endswith("; the base is a link, which moves in the world")

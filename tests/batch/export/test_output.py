@@ -89,6 +89,7 @@ def test_what_stops_a_writer_leaves_nothing(
     assert sorted(path.name for path in Path().iterdir()) == ["a.h5", "a.h5.run.json"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["mcap", "csv"])
 def test_a_full_disk_is_said_and_leaves_nothing(archive: Path, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> int:
@@ -130,6 +131,7 @@ def test_half_an_export_of_ours_is_too(archive: Path) -> None:
     assert len(Mcap(export(archive).path).of("/tf")) == 51
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a.csv", "a.mcap", pytest.param("a.parquet", marks=pytest.mark.oracle)])
 def test_what_is_not_ours_is_not_written_over_unless_that_is_said(archive: Path, name: str) -> None:
     if name == "a.csv":
@@ -153,6 +155,7 @@ def test_an_empty_file_is_no_loss(archive: Path) -> None:
     assert export(archive, "a.csv").rows == 51
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a.h5", "b.csv"])
 def test_the_archive_itself_is_never_written_over(archive: Path, name: str) -> None:
     if name != "a.h5":
@@ -168,6 +171,7 @@ def test_the_archive_itself_is_never_written_over(archive: Path, name: str) -> N
     assert archive.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_place_that_is_none_is_said_before_anything_is_read(archive: Path) -> None:
     Path("folder.mcap").mkdir()
     Path("file").touch()
@@ -181,6 +185,7 @@ def test_a_place_that_is_none_is_said_before_anything_is_read(archive: Path) -> 
         assert said(caught.value) == f"error[E305]: {words}\n\n1 error\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a.xlsx", "a"])
 def test_a_name_that_says_no_format_is_refused(archive: Path, name: str) -> None:
     with pytest.raises(Problem) as caught:
@@ -194,6 +199,7 @@ def test_a_name_that_says_no_format_is_refused(archive: Path, name: str) -> None
     assert export(archive, name, form="csv").path == Path(name)
 
 
+@pytest.mark.slow
 def test_the_name_is_the_archives_unless_it_is_given(archive: Path) -> None:
     assert export(archive).path == Path("a.mcap")
     assert export(archive, form="csv").path == Path("a.csv")

@@ -72,6 +72,7 @@ def test_it_may_be_run_again(here: Path) -> None:
     assert (here / "z.mcap").exists() and (here / "z.h5").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -32,6 +32,7 @@ def table(path: Path) -> tuple[list[str], list[str], list[list[str]]]:
     return comments, heads, rows
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_a_case_is_a_row_an_instant_and_a_column_a_number(here: Path) -> None:
     batch.run(plans.plan(), output="a.h5")
@@ -56,6 +57,7 @@ def test_a_case_is_a_row_an_instant_and_a_column_a_number(here: Path) -> None:
         np.testing.assert_array_equal(np.array(rows, float), np.hstack(kept))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_several_cases_are_under_one_another_with_their_numbers(here: Path) -> None:
     batch.run(plans.plan(plans.gains(5)), output="a.h5")
@@ -67,6 +69,7 @@ def test_several_cases_are_under_one_another_with_their_numbers(here: Path) -> N
     assert some == rows[3 * 51 : 4 * 51] + rows[51 : 2 * 51]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_cases_of_several_runs_say_their_run(here: Path) -> None:
     batch.run(plans.plan(plans.nominal(), plans.gains(2)), output="a.h5")
@@ -75,6 +78,7 @@ def test_cases_of_several_runs_say_their_run(here: Path) -> None:
     assert [row[:3] for row in rows[::51]] == [["gains", "0", "0.01"], ["gains", "1", "0.04"], ["nominal", "0", ""]]
 
 
+@pytest.mark.slow
 def test_a_case_that_failed_has_its_rows_before_that(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plans.answering(monkeypatch)
     monkeypatch.setattr(engine, "run", partial(plans.answer, fails=frozenset({1})))
@@ -281,6 +285,7 @@ def test_a_case_that_failed_says_why(here: Path, monkeypatch: pytest.MonkeyPatch
     assert [bool(row[-1]) for row in rows] == [False, True, False] and rows[1][5] == "nan"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["csv", pytest.param("parquet", marks=pytest.mark.oracle)])
 def test_structures_and_runs_are_under_one_another(tmp_path: Path, form: str) -> None:
     found = export(made(tmp_path, "links", CHAIN), tmp_path / f"a.{form}").path
@@ -296,6 +301,7 @@ def test_structures_and_runs_are_under_one_another(tmp_path: Path, form: str) ->
     assert [(row[0], row[2]) for row in rows] == [("0", "1"), ("1", "1"), ("2", "2"), ("3", "2")]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_metrics_and_what_is_varied_may_be_in_the_deck_s_units(here: Path) -> None:
     from dataclasses import replace
@@ -311,6 +317,7 @@ def test_metrics_and_what_is_varied_may_be_in_the_deck_s_units(here: Path) -> No
     assert comments[1] == "# units: 1,V*s/rad,g,s,rad" and rows[0][2] == deck[2][0][3]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 @pytest.mark.parametrize(
     ("options", "message", "helps"),

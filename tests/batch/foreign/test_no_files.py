@@ -37,6 +37,7 @@ def patience() -> Iterator[None]:
     signal.signal(signal.SIGALRM, before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["show", "diff", "plot", "report", "export", "status"])
 def test_a_pipe_in_the_place_of_an_archive(command: str, archive: Path, here: Path) -> None:
     os.mkfifo("a.h5")

@@ -147,6 +147,7 @@ def test_letters_of_all_languages_stay_as_they_are() -> None:
     assert line("a\tb\nc\u2028d\ud800") == r"a\tb\nc\u2028d\ud800"
 
 
+@pytest.mark.slow
 def test_a_report_escapes_what_would_end_its_script(archive: Path, tmp_path: Path) -> None:
     with changed(archive, tmp_path) as (copy, file):
         for run in ("open", "masses.rk4"):

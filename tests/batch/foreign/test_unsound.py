@@ -156,6 +156,7 @@ def test_a_truncated_archive_is_told_wherever_it_ends(single: Path, tmp_path: Pa
         assert answer.status == 2 and f"error[E302]: the archive {copy} is damaged" in answer.text
 
 
+@pytest.mark.slow
 def test_bits_turned_over_are_read_or_told(single: Path, tmp_path: Path) -> None:
     copy = tmp_path / "given.h5"
     chance = np.random.default_rng(3)

@@ -55,6 +55,7 @@ def test_the_dataset_has_the_matrices_with_names(answer: LinearAnswer) -> None:
     np.testing.assert_array_equal(data.plant_A.sel(plant_state="hinge.q"), [0.0, 1.0])
 
 
+@pytest.mark.slow
 def test_a_step_of_the_system_is_the_step_of_the_run(answer: LinearAnswer, tmp_path: Path) -> None:
     """The linear answer to a moved command is that of two runs; the arm without gravity and friction's change is
     linear, so they agree to rounding."""
@@ -127,6 +128,7 @@ def test_without_python_control_that_is_said(answer: LinearAnswer, monkeypatch: 
     assert told.help == ("`pip install control`, or what MET's extra `control` names",)
 
 
+@pytest.mark.slow
 def test_a_picture_is_drawn_alike_each_time(answer: LinearAnswer, tmp_path: Path) -> None:
     for name in ("a.png", "b.png", "a.svg"):
         answer.draw(tmp_path / name)

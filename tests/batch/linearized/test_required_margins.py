@@ -62,6 +62,7 @@ def plan_of(folder: Path, name: str = "gains") -> Plan:
     return plan_file.read(folder / f"{name}.json")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [{"threads": 2}, {"processes": 2}])
 def test_threads_and_processes_make_the_same_archive(
     how: dict[str, Any], folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -96,12 +97,14 @@ def test_every_case_has_what_it_has_alone(folder: Path) -> None:
     assert set(data["met"].values.ravel()) == {0, 1}
 
 
+@pytest.mark.slow
 def test_show_counts_them_and_diff_finds_none_of_its_own(folder: Path) -> None:
     said = met(folder, "show", "a.h5", "--no-plots", status=None)
     assert "require firm: phase_margin(loop) > 60 deg  met by" in said and "phase_margin of loop" in said
     assert batch.diff(folder / "a.h5", folder / "a.h5").verdict == "identical"
 
 
+@pytest.mark.slow
 def test_a_diff_tells_margins_that_another_sensor_leaves(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "deck.ic").write_text(DECK.replace("delay = 1", "delay = 2"))
     batch.run(plan_of(tmp_path), output=tmp_path / "b.h5")
@@ -109,6 +112,7 @@ def test_a_diff_tells_margins_that_another_sensor_leaves(folder: Path, tmp_path:
     assert found.verdict == "different" and "firm" in str(found)
 
 
+@pytest.mark.slow
 def test_a_case_that_is_run_again_for_its_history_is_the_same_case(folder: Path, tmp_path: Path) -> None:
     made = batch.run(plan_of(folder), output=tmp_path / "b.h5", histories="worst:1:firm")
     data, before = made.open(), batch.open(folder / "a.h5")
@@ -116,12 +120,14 @@ def test_a_case_that_is_run_again_for_its_history_is_the_same_case(folder: Path,
     assert data.recorded_case.values.tolist() == [int(np.argmin(before.firm.values))]
 
 
+@pytest.mark.slow
 def test_a_summary_and_evidence_have_them(folder: Path, tmp_path: Path) -> None:
     batch.run(plan_of(folder, "drawn"), output=tmp_path / "b.h5", rows="summary")
     said = met(tmp_path, "show", "b.h5", "--evidence", "--format", "json", status=None)
     assert "firm" in json.dumps(json.loads(said))
 
 
+@pytest.mark.slow
 def test_a_search_finds_the_least_margin_and_a_tuning_keeps_it(folder: Path, tmp_path: Path) -> None:
     """The loop has least phase at one end of its gains; a tuning goes as far as its limits let it."""
     worst = batch.run(plan_of(folder, "worst"), output=tmp_path / "w.h5").open()
@@ -148,6 +154,7 @@ def test_a_block_that_no_run_can_answer_is_refused_before_anything_is_written(tm
     assert not list(tmp_path.glob("b.h5*"))
 
 
+@pytest.mark.slow
 def test_the_command_asks_what_the_deck_asks(folder: Path) -> None:
     """By name, and by itself where there is one block and no question."""
     said = met(folder, "linear", "deck.ic", "hold", "--of", "loop", status=0)

@@ -72,6 +72,7 @@ def test_the_frames_are_those_of_the_kinematics_one_row_at_a_time(reaches: xarra
                 np.testing.assert_allclose(here["orientation"], sign * turn, rtol=0, atol=CLOSE)
 
 
+@pytest.mark.slow
 def test_the_frames_are_those_of_an_export(reaches: xarray.Dataset) -> None:
     with ArchiveFile(reaches.encoding["source"]) as file:
         cases = pick(file, (), ["#1"], ())
@@ -81,6 +82,7 @@ def test_the_frames_are_those_of_an_export(reaches: xarray.Dataset) -> None:
     np.testing.assert_allclose(stand["orientation"].isel(link=0), arm.poses["stand"].orientation, rtol=0, atol=CLOSE)
 
 
+@pytest.mark.slow
 def test_a_planar_arm_in_closed_form(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with batch.open(answered(monkeypatch, tmp_path / "a.h5", plans.gains(4))) as data:
         frames = data.met.frames()
@@ -94,6 +96,7 @@ def test_a_planar_arm_in_closed_form(tmp_path: Path, monkeypatch: pytest.MonkeyP
         np.testing.assert_allclose(turn.sel(quaternion="z"), np.sin((shoulder + elbow) / 2), rtol=0, atol=CLOSE)
 
 
+@pytest.mark.slow
 def test_after_a_failure_there_are_no_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     archive = answered(monkeypatch, tmp_path / "a.h5", plans.gains(4), fails=frozenset({2}))
     with batch.open(archive) as data:

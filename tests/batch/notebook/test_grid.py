@@ -60,6 +60,7 @@ def test_it_is_what_xarray_makes_of_the_axes(tuning: xarray.Dataset) -> None:
     np.testing.assert_array_equal(plain.values, tuning.met.grid("volts").values)
 
 
+@pytest.mark.slow
 def test_what_is_varied_in_step_shares_a_dimension(tuning: xarray.Dataset) -> None:
     mass = tuning.met.grid("volts")["links.lower.mass"]
     assert mass.dims == ("links.upper.mass",) and mass.values.tolist() == [20.0, 30.0]
@@ -90,6 +91,7 @@ def test_signals_of_the_cases_that_have_them(tuning: xarray.Dataset) -> None:
     np.testing.assert_array_equal(again, q)
 
 
+@pytest.mark.slow
 def test_one_list_follows_from_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     data = block(monkeypatch, tmp_path, kp=[0.02, 0.02, 0.01], mass=[3, 1, 2])
     grid = data.met.grid("settle")
@@ -98,6 +100,7 @@ def test_one_list_follows_from_another(tmp_path: Path, monkeypatch: pytest.Monke
     np.testing.assert_allclose(grid, [5.0, np.inf, 5.0])
 
 
+@pytest.mark.slow
 def test_repeats_are_a_dimension(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     data = block(monkeypatch, tmp_path, kp=[0.01, 0.01, 0.02, 0.02], repeats=[0, 1, 0, 1])
     assert data.met.grid("settle").sizes == {"gearbox.kp": 2, "repeat": 2}
@@ -105,6 +108,7 @@ def test_repeats_are_a_dimension(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert data.met.grid("cause").sel(repeat=0).values.tolist() == ["", ""]
 
 
+@pytest.mark.slow
 def test_words_where_there_is_no_case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     data = block(monkeypatch, tmp_path, kp=[0.01, 0.01, 0.02], mass=[1, 2, 1])
     causes = data.met.grid("cause")
@@ -156,6 +160,7 @@ def test_a_single_run_has_no_dimensions(tmp_path: Path) -> None:
 
 
 class TestMessages:
+    @pytest.mark.slow
     def test_two_cases_at_one_place(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         data = block(monkeypatch, tmp_path, kp=[0.01, 0.02, 0.02, 0.01], mass=[1, 2, 2, 2])
         assert said(lambda: data.met.grid("settle")) == (

@@ -77,6 +77,7 @@ def swept(name: str = "gains", choice: str = "", **columns: Any) -> Any:
     return replace(base, name=name, cases=cases, sweep="s" if choice else "")
 
 
+@pytest.mark.slow
 def test_an_arm_whose_joint_is_called_joint_1_has_frames_of_one_case(tmp_path: Path) -> None:
     with made(tmp_path, ONE, "pushes") as data:
         np.testing.assert_array_equal(
@@ -92,6 +93,7 @@ def test_a_metric_in_metres_is_not_compared_with_degrees(tmp_path: Path) -> None
             tree.met.sel(end="0 deg")
 
 
+@pytest.mark.slow
 def test_a_block_is_in_one_unit(tmp_path: Path) -> None:
     with made(tmp_path, ONE, "kinds") as tree, pytest.raises(Problem):
         tree.met.grid("end")
@@ -142,6 +144,7 @@ def test_what_xarray_answers_is_asked_for(tmp_path: Path) -> None:
         assert data.met.sel(reach_back=data["reach_back"].values[1:].reshape(()))["case"].values.tolist() == [1]
 
 
+@pytest.mark.slow
 def test_a_range_that_ends_at_zero_has_the_zero_that_is_rounded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -152,6 +155,7 @@ def test_a_range_that_ends_at_zero_has_the_zero_that_is_rounded(
         assert data.met.sel({"gearbox.kp": slice(None, 0)})["case"].values.tolist() == list(range(8))
 
 
+@pytest.mark.slow
 def test_a_signal_that_one_run_lacks_is_put_in_another_unit_in_the_others(tmp_path: Path) -> None:
     with made(tmp_path, ONE, "swing", "blind") as tree:
         turned = tree.met.in_units(q="deg")
@@ -167,6 +171,7 @@ def test_a_parameter_called_as_a_dimension_is_unfolded(tmp_path: Path, name: str
         data.met.frames().met.grid("position")
 
 
+@pytest.mark.slow
 def test_a_parameter_called_position_is_no_position(tmp_path: Path) -> None:
     with made(tmp_path, BRIEF.replace("reach_back", "position"), "backs") as data:
         frames = data.met.frames(case=1)

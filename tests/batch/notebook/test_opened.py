@@ -138,6 +138,7 @@ class TestTheVariableOfVerdicts:
 
 
 class TestWhatWasRun:
+    @pytest.mark.slow
     def test_the_parameters_of_a_case(self, data: xarray.Dataset, tmp_path: Path) -> None:
         table = data.met.parameters("#20")
         assert list(table.columns) == ["value", "unit", "varies", "origin", "place"]

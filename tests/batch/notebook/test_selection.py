@@ -57,6 +57,7 @@ def test_signals_are_cut_as_cases_are(tuning: xarray.Dataset) -> None:
     assert rows(none) == [1, 2] and none.sizes["recorded_case"] == 0
 
 
+@pytest.mark.slow
 def test_several_values_ranges_and_names_hold_together(tuning: xarray.Dataset) -> None:
     kp, ki = "gearbox.kp", "gearbox.ki"
     assert rows(tuning.met.sel({kp: [0.01, "0.04 V*s/rad"], ki: "125 mV/rad"})) == [2, 3, 19]
@@ -74,6 +75,7 @@ def test_a_metric_chooses_too_and_what_never_comes_is_beyond_every_range(gains: 
     assert rows(gains.met.sel(settle=slice(np.inf, None))) == [0]
 
 
+@pytest.mark.slow
 def test_how_cases_ended(gains: xarray.Dataset) -> None:
     assert rows(gains.met.sel(failed=True)) == [3]
     assert rows(gains.met.sel(failed=False)) == [0, 1, 2, 4, 5, 6]
@@ -132,6 +134,7 @@ class TestOfSeveral:
         found = ways.met.sel(case="#2")
         assert list(found.children) == ["ways.midpoint"] and found["ways.midpoint"]["qd"].dims == ("time", "joint")
 
+    @pytest.mark.slow
     def test_a_node_by_itself(self, ways: xarray.DataTree) -> None:
         node = ways["ways.midpoint"]
         assert rows(node.met.sel({"gearbox.kp": 0.03})) == [3]
@@ -189,6 +192,7 @@ class TestMessages:
             "  a number alone is in kg, as the values here are",
         )
 
+    @pytest.mark.slow
     def test_what_is_nearest_can_be_typed(self, gains: xarray.Dataset) -> None:
         third = (gains["gearbox.kp"] / 3.0).assign_attrs(gains["gearbox.kp"].attrs)
         gains = gains.assign_coords({"gearbox.kp": third})

@@ -113,6 +113,7 @@ class TestSignals:
         assert [len(pale(ax)) for ax in shown(figures[0])] == [2, 2, 0, 0]
         assert refused("tau") == ("error[E393]: no `tau` in b.h5 to draw against\n = help: in b.h5: q, qd\n")
 
+    @pytest.mark.slow
     def test_in_another_unit_are_refused(self, here: Path) -> None:
         one = plans.nominal()
         archives.made(here / "a.h5", one)
@@ -140,6 +141,7 @@ class TestSignals:
 
 
 class TestMetrics:
+    @pytest.mark.slow
     def test_as_points_are_hollow(self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
         archives.made(here / "a.h5", archives.grid([0.03, 0.04, 0.05], [20.0]), histories="none")
         slower(monkeypatch)
@@ -171,6 +173,7 @@ class TestMetrics:
         assert [text.get_text() for text in figures[0].legends[0].get_texts()] == ["missed in b.h5 alone", "infinite"]
         assert cells(ax, hatch=DOTTED) == 10 and cells(ax, hatch=STRIPES) == 0
 
+    @pytest.mark.slow
     def test_of_cases_that_are_in_one_alone_have_no_colour(self, here: Path, figures: list[Any]) -> None:
         one = archives.grid(KP, MASS)
         archives.made(here / "a.h5", one, histories="none")
@@ -179,6 +182,7 @@ class TestMetrics:
         assert np.isnan(mesh(shown(figures[0])[0])).sum() == 5
         assert said(figures[0]) == "25 cases, 20 of them also in b.h5: a cell a case"
 
+    @pytest.mark.slow
     def test_that_the_other_lacks_are_told_of(self, here: Path) -> None:
         one = archives.grid(KP, MASS)
         archives.made(here / "a.h5", one, histories="none")
@@ -202,6 +206,7 @@ def test_archives_that_have_nothing_in_common(here: Path) -> None:
     assert refused() == ("error[E393]: no run or sweep `gains` in b.h5 to draw against\n = help: in it: one, two\n")
 
 
+@pytest.mark.slow
 def test_archives_of_the_same_name_have_their_folders(here: Path, figures: list[Any]) -> None:
     (here / "old").mkdir()
     archives.made(here / "a.h5", plans.nominal())
@@ -211,6 +216,7 @@ def test_archives_of_the_same_name_have_their_folders(here: Path, figures: list[
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["a.h5", "old/a.h5"]
 
 
+@pytest.mark.slow
 def test_names_of_files_are_written_as_they_are(here: Path, figures: list[Any]) -> None:
     archives.made(here / "_$a$.h5", plans.nominal())
     archives.made(here / "$\\frac{b.h5", plans.nominal())

@@ -41,6 +41,7 @@ def refused(path: Path, **options: Any) -> str:
     return render(caught.value.diagnostics).rpartition("\n1 error")[0]
 
 
+@pytest.mark.slow
 def test_links_are_where_the_simulation_recorded_them(folder: Path) -> None:
     compared = 0
     with ArchiveFile(folder / "lengths.h5") as file:
@@ -60,6 +61,7 @@ def test_links_are_where_the_simulation_recorded_them(folder: Path) -> None:
     assert compared == 102
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [".png", ".svg"])
 def test_the_same_archive_gives_the_same_picture_and_all_of_the_arm_is_in_it(
     folder: Path, ending: str, figures: list[Any]
@@ -79,6 +81,7 @@ def test_the_same_archive_gives_the_same_picture_and_all_of_the_arm_is_in_it(
         assert low < corners[:, 1].min() < corners[:, 1].max() < high
 
 
+@pytest.mark.slow
 def test_what_cannot_be_drawn_is_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert refused(folder / "lengths.h5", cases=["#0"], at=[1.0, 2.5]) == (
         "error[E399]: case #0 "

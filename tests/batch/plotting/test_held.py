@@ -98,6 +98,7 @@ def test_limits_are_those_of_requirements_stops_and_servos(ran: dict[str, Archiv
     }
 
 
+@pytest.mark.slow
 def test_limits_that_are_near_are_thin_lines_with_their_names(
     ran: dict[str, ArchiveFile], figures: list[Any], tmp_path: Path
 ) -> None:
@@ -125,6 +126,7 @@ def test_a_limit_that_is_far_off_is_named_above_the_panel(
     assert ax.get_ylim()[1] < 1.0
 
 
+@pytest.mark.slow
 def test_lines_of_a_panel_are_equally_thick(ran: dict[str, ArchiveFile], figures: list[Any], tmp_path: Path) -> None:
     draw(ran["slew"], tmp_path / "a.png")
     for ax in shown(figures[0]):

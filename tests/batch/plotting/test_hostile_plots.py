@@ -87,6 +87,7 @@ class TestPoints:
         on_edge = [each.get_offsets() for each in ax.collections if each.get_offset_transform() != ax.transData]
         assert sorted(float(x) for each in on_edge for x in each[:, 0]) == pytest.approx([0.0175, 0.0325])
 
+    @pytest.mark.slow
     def test_of_a_map_tell_apart_which_archive_misses(
         self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -114,6 +115,7 @@ class TestMapsOfADifference:
         found = [(cells(ax, hatch=STRIPES), cells(ax, hatch=DOTTED)) for ax in (shown(each)[0] for each in figures)]
         assert found == [(0, 5), (5, 0)]
 
+    @pytest.mark.slow
     def test_mark_nothing_that_is_not_in_both(
         self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -163,6 +165,7 @@ class TestNames:
         xml.dom.minidom.parseString(text)
         assert f"<!-- {shown_as} -->" in text
 
+    @pytest.mark.slow
     def test_of_files_may_be_long(self, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         made(monkeypatch, "a.h5", plans.gains(5))
         shutil.copy("a.h5", "x" * 200 + ".h5")

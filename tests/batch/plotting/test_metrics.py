@@ -35,6 +35,7 @@ def made(kps: list[float] = KP, masses: list[float] = MASS, **options: Any) -> P
 
 
 class TestPoints:
+    @pytest.mark.slow
     def test_are_drawn_over_what_varies_where_there_are_no_histories(self, here: Path, figures: list[Any]) -> None:
         with archive(40, "none") as file:
             draw(file, "a.png")
@@ -46,6 +47,7 @@ class TestPoints:
         )
         assert said(figures[0]) == "40 cases"
 
+    @pytest.mark.slow
     def test_of_cases_without_a_value_stand_on_the_edge(
         self, here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -99,6 +101,7 @@ class TestPoints:
             "0.1",
         ]
 
+    @pytest.mark.slow
     def test_have_the_limit_as_a_line_where_it_is_near(self, here: Path, figures: list[Any]) -> None:
         def limits(ax: Any) -> list[float]:
             return [line.get_ydata()[0] for line in ax.lines if line.get_label() == "limit"]
@@ -182,6 +185,7 @@ class TestMaps:
             "failed",
         ]
 
+    @pytest.mark.slow
     def test_have_signs_that_are_whole_at_the_edge_and_cover_no_other_cell(
         self, here: Path, figures: list[Any]
     ) -> None:
@@ -199,6 +203,7 @@ class TestMaps:
         right = ax.transData.transform((edges[np.flatnonzero(greys[0])[-1] + 1], MASS[0]))[0]
         assert affine.transform_path(clip).get_extents().x1 == pytest.approx(right, abs=1e-6)
 
+    @pytest.mark.slow
     def test_leave_cells_white_that_have_no_case(self, here: Path, figures: list[Any]) -> None:
         one = archives.grid(KP, MASS)
         first, second = one.cases.coordinates
@@ -233,6 +238,7 @@ class TestMaps:
         assert np.isfinite(mesh(ax)).all()
         assert not figures[0].legends
 
+    @pytest.mark.slow
     def test_of_cases_that_fill_no_grid_are_points(self, here: Path, figures: list[Any]) -> None:
         with archive(40, "none") as file:
             draw(file, "a.png", ["volts"], over=["gearbox.kp", "links.lower.mass"])

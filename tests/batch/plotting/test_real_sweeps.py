@@ -59,6 +59,7 @@ def test_a_map_says_what_stands_for_its_cases(archive: Path, figures: list[Any],
     assert said(figures[0]) == "12 cases: up to 2 cases in a cell, which shows the middle one"
 
 
+@pytest.mark.slow
 def test_points_say_what_is_varied_besides(archive: Path, figures: list[Any], tmp_path: Path) -> None:
     plot(archive, tmp_path / "a.png", ["volts"], run="ways")
     words = [text.get_text() for text in figures[0].legends[0].get_texts()]
@@ -67,6 +68,7 @@ def test_points_say_what_is_varied_besides(archive: Path, figures: list[Any], tm
     assert said(figures[0]) == "12 cases; integrator varied too"
 
 
+@pytest.mark.slow
 def test_points_stand_over_words(archive: Path, figures: list[Any], tmp_path: Path) -> None:
     plot(archive, tmp_path / "a.png", ["volts"], run="ways", over=["integrator"])
     ax = shown(figures[0])[0]
@@ -74,6 +76,7 @@ def test_points_stand_over_words(archive: Path, figures: list[Any], tmp_path: Pa
     assert ax.get_xlim() == (-0.5, 1.5)
 
 
+@pytest.mark.slow
 def test_one_structure_may_be_drawn_alone(archive: Path, figures: list[Any], tmp_path: Path) -> None:
     plot(archive, tmp_path / "a.png", ["volts"], run="ways.rk4")
     assert said(figures[0]) == "6 cases"

@@ -47,6 +47,7 @@ def chromium() -> Iterator[Chromium]:
         yield started
 
 
+@pytest.mark.slow
 def test_a_log_is_in_si_on_straight_lines_between_its_rows_and_nothing_outside_of_them(folder: Path) -> None:
     columns = [{"channel": f"{joint}.q", "signal": "q", "unit": "rad"} for joint in ("elbow", "shoulder", "wrist")]
     found = log_data(folder / "log.csv", columns, np.array([0.0, 0.3, 0.6, 0.7]))
@@ -58,6 +59,7 @@ def test_a_log_is_in_si_on_straight_lines_between_its_rows_and_nothing_outside_o
     assert found["told"] == ["time [s]", "shoulder.q [deg]", "elbow.q [deg]"] and found["unused"] == ["heat"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -100,6 +102,7 @@ def test_a_log_that_does_not_fit_is_refused_with_its_place(
     assert not (tmp_path / "page.html").exists()
 
 
+@pytest.mark.slow
 def test_what_is_neither_archive_nor_log_and_an_archive_of_no_same_case_are_refused(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -59,6 +59,7 @@ def test_a_module_says_which_metrics_it_does_not_compute(folder: Path, capsys: p
     assert "loop_phase_margin" not in [each["name"] for each in told["metrics"]]
 
 
+@pytest.mark.slow
 def test_a_module_and_its_description_belong_together(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert met("compile", "deck.ic", "tuned") == 0
     said = re.sub(r"\([\d.]+ KiB\)", "(SIZE)", capsys.readouterr().out)
@@ -83,6 +84,7 @@ def test_a_module_and_its_description_belong_together(folder: Path, capsys: pyte
     assert (folder / "tuned.wasm").read_bytes() == module
 
 
+@pytest.mark.slow
 def test_an_archive_and_a_plan_give_the_module_of_their_deck(folder: Path) -> None:
     assert met("compile", "deck.ic", "tuned", "-q") == 0
     assert met("run", "deck.ic", "tuned", "-q", "--no-picture") == 0
@@ -134,6 +136,7 @@ def test_what_met_did_not_write_is_not_written_over(folder: Path, capsys: pytest
     assert not (folder / "tuned.wasm").exists()
 
 
+@pytest.mark.slow
 def test_a_sweep_of_several_structures_has_no_one_module(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert met("compile", "deck.ic", "ways") == 2
     assert (

@@ -54,6 +54,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["mcap", "csv"])
 def test_what_is_exported_comes_back_with_its_bits(folder: Path, ending: str) -> None:
     with xarray.open_dataset(folder / "a.h5") as data:
@@ -70,6 +71,7 @@ def test_what_is_exported_comes_back_with_its_bits(folder: Path, ending: str) ->
     assert "shoulder.q [rad]" in found["told"] and "elbow.reaction.force.z [N]" in found["told"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["mcap", "csv"])
 def test_an_export_of_several_cases_is_refused_and_one_of_them_makes_a_page(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], ending: str

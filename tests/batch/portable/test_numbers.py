@@ -103,6 +103,7 @@ def test_limits_are_where_the_deck_is_refused() -> None:
                 assert made.broken({**own, path: np.array([further])}, 1)[0]
 
 
+@pytest.mark.slow
 def test_another_deck_is_refused(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "other.ic").write_text(DECK.replace("12.3", "12.4"), encoding="utf-8")
     assert met("view", folder / "it.h5", "--numbers", tmp_path / "other.ic") == 2
@@ -112,6 +113,7 @@ def test_another_deck_is_refused(folder: Path, tmp_path: Path, capsys: pytest.Ca
     )
 
 
+@pytest.mark.slow
 def test_what_a_deck_reads_must_be_as_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "shared"
     folder.mkdir()
@@ -141,6 +143,7 @@ def test_of_a_sweep_they_are_those_of_its_run(folder: Path) -> None:
     assert all(keys) and keys[0][1] != keys[1][1]  # type: ignore[index]
 
 
+@pytest.mark.slow
 def test_of_several_structures_they_are_of_the_one_that_is_viewed(folder: Path) -> None:
     found = {name: numbers_of(folder, "ways.h5", f"ways.{name}") for name in ("modified_euler", "rk4")}
     for name, each in found.items():
@@ -153,6 +156,7 @@ def test_of_several_structures_they_are_of_the_one_that_is_viewed(folder: Path) 
         assert float(mass.values[0]) == 1.0 + float(value) and each.fixed == (f"macro HEAVY = {value}",)
 
 
+@pytest.mark.slow
 def test_an_archive_of_vary_or_set_has_them_too(folder: Path, tmp_path: Path) -> None:
     deck = folder / "deck.ic"
     words = ["-q", "--no-picture", "-o", tmp_path / "a.h5"]

@@ -43,6 +43,7 @@ def sent(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_page_is_whole_and_allows_itself_one_script_and_webassembly(sent: Path) -> None:
     page = (sent / "tuned.view.html").read_text(encoding="utf-8")
     rules = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
@@ -61,6 +62,7 @@ def test_a_page_is_whole_and_allows_itself_one_script_and_webassembly(sent: Path
     assert again.read_text(encoding="utf-8") == page
 
 
+@pytest.mark.slow
 def test_pages_are_refused_before_anything_is_computed(
     sent: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

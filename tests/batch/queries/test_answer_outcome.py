@@ -70,6 +70,7 @@ def group_of(file: ArchiveFile, name: str) -> tuple[ArchiveGroup, SearchAnswer, 
     return group, answer, answer_outcome(answer)
 
 
+@pytest.mark.slow
 def test_a_tuning_is_judged_in_the_cases_of_its_sweep(archive: Path) -> None:
     with ArchiveFile(archive) as file:
         group, answer, outcome = group_of(file, "still")
@@ -126,6 +127,7 @@ def test_a_search_says_what_another_case_misses(archive: Path) -> None:
         assert outcome.requirements[0].elsewhere and not outcome.requirements[1].elsewhere
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_requirement_over_a_share_is_asked_of_each_case_and_stands_once(archive: Path, name: str) -> None:
     with ArchiveFile(archive) as file:
@@ -150,6 +152,7 @@ def test_some_cases_of_a_tuning_are_held_without_a_confidence_too(archive: Path,
         assert all(row.at_least is None and row.share is None and row.cases == 3 for row in rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "word", "said"), [
     ("still", "Requirements met", "The answer meets all requirements in all 5 cases of loads."),
     ("poor", "Requirements not met", "The answer misses far &gt; -0.05 m in "),
@@ -168,6 +171,7 @@ def test_a_report_opens_with_the_answer_and_has_no_share(
     assert "<h2>Evidence</h2>" not in page and "demonstrated" not in page.partition("<script")[0]
 
 
+@pytest.mark.slow
 def test_the_terminal_says_the_requirements_of_the_answer(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", str(archive), "--run", "still", "--no-plots"]) == 0
     said = capsys.readouterr().out
@@ -187,6 +191,7 @@ def test_programs_are_told_the_requirements_of_the_answer(archive: Path, capsys:
     assert [row["cases"] for row in told["evidence"]] == [5, 5]
 
 
+@pytest.mark.slow
 def test_notebooks_say_the_requirements_of_the_answer(archive: Path) -> None:
     data = batch.open(archive)["still"]
     said = str(data.met)
@@ -196,6 +201,7 @@ def test_notebooks_say_the_requirements_of_the_answer(archive: Path) -> None:
     assert data.met.evidence()["cases"].tolist() == [5, 5]
 
 
+@pytest.mark.slow
 def test_the_exit_status_of_a_run_is_that_of_its_answers(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:
     deck = str(archive.parent / "d.ic")
     output = ["-o", str(archive.parent / "run.h5"), "--no-picture", "--fresh"]
@@ -206,6 +212,7 @@ def test_the_exit_status_of_a_run_is_that_of_its_answers(archive: Path, capsys: 
     assert capsys.readouterr().out.endswith("exit 1: `poor` found nothing that meets all\n")
 
 
+@pytest.mark.slow
 def test_what_a_search_depends_on_is_no_question_to_its_cases(
     archive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -86,6 +86,7 @@ def test_of_a_campaign_there_is_one_warning_with_the_count_and_the_worst_case(tm
     assert at_limit.largest == pytest.approx(0.25, abs=0.0006)  # until 0.501 s, the least steep part of the table
 
 
+@pytest.mark.slow
 def test_a_report_says_it_beside_the_verdict_with_its_line_and_what_to_do(tmp_path: Path) -> None:
     path, _ = made(tmp_path, "it")
     with ArchiveFile(path) as file:
@@ -129,6 +130,7 @@ def test_limits_may_vary(tmp_path: Path) -> None:
     assert batch.open(path)["excess.hinge.q_max"].values.tolist() == pytest.approx([1.0, 0.0], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_what_a_requirement_judges_is_not_warned_of_besides(tmp_path: Path) -> None:
     path, plan = made(tmp_path, "judged")
     assert warned(path, plan) == []
@@ -146,6 +148,7 @@ def test_cases_that_are_at_a_limit_for_most_of_the_time_are_counted(tmp_path: Pa
     assert said.endswith(" % at most, in #0; not 0 in 2 of 3 cases, more than half in 2")
 
 
+@pytest.mark.slow
 def test_show_and_its_json_list_the_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, _ = made(tmp_path, "motors")
     with ArchiveFile(path) as file:

@@ -144,6 +144,7 @@ def test_which_way_round_is_said_of_each_or_of_all() -> None:
     assert ways("a", "b:largest", "c:smallest", reverse=True) == [True, True, False]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -183,6 +184,7 @@ def test_an_order_that_is_none_is_told(
     assert capsys.readouterr().err == said
 
 
+@pytest.mark.slow
 def test_what_cases_cannot_be_listed_by_is_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def told(*words: str) -> str:
         assert main(["show", "a.h5", *words]) == 2
@@ -233,6 +235,7 @@ def test_smallest_median_and_largest_are_of_the_finite_values_everywhere() -> No
     assert texts == ["2.5, 3 inf", "2", "inf", "-"]
 
 
+@pytest.mark.slow
 def test_a_pure_number_has_no_unit_and_may_be_in_per_cent(here: Path) -> None:
     from batch.queries.summary import summary_of
 

@@ -42,6 +42,7 @@ def ran(folder: Path, required: str, *command: str, cases: int = 100, sweep: str
     return main(["run", str(folder / "spread.ic"), sweep, "-o", str(out), "--no-picture", *command]), out
 
 
+@pytest.mark.slow
 def test_each_design_point_has_its_verdict_from_its_own_cases(tmp_path: Path) -> None:
     texts = ["late < 2.4 s in 95 % of cases with 90 % confidence", "percentile(late, 5 %) > 2 s with 90 % confidence"]
     ran(tmp_path, " ".join(f"require {text};" for text in texts))
@@ -63,6 +64,7 @@ def test_each_design_point_has_its_verdict_from_its_own_cases(tmp_path: Path) ->
     assert len({row.verdict for row in rows}) > 1, "the limits tell the design points apart"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("required", "cases", "code", "said"), [
     ("require late < 5 s in 95 % of cases with 90 % confidence;", 45, 0, "demonstrated  45 of 45 cases meet it: at "
      "least 95.01 % of all do"),
@@ -94,6 +96,7 @@ def test_verdicts_decide_the_exit_code_and_are_shown(
     assert capsys.readouterr().out.count(said) == 2
 
 
+@pytest.mark.slow
 def test_without_draws_each_case_is_judged_by_itself(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     required = "require late < 5 s in 95 % of cases with 90 % confidence;"
     assert ran(tmp_path, required, sweep="grid")[0] == 0
@@ -107,6 +110,7 @@ def test_some_cases_of_a_table_give_no_confidence(tmp_path: Path, capsys: pytest
     assert f"met  2 of 2 cases meet it; {SOME_OF_THE_TABLE}" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_programs_and_reports_have_the_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = "late < 5 s in 95 % of cases with 90 % confidence"
     ran(tmp_path, f"require {text};", cases=50)
@@ -121,6 +125,7 @@ def test_programs_and_reports_have_the_rows(tmp_path: Path, capsys: pytest.Captu
     assert "Requirements demonstrated" in written and "at least 95.49 %" in written
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("forged", [[2.0], [-0.1], [0.9, 0.9], ["0.9"]])
 def test_a_forged_share_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], forged: list[object]) -> None:
     _, path = ran(tmp_path, "require late < 5 s in 95 % of cases;", cases=3)
@@ -131,6 +136,7 @@ def test_a_forged_share_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "error[E302]" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "forged"), [("share", 1.0), ("share", 1.0 - 1e-12), ("share", 1e-12), ("confidence", 1.0)]
 )
@@ -145,6 +151,7 @@ def test_a_forged_share_that_nothing_shows_is_refused(
     assert "a requirement asks for what no number of cases shows" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("forged", [0, -3, "many", 2.5])
 def test_a_forged_number_of_cases_at_most_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], forged: object

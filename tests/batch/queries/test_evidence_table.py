@@ -63,6 +63,7 @@ def rows_of(path: Path) -> list[RequirementEvidence]:
         return requirement_evidence(file.groups, path.name)
 
 
+@pytest.mark.slow
 def test_a_row_has_the_numbers_of_the_cases_of_its_design_point(folder: Path) -> None:
     data = batch.open(folder / "a.h5")
     rows = [row for row in rows_of(folder / "a.h5") if row.share is not None]
@@ -114,6 +115,7 @@ def test_structures_are_told_apart_by_what_was_chosen_for_them(folder: Path) -> 
     assert [row.run for row in rows] == ["ways", "ways"] and all(row.cases == 30 for row in rows)
 
 
+@pytest.mark.slow
 def test_the_command_of_a_row_runs_its_worst_case_to_the_same_value(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -125,6 +127,7 @@ def test_the_command_of_a_row_runs_its_worst_case_to_the_same_value(
     assert batch.open("again.h5")["late"].values.item() == row.worst
 
 
+@pytest.mark.slow
 def test_terminal_csv_notebook_and_programs_have_the_same_rows(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -202,6 +205,7 @@ def test_evidence_of_some_of_the_cases_is_refused(folder: Path) -> None:
         batch.open(folder / "a.h5").met.sel(case=[1, 2]).met.evidence()
 
 
+@pytest.mark.slow
 def test_a_comparison_says_what_the_cases_show_now(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -252,6 +256,7 @@ def test_words_are_signs_where_the_table_is_too_wide() -> None:
     assert max(map(len, narrow)) <= 100 < max(map(len, wide))
 
 
+@pytest.mark.slow
 def test_parts_of_a_sum_of_sweeps_are_told_apart(tmp_path: Path) -> None:
     deck = tmp_path / "sum.ic"
     sweeps = (

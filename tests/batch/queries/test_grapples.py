@@ -42,6 +42,7 @@ def warned(folder: Path, run: str) -> list[Diagnostic]:
         return campaign_warnings(file.groups, {each.name: each for each in plan.experiments})
 
 
+@pytest.mark.slow
 def test_a_payload_beside_its_place_is_told_with_the_distance(tmp_path: Path) -> None:
     [found] = warned(tmp_path, "beside")
     assert (found.code, found.severity) == ("D347", "warning")
@@ -55,6 +56,7 @@ def test_a_payload_beside_its_place_is_told_with_the_distance(tmp_path: Path) ->
     )
 
 
+@pytest.mark.slow
 def test_a_payload_that_flies_past_is_told_with_its_speed_and_the_energy(tmp_path: Path) -> None:
     """Its angular momentum about the hinge is kept; the box's middle is 0.1 m from there, as the payload is."""
     [found] = warned(tmp_path, "fast")
@@ -68,21 +70,25 @@ def test_a_payload_that_flies_past_is_told_with_its_speed_and_the_energy(tmp_pat
     assert found.help == ("let the link go along with it by then: no gripper closes on what moves so fast",)
 
 
+@pytest.mark.slow
 def test_a_payload_that_turns_fast_is_told(tmp_path: Path) -> None:
     [found] = warned(tmp_path, "turning")
     assert found.message.startswith("payload `p` is grappled at 12 rad/s against its link: momentum is kept, and ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", ["r", "gentle", "late", "meant"])
 def test_what_a_gripper_makes_is_not_told_nor_what_never_comes_or_is_meant(tmp_path: Path, run: str) -> None:
     assert warned(tmp_path, run) == []
 
 
+@pytest.mark.slow
 def test_what_the_check_tells_is_not_told_again(tmp_path: Path) -> None:
     assert warned(tmp_path, "afar") == []
     assert [each.code for each in ic.check(tmp_path / "d.ic", select=["afar"]).diagnostics] == ["D339"]
 
 
+@pytest.mark.slow
 def test_of_a_campaign_there_is_one_warning_with_the_count_and_the_worst_case(tmp_path: Path) -> None:
     [found] = warned(tmp_path, "offsets")
     assert found.message.startswith("payload `p` is grappled 0.3 m from its place, in 2 of 4 cases, worst in #2: ")

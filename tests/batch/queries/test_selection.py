@@ -34,6 +34,7 @@ def pool(sweep: ArchiveFile) -> Pool:
     return Pool("gains", sweep.groups)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("condition", "holds"), [
     ("settle < 4 s", lambda v: v["settle"] < 4.0),
     ("settle < 4000 ms and gearbox.kp > 0.02 V*s/rad", lambda v: (v["settle"] < 4.0) & (v["gearbox.kp"] > 0.02)),
@@ -94,6 +95,7 @@ def test_where_there_is_none_it_is_said(sweep: ArchiveFile) -> None:
     assert "0 of 20 cases: where settle < 0 s" in lines and not any("#" in line for line in lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("condition", "said"), [
     ("settle < 4 kg", """\
 error[D063]: `<` of s and kg

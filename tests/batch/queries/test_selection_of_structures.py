@@ -14,6 +14,7 @@ sweep both of nominal { vary integrator = [rk4, modified_euler]; vary gearbox.kp
 """
 
 
+@pytest.mark.slow
 def test_structures_of_a_sweep_are_chosen_among_together(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "deck.ic").write_text(DECK, encoding="utf-8")
     out = str(tmp_path / "a.h5")

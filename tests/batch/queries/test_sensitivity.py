@@ -119,6 +119,7 @@ def test_a_pair_of_points_with_a_case_that_failed_is_left_out(tmp_path: Path) ->
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("vary", "spoilt", "why"), [
     ("vary links.lower.mass = [20, 30] kg;", False, "more varies than was drawn by `saltelli`"),
     ("", True, "not all cases of `saltelli` are there"),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 import ic
 from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import prepare
@@ -44,6 +46,7 @@ def test_what_comes_within_the_run_is_judged_and_not_warned_of(tmp_path: Path) -
     assert warned(tmp_path, "go") == []
 
 
+@pytest.mark.slow
 def test_what_has_not_come_by_the_end_is_warned_of_unless_that_is_late_enough(tmp_path: Path) -> None:
     [found] = warned(tmp_path, "other")
     assert (found.code, found.severity) == ("D341", "warning")

@@ -185,6 +185,7 @@ class TestThePage:
         self.all_told(Path("a.h5"), Path("b.h5"))
         self.all_told(Path("b.h5"), Path("a.h5"))
 
+    @pytest.mark.slow
     def test_says_what_the_deck_allows(self, here: Path) -> None:
         deck = archives.DECK.replace("duration = 4 s;", "duration = 4 s; tolerances { qd = 1e-6 rad/s; rel = 1e-9; }")
         batch.run(archives.compiled(here, "brief", deck=deck), output="a.h5")
@@ -200,6 +201,7 @@ class TestThePage:
         self.all_told(Path("a.h5"), Path("b.h5"))
         assert gathered(Path("a.h5"), Path("b.h5")).sections[0].changes[0].samples
 
+    @pytest.mark.slow
     def test_shows_the_lines_of_the_decks_that_differ(self, here: Path) -> None:
         deck = archives.DECK
         for name, text in (("a.h5", deck), ("b.h5", deck.replace("duration = 4 s;", "duration = 4.04 s;"))):
@@ -212,6 +214,7 @@ class TestThePage:
         assert '<li class="gone"><code>-run brief like nominal { duration = 4 s; }</code></li>' in source
         assert '<li class="new"><code>+run brief like nominal { duration = 4.04 s; }</code></li>' in source
 
+    @pytest.mark.slow
     def test_of_many_changes_folds_away_the_later_ones(self, here: Path, engine: None) -> None:
         one = plans.nominal()
         archives.made(here / "a.h5", one)
@@ -237,6 +240,7 @@ class TestThePage:
         one, other = (report(planted[1], name, against=planted[0]).read_bytes() for name in ("1.html", "2.html"))
         assert one == other
 
+    @pytest.mark.slow
     def test_is_that_of_the_archive_alone_without_another(self, planted: tuple[Path, Path]) -> None:
         source = report(planted[1], "1.html").read_text(encoding="utf-8")
         assert "What changed" not in source and '"against":null' in source
@@ -381,6 +385,7 @@ class TestTheSignals:
         alone = [each.case for each in found.histories if each.before is None]
         assert sorted(alone) == list(GONE)
 
+    @pytest.mark.slow
     def test_that_the_other_archive_has_of_other_joints_are_left_out(self, here: Path, engine: None) -> None:
         one = plans.gains(3)
         archives.made(here / "a.h5", replace(one, structure=replace(one.structure, record=one.structure.record[:2])))
@@ -410,6 +415,7 @@ class TestNames:
     def test_tell_the_two_apart(self, before: str, now: str, said: tuple[str, str]) -> None:
         assert sides.display_names(Path(before), Path(now)) == said
 
+    @pytest.mark.slow
     def test_stand_in_all_that_is_said(self, here: Path, engine: None) -> None:
         for folder in ("v1", "v2"):
             (here / folder).mkdir()
@@ -437,6 +443,7 @@ class TestTheCommand:
         assert cli.main(["report", *args]) == cli.BAD_INPUT
         return capsys.readouterr().err.removesuffix("\n1 error\n")
 
+    @pytest.mark.slow
     def test_refuses_a_tolerance_without_another_archive(
         self, planted: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
     ) -> None:
@@ -459,6 +466,7 @@ class TestTheCommand:
         assert not Path("b.html").exists()
 
 
+@pytest.mark.slow
 def test_says_which_cases_meet_a_requirement_whose_limit_is_another(here: Path) -> None:
     for name, limit in (("a.h5", "5 s"), ("b.h5", "1 us")):
         brief = "run brief like nominal { "

@@ -73,6 +73,7 @@ class TestTheVerdict:
         found = gathered(archives.made(here / "a.h5", replace(plans.gains(3), requirements=())))
         assert found.verdicts[0].ok and found.verdicts[0].headline == "All 3 cases reached their end"
 
+    @pytest.mark.slow
     def test_of_several_runs_is_one_each_in_their_order(self, here: Path, engine: None) -> None:
         found = gathered(archives.made(here / "a.h5", plans.nominal(), plans.gains(3)))
         assert [verdict.about for verdict in found.verdicts] == ["nominal", "gains"]
@@ -103,6 +104,7 @@ class TestTheDesignToUse:
             assert (found.steps > 0).sum() == designs.good.sum() == 16
             assert design_map(Designs(pools(file.groups)[0]), 0) is None
 
+    @pytest.mark.slow
     def test_is_not_asked_of_a_run_or_where_nothing_is_required(self, here: Path, engine: None) -> None:
         assert gathered(archives.made(here / "a.h5", plans.nominal())).sections[0].designs is None
         bare = replace(plans.gains(4), requirements=())
@@ -129,6 +131,7 @@ class TestWorstCases:
         assert worst.table.rows[0][:2] == ("#0", worst.table.rows[0][1])
         assert (0, 4) in worst.table.marked
 
+    @pytest.mark.slow
     def test_name_their_sweep_where_there_are_several(self, here: Path, engine: None) -> None:
         found = gathered(archives.made(here / "it is.h5", plans.nominal(), plans.gains(3)))
         worst = found.sections[1].worst
@@ -163,6 +166,7 @@ class TestBestCases:
         assert section.best.more == f"{int((margin > 0).sum()) - 5} more cases meet all."
         assert section.best.table.marked == frozenset()
 
+    @pytest.mark.slow
     def test_are_not_told_apart_where_none_is_good_or_few_are_there(self, here: Path, sweep: Path) -> None:
         assert gathered(sweep).sections[0].best is None
         assert gathered(archives.made(here / "b.h5", plans.gains(5))).sections[0].best is None
@@ -360,6 +364,7 @@ class TestSignals:
         ]
         assert found.histories[0].values[found.panels.index(qd)][:, 2:] == pytest.approx(0.03)
 
+    @pytest.mark.slow
     def test_are_in_the_deck_s_units(self, tmp_path: Path) -> None:
         deck = """#include <two_link.ic>
             run short like nominal {
@@ -374,6 +379,7 @@ class TestSignals:
         assert found.histories[0].values[0][0] == pytest.approx([30.0, -20.0])
         assert found.histories[0].values[1][0] == pytest.approx([3.0, 3.0, *[np.rad2deg(0.03)] * 2])
 
+    @pytest.mark.slow
     def test_of_another_archive_are_in_the_same_units(self, tmp_path: Path) -> None:
         deck = "#include <two_link.ic>\nrun short like nominal { duration = 0.2 s;  initial { q = %s; } }\n"
         for name, start in (("a", "0.5 rad"), ("b", "30 deg")):

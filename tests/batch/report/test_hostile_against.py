@@ -60,6 +60,7 @@ class TestAgainst:
         text = report("b.h5", against="a.h5").read_text(encoding="utf-8")
         assert "The two have no case in common" in text
 
+    @pytest.mark.slow
     def test_of_large_values_says_nothing_of_overflow(self, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         archives.made(here / "a.h5", plans.gains(3))
         told(monkeypatch, settle=[1e200])

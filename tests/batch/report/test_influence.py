@@ -65,6 +65,7 @@ def test_the_bars_of_a_tornado_go_from_the_mean_to_both_ends(tmp_path: Path) -> 
             assert width / wide == pytest.approx(abs(row.low - mean) / abs(row.high - mean), rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sweep", "count", "said"), [
     ("drawn", 40, ["Not enough cases to tell: 40; 64 at least."]), ("single", 0, []), ("few", 0, []),
 ])  # fmt: skip

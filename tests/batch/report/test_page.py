@@ -142,6 +142,7 @@ def test_the_same_archive_gives_the_same_bytes(here: Path, engine: None) -> None
     assert one == other
 
 
+@pytest.mark.slow
 def test_it_is_small_but_for_its_data(found: Report) -> None:
     source = page(found)
     data = sum(len(json.dumps(each)) for each in data_of(source))

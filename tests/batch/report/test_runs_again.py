@@ -70,6 +70,7 @@ def sent(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class TestWhatIsInIt:
+    @pytest.mark.slow
     def test_is_each_case_as_it_was_run_and_what_came_of_it(self, sent: Path) -> None:
         found = gathered(sent / "ways.h5").sections[0].simulation
         assert found is not None and found.said == ()
@@ -135,6 +136,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_another_archive_s_cases_are_there_under_the_numbers_of_this_one(compared: Path) -> None:
     with ArchiveFile(compared / "b.h5") as file, ArchiveFile(compared / "a.h5") as other:
         before = ComparedArchive(other, batch.diff(compared / "a.h5", compared / "b.h5"))

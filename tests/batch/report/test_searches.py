@@ -47,6 +47,7 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ).path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "heading", "link"),
     [("slowest", "The worst case found", "The worst case"), ("still", "Which design to use", "Which design")],

@@ -23,6 +23,7 @@ from tests.batch.begun import CASES, OF_TASK, begin, flip, go_on, plan, refused
 # The finished archive
 
 
+@pytest.mark.slow
 def test_nothing_is_missing(archive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plan_file.write(plan(), tmp_path / "p.json")
     words = ["run", str(tmp_path / "p.json"), "-o", str(archive), "--no-picture"]
@@ -131,6 +132,7 @@ def test_what_is_killed_while_its_folder_is_removed_is_tidied_up(archive: Path, 
     go_on(archive)
 
 
+@pytest.mark.slow
 def test_what_another_campaign_has_begun_is_not_tidied_up(archive: Path, undisturbed: bytes) -> None:
     """As where somebody goes back to the deck before, for a look at its archive."""
     go_on(archive)
@@ -251,6 +253,7 @@ def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Disk]:
     found.unmount()
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_up_while_cases_are_run(disk: Disk, undisturbed: bytes) -> None:
     archive = disk.folder / "a.h5"
     assert refused(archive, executor=whole.Watched(after=2, then=disk.fill)) == (
@@ -267,6 +270,7 @@ def test_a_disk_that_fills_up_while_cases_are_run(disk: Disk, undisturbed: bytes
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_up_while_shards_are_merged(disk: Disk, undisturbed: bytes) -> None:
     archive = disk.folder / "a.h5"
     assert refused(archive, executor=whole.Watched(after=CASES // OF_TASK, then=disk.fill)) == (
@@ -293,6 +297,7 @@ def test_a_disk_that_is_still_full_takes_nothing_away(archive: Path, monkeypatch
     assert whole.shards(archive) == kept
 
 
+@pytest.mark.slow
 def test_room_is_asked_for_what_is_missing_alone(
     archive: Path, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -306,6 +311,7 @@ def test_room_is_asked_for_what_is_missing_alone(
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_nothing_is_missing_on_a_full_disk(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     go_on(archive)
     monkeypatch.setattr(shutil, "disk_usage", room(0))

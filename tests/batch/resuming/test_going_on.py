@@ -47,6 +47,7 @@ def test_going_on_again_and_again(archive: Path, undisturbed: bytes) -> None:
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_the_last_shards_alone_are_enough(archive: Path, undisturbed: bytes) -> None:
     kept = begin(archive)
     first = min(kept)
@@ -164,6 +165,7 @@ def test_a_shard_that_is_damaged_after_it_was_counted(archive: Path, undisturbed
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_a_shard_that_is_damaged_before_histories_are_chosen(archive: Path) -> None:
     shards = whole.folder_of(archive).shards
     name = "0-000000008-000000016"

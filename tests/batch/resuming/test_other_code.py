@@ -65,6 +65,7 @@ class TestOfBeforeKeysHadAVersion:
             self.kept = begin(archive)
         assert self.kept
 
+    @pytest.mark.slow
     def test_it_goes_on(self, archive: Path, undisturbed: bytes) -> None:
         rest, _ = go_on(archive)
         assert rest.cases == CASES - OF_TASK * len(self.kept)
@@ -74,6 +75,7 @@ class TestOfBeforeKeysHadAVersion:
         another_constant(monkeypatch)
         assert "changed since: MET's own models or code" in refused(archive)
 
+    @pytest.mark.slow
     def test_it_goes_on_in_processes(self, archive: Path, undisturbed: bytes) -> None:
         batch.run(plan(), output=archive, processes=2)
         assert archive.read_bytes() == undisturbed

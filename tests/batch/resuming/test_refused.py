@@ -29,6 +29,7 @@ sweep it of brief {
 # Two at once
 
 
+@pytest.mark.slow
 def test_a_second_driver_is_refused(archive: Path, undisturbed: bytes) -> None:
     said = []
     executor = whole.Watched(after=2, then=lambda: said.append(refused(archive)))
@@ -177,6 +178,7 @@ def test_whose_histories_are_kept_may_change_on_the_way(archive: Path) -> None:
         assert data.sizes["recorded_case"] == 4
 
 
+@pytest.mark.slow
 def test_starting_over_says_what_it_removes(archive: Path, here: Path) -> None:
     kept = begin(archive, compiled(here))
     changed = compiled(here, ("0.040", "0.050"))
@@ -186,6 +188,7 @@ def test_starting_over_says_what_it_removes(archive: Path, here: Path) -> None:
     assert archive.read_bytes() == alone.read_bytes()
 
 
+@pytest.mark.slow
 def test_starting_over_where_nothing_was_begun(archive: Path, undisturbed: bytes) -> None:
     go_on(archive)
     rest, notes = go_on(archive, fresh=True)

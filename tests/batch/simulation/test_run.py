@@ -33,6 +33,7 @@ def of_archive(text: str, sweep: str, run: str, where: Path, **options: Any) -> 
 
 
 class TestLikeAnArchive:
+    @pytest.mark.slow
     def test_lists_in_step_give_what_an_archive_of_the_zip_holds(self, arm: batch.Simulation, tmp_path: Path) -> None:
         data = arm.run({"gearbox.kp": [0.01, 0.02, 0.03], "load": ["10 kg", "20000 g", 30]}, histories=True)
         xarray.testing.assert_identical(data, of_archive(ARM, "in_step", "reach", tmp_path))
@@ -65,11 +66,13 @@ class TestLikeAnArchive:
         wanted.attrs |= {"experiment": name, "deck": f"<{deck}>"}
         xarray.testing.assert_identical(sim.run(values, product=True, histories=True), wanted)
 
+    @pytest.mark.slow
     def test_noise_is_that_of_the_decks_seed_and_repeats(self, tmp_path: Path) -> None:
         data = batch.Simulation(text=NOISY, run="noisy").run({"gearbox.kp": [0.01, 0.02]}, repeat=3, histories=True)
         xarray.testing.assert_identical(data, of_archive(NOISY, "repeated", "noisy", tmp_path))
         assert len(np.unique(data.qd.values[:3, -1, 0])) == 3
 
+    @pytest.mark.slow
     def test_without_values_it_is_the_run_of_the_deck(self, arm: batch.Simulation, tmp_path: Path) -> None:
         xarray.testing.assert_identical(arm.run(histories=True), of_archive(ARM, "reach", "reach", tmp_path))
 
@@ -419,6 +422,7 @@ class TestWhichRun:
         sim = batch.Simulation("two_link.ic", set="duration=1 s")
         assert sim.experiment.structure.schedule.duration == 1.0
 
+    @pytest.mark.slow
     def test_what_is_given_comes_before_what_is_set(self) -> None:
         sim = batch.Simulation(text=ARM, run="reach", set={"gearbox.kp": "0.03 V*s/rad", "load": "5 kg"})
         data = sim.run({"gearbox.kp": [0.01, 0.02], "load": 25})

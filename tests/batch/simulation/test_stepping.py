@@ -86,6 +86,7 @@ class TestSameAsARun:
                 compared += 1
         assert compared == 40 and not state.failed
 
+    @pytest.mark.slow
     def test_commands_that_change_give_the_bits_of_a_table(self) -> None:
         sim = batch.Simulation(text=TABLES, run="swing")
         state = sim.start(commands="shoulder")
@@ -98,6 +99,7 @@ class TestSameAsARun:
             np.testing.assert_array_equal([each[name] for each in seen], data[name].values[0])
         assert np.ptp(data.qd.values[0, :, 0]) > 0.01
 
+    @pytest.mark.slow
     def test_a_command_may_be_of_another_kind_than_the_decks(self) -> None:
         state = batch.Simulation(text=TABLES, run="swing").start(commands={"shoulder": "torque"})
         while not state.done:
@@ -106,6 +108,7 @@ class TestSameAsARun:
         np.testing.assert_allclose(state.seen.q, data.q.values[0, -1], rtol=1e-12)
         assert abs(state.seen.q[0]) > 1e-3
 
+    @pytest.mark.slow
     def test_noise_and_what_sensors_read_are_those_of_the_repeat(self) -> None:
         sim = batch.Simulation(text=NOISY, run="noisy")
         data = sim.run({"shoulder.servo.command.value": 0.03}, repeat=3, histories=True)
@@ -222,6 +225,7 @@ NEGATIVE = "link `upper` must be at least 0 kg; case #0 breaks it"
 
 
 class TestWhatIsRefused:
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("run", "asked", "code", "said"),
         [

@@ -78,6 +78,7 @@ DIFF = (
 )
 
 
+@pytest.mark.slow
 def test_the_change_is_shown_and_written_only_when_it_is_asked_for(
     archive: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -93,6 +94,7 @@ def test_the_change_is_shown_and_written_only_when_it_is_asked_for(
     assert f"kp = {kp} V*s/rad;  ki = {ki} V/rad;" in Path("arm.ic").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_deck_that_is_written_gives_the_numbers_of_the_chosen_design(
     archive: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -107,6 +109,7 @@ def test_the_deck_that_is_written_gives_the_numbers_of_the_chosen_design(
     assert float(new["settle"].values[0]) == float(swept["settle"].values[here.values][0])
 
 
+@pytest.mark.slow
 def test_windows_line_ends_are_kept(archive: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path("arm.ic").write_bytes(DECK.replace("\n", "\r\n").encode())
     assert said(capsys, archive, "--write")[0] == 0
@@ -114,6 +117,7 @@ def test_windows_line_ends_are_kept(archive: str, capsys: pytest.CaptureFixture[
     assert b"// chosen of 25" in data and data.count(b"\r\n") == data.count(b"\n") == DECK.count("\n")
 
 
+@pytest.mark.slow
 def test_a_copy_is_a_new_file(archive: str, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = said(capsys, archive, "--write", "-o", "tuned.ic")
     assert status == 0 and out.endswith("\ntuned.ic: written; it changes arm\n")
@@ -149,6 +153,7 @@ def test_a_deck_that_is_another_now_is_left_alone(archive: str, capsys: pytest.C
     assert said(capsys, archive, "--write") == (2, "", GONE)
 
 
+@pytest.mark.slow
 def test_a_deck_of_met_is_not_written_to(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -175,6 +180,7 @@ def test_a_choice_among_words_is_left_to_its_author(archive: str, capsys: pytest
     )
 
 
+@pytest.mark.slow
 def test_what_was_set_for_the_archive_must_be_in_the_deck_first(
     archive: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -189,6 +195,7 @@ def test_what_was_set_for_the_archive_must_be_in_the_deck_first(
     )
 
 
+@pytest.mark.slow
 def test_where_no_design_is_good_none_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -202,6 +209,7 @@ def test_where_no_design_is_good_none_is_written(
     assert Path("arm.ic").read_text(encoding="utf-8") == deck
 
 
+@pytest.mark.slow
 def test_a_table_that_the_sweep_takes_values_from_is_part_of_its_deck(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -21,6 +21,7 @@ sweep some of short { vary gearbox.kp = [0.01, 0.02, 0.03] V*s/rad; }
 """
 
 
+@pytest.mark.slow
 def test_the_case_that_it_offers_to_run_again_is_one_of_the_archive(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

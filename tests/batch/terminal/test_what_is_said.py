@@ -91,6 +91,7 @@ class TestWhatIsSaid:
         )
         assert (here / "two_link.png").read_bytes() == b"\x89PNG mine"
 
+    @pytest.mark.slow
     def test_a_metric_without_a_value_is_not_called_a_failure(
         self, here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
     ) -> None:

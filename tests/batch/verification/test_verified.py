@@ -78,6 +78,7 @@ def test_the_first_the_last_the_worst_and_some_by_the_seed_are_chosen_of_those_t
 # What is kept
 
 
+@pytest.mark.slow
 def test_what_is_kept_is_what_the_refined_experiments_give(sweep: Plan, tmp_path: Path) -> None:
     archive = batch.run(sweep, output=tmp_path / "a.h5", verify="all")
     [of] = sweep.experiments
@@ -93,6 +94,7 @@ def test_what_is_kept_is_what_the_refined_experiments_give(sweep: Plan, tmp_path
             np.testing.assert_allclose(values[:, column], metrics[name], rtol=1e-13)
 
 
+@pytest.mark.slow
 def test_the_campaign_has_the_same_bytes_with_and_without(sweep: Plan, tmp_path: Path) -> None:
     bare = batch.run(sweep, output=tmp_path / "a.h5", verify="none").path
     verified = batch.run(sweep, output=tmp_path / "b.h5", verify="some").path
@@ -103,6 +105,7 @@ def test_the_campaign_has_the_same_bytes_with_and_without(sweep: Plan, tmp_path:
         assert file.groups[0].verified is None and figures(file.groups[0]) is None
 
 
+@pytest.mark.slow
 def test_a_campaign_that_was_interrupted_or_run_in_processes_is_verified_alike(
     sweep: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -117,6 +120,7 @@ def test_a_campaign_that_was_interrupted_or_run_in_processes_is_verified_alike(
     assert resumed.read_bytes() == wanted
 
 
+@pytest.mark.slow
 def test_the_command_has_three_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "d.ic").write_text(SWEEP)
@@ -131,6 +135,7 @@ def test_the_command_has_three_words(tmp_path: Path, monkeypatch: pytest.MonkeyP
         batch.run(ic.compile("d.ic", select=["gain"]), verify="much")  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_an_archive_is_whole_for_whoever_asks_for_the_same(sweep: Plan, tmp_path: Path) -> None:
     def written() -> int:
         return (tmp_path / "a.h5").stat().st_mtime_ns
@@ -143,6 +148,7 @@ def test_an_archive_is_whole_for_whoever_asks_for_the_same(sweep: Plan, tmp_path
     assert written() != first
 
 
+@pytest.mark.slow
 def test_what_is_damaged_is_told(sweep: Plan, tmp_path: Path) -> None:
     archive = batch.run(sweep, output=tmp_path / "a.h5", verify="some").path
 

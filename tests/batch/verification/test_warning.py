@@ -49,6 +49,7 @@ def changed(path: Path, change: Callable[[h5py.Group], None]) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_margin_below_the_error(tmp_path: Path) -> None:
     plan = planned(tmp_path)
     path = batch.run(plan, output=tmp_path / "a.h5", verify="some").path
@@ -64,6 +65,7 @@ def test_a_margin_below_the_error(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_one_that_the_run_allows_is_not_given(tmp_path: Path) -> None:
     plan = planned(tmp_path, DECK.replace("0.0721 rad;", '0.0721 rad; allow D310 because "the limit is soft";'))
     given = ic.check(tmp_path / "d.ic").diagnostics
@@ -75,6 +77,7 @@ def test_one_that_the_run_allows_is_not_given(tmp_path: Path) -> None:
         assert "D310, because the limit is soft" in show(file, plots=False)
 
 
+@pytest.mark.slow
 def test_the_step_that_is_named_would_do(tmp_path: Path) -> None:
     """At the rate that the warning names, there is none, and the metric is nearer to the truth than the margin was."""
     refined = DECK.replace("duration", "rates { dynamics = 100 Hz; servos = 100 Hz; record = 25 Hz; } duration")
@@ -93,6 +96,7 @@ def file_error(file: ArchiveFile) -> float:
     return summary.verified.metrics["turn"].error
 
 
+@pytest.mark.slow
 def test_a_limit_that_is_far_warns_of_nothing(tmp_path: Path) -> None:
     plan = planned(tmp_path, DECK.replace("0.0721", "0.09"))
     assert warned(batch.run(plan, output=tmp_path / "a.h5", verify="some").path, plan) == []
@@ -118,6 +122,7 @@ def test_what_is_turned_round_by_another_step_is_told_of_the_worst_case(tmp_path
     )
 
 
+@pytest.mark.slow
 def test_a_metric_that_changes_with_the_step_and_not_as_the_integrator_does(tmp_path: Path) -> None:
     plan = planned(tmp_path, DECK.replace("    require turn < 0.0721 rad;\n", ""))
     path = batch.run(plan, output=tmp_path / "a.h5", verify="some").path
@@ -137,6 +142,7 @@ def test_a_metric_that_changes_with_the_step_and_not_as_the_integrator_does(tmp_
     assert found.help == ("it is not known which step would do; `rates { dynamics = 100 Hz; }` shows more of it",)
 
 
+@pytest.mark.slow
 def test_a_large_change_is_told_although_the_integrator_explains_it(tmp_path: Path) -> None:
     plan = planned(tmp_path, DECK.replace("    require turn < 0.0721 rad;\n", ""))
     path = batch.run(plan, output=tmp_path / "a.h5", verify="some").path
@@ -154,6 +160,7 @@ def test_a_large_change_is_told_although_the_integrator_explains_it(tmp_path: Pa
     assert found.help == ("`rates { dynamics = 100 Hz; }` would do, for an error below 1 %",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "said", "rate"), [("half", "half", 50), ("quarter", "a quarter", 100)])
 def test_a_case_that_fails_with_a_shorter_step(tmp_path: Path, share: str, said: str, rate: int) -> None:
     plan = planned(tmp_path, DECK.replace("0.0721", "0.09"), "gain")
@@ -192,6 +199,7 @@ def test_a_case_that_fails_with_a_shorter_step_is_none_of_the_campaign_s_failure
     assert [each.code for each in warned(archive.path)] == ["D312"]
 
 
+@pytest.mark.slow
 def test_people_and_programs_are_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

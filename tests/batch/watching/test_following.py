@@ -52,6 +52,7 @@ def doubles(text: object) -> list[float]:
     return found
 
 
+@pytest.mark.slow
 def test_each_save_is_a_new_page_with_the_cases_that_met_run_has(tmp_path: Path) -> None:
     deck = write_deck(tmp_path)
     with viewing(deck, *WATCHED) as view:
@@ -77,6 +78,7 @@ def test_each_save_is_a_new_page_with_the_cases_that_met_run_has(tmp_path: Path)
         assert doubles(of_deck["metrics"][0]) != doubles(of_file["metrics"][0])
 
 
+@pytest.mark.slow
 def test_a_mistake_is_told_as_met_check_tells_it_beside_the_page_until_it_is_mended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -94,6 +96,7 @@ def test_a_mistake_is_told_as_met_check_tells_it_beside_the_page_until_it_is_men
         assert (state["broken"], state["messages"]) == (False, "")
 
 
+@pytest.mark.slow
 def test_what_changes_no_number_changes_no_page(tmp_path: Path) -> None:
     deck = write_deck(tmp_path)
     with viewing(deck, *WATCHED) as view:
@@ -104,6 +107,7 @@ def test_what_changes_no_number_changes_no_page(tmp_path: Path) -> None:
         assert (view.state["page"], view.state["numbers"]) == (1, 1)
 
 
+@pytest.mark.slow
 def test_a_file_that_was_missing_is_noticed_when_it_comes(tmp_path: Path) -> None:
     deck = write_deck(tmp_path)
     (tmp_path / "length.ic").rename(tmp_path / "away")
@@ -117,6 +121,7 @@ def test_a_file_that_was_missing_is_noticed_when_it_comes(tmp_path: Path) -> Non
 SEVERAL = DECK.replace("default ", "") + "sweep ways of brief { vary integrator = [modified_euler, rk4]; }\n"
 
 
+@pytest.mark.slow
 def test_of_several_runs_one_is_chosen_on_the_page_or_named(tmp_path: Path) -> None:
     deck = write_deck(tmp_path, SEVERAL)
     with viewing(deck, *WATCHED) as view:
@@ -136,6 +141,7 @@ def test_of_several_runs_one_is_chosen_on_the_page_or_named(tmp_path: Path) -> N
         assert view.whole(page=1)["run"] == "tuned"
 
 
+@pytest.mark.slow
 def test_what_is_set_on_the_command_line_counts_each_time(tmp_path: Path) -> None:
     deck = write_deck(tmp_path)
     with viewing(deck, "brief", "--vary", "gearbox.kp=[0.01, 0.02] V*s/rad", "-D", "SPARE", *WATCHED) as view:
@@ -145,6 +151,7 @@ def test_what_is_set_on_the_command_line_counts_each_time(tmp_path: Path) -> Non
         assert len(view.numbers()["status"]) == 2
 
 
+@pytest.mark.slow
 def test_of_many_cases_the_first_are_shown_and_run(tmp_path: Path) -> None:
     deck = write_deck(tmp_path, DECK.replace("[0.005, 0.01, 0.02] V", "linspace(0.005, 0.02, 600) V"))
     with viewing(deck, *WATCHED) as view:
@@ -169,6 +176,7 @@ default sweep damped of it { vary environment.drag.sliding = [50, 220] N*s/m; }
 """
 
 
+@pytest.mark.slow
 def test_cases_that_fail_are_told_with_their_cause(tmp_path: Path) -> None:
     deck = write_deck(tmp_path, FAILING)
     with viewing(deck, *WATCHED) as view:
@@ -183,6 +191,7 @@ def test_cases_that_fail_are_told_with_their_cause(tmp_path: Path) -> None:
 SEARCH = DECK + "search hardest of brief { gearbox.kp = between(0.005, 0.02) V*s/rad; maximise volts; at_most = 20; }\n"
 
 
+@pytest.mark.slow
 def test_what_met_check_says_at_the_start_stands_in_the_terminal_too(tmp_path: Path) -> None:
     deck = write_deck(tmp_path, DECK.replace("volts < 3.55 V", "vols < 3.55 V"))
     with viewing("deck.ic", "brief", cwd=tmp_path) as view:
@@ -196,6 +205,7 @@ def test_what_met_check_says_at_the_start_stands_in_the_terminal_too(tmp_path: P
     assert found.startswith("error[D") and "deck.ic:6:13" in found and found.count("error[") == 1
 
 
+@pytest.mark.slow
 def test_of_a_search_it_is_said_that_its_cases_are_not_known_yet(tmp_path: Path) -> None:
     write_deck(tmp_path, SEARCH)
     with viewing("deck.ic", "hardest", *WATCHED, cwd=tmp_path) as view:
@@ -207,6 +217,7 @@ def test_of_a_search_it_is_said_that_its_cases_are_not_known_yet(tmp_path: Path)
         )
 
 
+@pytest.mark.slow
 def test_a_deck_that_has_no_run_says_so_on_the_page(tmp_path: Path) -> None:
     (tmp_path / "deck.ic").write_text("let a = 1 m;\n")
     with viewing(tmp_path / "deck.ic", *WATCHED) as view:
@@ -252,6 +263,7 @@ run spun {
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 12])
 def test_a_save_ends_a_long_case_of_the_deck_before_it(tmp_path: Path, count: int) -> None:
     (tmp_path / "deck.ic").write_text(
@@ -308,6 +320,7 @@ def test_a_defect_is_told_in_terminal_and_page_and_the_next_save_is_shown(
     loop.give_up(60)
 
 
+@pytest.mark.slow
 def test_two_views_of_one_deck_and_two_pages_of_one_view_follow_it(tmp_path: Path) -> None:
     deck = write_deck(tmp_path)
     with viewing(deck, *WATCHED) as one, viewing(deck, "brief", *WATCHED) as other:
@@ -322,6 +335,7 @@ def test_two_views_of_one_deck_and_two_pages_of_one_view_follow_it(tmp_path: Pat
         assert [view.state["run"] for view in views] == ["tuned", "brief", "tuned"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 0), (signal.SIGTERM, 143), (signal.SIGHUP, -1)])
 def test_it_ends_when_it_is_told_to_without_a_word(tmp_path: Path, sent: signal.Signals, status: int) -> None:
     deck = write_deck(tmp_path)
@@ -332,6 +346,7 @@ def test_it_ends_when_it_is_told_to_without_a_word(tmp_path: Path, sent: signal.
         assert (out, err, view.process.returncode) == ("", "", status)
 
 
+@pytest.mark.slow
 def test_it_ends_with_its_terminal(tmp_path: Path) -> None:
     deck = write_deck(tmp_path)
     terminal, own = pty.openpty()
@@ -349,6 +364,7 @@ def test_it_ends_with_its_terminal(tmp_path: Path) -> None:
         assert process.wait(60) == -signal.SIGHUP
 
 
+@pytest.mark.slow
 def test_killed_in_the_middle_it_leaves_nothing_and_its_port_is_free(tmp_path: Path) -> None:
     deck = write_deck(tmp_path, DECK.replace("[0.005, 0.01, 0.02] V", "linspace(0.005, 0.02, 500) V"))
     work = tmp_path / "tmp"
@@ -367,6 +383,7 @@ def test_killed_in_the_middle_it_leaves_nothing_and_its_port_is_free(tmp_path: P
 # Mistakes of usage
 
 
+@pytest.mark.slow
 def test_a_port_that_is_taken_is_a_mistake_that_is_told(tmp_path: Path) -> None:
     deck = write_deck(tmp_path)
     with socket.socket() as taken:

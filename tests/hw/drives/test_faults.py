@@ -27,6 +27,7 @@ def through(folder: Path, dialect: str, kind: str, exchanges: int) -> tuple[Tall
     return tally, spoiler
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("kind", FAULTS)
 def test_no_wrong_answer_is_taken(tmp_path: Path, dialect: str, kind: str) -> None:
@@ -44,6 +45,7 @@ def test_no_wrong_answer_of_two_thousand_is_taken(tmp_path: Path, dialect: str, 
     assert tally.wrong == 0, tally
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dialect", "fault"),
     [

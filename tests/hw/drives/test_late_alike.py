@@ -56,6 +56,7 @@ def through(folder: Path, dialect: str, told: DriveCommand, late: float, seed: i
     return tally
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("told", ["voltage", "rate"])
 @pytest.mark.parametrize("late", LATE)
 @pytest.mark.parametrize("exchanges", [300, pytest.param(2000, marks=pytest.mark.slow)])
@@ -66,6 +67,7 @@ def test_odrives_that_are_late_alike_are_not_taken_for_new(
     assert tally.answered > exchanges / 2 and tally.wrong == 0, tally
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dialect", OTHERS)
 @pytest.mark.parametrize("late", [2e-3, 2.5e-3, 3e-3])
 @pytest.mark.parametrize("exchanges", [200, pytest.param(1000, marks=pytest.mark.slow)])

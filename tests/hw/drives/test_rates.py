@@ -55,6 +55,7 @@ def experiment(folder: Path, name: str) -> Experiment:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dialect", TOLD)
 def test_the_drive_brings_its_shaft_to_the_rate_that_it_is_told(tmp_path: Path, dialect: str) -> None:
     bed, played, line = bed_of(tmp_path, dialect)
@@ -160,6 +161,7 @@ def through(folder: Path, dialect: str, kind: str, exchanges: int) -> tuple[Tall
     return tally, spoiler
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dialect", TOLD)
 @pytest.mark.parametrize("kind", FAULTS)
 @pytest.mark.parametrize("exchanges", [400, pytest.param(2000, marks=pytest.mark.slow)])
@@ -251,6 +253,7 @@ def test_a_mode_that_does_not_reach_an_odrive_is_not_that_of_the_session_before(
         assert drive.state == 8 and drive.mode == 1 and played.shaft.rate == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dialect", TOLD)
 @pytest.mark.parametrize("by", ["fault", "host", "silence"])
 def test_a_drive_that_has_stopped_keeps_no_rate_that_it_was_told(tmp_path: Path, dialect: str, by: str) -> None:
@@ -322,6 +325,7 @@ def test_a_dialect_that_is_told_no_rate_is_refused_at_the_bench_s_file(tmp_path:
     )
 
 
+@pytest.mark.slow
 def test_a_bench_weaker_than_the_deck_s_motor_is_told_at_its_torque(tmp_path: Path) -> None:
     path = bench_file(tmp_path)
     weak, bench = (
@@ -345,6 +349,7 @@ def test_a_bench_weaker_than_the_deck_s_motor_is_told_at_its_torque(tmp_path: Pa
     assert not any("N*m at most" in each.message for each in bench.warnings)
 
 
+@pytest.mark.slow
 def test_a_drive_weaker_than_the_deck_s_motor_by_its_own_limits_is_told_when_it_is_greeted(tmp_path: Path) -> None:
     path, played = bench_file(tmp_path), played_bench()
     drive = played.drive

@@ -64,6 +64,7 @@ def test_lines_that_move_and_other_names_of_definitions_ask_for_nothing_new() ->
     assert_same(compiled, plain(moved), moved)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "anew"),
     [
@@ -102,6 +103,7 @@ def test_a_remedy_that_is_not_known_is_found_for_a_fault_that_is() -> None:
     assert_same(again, first, deck)
 
 
+@pytest.mark.slow
 def test_motors_on_beds_and_all_else_of_a_shipped_deck_are_looked_into_once() -> None:
     deck = (LIBRARY / "two_link.ic").read_text()
     _, known, anew = audited(deck, {})
@@ -134,6 +136,7 @@ def test_equal_runs_are_looked_into_once() -> None:
     assert anew == len(audited(DECK, {})[1])
 
 
+@pytest.mark.slow
 def test_after_any_edits_answers_that_were_brought_along_make_no_difference() -> None:
     known: Mapping[bytes, Any] = {}
     for now in typed(DECK, random.Random(5), 12):

@@ -126,6 +126,7 @@ def test_while_a_line_cannot_be_read_what_is_known_of_other_runs_counts() -> Non
     assert units[1] < units[0]
 
 
+@pytest.mark.slow
 def test_findings_of_what_is_no_more_are_not_kept() -> None:
     _, known = found(ARM + RUN, {})
     sizes = []
@@ -152,6 +153,7 @@ def test_nor_does_a_deck_whose_file_is_not_there_yet() -> None:
     assert known == {}
 
 
+@pytest.mark.slow
 def test_after_any_edits_what_was_brought_along_makes_no_difference() -> None:
     compare(ARM + RUN, 1, 40)
 
@@ -162,6 +164,7 @@ def test_after_any_edits_of_a_shipped_deck_what_was_brought_along_makes_no_diffe
     compare((LIBRARY / name).read_text(), 7, 30)
 
 
+@pytest.mark.slow
 def test_what_is_told_first_is_told_in_the_end() -> None:
     for now in typed(ARM + RUN, random.Random(2), 12):
         errors = {each for each in checked(now) if each.severity == "error"}

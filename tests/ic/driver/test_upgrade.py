@@ -72,6 +72,7 @@ def meaning(path: str) -> object:
     return [(each.name, placeless(each.parameters), placeless(each.structure)) for each in plan.experiments], keys
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("before", "after"), [
     ("let reach = 1 m;\n", "deck 2;\n\nlet reach = 1 m;\n"),
     ("// a: an arm\n\nlet reach = 1 m;\n", "// a: an arm\n\ndeck 2;\n\nlet reach = 1 m;\n"),
@@ -216,6 +217,7 @@ def test_standard_decks_can_be_upgraded(name: str, folder: Path, capsys: pytest.
     assert meaning("a.ic") == before == meaning(str(LIBRARY / name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_random_decks_with_values_that_are_called_as_units_are_keep_their_plans(
     seed: int, capsys: pytest.CaptureFixture[str]

@@ -140,6 +140,7 @@ def test_a_long_line_has_its_remark_above_and_keeps_one(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("si", [0.1, 1 / 3, 0.30000000000000004, 1e-5, 0.05 * (1 + 2**-52), 123456.789])
 def test_the_deck_written_means_what_set_does_to_the_bit(si: float, tmp_path: Path) -> None:
     found = made(tmp_path, ("base_drive.kp", si, "V*s/rad"))
@@ -156,6 +157,7 @@ def test_a_value_that_does_not_change_keeps_its_text(tmp_path: Path) -> None:
     assert changed(text, found.text) == ["let whole = 4;    // chosen of 9: many, a.h5"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("si", "text"), [(4.0, "4"), (0.0, "0"), (2.5, "2.5"), (1e9, "1000000000.0")])
 def test_whole_numbers_are_written_as_a_deck_would(si: float, text: str, tmp_path: Path) -> None:
     deck = ARM.replace("let slow", "let soft = 1;\nlet slow").replace("mass = 2 kg", "mass = 2 kg + 1 kg * soft")

@@ -100,6 +100,7 @@ def test_nothing_is_told_again_where_no_more_is_found() -> None:
     assert len(replies(DECK.replace("sweep spares", "// sweep spares"), 2 * EARLY)) == 2
 
 
+@pytest.mark.slow
 def test_an_audit_takes_along_what_the_last_one_found_also_where_it_was_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(checking, "DEAR", -1.0)  # everything is dear
     monkeypatch.setattr(checking, "EARLY", math.inf)  # on a machine of any speed
@@ -181,6 +182,7 @@ def messages(reply: CheckReply | None) -> list[str]:
     return [each.message for each in reply.diagnostics]
 
 
+@pytest.mark.slow
 def test_errors_of_definitions_stand_alone_and_once_mended_the_last_audit_counts_again() -> None:
     last = LastAudit()
     assert messages(last.carried_into(definitions(QUIET))) == []
@@ -192,6 +194,7 @@ def test_errors_of_definitions_stand_alone_and_once_mended_the_last_audit_counts
     assert messages(last.carried_into(definitions(QUIET))) == [NO_NOISE]
 
 
+@pytest.mark.slow
 def test_what_an_audit_said_goes_with_its_line_and_with_an_audit_that_does_not_say_it() -> None:
     last = LastAudit()
     last.carried_into(definitions(QUIET))
@@ -205,6 +208,7 @@ def test_what_an_audit_said_goes_with_its_line_and_with_an_audit_that_does_not_s
     assert messages(last.carried_into(definitions(QUIET))) == []
 
 
+@pytest.mark.slow
 def test_where_an_audit_dies_what_the_last_one_said_is_taken_back() -> None:
     last = LastAudit()
     last.carried_into(definitions(QUIET))
@@ -228,6 +232,7 @@ class GivenReplies(CheckerProcess):
             yield each
 
 
+@pytest.mark.slow
 def test_a_file_of_values_belongs_to_its_deck_also_while_a_check_has_not_come_to_it(tmp_path: Path) -> None:
     deck = OpenText((tmp_path / "arm.ic").as_uri(), "", 1)
     partial = CheckReply((), (), {"arm.ic": ""}, audited=False)

@@ -38,6 +38,7 @@ def related(found: Any) -> list[str]:
     return [each["message"] for each in found["relatedInformation"]]
 
 
+@pytest.mark.slow
 def test_a_mistake_is_shown_in_the_words_of_met_check_until_it_is_mended(tmp_path: Path, editor: Editor) -> None:
     deck = tmp_path / "arm.ic"
     deck.write_text(BAD)
@@ -132,6 +133,7 @@ def test_a_mistake_in_a_macro_is_shown_where_it_is_used_with_the_way_there(tmp_p
     assert "note: in expansion of macro LONG" in related(found)
 
 
+@pytest.mark.slow
 def test_an_editor_that_shows_nothing_related_has_the_help_in_the_message(tmp_path: Path) -> None:
     deck = tmp_path / "arm.ic"
     for given in ({"related": False}, {"options": {"helpInMessage": True}}):
@@ -142,6 +144,7 @@ def test_an_editor_that_shows_nothing_related_has_the_help_in_the_message(tmp_pa
             assert not found.get("relatedInformation")
 
 
+@pytest.mark.slow
 def test_folders_and_macros_are_taken_from_the_command_line_and_from_the_editor(tmp_path: Path) -> None:
     (tmp_path / "one").mkdir()
     (tmp_path / "two").mkdir()
@@ -196,6 +199,7 @@ def test_a_checker_that_dies_is_told_in_the_log_and_started_again(tmp_path: Path
     assert editor.of(deck) == []
 
 
+@pytest.mark.slow
 def test_a_crash_in_a_check_is_told_in_the_log_and_the_server_lives_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -224,6 +228,7 @@ def test_a_crash_in_a_check_is_told_in_the_log_and_the_server_lives_on(
         assert editor.of(deck) == []
 
 
+@pytest.mark.slow
 def test_met_lsp_without_pygls_says_how_to_install_it(tmp_path: Path) -> None:
     hidden = "u.find_spec = lambda name, *more: None if name == 'pygls' else find(name, *more)\n"
     hidden = f"import importlib.util as u\nfind = u.find_spec\n{hidden}"

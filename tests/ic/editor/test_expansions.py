@@ -60,6 +60,7 @@ def test_a_body_has_the_entries_of_the_block_that_it_is_of() -> None:
     assert {"model", "command", "rate"} <= set(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", ["X X", "X(X)", "Y", "Y(1) Y(2)", "{ X", "} X {", "X " * 40])
 def test_macros_that_use_themselves_end(body: str) -> None:
     text = f"#define X {body}\n#define Y(A) X Z(A) Z(A)\n#define Z(A) {'Y(A) ' * 40}\nX\nY(1)\nX(2) {{ Y( }}\n"

@@ -10,6 +10,7 @@ from concurrent.futures import Future
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+import pytest
 from lsprotocol import types
 from pygls.workspace import Workspace
 
@@ -33,6 +34,7 @@ def futures() -> int:
     return sum(issubclass(type(each), Future) for each in gc.get_objects())
 
 
+@pytest.mark.slow
 def test_of_a_thousand_changes_of_a_text_none_is_kept() -> None:
     server = make()
     server.protocol._workspace = Workspace(None)
@@ -80,6 +82,7 @@ def structures() -> int:
     return sum(type(each) is DeckText for each in gc.get_objects())
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_number_of_edits(tmp_path: Path) -> None:
     uri = (tmp_path / "arm.ic").as_uri()
 

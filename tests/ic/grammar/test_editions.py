@@ -64,6 +64,7 @@ def test_a_deck_that_says_its_edition_has_the_tree_of_one_that_does_not(edition:
     assert same(desk, f"// one\ndeck {edition};\n{text}", text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in units.ALL_UNITS if name.isalpha()])
 def test_in_edition_2_every_name_of_a_unit_may_name_a_value(name: str, tmp_path: Path) -> None:
     text = f"deck 2;\nlet {name} = 3;\nlet twice = 2 * {name};\nlet power = {name}^2 / {name};\nlet both = 4 {name};\n"
@@ -134,6 +135,7 @@ def test_a_plan_keeps_the_editions_of_its_files_and_nothing_else_of_them(tmp_pat
     assert plan_file.loads(texts[2]).sources[0].edition == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_random_decks_have_the_same_parameters_with_names_of_units_and_units_of_their_own(seed: int) -> None:
     old = random_deck(seed)

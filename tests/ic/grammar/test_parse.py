@@ -356,6 +356,7 @@ error[D026]: `m` is the unit metre, so it cannot name a value
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "line", "help"),
     [
@@ -461,6 +462,7 @@ def test_with_very_many_mistakes_reading_stops_and_says_so(desk: Desk):
 # hostile decks
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "code"),
     [

@@ -57,6 +57,7 @@ def experiment(tmp_path: Path, more: str = "") -> Experiment:
     return ic.compile(path, select=["hold"]).experiments[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "of", [each for each in ENTRIES if each[1].varies == "number" and each[0].name in ("link", "joint")], ids=named
 )

@@ -33,6 +33,7 @@ TEXT, GRAMMAR, LOOPS, EDITIONS = (cases(f"{name}.txt") for name in ("text", "gra
 ALL = {**TEXT, **GRAMMAR, **LOOPS, **EDITIONS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("title", ALL)
 def test_a_mistake_is_this_message(desk: Desk, title: str) -> None:
     deck, others, said = ALL[title]

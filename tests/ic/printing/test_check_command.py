@@ -27,6 +27,7 @@ def asked(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str
     return status, *capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_several_decks_are_checked_one_after_the_other(capsys: pytest.CaptureFixture[str]) -> None:
     status, out, err = asked(capsys, "good.ic", "bad.ic", "good.ic")
     assert status == cli.BAD_INPUT
@@ -35,12 +36,14 @@ def test_several_decks_are_checked_one_after_the_other(capsys: pytest.CaptureFix
     assert asked(capsys, "good.ic", "good.ic", "-q") == (cli.YES, "", "")
 
 
+@pytest.mark.slow
 def test_a_deck_that_is_not_there_hides_nothing_of_the_others(capsys: pytest.CaptureFixture[str]) -> None:
     status, out, err = asked(capsys, "none.ic", "bad.ic", "good.ic")
     assert status == cli.BAD_INPUT and out.startswith("good.ic: ")
     assert "error[D173]: no deck `none.ic`" in err and "error[D060]" in err
 
 
+@pytest.mark.slow
 def test_programs_are_told_what_several_decks_have_in_common_once(capsys: pytest.CaptureFixture[str]) -> None:
     status, out, err = asked(capsys, "bad.ic", "worse.ic", "--format", "json")
     found = json.loads(out)
@@ -50,6 +53,7 @@ def test_programs_are_told_what_several_decks_have_in_common_once(capsys: pytest
     assert json.loads(out)["errors"] == 2
 
 
+@pytest.mark.slow
 def test_a_mistake_of_an_include_is_told_once_whatever_line_includes_it(capsys: pytest.CaptureFixture[str]) -> None:
     """Also through one more file, and in every form for programs; its place in a macro is the same mistake's, too."""
     part = PART.replace("recrod = [q];", "BAD").replace("#include <", "#define BAD recrod = [q];\n#include <")
@@ -66,6 +70,7 @@ def test_a_mistake_of_an_include_is_told_once_whatever_line_includes_it(capsys: 
     assert len(json.loads(out)["runs"][0]["results"]) == 1
 
 
+@pytest.mark.slow
 def test_the_edits_of_the_json_mend_the_deck(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = asked(capsys, "bad.ic", "--format", "json")
     for each in json.loads(out)["diagnostics"]:
@@ -78,6 +83,7 @@ def test_the_edits_of_the_json_mend_the_deck(capsys: pytest.CaptureFixture[str])
     assert asked(capsys, "bad.ic")[0] == cli.YES
 
 
+@pytest.mark.slow
 def test_sarif_has_the_headings_of_the_codes_and_is_written_of_a_sound_deck_too(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -127,6 +133,7 @@ ADDRESSES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ADDRESSES)
 def test_a_path_that_stands_as_an_entry_is_written_as_the_block_that_it_means(
     text: str, capsys: pytest.CaptureFixture[str]

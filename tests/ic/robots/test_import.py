@@ -117,6 +117,7 @@ def test_the_deck_is_printed_to_be_read(capsys: pytest.CaptureFixture[str]) -> N
     assert out == PRINTED.replace("HASH", first.rpartition(" ")[2].removesuffix("...")) and err == ""
 
 
+@pytest.mark.slow
 def test_the_deck_is_checked_without_a_word_and_runs_hold_and_fall(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["import", "arm.urdf", "-o", "arm.ic", "--mimic", "fixed"]) == 0
     assert capsys.readouterr() == ("wrote arm.ic\n", "")

@@ -582,6 +582,7 @@ def test_what_is_no_xml_is_told_with_what_to_do(text: str, remedy: str, tmp_path
     assert said(tmp_path, text).endswith(f"  = help: {remedy}\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "says"), [each[1:] for each in MISTAKES], ids=[each[0] for each in MISTAKES])
 def test_a_mistake_is_told_at_its_place(text: str | bytes, says: str, tmp_path: Path) -> None:
     assert said(tmp_path, text) == says

@@ -41,6 +41,7 @@ def lists(folder: Path, written: list[str]) -> list[tuple[float, ...]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_random_lists_end_where_they_are_written_to_the_last_bit(tmp_path: Path, seed: int) -> None:
     rng = random.Random(seed)
@@ -63,6 +64,7 @@ def test_random_lists_end_where_they_are_written_to_the_last_bit(tmp_path: Path,
             assert value == pytest.approx(exact(f"{Decimal(number.numerator) / number.denominator:f}", unit), rel=4e-16)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("written", "count", "last"), [
     ("(0 deg .. 90 deg by 0.1 deg)", 901, "90 deg"), ("(0 .. 90 by 0.1) deg", 901, "90 deg"),
     ("(0 .. 360 by 0.01) deg", 36001, "360 deg"), ("(1 ms .. 1 s by 1 ms)", 1000, "1 s"),

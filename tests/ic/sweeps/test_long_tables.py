@@ -36,6 +36,7 @@ def said(folder: Path, low: float, more: str = "") -> str:
     return f"{plan.experiments[0].cases.count} cases\n" + "\n".join(plan.experiments[0].notes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("low", "more"),
     [

@@ -85,6 +85,7 @@ def test_a_run_is_the_one_that_the_deck_would_say(setting: str, old: str, new: s
     assert not found.cases.coordinates and not any(isinstance(q.value, Formula) for q in found.parameters.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("setting", "old", "new"), [
     ("hinge.bed.kt=0.06 N*m/A", "emulated(", "emulated(kt = 0.06 N*m/A, "),
     ("drive.kt=0.06 N*m/A", "kt = 0.05", "kt = 0.06"),

@@ -130,6 +130,7 @@ def test_batch_runs_it(deck: str) -> None:
         batch.run(ic.compile(deck), vary=["long=[1, 2] m"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [
     ["check", "deck.ic"],
     ["cases", "deck.ic"],
@@ -149,6 +150,7 @@ def test_every_command_that_takes_a_deck_takes_it(
     assert "`drive.kq`" in capfd.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_archive_is_named_after_the_sweep_and_its_commands_work(
     deck: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

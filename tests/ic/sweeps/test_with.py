@@ -177,6 +177,7 @@ def test_two_files_that_do_not_include_each_other_do_not_set_each_others() -> No
 # with
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("entry", "old", "new"), [
     ("drive.kp = 0.2 V*s/rad", "kp = 0.1", "kp = 0.2"),
     ("hinge.servo.kp = 0.2 V*s/rad", "hinge = drive;", "hinge = drive { kp = 0.2 V*s/rad; };"),

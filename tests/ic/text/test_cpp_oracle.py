@@ -189,6 +189,7 @@ def test_hundreds_of_random_macros_expand_as_gcc_expands_them(desk: Desk, circle
 DEFERRED = TEXTS.joinpath("deferred.txt").read_text().split("%%\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stored", DEFERRED, ids=range(len(DEFERRED)))
 def test_calls_that_are_put_off_expand_as_gcc_has_expanded_them(desk: Desk, stored: str) -> None:
     text, _, expected = stored.rpartition("-> ")

@@ -47,6 +47,7 @@ def test_a_hostile_deck_ends_in_a_diagnostic(desk: Desk, text: str, code: str):
     assert code in [d.code for d in made.diagnostics]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", [
     "// " + "x" * 199_000, "/*" + "* " * 99_000 + "*/", "// " + "x \\\n" * 30_000, '"' + "x" * 199_000 + '"',
     " " * 199_000, "/**/" * 20_000, "\\" + " " * 190_000, "#if 0 // " + "x" * 190_000 + "\n#endif",

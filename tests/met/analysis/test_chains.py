@@ -85,6 +85,7 @@ def test_equal_chains_that_are_numbered_are_equal_experiments(tmp_path: Path, mo
     assert chains.numbered(of_four[2])[1] == {"0": "j4", "1": "j5"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("servo", ["drive", "spring"])
 @pytest.mark.parametrize("count", [2, 3])
 def test_chain_by_chain_the_same_is_found_as_of_the_whole(

@@ -66,6 +66,7 @@ def test_its_limit_is_that_of_the_closed_form(tmp_path: Path) -> None:
     assert found.joints == ("hinge",) and found.gain == pytest.approx(0.5, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hz", [1000, 50, 25, 10])
 def test_it_is_on_the_right_side_of_the_limit_of_runs(hz: int, tmp_path: Path) -> None:
     """Steps shorter than a tick, as long, and longer: then memory goes evenly over the step."""
@@ -124,6 +125,7 @@ SWINGS = changed(
 """s^3 + (a + b) s^2 + (c + b k) s + c k, a = 12.5, b = 1.25, c = 750, k = 30: (a + b)(c + b k) < c k."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", ["", "rate = continuous;  "])
 def test_a_loop_that_swings_up_without_ticks_too_is_told_by_itself(rate: str, tmp_path: Path) -> None:
     """Below c = (a + b) b k/(k - a - b) it does not: ki = 1.269 V/rad, a little more with e over the run."""

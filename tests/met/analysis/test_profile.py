@@ -60,6 +60,7 @@ def test_a_step_is_counted_as_the_rates_have_it(gains: RunProfile) -> None:
     assert calls["integrator", ""] == calls["further stages", "dynamics"] == 500 / 500
 
 
+@pytest.mark.slow
 def test_friction_is_counted_apart_and_as_often_as_it_comes(gains: RunProfile) -> None:
     """At t = 0 both joints are at rest in every case, so each block decides; later they turn on and on."""
     events = {part.work: part for part in gains.parts if part.event}

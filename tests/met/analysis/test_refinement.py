@@ -24,6 +24,7 @@ def signals(of: Experiment) -> dict[str, np.ndarray]:
     return engine.run(of).signals
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 11, 12])
 def test_the_error_falls_with_the_square_of_the_step(tmp_path: Path, seed: int) -> None:
     of = experiment(tmp_path, random_deck(seed, friction=False))
@@ -51,6 +52,7 @@ run noisy like nominal {
 """
 
 
+@pytest.mark.slow
 def test_noise_is_drawn_at_the_same_instants(tmp_path: Path) -> None:
     deck = tmp_path / "deck.ic"
     deck.write_text(NOISY, encoding="utf-8")

@@ -104,6 +104,7 @@ ARMS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", ARMS)
 def test_the_load_is_what_the_shafts_equation_leaves_over(tmp_path: Path, arm: str) -> None:
     """Torque by the arm's dynamics, against that by voltage, rate and its slope: two ways that share nothing. A step's
@@ -119,6 +120,7 @@ def test_the_load_is_what_the_shafts_equation_leaves_over(tmp_path: Path, arm: s
     assert np.abs(other[slides]).max() == pytest.approx(np.abs(mean[slides]).max(), rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", ARMS)
 def test_both_motors_together_give_what_the_shaft_and_friction_take(tmp_path: Path, arm: str) -> None:
     """Over the run: the shaft's kinetic energy at its end, and F_c and F_v along its way."""
@@ -145,6 +147,7 @@ def test_the_two_link_arms_load_is_its_mass_matrix_times_its_accelerations(tmp_p
     np.testing.assert_allclose(work(experiment, "shoulder").load[0], load, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", ARMS)
 def test_the_figures_are_those_of_the_engines_metrics(tmp_path: Path, arm: str) -> None:
     text, joint, numbers = ARMS[arm]
@@ -161,6 +164,7 @@ def test_the_figures_are_those_of_the_engines_metrics(tmp_path: Path, arm: str) 
         assert np.abs(values).max() == pytest.approx(by_engine[f"peak_{short}"][0], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_joint_on_a_faultless_bed_asks_what_the_joint_itself_asks(tmp_path: Path) -> None:
     """To the bed's own error, which settles (docs/substitution.md)."""
     text, joint, _ = ARMS["two_link"]
@@ -174,6 +178,7 @@ def test_a_joint_on_a_faultless_bed_asks_what_the_joint_itself_asks(tmp_path: Pa
     assert bed.kt_load[0] == 0.072
 
 
+@pytest.mark.slow
 def test_the_torque_on_a_bed_is_of_the_bed_s_motor_and_the_current_is_of_its_load(tmp_path: Path) -> None:
     """The motor that is there, not the one of the data sheet: 7 % more torque for an ampere."""
     text = ARMS["two_link"][0] + (
@@ -200,6 +205,7 @@ def test_a_parameter_that_a_sweep_varies_is_each_case_s_own(tmp_path: Path) -> N
     np.testing.assert_allclose(found.acceleration[:, 0], slope, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_joint_that_is_put_on_a_bed_has_the_margin_of_a_deck_that_does_it(tmp_path: Path) -> None:
     text, joint, _ = ARMS["panda"]
     written = "run bedded like fine { substitute joint2 { bed = emulated(delay = 1); } }"

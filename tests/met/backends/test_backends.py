@@ -39,6 +39,7 @@ def test_all_have_the_bits_of_the_default(name: str, run: str) -> None:
     assert np.array_equal(bits(outputs), bits(other_outputs))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_block_goes_on_where_it_stands(name: str) -> None:
     recording, given = two_link()
@@ -54,6 +55,7 @@ def test_a_block_goes_on_where_it_stands(name: str) -> None:
     assert parts.recorded(41, 80)[0, -1].tolist() != whole.recorded(41, 80)[0, -1].tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(backends.HOMES))
 def test_each_writes_the_program_as_text(name: str) -> None:
     recording, _ = two_link()

@@ -68,6 +68,7 @@ def as_json(value: object) -> object:
     return repr(value) if value in (math.inf, -math.inf) else value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "name"), EVERY)
 def test_a_row_says_all_that_is_declared_of_a_parameter(
     kind: models.Kind, name: str, capsys: pytest.CaptureFixture[str]
@@ -79,6 +80,7 @@ def test_a_row_says_all_that_is_declared_of_a_parameter(
     assert rows[1:][: len(parameters)] == [cells(parameter) for parameter in parameters]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "name"), EVERY)
 def test_a_program_is_told_all_that_is_declared_of_a_parameter(
     kind: models.Kind, name: str, capsys: pytest.CaptureFixture[str]

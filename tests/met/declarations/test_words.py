@@ -73,6 +73,7 @@ def test_what_is_no_word_is_refused(kind: models.Kind, name: str, text: str, tmp
         assert refused.message == f"`{parameter.name}` of {use.label} is a word{quoted}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "name"), WITH_WORDS)
 def test_a_word_does_not_vary_as_a_number_does(kind: models.Kind, name: str, tmp_path: Path) -> None:
     use = smallest(kind, name)

@@ -169,6 +169,7 @@ def by_wrenches(arm: RandomArm, of: LinearisedDynamics) -> np.ndarray:
     return np.array(rows).reshape(-1, 2 * arm.n).T
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", range(1, 8))
 def test_any_modes_and_wrenches_move_as_the_recorded_recursion_does(joints: int) -> None:
     worst = Worst("qdd and tau_load by all that is given, share of the largest entry")
@@ -182,6 +183,7 @@ def test_any_modes_and_wrenches_move_as_the_recorded_recursion_does(joints: int)
     worst.below(CLOSE)
 
 
+@pytest.mark.slow
 def test_modes_decided_when_the_program_runs_give_what_modes_decided_before_do() -> None:
     worst = Worst("masks against truths, share of the largest entry")
     for arm, tree in forest()[:12]:
@@ -200,6 +202,7 @@ def test_modes_decided_when_the_program_runs_give_what_modes_decided_before_do()
     worst.below(CLOSE)
 
 
+@pytest.mark.slow
 def test_without_velocity_products_rates_move_nothing() -> None:
     for arm, tree in forest()[:30]:
         found = passed(arm, True, tree, velocity_products=False)
@@ -245,6 +248,7 @@ def operations(bodies: Sequence[Body]) -> tuple[int, int]:
 
 # Counted when it was written, beside 1,237 and 6,872 of the evaluation alone; by operation of the recursion, one
 # direction after the other, the seven joints' took 10,100 without tau.
+@pytest.mark.slow
 @pytest.mark.parametrize(("arm", "at_most"), [(panda_like, 3_840), (tree_of_thirty, 50_700)])
 def test_a_whole_jacobian_costs_no_more_operations_than_it_did(arm: Any, at_most: int) -> None:
     alone, whole = operations(arm())

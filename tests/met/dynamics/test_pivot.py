@@ -70,6 +70,7 @@ def test_accelerations_and_frames_are_those_of_pinocchio_for_the_arm_in_two_bodi
         np.testing.assert_allclose(np.array(motion.pose.p, float), p, atol=2e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(40))
 def test_reactions_are_those_of_the_arm_in_two_bodies_taken_to_the_links_frame(seed: int) -> None:
     arm = random_tree(seed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from met import run as engine
 from met.run import Run
@@ -49,6 +50,7 @@ def test_it_stops_what_moves_holds_it_and_lets_it_go(tmp_path: Path) -> None:
     assert run.events["splits"][0] == 1
 
 
+@pytest.mark.slow
 def test_it_holds_no_more_than_its_torque(tmp_path: Path) -> None:
     always = ("from = 0.2 s;  until = 1 s;", "")
     assert (of(ran(tmp_path, always), "q") == 0.0).all()

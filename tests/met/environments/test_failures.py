@@ -116,6 +116,7 @@ def test_a_drive_that_runs_away_gives_all_it_can(tmp_path: Path) -> None:
     assert of(run, "qd")[inside][-1] < -0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("reads", "seen"), [("zero", 0.0), ("last", None)])
 def test_a_law_that_does_not_see_goes_by_nothing_or_by_what_it_saw_last(
     reads: str, seen: float | None, tmp_path: Path
@@ -171,6 +172,7 @@ def test_what_is_on_a_bed_is_not_let_go_but_may_run_away(tmp_path: Path) -> None
     assert (of(run, "servo.voltage")[(run.time >= 0.3) & (run.time < 0.6)] == 24.0).all()
 
 
+@pytest.mark.slow
 def test_a_case_that_never_fails_has_the_bits_of_one_without_the_model(tmp_path: Path) -> None:
     """Nothing is let go of outside of the window: not a bit of the motion moves."""
     never = ran(tmp_path, "free_swinging { joint = hinge;  from = 5 s; }", changed(SERVO, RUB))

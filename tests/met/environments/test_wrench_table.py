@@ -155,6 +155,7 @@ PULSES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["modified_euler", "midpoint", "semi_implicit_euler", "rk4"])
 @pytest.mark.parametrize("name", PULSES)
 def test_the_impulse_of_rows_within_steps_is_kept(tmp_path: Path, name: str, integrator: str) -> None:
@@ -171,6 +172,7 @@ def test_the_impulse_of_rows_within_steps_is_kept(tmp_path: Path, name: str, int
     assert found == pytest.approx(impulse / 2.0, rel=1e-12, abs=1e-14)
 
 
+@pytest.mark.slow
 def test_a_table_whose_begin_varies_keeps_the_impulse_and_is_as_it_was_where_rows_lie_on_steps(tmp_path: Path) -> None:
     text = changed(SLIDER, ("[0.2, 0.4, 0.7] s", "[0.2, 0.201, 0.203, 0.204] s"), ("[0, 6, -3]", "[0, 6, 6, 0]"))
     sweep = "sweep some of it { vary environment.push.begin = [0, 0.1, 0.1037] s; }\n"

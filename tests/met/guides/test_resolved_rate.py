@@ -151,6 +151,7 @@ def test_the_path_is_kept_better_in_proportion_to_the_period(tmp_path: Path) -> 
     np.testing.assert_allclose(orders, 1.0, atol=0.1)
 
 
+@pytest.mark.slow
 def test_between_its_ticks_a_position_goes_on_with_the_rate(tmp_path: Path) -> None:
     rates = "dynamics = 200 Hz; servos = 200 Hz; record = 200 Hz;"
     text = chain(5, 7, f"{LAW} loop = open; rate = 50 Hz;", command="position", rates=rates)

@@ -115,6 +115,7 @@ run hold {
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("integrator", "q", "qd"),
     [

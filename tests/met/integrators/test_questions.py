@@ -72,6 +72,7 @@ def by_weight(weight: float | None, slope: Ask, h: Real, y: Motion, k1: Slope) -
     return ahead(y, h, by_parts(lambda a, b: weight * (a + b), k1, slope(1.0, ahead(y, h, k1))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("advance", [catching, catching_all, dividing, partial(by_weight, 0.5)])
 def test_what_an_integrator_catches_and_how_it_is_written_does_not_matter(run, advance) -> None:  # type: ignore[no-untyped-def]
     expected = run(modified_euler.advance)

@@ -6,6 +6,8 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 from met.messages.warning_codes import WARNINGS, WHILE_RUNNING
 
 ROOT = Path(__file__).parents[3]
@@ -32,6 +34,7 @@ def in_the_source() -> Iterator[str]:
                     yield from (str(each) for each in words[:1] if len(str(each)) == 4)
 
 
+@pytest.mark.slow
 def test_the_table_has_every_code_that_warns_and_no_other() -> None:
     assert {*in_the_source(), *ELSEWHERE} - OF_NO_RUN == WARNINGS
 

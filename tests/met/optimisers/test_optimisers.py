@@ -23,6 +23,7 @@ def asked(optimiser: Optimiser, landscape: landscapes.Landscape) -> list[np.ndar
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", EVERY)
 @pytest.mark.parametrize("dimension", [1, 2, 3, 16, 40])
 @pytest.mark.parametrize("at_most", [0, 1, 7, 8, 100, 1001])
@@ -112,6 +113,7 @@ def test_a_generation_keeps_lanes_and_threads_busy():
     assert len(optimisers.tuner(8, 1, 3200).ask()) == 32
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dimension", [2, 5, 16])
 def test_a_search_reaches_the_corner(dimension):
     """2,000 points; the best of 100,000 random ones in 16 dimensions is 3.2 from it."""
@@ -119,12 +121,14 @@ def test_a_search_reaches_the_corner(dimension):
     assert max(least(optimisers.hardest(dimension, seed, 2000), landscapes.corner) for seed in range(3)) < bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dimension", [1, 2, 5, 16])
 def test_a_search_finds_a_resonance_that_is_one_percent_wide(dimension):
     for seed in range(3):
         assert least(optimisers.hardest(dimension, seed, 2000), landscapes.resonance) < -95.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("landscape", "bound"),
     [(landscapes.sphere, 1e-9), (landscapes.ellipsoid, 1e-4), (landscapes.ackley, 1e-3), (landscapes.corner, 1e-3)],

@@ -63,6 +63,7 @@ def base(**new: Any) -> Change:
     return lambda e: e["structure"]["base"].update(new)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "change", "said"),
     [

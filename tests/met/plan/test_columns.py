@@ -118,6 +118,7 @@ def test_any_draws_are_had_in_any_order() -> None:
     assert columns.ends(column) == (int(np.argmin(array)), int(np.argmax(array)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sweep", SWEEPS)
 def test_a_long_sweep_has_the_values_keys_and_plan_of_a_listed_one(
     sweep: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -135,6 +136,7 @@ def test_a_long_sweep_has_the_values_keys_and_plan_of_a_listed_one(
         assert one.cases.table[rows].tolist() == two.cases.table[rows].tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sweep", SWEEPS)
 def test_what_a_table_is_computed_from_comes_back_from_a_plan(sweep: str, tmp_path: Path) -> None:
     plan = compiled(tmp_path, sweep)
@@ -147,6 +149,7 @@ def test_what_a_table_is_computed_from_comes_back_from_a_plan(sweep: str, tmp_pa
     assert again == (tmp_path / "p.json").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("was", "now"),
     [

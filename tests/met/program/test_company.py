@@ -96,6 +96,7 @@ def brake(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     models.available.cache_clear()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("brake")
 @pytest.mark.parametrize("integrator", ["modified_euler", "midpoint", "rk4"])
 def test_friction_that_begins_within_a_step_opposes_motion_either_way(tmp_path: Path, integrator: str) -> None:

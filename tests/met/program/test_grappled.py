@@ -27,6 +27,7 @@ sweep times of it { vary payloads.ball.grapple = [0.5, 3] s; }
 """
 
 
+@pytest.mark.slow
 def test_of_two_spheres_all_figures_are_as_the_formulas_say(tmp_path: Path) -> None:
     run = engine.run(experiment(tmp_path, SPHERES, select="times"))
     got = {name: run.grapples[f"ball.{name}"] for name in GRAPPLE_FIGURES}

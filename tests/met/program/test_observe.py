@@ -296,6 +296,7 @@ def test_a_slow_record_has_the_rows_of_a_fast_one(tmp_path: Path) -> None:
         assert values.tobytes() == fast.signals[name][:, ::20].tobytes(), name
 
 
+@pytest.mark.slow
 def test_a_row_between_instants_shows_the_last_one(tmp_path: Path) -> None:
     rates = "dynamics = 250 Hz;  servos = 500 Hz;  record = 1 kHz;"
     text = recording(re.sub(r"dynamics = 1 kHz;.*?record = 50 Hz;", rates, DECK), "J_eff", "links.tip.position")

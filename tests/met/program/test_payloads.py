@@ -264,6 +264,7 @@ def test_a_wrench_on_a_payload_is_felt_wherever_it_is(tmp_path: Path) -> None:
     np.testing.assert_allclose(gained[3:6], whole, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_gradient_of_gravity_pulls_at_payloads_too(tmp_path: Path) -> None:
     # Hill's equations of a point that is let go beside the origin: drift along the flight, 4 periods of 200 s on a
     # small and heavy world
@@ -474,6 +475,7 @@ def test_on_a_base_that_is_told_its_way_a_payload_goes_along_and_off_with_its_sp
     assert (jumps > 0.05).all() if link == "lower" else (jumps < 0.05).all()
 
 
+@pytest.mark.slow
 def test_a_payload_on_the_ground_stays_there(tmp_path: Path) -> None:
     run = flown(
         tmp_path,
@@ -536,6 +538,7 @@ def test_plain_numbers_give_the_kernels_results(tmp_path: Path) -> None:
     np.testing.assert_allclose(plain, ours, rtol=0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_a_payload_that_runs_away_fails_its_case_and_says_so(tmp_path: Path) -> None:
     push = "push = wrench { link = box; force = [1e308, 1e308, 0] N; moment = [1e308, 0, 0] N*m; };"
     run = flown(tmp_path, ("environment {}", f"environment {{ {push} }}"))

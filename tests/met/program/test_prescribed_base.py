@@ -134,6 +134,7 @@ sweep some of shaken {
     np.testing.assert_allclose(runs[0].signals["links.base.position"][:, 0, 2], [0.0, 1.0, 2.0])
 
 
+@pytest.mark.slow
 def test_a_base_of_constants_is_a_fixed_one_that_stands_elsewhere(tmp_path: Path) -> None:
     elsewhere = "prescribed { x = 2 m; y = -1 m; yaw = 90 deg; }"
     still = RUN[RUN.index("prescribed {") : RUN.index("initial ")]

@@ -50,6 +50,7 @@ def lost(run: Run) -> np.ndarray:
     return np.max(np.abs(whole - whole[0]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MODELS)
 def test_momentum_is_kept_to_the_integrators_order(tmp_path: Path, model: str) -> None:
     errors = [lost(flown(tmp_path, model, hz)) for hz in (1000, 2000, 4000)]
@@ -68,6 +69,7 @@ BOX = """\
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MODELS)
 def test_momentum_is_kept_through_a_grapple(tmp_path: Path, model: str) -> None:
     text = DECK.format(model=model, more=MODELS[model], hz=8000)
@@ -82,6 +84,7 @@ def test_momentum_is_kept_through_a_grapple(tmp_path: Path, model: str) -> None:
     assert lost(run) < 1e-7
 
 
+@pytest.mark.slow
 def test_a_base_with_less_inertia_than_the_rotor_it_carries_is_a_failed_case(tmp_path: Path) -> None:
     text = DECK.format(model="rigid_gearbox", more="", hz=1000).replace("j_m = 2e-3", "j_m = 60")
     [why] = engine.run(experiment(tmp_path, text)).cause

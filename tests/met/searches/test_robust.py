@@ -47,6 +47,7 @@ def away(cases: np.ndarray) -> np.ndarray:
     return np.asarray(np.abs(cases[:, 0] - cases[:, -1]) + 0.1 * np.abs(cases[:, 1:-1]).sum(axis=1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_the_middle_between_the_outermost_plants_is_found(seed: int) -> None:
     plants = [0.1, 0.0, 0.3, -0.2, 0.62, 0.05, -0.1]

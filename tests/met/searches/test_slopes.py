@@ -159,6 +159,7 @@ class Valleys(Bowl):
         return CaseSlopes(np.ones(len(cases), bool), values, slopes, {})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_cases_that_are_left_at_a_corner_go_into_fresh_beginnings(seed: int) -> None:
     """At the corner the goal is 1, and 0.8 in the narrow valley. What the first beginning missed the next may find."""

@@ -386,6 +386,7 @@ run it {
 N = math.sqrt(3.986004418e14 / 6.778e6**3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["inertial", "orbital"])
 def test_in_orbit_it_feels_the_tide_away_from_the_centre_and_nothing_at_it(frame: str, tmp_path: Path) -> None:
     """Held against the Earth, 20 m above the centre of mass: -3 n^2 20 m, a third of it from the orbit's turning.
@@ -492,6 +493,7 @@ run it {
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hz", [90, 170])
 def test_what_sticks_stops_being_felt_where_it_does(hz: int, tmp_path: Path) -> None:
     """3 kg against 4 N for 0.75 s, between steps: a filter's answer to a rectangle, and nothing creeps after."""
@@ -523,6 +525,7 @@ def test_it_feels_the_motion_that_is_whatever_the_dynamics_leave_out(tmp_path: P
     np.testing.assert_allclose(of(run, "out"), -18.0, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_with_a_motor_on_a_bed_it_feels_the_acceleration_that_the_bed_gives(tmp_path: Path) -> None:
     servo = """\
 servo motor { model = rigid_gearbox; ratio = 100; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm;

@@ -199,6 +199,7 @@ run still {{
 # What a deck may write
 
 
+@pytest.mark.slow
 def test_it_is_a_word_that_sweeps_and_the_command_line_may_change(tmp_path: Path) -> None:
     deck = ARM + run_of("panda", "").replace("{more}", "")
     sweep = "sweep both of still { vary initial.servos = [unloaded, balanced]; }\n"

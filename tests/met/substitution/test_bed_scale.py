@@ -22,6 +22,7 @@ LAWS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("left", "right"), [law[1:] for law in LAWS], ids=[law[0] for law in LAWS])
 @given(torque=SCALES, rate=SCALES, voltage=SCALES)
 def test_both_sides_of_a_law_have_one_scale(

@@ -127,6 +127,7 @@ def test_a_case_of_a_sweep_over_the_bed_has_its_own_plant(tmp_path: Path, case: 
     assert_same_run(found, case, ticks=1000)
 
 
+@pytest.mark.slow
 def test_another_noise_or_another_case_is_another_plant(tmp_path: Path) -> None:
     found = experiment(tmp_path, "several")
     one, other = Plant(found, "shoulder", period=0.002), Plant(found, "shoulder", case=15, period=0.002)
@@ -191,6 +192,7 @@ def test_on_a_controller_without_floating_point_it_has_the_same_bits(
     assert different(ours, answered(command, question).reshape(-1, 3)) == 0
 
 
+@pytest.mark.slow
 def test_the_text_is_the_same_each_time_and_another_cases_is_another(tmp_path: Path) -> None:
     found = experiment(tmp_path, "several")
     text = plant_c(found, "shoulder", case=3, period=0.002)

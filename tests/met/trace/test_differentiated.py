@@ -93,6 +93,7 @@ def test_what_moves_in_steps_alone_is_told_from_what_moves() -> None:
     assert of_y.moves == {"x", "kept"} and of_y.changes == {"x", "kept", "count", "whole"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [8, 16])
 def test_the_numbers_of_a_run_have_the_bits_that_they_have_without_tangents(lanes: int) -> None:
     """Of all cases of a shipped sweep, with friction that sticks; in each of the back ends that compile."""

@@ -120,6 +120,7 @@ def bare(experiment: Experiment) -> Experiment:
     return replace(experiment, structure=structure, requirements=())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(path.stem for path in DECKS.glob("*.ic")))
 def test_what_is_recorded_and_measured_changes_no_decks_state(name: str) -> None:
     for experiment in ic.compile(DECKS / f"{name}.ic").experiments:

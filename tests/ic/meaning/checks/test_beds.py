@@ -41,6 +41,7 @@ def said(folder: Path, deck: str) -> tuple[list[str], list[str]]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("r", "kp", "law", "weight"), [
     (5.30, 0.02, "measured_acceleration", ""),
     (5.40, 0.02, "measured_acceleration", "heavy"),

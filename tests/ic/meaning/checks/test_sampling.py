@@ -229,6 +229,7 @@ def test_a_command_that_begins_in_a_pulse_is_told(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100))
 def test_integrals_of_random_pulses_are_those_of_a_fine_sum(seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -243,6 +244,7 @@ def test_integrals_of_random_pulses_are_those_of_a_fine_sum(seed: int) -> None:
             assert found.seen == pytest.approx(ticks)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(40))
 def test_random_sane_decks_are_told_nothing_of_it(tmp_path: Path, seed: int) -> None:
     said = codes(tmp_path, random_deck(seed))

@@ -216,6 +216,7 @@ def test_falling_counts(tmp_path: Path) -> None:
     assert codes(tmp_path, ARM, SERVO, falls) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_no_grapple_that_a_pose_could_make_is_told(tmp_path: Path, seed: int) -> None:
     """Payloads put where the link's place for them is, at a random pose of a random chain."""

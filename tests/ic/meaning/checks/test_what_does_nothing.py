@@ -180,6 +180,7 @@ TABLE = "wrench_table {{ link = {}; times = [0, 1, 2] s; force_x = {} N; {} }}"
 STILL = "D256 environment `it` changes nothing: link `mast`, which is fixed to the base, is part of the ground"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("model", "expected"), [
     (TABLE.format("bar", "[1, 0, 0]", ""), []),
     (TABLE.format("mast", "[1, 0, 0]", ""), [STILL]),

@@ -67,6 +67,7 @@ def test_a_scale_is_taken_over_changed_and_removed_as_any_block(tmp_path: Path) 
     assert not experiment(tmp_path, DECK, removed, select=["it"]).structure.substitutions[0].scaled
 
 
+@pytest.mark.slow
 def test_a_sweep_varies_scales_and_what_follows_from_them(tmp_path: Path) -> None:
     more = (
         "run it like hold { substitute hinge { scale { rate = 2; } } }\n"

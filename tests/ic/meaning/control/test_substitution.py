@@ -89,6 +89,7 @@ def test_bed_and_law_of_a_joint_and_the_place_that_wrote_them(tmp_path: Path) ->
     assert {path for path in hybrid.parameters if path.startswith("one.bed.")} == declared
 
 
+@pytest.mark.slow
 def test_bed_and_law_that_are_left_out_are_the_defaults(tmp_path: Path) -> None:
     for block in (
         "{}",

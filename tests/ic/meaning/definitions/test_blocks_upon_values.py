@@ -29,6 +29,7 @@ SERVO_LIKE = "servo other like drive {{ {} }} run it like hold {{ servos {{ hing
 RUN_LIKE = "run it like hold {{ {} }}\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("definition", "body", "name"),
     [

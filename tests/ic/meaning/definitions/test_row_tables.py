@@ -64,6 +64,7 @@ arm crane {
     assert keys.structure_key(tabled.structure) == keys.structure_key(plain.structure)
 
 
+@pytest.mark.slow
 def test_a_cell_with_its_unit_is_rounded_as_the_deck_rounds_it(folder: Path) -> None:
     pick = random.Random(24)
     units = ["kg", "g", "mg", "t"]
@@ -380,6 +381,7 @@ def test_a_word_that_names_a_servo_too_means_the_servo(folder: Path) -> None:
     assert "no value" not in found
 
 
+@pytest.mark.slow
 def test_a_long_table_is_read_in_a_moment(tmp_path: Path) -> None:
     rows = "\n".join(f"row_{n}, {n}" for n in range(50_000))
     (tmp_path / "long.csv").write_text("row, mass [kg]\n" + rows, encoding="utf-8")
@@ -388,6 +390,7 @@ def test_a_long_table_is_read_in_a_moment(tmp_path: Path) -> None:
     assert [each.code for each in ic.check(deck).diagnostics] == ["D041"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_random_decks_have_the_same_parameters_and_keys_with_their_values_in_a_table(seed: int, tmp_path: Path) -> None:
     written = random_deck(seed)

@@ -123,6 +123,7 @@ PLAIN = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", PLAIN, ids=lambda change: change[1])
 def test_what_is_plain_is_not_told(tmp_path: Path, change: tuple[str, str]) -> None:
     assert "D305" not in found(tmp_path, change)[0]

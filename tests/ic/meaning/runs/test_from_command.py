@@ -37,6 +37,7 @@ def follower(setpoint: str) -> str:
     return changed(FOLLOWER, ("position(0.4 rad)", setpoint))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("course", COURSES)
 def test_a_joint_begins_where_its_command_is_at_the_first_tick(tmp_path: Path, course: str) -> None:
     (tmp_path / "moves.csv").write_text(MOVES, encoding="utf-8")

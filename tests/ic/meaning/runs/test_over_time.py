@@ -78,6 +78,7 @@ EXPRESSIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", EXPRESSIONS)
 def test_expressions_are_what_numpy_makes_of_the_recorded_channels(tmp_path: Path, text: str) -> None:
     found = made(
@@ -93,6 +94,7 @@ def test_expressions_are_what_numpy_makes_of_the_recorded_channels(tmp_path: Pat
     assert result.metrics["most"][0] == result.metrics["same"][0] == result.signals["signals.made"][0].max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("model", "reduce"), [
     ("max", np.max),
     ("min", np.min),
@@ -129,6 +131,7 @@ MARGINS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", MARGINS)
 def test_margins_of_a_run_are_those_of_its_recorded_channels(tmp_path: Path, text: str) -> None:
     found = made(
@@ -318,6 +321,7 @@ def test_a_plan_whose_expressions_are_damaged_is_refused(tmp_path: Path, old: st
         plan_file.loads(text[:start] + text[start:].replace(old, new))
 
 
+@pytest.mark.slow
 def test_the_reference_and_the_kernel_agree(tmp_path: Path) -> None:
     more = "sweep both of hold { vary limit = [0.2, 0.4] rad/s; }\n"
     found = made(

@@ -68,6 +68,7 @@ def agree(program: PeriodProgram, flows: Sequence[Flow]) -> int:
     return sum(same(each, program, flow) for each, flow in zip(found, flows, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [3, pytest.param(20, marks=pytest.mark.slow, id="of 20 states")])
 @pytest.mark.parametrize(("deck", "name"), shipped())
 def test_of_shipped_decks_about_scattered_states(deck: str, name: str, count: int) -> None:
@@ -77,6 +78,7 @@ def test_of_shipped_decks_about_scattered_states(deck: str, name: str, count: in
     assert agree(program, flows) > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "name"), [each for each in EVERY if each[0] != "metric"])
 def test_of_every_model_at_rest_and_on_its_way(kind: models.Kind, name: str, tmp_path: Path) -> None:
     """Cases of a sweep as the run has them, and some of their rates made 0, on kinks and where friction holds."""

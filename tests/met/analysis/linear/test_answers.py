@@ -120,6 +120,7 @@ def test_rates_that_hardly_ever_meet_are_refused(tmp_path: Path) -> None:
     assert told.help == ("choose rates of which one divides the other: 5,000 ticks of the base rate are looked at",)
 
 
+@pytest.mark.slow
 def test_a_motor_on_a_bed_is_linearised_with_its_bed_and_observer(tmp_path: Path) -> None:
     """The shaft's rate is that of the bed, and what the loop does is nearly what the joint's own motor does."""
     from tests.met.analysis.linear.oracles import DECKS

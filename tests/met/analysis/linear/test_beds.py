@@ -38,6 +38,7 @@ def with_loads(made: Experiment, loads: list[float]) -> Experiment:
     return replace(made, cases=cases)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [0, 1, 2])
 @pytest.mark.parametrize("rate", ["100 Hz", pytest.param("1 kHz", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("law", ["measured_acceleration", "bare"])
@@ -70,6 +71,7 @@ OTHER = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["torque_balance", "bare"])
 def test_a_motor_that_is_far_from_what_its_law_takes_it_for_is_as_in_the_whole_program(
     law: str, tmp_path: Path

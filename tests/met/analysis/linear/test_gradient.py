@@ -79,6 +79,7 @@ def by_richardson(program: GradientProgram, number: int, share: float) -> dict[s
     return {use.name: found[names.index(METRIC + use.name)] for use in made.structure.metrics}
 
 
+@pytest.mark.slow
 def test_they_are_those_of_settling_peak_and_rms_through_20_sticks() -> None:
     """Both joints stick where they turn around, ten times each: by extrapolated differences to 1e-6."""
     program = GradientProgram(varied(SWAY, NUMBERS))
@@ -107,6 +108,7 @@ run coast {
 """
 
 
+@pytest.mark.slow
 def test_they_are_those_of_a_run_whose_motor_comes_to_its_limit_again_and_again() -> None:
     """The hinge's voltage is cut at each turn, at ticks: by extrapolated differences that move none, to 1e-5."""
     text = changed(SWAY, ("v_max = 24 V", "v_max = 2.5 V"), ("duration = 5.1 s", "duration = 2.1 s"))
@@ -154,6 +156,7 @@ def test_a_metric_that_counts_and_a_number_that_only_decides_when_are_refused() 
     assert np.isnan(found.slope[0, 0, 0]) and np.isfinite(found.slope[0, 1, 0])
 
 
+@pytest.mark.slow
 def test_a_case_on_an_edge_says_so() -> None:
     """The voltage's limit is just what the law asks for at its peak: more of it changes nothing, less does."""
     free = GradientProgram(varied(SWAY, {"drive.v_max": (24.0, "V")})).of([0], ["top", "shake"])
@@ -165,12 +168,14 @@ def test_a_case_on_an_edge_says_so() -> None:
     assert below.slope[0, 0, 0] == pytest.approx(1.0, rel=1e-12) and not below.why_not
 
 
+@pytest.mark.slow
 def test_a_case_that_fails_or_never_settles_has_none() -> None:
     text = changed(SWAY, ("within = 0.1 rad", "within = 0.001 rad"), ("target = 0 rad", "target = 1 rad"))
     found = GradientProgram(varied(text, {"drive.kp": (0.1, "V*s/rad")})).of([0], ["settle", "shake"])
     assert refusals(found) == {("settle", "drive.kp"): "the metric is infinite"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "name"), [each if each[0] == "metric" else pytest.param(*each, marks=pytest.mark.slow) for each in EVERY]
 )
@@ -189,6 +194,7 @@ def test_every_model_has_them_or_a_reason(kind: models.Kind, name: str, tmp_path
                 assert found.slope[0, metric, number] == pytest.approx(expected[of], rel=1e-4, abs=1e-6 * size)
 
 
+@pytest.mark.slow
 def test_they_come_as_a_dataset_of_a_sweep_and_of_a_simulation(tmp_path: Path) -> None:
     path = tmp_path / "sway.ic"
     sweep = "sweep gains of sway { vary drive.kp = [0.1, 0.12] V*s/rad;  vary drive.ki = [1, 2] V/rad; }\n"
@@ -204,6 +210,7 @@ def test_they_come_as_a_dataset_of_a_sweep_and_of_a_simulation(tmp_path: Path) -
     assert (made.why_not == "").all()
 
 
+@pytest.mark.slow
 def test_many_cases_are_run_some_at_a_time(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     sweep = (
         "sweep gains of sway { vary drive.kp = [0.1, 0.12, 0.14] V*s/rad;  vary hinge.servo.v_max = [3.9, 24] V; }\n"

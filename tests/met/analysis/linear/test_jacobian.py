@@ -33,6 +33,7 @@ def mapped(made: Experiment, time: float = 0.0, inputs: bool = False) -> PeriodM
     return period_map(program, at_instant(program, 0, tick))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "count", [2, pytest.param(30, marks=pytest.mark.slow, id="of 30 states")]
 )  # fmt: skip
@@ -56,6 +57,7 @@ def test_it_is_that_of_shipped_decks(deck: str, name: str, count: int) -> None:
     assert compared >= 0.5 * count
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [(0.06,), pytest.param((0.0, 0.12), marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("kind", "name"), [each for each in EVERY if each[0] != "metric"])
 def test_it_is_that_of_every_model(kind: models.Kind, name: str, times: tuple[float, ...], tmp_path: Path) -> None:
@@ -132,6 +134,7 @@ def test_what_sticks_is_held_and_no_state(tmp_path: Path) -> None:
     assert mapped(made).states == ("hinge.servo.integral",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "what"),
     [
@@ -201,6 +204,7 @@ def test_a_converter_counts_as_the_straight_line_through_its_steps(tmp_path: Pat
     np.testing.assert_allclose(fine.A, none.A[np.ix_(common, common)], rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_the_product_of_periods_is_the_monodromy_matrix_of_a_run(tmp_path: Path) -> None:
     """Of 50 periods, by differences of kernel's runs from moved initial states."""
     from dataclasses import replace

@@ -109,6 +109,7 @@ run r {
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [

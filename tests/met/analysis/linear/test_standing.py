@@ -65,6 +65,7 @@ def solved(folder: Path, run: str, block: str) -> tuple[LinearQuestion, Flow]:
     return asked, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", ["hold", "slow"])
 def test_an_arm_that_is_put_there_stays_for_a_thousand_periods(tmp_path: Path, run: str) -> None:
     """In all that it remembers, and its joints are where they are asked for."""
@@ -155,6 +156,7 @@ def test_what_no_servo_holds_has_none(tmp_path: Path) -> None:
     assert refused.value.diagnostics[0].code == "D377"
 
 
+@pytest.mark.slow
 def test_metrics_of_a_sweep_are_of_the_operating_point_of_each_case(tmp_path: Path) -> None:
     """One of three loads is too heavy: it has no number, and says why."""
     made = engine.prepare(experiment(tmp_path, ARM, select=["loads"]))

@@ -36,6 +36,7 @@ run faulty like there { hinge { bed = emulated(tachometer = 0.1 rad/s);  law = v
 LAWS = ["velocity_tracking", "torque_balance_observer", "torque_balance", "bare", "measured_acceleration"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [0, 2])
 @pytest.mark.parametrize("law", LAWS)
 def test_an_arm_on_a_bed_that_is_put_there_stays_and_moves_as_its_map_says(
@@ -85,6 +86,7 @@ def test_a_shaft_that_no_friction_holds_has_no_derivative_at_rest(tmp_path: Path
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [0, 2])
 @pytest.mark.parametrize("law", LAWS)
 def test_a_bed_whose_servo_is_commanded_a_torque_stands_by_the_one_that_bears_the_weight(
@@ -106,6 +108,7 @@ def test_a_bed_whose_servo_is_commanded_a_torque_stands_by_the_one_that_bears_th
     assert max(abs(later.cells[name] - flow.cells[name]) for name in asked.program.states) < 1e-9
 
 
+@pytest.mark.slow
 def test_a_bed_whose_load_motor_is_too_weak_is_told_of_with_what_limits_it(tmp_path: Path) -> None:
     """0.036 N m of 0.0597 that the weight asks of it, of which friction takes 0.0205; 1 A does."""
     told = _refused(tmp_path, "weak")
@@ -118,6 +121,7 @@ def test_a_bed_whose_load_motor_is_too_weak_is_told_of_with_what_limits_it(tmp_p
     assert settled(asked.program, [at_instant(asked.program, 0, asked.program.begin(0.0))]) != [None]
 
 
+@pytest.mark.slow
 def test_a_bed_with_noise_does_not_stand_still(tmp_path: Path) -> None:
     assert _refused(tmp_path, "faulty") == (
         "`faulty` has no operating point in this pose: its beds have faults, with which nothing comes to rest or goes "
