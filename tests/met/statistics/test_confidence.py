@@ -66,6 +66,12 @@ def test_an_order_statistic_bounds_a_percentile_as_often_as_it_says(
     assert binom.cdf(rank - 1, cases, share) >= confidence > binom.cdf(rank - 2, cases, share)
 
 
+def test_one_case_may_be_enough() -> None:
+    """One case without a miss demonstrates with confidence 0.9 that a bit less than a tenth of all cases meet it."""
+    assert cases_needed(0.09, 0.9) == 1
+    assert cases_needed(0.11, 0.9) == 2
+
+
 def test_too_few_cases_bound_no_percentile() -> None:
     assert percentile_rank(44, 0.95, 0.9) == 0 and percentile_rank(45, 0.95, 0.9) == 45
 
