@@ -171,7 +171,7 @@ def missed(folder: Path, seeds: int, faults: str) -> dict[str, int]:
     return out
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("faults", ["none", "typical"])
 def test_the_truth_is_in_its_interval(tmp_path: Path, faults: str) -> None:
     """Of 100 seeds it is in 90 at least: `python -m tests.hw.test_identify` counts them, in half an hour."""

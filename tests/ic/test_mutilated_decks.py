@@ -58,7 +58,7 @@ def check(folder: Path, seed: int) -> None:
     assert all(d.at is not None for d in errors), (seed, errors)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("first", range(0, 200, 20))
 def test_a_mutilated_deck_ends_in_placed_diagnostics(tmp_path: Path, first: int) -> None:
     for seed in range(first, first + 20):

@@ -61,7 +61,7 @@ def test_the_errors_of_the_page_are_those_after_every_step():
     assert row == " | ".join(f"{off(found, exact, signal):.1e}".replace("e-0", "e-") for signal in ("q", "qd", "tau"))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_errors_with_friction_are_those_after_every_step_too():
     """Every other one at 2 kHz."""
     (row,) = re.findall(r"the error of qd is ([^,]*), ([^,\s]*)\s+and (\S*) at 500 Hz, 1 kHz and 2 kHz", PAGE)

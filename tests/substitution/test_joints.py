@@ -46,6 +46,7 @@ HEAVY = tree("heavy", (160, 80, 40))
 BRANCH = tree("branched", (40, 20, 10), parents=(-1, 0, 0), at=(0, 2, 1))
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("law", ["velocity_tracking", pytest.param("torque_balance", marks=slow)])
 @pytest.mark.parametrize("joints", [
     ("j1",), ("j0", "j1", "j2"), pytest.param(("j2",), marks=slow), pytest.param(("j0", "j2"), marks=slow),

@@ -33,6 +33,7 @@ def tools() -> None:
         )
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 @pytest.mark.parametrize("name", ["wired", pytest.param("fast", marks=slow)])
 @pytest.mark.parametrize("port", ["firmware", pytest.param("qemu", marks=on_arm)])
@@ -50,6 +51,7 @@ def test_20_s_in_lock_step_have_the_bits_of_the_bed_in_process(tmp_path: Path, n
         assert batch.diff(tmp_path / "alone.h5", there).verdict == "identical"
 
 
+@pytest.mark.release
 @on_arm
 def test_figures_7_and_8_from_a_cortex_m3_behind_a_terminal_are_inside_the_band(tmp_path: Path) -> None:
     """Measured: 94.2 % of the shoulder's instants and 96.8 % of the elbow's; of a seed beside 19 others 92.6 % at

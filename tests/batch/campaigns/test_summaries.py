@@ -93,7 +93,7 @@ def judged(file: ArchiveFile) -> list[tuple[EvidenceRow, int]]:
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", SWEEPS)
 def test_its_evidence_is_that_of_all_rows(here: Path, name: str) -> None:
     archives(name)

@@ -161,7 +161,7 @@ def through(folder: Path, dialect: str, kind: str, exchanges: int) -> tuple[Tall
     return tally, spoiler
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("dialect", TOLD)
 @pytest.mark.parametrize("kind", FAULTS)
 @pytest.mark.parametrize("exchanges", [400, pytest.param(2000, marks=pytest.mark.slow)])

@@ -64,7 +64,7 @@ def test_answers_at_every_place_of_a_deck_with_loops_and_units_of_its_own_are_ri
     assert roles["sweep referred to"] == 1 and roles["start as commanded"] == 2
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_answers_at_500_random_places_of_all_shipped_decks_are_right() -> None:
     roles, wrong = asked(500, 24, shipped())
     assert not wrong, wrong

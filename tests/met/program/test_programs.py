@@ -23,7 +23,7 @@ def compiled(folder: Path, text: str, select: str | None = None) -> Experiment:
     return plan.experiments[0]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", range(24))
 def test_kernel_and_plain_floats_agree_on_random_decks(tmp_path: Path, seed: int) -> None:
     experiment = compiled(tmp_path, random_deck(seed))
