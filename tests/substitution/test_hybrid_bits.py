@@ -79,6 +79,7 @@ def test_bits_of_hybrid_cases_do_not_depend_on_threads_order_or_company_and_come
         assert ran(experiment, again, np.array([case])).tobytes() == rows[[case]].tobytes()
 
 
+@pytest.mark.slow
 def test_a_bed_without_numbers_ends_its_case_only(recorded: tuple[Experiment, Recording, np.ndarray]) -> None:
     experiment, recording, rows = recorded
     of = kernel.from_recording(recording, 8)

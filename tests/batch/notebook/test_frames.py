@@ -224,6 +224,7 @@ def test_a_case_without_a_history(tmp_path: Path) -> None:
             )
 
 
+@pytest.mark.slow
 def test_orientations_do_not_jump_where_a_link_passes_half_a_turn(reaches: xarray.Dataset) -> None:
     lamp = reaches.met.frames("lamp")["orientation"].isel(link=0)  # whose q goes from 3 rad to beyond pi
     assert (lamp.sel(quaternion="w").isel(time=0) >= 0.0).all() and (lamp.sel(quaternion="w") < 0.0).any()

@@ -117,6 +117,7 @@ def test_limits_that_are_near_are_thin_lines_with_their_names(
     }
 
 
+@pytest.mark.slow
 def test_a_limit_that_is_far_off_is_named_above_the_panel(
     ran: dict[str, ArchiveFile], figures: list[Any], tmp_path: Path
 ) -> None:

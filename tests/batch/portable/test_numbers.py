@@ -130,6 +130,7 @@ def test_what_a_deck_reads_must_be_as_it_was(tmp_path: Path, capsys: pytest.Capt
     assert "-I is for decks" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_of_a_sweep_they_are_those_of_its_run(folder: Path) -> None:
     found = numbers_of(folder, "cranes.h5", "cranes")
     assert found.of == "it" and found.fixed == () and found.run.experiment.cases.count == 1

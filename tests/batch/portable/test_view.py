@@ -363,6 +363,7 @@ def test_numbers_are_in_the_decks_units_and_a_signal_of_two_has_two_plots(chromi
     page.close()
 
 
+@pytest.mark.slow
 def test_an_archive_without_a_metric_of_its_plan_is_damaged(
     sent: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -82,6 +82,7 @@ def test_a_tuning_is_judged_in_the_cases_of_its_sweep(archive: Path) -> None:
         assert first.said.startswith("met in all 5 cases of loads; worst ") and second.text == "top < 1 m/s"
 
 
+@pytest.mark.slow
 def test_a_tuning_says_which_requirement_it_misses_and_in_which_case(archive: Path) -> None:
     with ArchiveFile(archive) as file:
         group, answer, outcome = group_of(file, "poor")

@@ -88,6 +88,7 @@ def test_a_row_has_the_numbers_of_the_cases_of_its_design_point(folder: Path) ->
     assert len({row.verdict for row in rows}) == 2, "the design points come out otherwise"
 
 
+@pytest.mark.slow
 def test_what_every_case_is_to_meet_has_one_row_of_all_cases(folder: Path) -> None:
     [row] = [row for row in rows_of(folder / "a.h5") if row.requirement.startswith("past")]
     past = batch.open(folder / "a.h5")["past"].values

@@ -85,6 +85,7 @@ class TestWhatIsInIt:
                 positions = np.searchsorted(group.values("case"), each.cases)
                 assert name == "volts" and values.tolist() == group.values("volts")[positions].tolist()
 
+    @pytest.mark.slow
     def test_knows_the_column_of_each_line(self, sent: Path) -> None:
         section = gathered(sent / "ways.h5").sections[0]
         assert section.signals is not None and section.simulation is not None

@@ -144,6 +144,7 @@ error[E398]: there is no `arm.ic` here, of which the archive is
 """
 
 
+@pytest.mark.slow
 def test_a_deck_that_is_another_now_is_left_alone(archive: str, capsys: pytest.CaptureFixture[str]) -> None:
     other = DECK.replace("6 s", "7 s")
     Path("arm.ic").write_text(other, encoding="utf-8")

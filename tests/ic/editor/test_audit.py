@@ -148,6 +148,7 @@ QUIET = DECK.replace("sweep spares", "// sweep spares")
 """The deck without errors: its audit has one message."""
 
 
+@pytest.mark.slow
 def test_what_the_last_audit_said_of_unchanged_lines_stands_until_the_next_one_ends(
     tmp_path: Path, editor: Editor
 ) -> None:

@@ -186,6 +186,7 @@ def checker_of(editor: Editor) -> int:
     return int(children[0])
 
 
+@pytest.mark.slow
 def test_a_checker_that_dies_is_told_in_the_log_and_started_again(tmp_path: Path, editor: Editor) -> None:
     deck = tmp_path / "arm.ic"
     editor.open(deck, BAD)

@@ -107,6 +107,7 @@ def test_what_words_alone_may_stand_is_offered_alone(tmp_path: Path, editor: Edi
     )
 
 
+@pytest.mark.slow
 def test_a_value_of_all_turns_is_shown(tmp_path: Path, editor: Editor) -> None:
     deck = opened(tmp_path, editor)
     found = editor.about("textDocument/hover", deck, *at(CHAIN, "mass = 0.1"))["contents"]["value"]

@@ -306,6 +306,7 @@ def test_definitions_are_found_in_included_files_and_in_the_library(editor: Edit
     assert places(editor.about("textDocument/definition", deck, *at(ARM, "<servos"))) == [(uri(library), 0, 0)]
 
 
+@pytest.mark.slow
 def test_all_uses_of_a_name_are_found_in_all_files(editor: Editor, deck: Path) -> None:
     context = {"context": {"includeDeclaration": True}}
     found = editor.about("textDocument/references", deck, *at(ARM, "reach, 0"), **context)

@@ -154,6 +154,7 @@ def test_a_deck_with_a_mistake_is_mended_first(editor: Editor, deck: Path) -> No
     assert refused(editor, deck, "gearbox like").endswith("mend D060 first")
 
 
+@pytest.mark.slow
 def test_a_name_with_other_uses_in_a_table_is_refused(editor: Editor, deck: Path) -> None:
     (deck.parent / "cases.csv").write_text("gearbox.kp [V*s/rad]\n0.02\n0.03\n")
     text = DECK + 'sweep listed of nominal { from "cases.csv"; }\n'

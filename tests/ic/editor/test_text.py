@@ -124,6 +124,7 @@ run broken like nominal {
 """
 
 
+@pytest.mark.slow
 def test_definitions_are_listed_in_order_also_of_a_text_that_is_not_whole(tmp_path: Path, editor: Editor) -> None:
     deck = tmp_path / "arm.ic"
     editor.open(deck, OUTLINED)

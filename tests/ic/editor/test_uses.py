@@ -104,6 +104,7 @@ def test_a_name_under_several_roofs_leads_through_all_of_them(editor: Editor, ne
     ]
 
 
+@pytest.mark.slow
 def test_behind_several_roofs_their_definitions_may_stand_and_before_them_none(editor: Editor, nested: Path) -> None:
     part = {"reach", "bar", "drive", "fast"}
     assert part <= set(words(editor, nested, NESTED + "let x = cell.left.|"))

@@ -212,6 +212,7 @@ def test_without_velocity_products_rates_move_nothing() -> None:
         assert arm.n < 3 or jacobian(linearised(tree, arm.qd, slow))[: arm.n, arm.n : 2 * arm.n].any()
 
 
+@pytest.mark.slow
 def test_joints_on_different_branches_have_no_entry() -> None:
     for arm, tree in forest()[:60]:
         of = linearised(tree, arm.qd, passed(arm, True, tree))

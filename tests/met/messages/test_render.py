@@ -181,6 +181,7 @@ def test_a_long_caret_ends_with_the_part_that_is_shown():
     assert len(caret) <= len(line) <= 123
 
 
+@pytest.mark.slow
 @given(st.text(max_size=400).filter(lambda t: "\n" not in t), st.integers(1, 500), st.integers(1, 500))
 def test_no_text_can_steer_the_terminal_or_break_the_frame(text, column, length):
     told = render([error("D020", text, Label(Place("a.ic", 1, column, length), text), help=text)], {"a.ic": text})
