@@ -6,7 +6,10 @@ processes which it started and waited for. Processors differ, and a shared one i
 tests times a fixed piece of work now and then (`Slowness`), and costs are in seconds of the processor that the ledger
 names.
 
-A function or a tier that costs more than its limit times `FACTOR` or `TOTAL_FACTOR` makes pytest's run fail.
+A fixture that several tests share costs what its setups and teardowns do, in all processes that make it. Which test
+comes first or last is chance, so the cost is the fixture's and not the test's.
+
+A function, a fixture or a tier that costs more than its limit times `FACTOR` or `TOTAL_FACTOR` makes pytest's run fail.
 """
 
 from __future__ import annotations
@@ -34,9 +37,10 @@ CALIBRATED_EVERY = 10.0
 
 @dataclass(frozen=True)
 class Tier:
-    """A tier's limits in the ledger: for each test function, and for all together, in calibrated seconds."""
+    """A tier's limits in the ledger: for each test function, each shared fixture, and all, in calibrated seconds."""
 
     function: float
+    fixture: float
     total: float
 
 
@@ -57,7 +61,10 @@ class Ledger:
 def read_ledger(path: Path = LEDGER) -> Ledger:
     """The ledger, read from its file."""
     table = tomllib.loads(path.read_text(encoding="utf-8"))
-    tiers = {name: Tier(float(limits["function"]), float(limits["total"])) for name, limits in table["tier"].items()}
+    tiers = {
+        name: Tier(float(limits["function"]), float(limits["fixture"]), float(limits["total"]))
+        for name, limits in table["tier"].items()
+    }
     dear = {name: (float(entry["seconds"]), str(entry["why"])) for name, entry in table.get("dear", {}).items()}
     return Ledger(float(table["calibration"]), tiers, dear)
 
@@ -103,11 +110,17 @@ def _spent() -> float:
 
 
 class Measured:
-    """Plugin of each process that runs tests: each report gets the cost of its phase, `cost`, in calibrated seconds."""
+    """Plugin of each process that runs tests: puts costs into the reports of phases, in calibrated seconds.
+
+    cost      of the phase, without that of shared fixtures
+    fixtures  cost of each shared fixture that was set up or torn down in it, by `FILE::fixture NAME`
+    """
 
     def __init__(self, ledger: Ledger) -> None:
         self._slowness = Slowness(ledger.calibration)
-        self._counted = 0.0
+        self._counted = 0.0  # what was spent before this phase
+        self._torn_down: float | None = None  # in a teardown: what was spent before that of the next fixture
+        self._fixtures: dict[str, float] = {}
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self) -> Generator[None, object, object]:
@@ -118,10 +131,36 @@ class Measured:
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(self) -> Generator[None, pytest.TestReport, pytest.TestReport]:
         report = yield
-        spent = _spent()
-        report.cost = (spent - self._counted) / self._slowness.now()  # type: ignore[attr-defined]
-        self._counted = _spent()
+        spent, slowness = _spent() - self._counted, self._slowness.now()
+        report.cost = (spent - sum(self._fixtures.values())) / slowness  # type: ignore[attr-defined]
+        report.fixtures = {name: cost / slowness for name, cost in self._fixtures.items()}  # type: ignore[attr-defined]
+        self._fixtures = {}
+        self._counted, self._torn_down = _spent(), None
         return report
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_teardown(self) -> None:
+        self._torn_down = _spent()
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_fixture_setup(self, fixturedef: pytest.FixtureDef[object]) -> Generator[None, object, object]:
+        others, before = sum(self._fixtures.values()), _spent()
+        try:
+            return (yield)
+        finally:
+            within = sum(self._fixtures.values()) - others  # fixtures that this one asked for on its way
+            self._add(fixturedef, _spent() - before - within)
+
+    def pytest_fixture_post_finalizer(self, fixturedef: pytest.FixtureDef[object]) -> None:
+        if self._torn_down is not None:  # else it makes place for another parameter's, which is the test's doing
+            spent = _spent()
+            self._add(fixturedef, spent - self._torn_down)
+            self._torn_down = spent
+
+    def _add(self, fixturedef: pytest.FixtureDef[object], spent: float) -> None:
+        if fixturedef.scope != "function":
+            name = f"{fixturedef.baseid}::fixture {fixturedef.argname}"
+            self._fixtures[name] = self._fixtures.get(name, 0.0) + spent
 
 
 class Counted:
@@ -132,8 +171,10 @@ class Counted:
         self._costs: dict[tuple[str, str], float] = defaultdict(float)  # by tier and test function
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        function = report.nodeid.partition("[")[0]
-        self._costs[tier_of(report.keywords), function] += getattr(report, "cost", 0.0)
+        tier, function = tier_of(report.keywords), report.nodeid.partition("[")[0]
+        self._costs[tier, function] += getattr(report, "cost", 0.0)
+        for name, cost in getattr(report, "fixtures", {}).items():
+            self._costs[tier, name] += cost
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
@@ -171,11 +212,14 @@ def excesses(costs: Mapping[tuple[str, str], float], ledger: Ledger) -> list[str
         limits = ledger.tiers.get(tier)
         if limits is None:
             continue
-        allowed, _ = ledger.dear.get(function, (limits.function, ""))
+        usual = limits.fixture if "::fixture " in function else limits.function
+        allowed, _ = ledger.dear.get(function, (usual, ""))
         if seconds > FACTOR * allowed:
             remedy = "mark it `slow`" if tier == "default" else "mark it `release`"
+            if "::fixture " in function:
+                remedy = remedy.replace("mark it", "mark the tests that use it")
             lines.append(
-                f"TOO DEAR {function}: {seconds:.1f} s of processor time, all parameters together, where tier {tier} "
+                f"TOO DEAR {function}: {seconds:.1f} s of processor time in all, where tier {tier} "
                 f"has {allowed:g} s (it fails above {FACTOR * allowed:g} s): make it cheaper, {remedy}, or give it a "
                 f"line with the reason in tests/costs.toml"
             )

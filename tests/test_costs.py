@@ -15,7 +15,7 @@ from tests.costs import Ledger, Tier
 
 ROOT = Path(__file__).parents[1]
 LEDGER = Ledger(
-    0.01, {"default": Tier(0.5, 10.0), "ci": Tier(5.0, 100.0)}, {"tests/test_it.py::test_dear": (4.0, "why")}
+    0.01, {"default": Tier(0.5, 2.0, 10.0), "ci": Tier(5.0, 20.0, 100.0)}, {"tests/test_it.py::test_dear": (4.0, "why")}
 )
 
 
@@ -30,12 +30,17 @@ def test_the_marks_of_a_test_say_its_tier(marks: tuple[str, ...], tier: str) -> 
 
 def test_a_function_that_costs_too_much_is_named_with_its_remedies() -> None:
     assert costs.excesses({("default", "tests/test_it.py::test_two"): 2.0}, LEDGER) == [
-        "TOO DEAR tests/test_it.py::test_two: 2.0 s of processor time, all parameters together, where tier default has "
-        "0.5 s (it fails above 1.5 s): make it cheaper, mark it `slow`, or give it a line with the reason in "
-        "tests/costs.toml"
+        "TOO DEAR tests/test_it.py::test_two: 2.0 s of processor time in all, where tier default has 0.5 s (it fails "
+        "above 1.5 s): make it cheaper, mark it `slow`, or give it a line with the reason in tests/costs.toml"
     ]
     assert costs.excesses({("default", "tests/test_it.py::test_two"): 1.4}, LEDGER) == []
     assert "mark it `release`" in costs.excesses({("ci", "tests/test_it.py::test_two"): 16.0}, LEDGER)[0]
+
+
+def test_a_shared_fixture_has_a_limit_of_its_own() -> None:
+    name = "tests/test_it.py::fixture archive"
+    assert costs.excesses({("default", name): 5.9}, LEDGER) == []
+    assert "mark the tests that use it `slow`" in costs.excesses({("default", name): 6.1}, LEDGER)[0]
 
 
 def test_a_function_of_the_ledger_may_cost_what_its_line_says() -> None:
@@ -84,7 +89,18 @@ def test_wasteful_in_a_child():
     subprocess.run([sys.executable, "-c", work], check=True)
 
 
-def test_patient():
+@pytest.fixture(scope="module")
+def dear():
+    begun = time.process_time()
+    while time.process_time() - begun < 0.15:
+        pass
+    yield
+    begun = time.process_time()
+    while time.process_time() - begun < 0.15:
+        pass
+
+
+def test_patient(dear):
     time.sleep(0.3)
 """
 
@@ -92,20 +108,24 @@ def test_patient():
 @pytest.mark.slow
 @pytest.mark.parametrize("processes", ["0", "2"])
 def test_a_run_with_such_a_function_fails_with_the_message(tmp_path: Path, processes: str) -> None:
-    """Parameters are added up whatever process runs them, what a test starts counts, and waiting does not."""
+    """Parameters are added up whatever process runs them, what a test starts counts, and waiting does not.
+
+    What several tests share is not the first one's.
+    """
     (tmp_path / "tests").mkdir()
     for name in ("conftest.py", "costs.py"):
         (tmp_path / "tests" / name).write_bytes((ROOT / "tests" / name).read_bytes())
     (tmp_path / "setup.cfg").write_bytes((ROOT / "setup.cfg").read_bytes())
     (tmp_path / "tests" / "instruction_sets.py").write_text('def header() -> str:\n    return ""\n')
     (tmp_path / "tests" / "test_it.py").write_text(WASTEFUL)
-    # Each of the two spends 0.3 s, and fails above 0.09 s of a processor as fast as this one.
+    # Each of the two spends 0.3 s, and fails above 0.06 s of a processor like this one.
     (tmp_path / "tests" / "costs.toml").write_text(
-        f"calibration = {costs.work():.6f}\n[tier.default]\nfunction = 0.03\ntotal = 100\n"
+        f"calibration = {costs.work():.6f}\n[tier.default]\nfunction = 0.02\nfixture = 0.02\ntotal = 100\n"
     )
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST_", "MET_TEST"))}
     words = [sys.executable, "-m", "pytest", "-n", processes]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, env=environment)
-    said = [line.split()[2] for line in done.stdout.splitlines() if line.startswith("TOO DEAR")]
-    assert said == ["tests/test_it.py::test_wasteful:", "tests/test_it.py::test_wasteful_in_a_child:"], done.stdout
+    said = [line.split(": ")[0] for line in done.stdout.splitlines() if line.startswith("TOO DEAR")]
+    dear = ("fixture dear", "test_wasteful", "test_wasteful_in_a_child")
+    assert said == [f"TOO DEAR tests/test_it.py::{name}" for name in dear], done.stdout
     assert "4 passed" in done.stdout and done.returncode == 1
