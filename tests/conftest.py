@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import importlib
 import os
+import re
 import signal
 import sys
 from collections.abc import Generator
@@ -57,10 +60,48 @@ def pytest_runtest_makereport(
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """With `-m alone...`, no file is imported that has no such mark: that would be half a minute of one core."""
-    if not config.option.markexpr.startswith("alone") or collection_path.suffix != ".py":
+    """No file is imported without a test of those asked for, as far as its first lines tell.
+
+    With `-m alone...` these are the files that name this mark, and with `-m "not (slow or ...)"` those which are not
+    marked so as a whole.
+    """
+    if collection_path.suffix != ".py":
         return None
-    return b"mark.alone" not in collection_path.read_bytes() or None
+    if config.option.markexpr.startswith("alone"):
+        return b"mark.alone" not in collection_path.read_bytes() or None
+    if not (unwanted := _unwanted_marks(config)):
+        return None
+    of_the_file = re.search(r"^pytestmark = (.*?)\n(?![ \])])", collection_path.read_text("utf-8"), re.M | re.S)
+    return bool(of_the_file and unwanted & set(re.findall(r"mark\.(\w+)", of_the_file[1]))) or None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pycollect_makeitem(collector: pytest.Collector, obj: object) -> list[pytest.Item] | None:
+    """Nothing is made of functions and classes that are marked as what was not asked for: half of all tests."""
+    unwanted = _unwanted_marks(collector.config)
+    marks = getattr(obj, "pytestmark", []) if unwanted and (isinstance(obj, type) or callable(obj)) else []
+    return [] if isinstance(marks, list) and any(mark.name in unwanted for mark in marks) else None
+
+
+def _unwanted_marks(config: pytest.Config) -> frozenset[str]:
+    """The marks of `-m "not (MARK or MARK ...)"`; none where it is another expression."""
+    alternatives = re.fullmatch(r"not \((\w+(?: or \w+)*)\)", config.option.markexpr)
+    return frozenset(alternatives[1].split(" or ")) if alternatives else frozenset()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection(session: pytest.Session) -> None:
+    """In a fresh clone, each process that runs tests compiles all of them, with what shows how an assert failed.
+
+    What one has compiled is on the disk for the others. So every other one begins with the last file.
+    """
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0")
+    if int(worker.removeprefix("gw")) % 2 == 0 or [Path(arg).name for arg in session.config.args] != ["tests"]:
+        return
+    for path in sorted(ROOT.glob("tests/**/test_*.py"), reverse=True):
+        if not pytest_ignore_collect(path, session.config):
+            with contextlib.suppress(Exception, pytest.skip.Exception):  # the collection tells
+                importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
 
 
 class _Passed:

@@ -1,4 +1,4 @@
-"""A server for the tests of a file, since each start takes a second; each test finds nothing open."""
+"""A server for all tests, since each start takes a second; each test finds nothing open."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pytest
 from tests.ic.editor.client import Editor
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Editor]:
-    """An editor with its server; that it ends well is part of each file's tests."""
+    """An editor with its server, which must end well."""
     with Editor(tmp_path_factory.mktemp("editor")) as made:
         yield made
         assert made.end() == 0

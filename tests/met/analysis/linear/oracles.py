@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -25,6 +26,7 @@ from met.trace.recording import Branch, RecordedControl, RecordSection
 DECKS = Path(ic.__file__).parent / "decks"
 
 
+@functools.cache
 def shipped() -> list[tuple[str, str]]:
     """All decks that come with MET, each with the runs and sweeps in it."""
     return [
