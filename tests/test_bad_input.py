@@ -178,6 +178,7 @@ error[D154]: `values` of `table` has 2 numbers, and `times` 3
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("right", "wrong", "said"), MISTAKES.values(), ids=MISTAKES)
 def test_a_mistake_is_one_placed_message_and_nothing_is_written(
     tmp_path: Path,
@@ -242,6 +243,7 @@ error[D173]: no deck `two_lnk.ic`
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_deck_is_found_in_a_folder_of_includes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("decks").mkdir()

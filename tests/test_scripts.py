@@ -143,6 +143,7 @@ def test_what_no_longer_holds_makes_the_environment_be_asked_for(checkout: Path,
     assert (done.returncode, done.stdout, done.stderr) == (7, "", "environment asked for run\n")
 
 
+@pytest.mark.slow
 def test_an_old_python_is_refused_in_one_line(checkout: Path, tools: Path) -> None:
     old = "#!/bin/sh\ncase $2 in *exit*) exit 1 ;; *) echo 3.9.2 ;; esac\n"
     program(tools / "python3", old)
@@ -155,6 +156,7 @@ def test_an_old_python_is_refused_in_one_line(checkout: Path, tools: Path) -> No
     )
 
 
+@pytest.mark.slow
 def test_no_python_at_all_is_refused_in_one_line(checkout: Path, tools: Path) -> None:
     done = start(checkout, PATH=str(tools))
     assert done.returncode == 2
@@ -162,6 +164,7 @@ def test_no_python_at_all_is_refused_in_one_line(checkout: Path, tools: Path) ->
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_newer_python_beside_an_old_one_is_found(checkout: Path, tools: Path) -> None:
     program(tools / "python3", "#!/bin/sh\nexit 1\n")
     program(tools / "python3.12", '#!/bin/sh\n[ "$1" = -I ] && echo "made with $4"\nexit 0\n')

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import ic
 from met import run as engine
 
 
+@pytest.mark.slow
 def test_the_arm_turns_the_satellite_the_other_way_and_no_momentum_comes_of_it() -> None:
     (made,) = ic.compile("free_flyer.ic").experiments
     run = engine.run(made)
@@ -23,6 +25,7 @@ def test_the_arm_turns_the_satellite_the_other_way_and_no_momentum_comes_of_it()
     np.testing.assert_allclose(np.linalg.norm(run.signals["links.base.rate"][0, -1]), 0.0, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_on_board_it_feels_that_it_turns_and_shakes_and_not_that_it_falls() -> None:
     (made,) = ic.compile("free_flyer.ic", select=["flyer_felt"]).experiments
     run = engine.run(made)
@@ -35,6 +38,7 @@ def test_on_board_it_feels_that_it_turns_and_shakes_and_not_that_it_falls() -> N
     assert np.max(np.abs(shake[run.time < 1.0])) < 5e-3 < 0.1 < np.max(np.abs(shake))
 
 
+@pytest.mark.slow
 def test_held_it_keeps_its_attitude_and_takes_momentum_from_outside() -> None:
     (made,) = ic.compile("free_flyer.ic", select=["flyer_held"]).experiments
     run = engine.run(made)

@@ -132,6 +132,7 @@ def test_the_stretched_shuttle_arm_is_as_long_as_nasa_says() -> None:
     assert place(made, "payload", [0.0, 90.0, 0.0, 0.0, 0.0, 0.0])[2] == pytest.approx(0.822 + 15.3166, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_other_arms_are_where_their_lengths_add_up_to() -> None:
     station = compiled("station_arm.ic station_arm_reach")
     ets_vii = compiled("ets_vii.ic ets_vii_reach")
@@ -210,6 +211,7 @@ def test_the_body_that_the_deck_has_for_a_free_base_is_one(deck: str, mass: floa
     assert lacks(written) < 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("deck", "joint", "rate", "effort", "volts"), [
     ("shuttle_arm.ic shuttle_arm_driven", "shoulder_yaw", 2.29 * DEG, 1570.0, 25.0),
     ("shuttle_arm.ic shuttle_arm_driven", "elbow", 3.21 * DEG, 1074.0, 24.0),
@@ -226,6 +228,7 @@ def test_the_assumed_motors_have_the_published_torque_at_the_published_rate(
     assert needed == pytest.approx(volts, abs=0.5) and needed < p["v_max"]
 
 
+@pytest.mark.slow
 def test_the_joints_of_the_r3_keep_step_below_the_librarys_limits() -> None:
     found = engine.run(compiled("manutec_r3.ic manutec_r3_move")).signals
     q, qd = found["q"][0], found["qd"][0]

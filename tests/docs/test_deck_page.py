@@ -129,6 +129,7 @@ def test_a_fragment_compiles_where_it_belongs_or_gives_the_error_it_shows(
         assert compiled.plan is not None and said == "", said
 
 
+@pytest.mark.slow
 def test_the_sweep_of_the_page_counts_with_its_last_axis_fastest(tmp_path: Path) -> None:
     (text,) = (text for where, _, text in FRAGMENTS if text.startswith("sweep loads"))
     compiled, _ = checked(tmp_path / "picker.ic", PICKER + text)

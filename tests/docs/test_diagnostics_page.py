@@ -320,6 +320,7 @@ def test_python_asks_where_nothing_comes_from() -> None:
         )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_beginning_of_an_id_that_several_cases_have(monkeypatch: pytest.MonkeyPatch) -> None:
     import batch
     from batch.archive.read import ArchiveFile

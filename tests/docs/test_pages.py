@@ -130,6 +130,7 @@ def test_a_branch_in_a_model_prints_what_the_page_shows(tmp_path: Path) -> None:
     assert said.startswith(re.sub(r"--> \S*/", "--> ", shown))
 
 
+@pytest.mark.slow
 def test_the_stability_figure_has_one_name_in_messages_and_pages() -> None:
     checked = ic.check("two_link.ic")
     assert checked.diagnostics == ()

@@ -60,6 +60,7 @@ def reach(monkeypatch: pytest.MonkeyPatch) -> Any:
     return names["Reach"]()
 
 
+@pytest.mark.slow
 def test_its_environment_goes_through_an_episode(reach: Any) -> None:
     seen, _ = reach.reset(seed=3)
     assert seen.shape == reach.observation_space.shape and seen.dtype == reach.observation_space.dtype
@@ -84,6 +85,7 @@ def test_equal_seeds_give_equal_episodes(reach: Any) -> None:
     assert episode(1) == episode(1) != episode(2)
 
 
+@pytest.mark.slow
 def test_an_episode_is_cut_at_the_runs_end(reach: Any) -> None:
     reach.reset(seed=1)
     ends = [reach.step(np.zeros(2))[2:4] for _ in range(500)]

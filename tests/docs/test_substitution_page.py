@@ -29,6 +29,7 @@ def experiment(folder: Path, more: str, name: str) -> Experiment:
     return ic.compile(deck, select=[name]).experiments[0]
 
 
+@pytest.mark.slow
 def test_the_deck_of_the_page_runs(tmp_path: Path) -> None:
     result = engine.run(experiment(tmp_path, "", "bench"))
     assert result.cause == [""]

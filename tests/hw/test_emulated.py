@@ -22,6 +22,7 @@ def made(values: dict[str, float] = VALUES, **more: float) -> EmulatedBed:
     return EmulatedBed(Shaft(), emulated.scales(values), emulated.limits(values, 1e-3), **more)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("values", [VALUES, {"i_max": 3.0}], ids=["converters", "fine"])
 def test_over_a_wire_the_same_plant_makes_the_same_bits(values: dict[str, float]) -> None:
     scales, limits = emulated.scales(values), emulated.limits(values, 1e-3)

@@ -20,6 +20,7 @@ def test_the_crc_is_the_one_of_the_page() -> None:
     assert framed(b"123456789") == b"\x0c123456789\xb1\x29\x00"
 
 
+@pytest.mark.slow
 @given(payloads)
 def test_a_frame_is_what_another_reading_of_the_page_makes(payload: bytes) -> None:
     frame = framed(payload)
@@ -36,6 +37,7 @@ def test_what_is_no_frame_is_none_for_both_readings(data: bytes) -> None:
     assert found == model.payload(data) or len(data) > 203
 
 
+@pytest.mark.slow
 @given(st.lists(payloads | st.binary(max_size=30).map(lambda x: b"-" + x), max_size=8), st.randoms())
 def test_pieces_do_not_matter(parts: list[bytes], chance: random.Random) -> None:
     stream, wanted = b"", []

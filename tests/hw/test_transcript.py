@@ -130,6 +130,7 @@ while True:
 """
 
 
+@pytest.mark.slow
 def test_a_killed_writer_loses_nothing_that_was_written(tmp_path: Path) -> None:
     words = [sys.executable, "-c", CHILD, str(tmp_path / "t")]
     child = subprocess.Popen(words, stdout=subprocess.PIPE, cwd=Path(__file__).parents[2])

@@ -60,6 +60,7 @@ def expected(wrong: set[int]) -> list[tuple[str, int]]:
     return sorted((MISTAKES[i][2], lines[i]) for i in wrong)
 
 
+@pytest.mark.slow
 def test_the_deck_without_mistakes_is_sound(tmp_path: Path) -> None:
     assert told(tmp_path, set()) == []
 
@@ -77,6 +78,7 @@ def test_to_mend_a_mistake_takes_just_its_message_away(tmp_path: Path, mended: i
     assert told(tmp_path, others) == expected(others)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alone", range(len(MISTAKES)), ids=[wrong or "nothing" for _, wrong, _ in MISTAKES])
 def test_a_mistake_alone_is_told_once(tmp_path: Path, alone: int) -> None:
     assert told(tmp_path, {alone}) == expected({alone})

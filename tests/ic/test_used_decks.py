@@ -90,6 +90,7 @@ def numbers(experiment: Experiment) -> dict[str, object]:
     return {path: each.value for path, each in experiment.parameters.items()}
 
 
+@pytest.mark.slow
 def test_an_arm_that_is_used_is_the_one_that_is_included(tmp_path: Path) -> None:
     used = experiments(compiled(tmp_path, USE + RUN.replace("ROOF", "part")))
     included = experiments(compiled(tmp_path, '#include "part.ic"\n' + RUN.replace("ROOF.", ""), part=PART))
@@ -167,6 +168,7 @@ def test_runs_and_sweeps_stay_away(tmp_path: Path) -> None:
         )
 
 
+@pytest.mark.slow
 def test_a_value_is_set_by_a_run_a_sweep_and_the_command_line(tmp_path: Path) -> None:
     text = USE + HOLD + "run far like hold { with part.reach = 1 m; }\n"
     far = experiments(compiled(tmp_path, text, set=["part.reach=1.2 m"]))["far"]
@@ -231,6 +233,7 @@ def test_a_plan_keeps_how_a_place_was_led_to(tmp_path: Path) -> None:
 BOTH = 'use "part.ic" as part;  use "part.ic" as other;\n'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text, code, message", [
     ("use <pandda.ic> as p;", "D005", "cannot find <pandda.ic>"),
     ('use "part.ic";', "D395", "expected `as`, found `;`"),

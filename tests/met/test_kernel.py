@@ -159,12 +159,14 @@ def bits(k, inputs, ticks=60, **options):
     return rows.tobytes() + outputs.tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [2, 4, 8, 16, 32])
 def test_bits_do_not_depend_on_lanes(lanes):
     program, inputs = machine_like_program(), some_cases(45)
     assert bits(kernel.compile(program, lanes), inputs) == bits(kernel.compile(program, 8), inputs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", [0, 1, 3])
 @pytest.mark.parametrize("lanes", [4, 8])
 def test_bits_do_not_depend_on_optimisation(level, lanes):
@@ -669,6 +671,7 @@ def test_a_hit_loads_without_the_optimiser(empty_cache, monkeypatch):
     assert kernel.compile(program).cached
 
 
+@pytest.mark.slow
 def test_importing_the_kernel_does_not_import_llvm():
     code = "import sys, met.backends.llvm.kernel; sys.exit('llvmlite' in sys.modules)"
     assert (

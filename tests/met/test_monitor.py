@@ -80,6 +80,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[engine.Run, list[dic
     return engine.run(experiment), answers
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in REQUIRED if not name.startswith("stretch")])
 def test_margins_and_shares_are_rtamts(both: tuple[engine.Run, list[dict[str, float]]], name: str) -> None:
     found, answers = both

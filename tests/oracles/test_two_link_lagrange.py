@@ -101,6 +101,7 @@ def test_a_reversing_command_makes_joints_stick_and_release():
     assert np.all(np.abs(need[motion.mode == 0]) <= 0.0205 * (1.0 + 1e-9))
 
 
+@pytest.mark.slow
 def test_a_torque_below_friction_moves_nothing_and_one_above_it_does():
     for share, moves in ((0.98, False), (1.02, True)):
         push = Command("torque", lambda t, share=share: ((share * 0.0205 * 1570.0, 0.0), (0.0, 0.0)))

@@ -176,6 +176,7 @@ run away like lift { environment { fault = runaway { joint = hinge; from = 5 s; 
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["lift", "smooth", "away"])
 def test_the_belt_drives_integral_begin_and_full_do_what_the_page_says(
     installed: None, name: str, tmp_path: Path

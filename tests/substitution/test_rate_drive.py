@@ -101,6 +101,7 @@ def test_a_position_loop_of_the_servo_s_tells_the_rate() -> None:
     assert np.abs(q - there).max() < 2e-3 * a * w  # it is held for a tick, and comes a tick late
 
 
+@pytest.mark.slow
 def test_the_loop_of_a_shaft_without_friction_does_as_its_difference_equation_says(tmp_path: Path) -> None:
     plant = shaft(tmp_path, "rate_drive(f_c = 0 N*m, f_v = 0 N*m*s/rad)")
     plant.start(3.0)
@@ -212,6 +213,7 @@ def test_at_a_port_it_is_told_rates_and_makes_the_same_bits() -> None:
     assert plant.shaft_rate == inside.signals["shoulder.bed.shaft_rate"][0, -1] != 0.0
 
 
+@pytest.mark.slow
 def test_the_work_of_its_motors_is_what_shaft_and_friction_take() -> None:
     (found,) = shaft_work(compiled(bench("rate_drive(delay = 1)"), "bench"), "shoulder")
     w = found.rate[0]

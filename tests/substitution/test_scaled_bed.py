@@ -110,6 +110,7 @@ def test_where_nothing_is_rounded_the_bits_are_the_same(faults: bool, scales: di
         assert (one.signals[channel] / scale).tobytes() == other.signals[channel].tobytes(), name
 
 
+@pytest.mark.slow
 def test_a_fault_of_once_a_turn_comes_at_another_time_where_rates_are_scaled() -> None:
     assert apart(text(WHOLE, faults=True)) > 1e-4
 
@@ -119,6 +120,7 @@ def test_two_joints_on_scaled_beds_are_solved_together_as_on_others() -> None:
     assert apart(text(SCALES, joints=("shoulder", "elbow"))) < 1e-11
 
 
+@pytest.mark.slow
 def test_scales_of_1_are_no_scales_to_the_bit() -> None:
     deck = text(dict.fromkeys(SCALES, 1.0), faults=True)
     assert ran(deck, "full").signals["q"].tobytes() == ran(deck, "lab").signals["q"].tobytes()

@@ -93,6 +93,7 @@ def shaft(tmp_path: Path, bed: str) -> Plant:
     return Plant(ic.compile(tmp_path / "deck.ic", select=["bench"]).experiments[0], "shoulder")
 
 
+@pytest.mark.slow
 def test_a_shaft_without_friction_turns_as_newton_says(tmp_path: Path) -> None:
     plant = shaft(tmp_path, "torque_drive(f_c = 0 N*m, f_v = 0 N*m*s/rad, inertia = 1e-4 kg*m^2)")
     plant.start(2.0)

@@ -34,6 +34,7 @@ def opened(path: Path, engine: str) -> Any:
     return xarray.open_dataset(path, engine=engine)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine_name", ENGINES)
 def test_xarray_opens_a_single_experiment_as_it_is(here: Path, engine_name: str) -> None:
     plan = plans.plan(plans.gains(7))
@@ -54,6 +55,7 @@ def test_xarray_opens_a_single_experiment_as_it_is(here: Path, engine_name: str)
         assert data.qd.sel(joint="elbow", recorded_case=3).attrs["units"] == "rad/s"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine_name", ENGINES)
 def test_every_variable_has_a_long_name_and_every_number_its_unit(here: Path, engine_name: str) -> None:
     batch.run(plans.plan(plans.gains(3)), output="a.h5")
@@ -82,6 +84,7 @@ def test_every_variable_has_a_long_name_and_every_number_its_unit(here: Path, en
         assert data["links.lower.mass"].attrs["deck_unit"] == "g"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine_name", ENGINES)
 def test_a_signal_by_itself_says_what_was_varied_in_its_cases(here: Path, engine_name: str) -> None:
     batch.run(plans.plan(plans.gains(7)), output="a.h5")
@@ -234,6 +237,7 @@ def test_the_plan_and_the_deck_are_inside(here: Path) -> None:
         }
 
 
+@pytest.mark.slow
 def test_the_plan_of_a_large_sweep_comes_back_from_some_of_its_cases(here: Path) -> None:
     """A case that is run alone leaves the whole case table in its archive: others can be run from it."""
     plan = plans.plan(plans.gains(10_001))
@@ -256,6 +260,7 @@ def test_dates_and_hosts_are_beside_the_archive_not_in_it(here: Path) -> None:
     assert beside["began"][:10].encode() not in inside
 
 
+@pytest.mark.slow
 def test_a_signal_of_some_joints_has_a_dimension_of_its_own(here: Path) -> None:
     from dataclasses import replace
 
@@ -272,6 +277,7 @@ def test_a_signal_of_some_joints_has_a_dimension_of_its_own(here: Path) -> None:
         assert group.joints(group.variables["servo.voltage"]) == ("shoulder",)
 
 
+@pytest.mark.slow
 def test_joints_of_unlike_kind_have_their_own_units(here: Path) -> None:
     from dataclasses import replace
 
@@ -283,6 +289,7 @@ def test_joints_of_unlike_kind_have_their_own_units(here: Path) -> None:
         assert file.groups[0].variables["q"].unit == ""
 
 
+@pytest.mark.slow
 def test_a_metric_with_a_taken_name_gets_another(here: Path) -> None:
     from dataclasses import replace
 
@@ -490,6 +497,7 @@ def test_what_an_archive_lacks_is_said(here: Path, change: Any, said: str) -> No
     assert damaged(change, plans.nominal()).startswith(said)
 
 
+@pytest.mark.slow
 def test_an_archive_without_experiments_is_damaged(here: Path) -> None:
     def empty(file: Any) -> None:
         del file["nominal"], file["gains"]
@@ -498,6 +506,7 @@ def test_an_archive_without_experiments_is_damaged(here: Path) -> None:
     assert said == "E302: the archive a.h5 is damaged: it holds no run and no sweep"
 
 
+@pytest.mark.slow
 def test_a_flipped_bit_in_a_history_is_noticed(here: Path) -> None:
     batch.run(plans.plan(plans.nominal()), output="a.h5")
     with ArchiveFile("a.h5") as file:

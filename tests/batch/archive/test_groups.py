@@ -152,6 +152,7 @@ def test_cases_lists_the_table_of_all_groups_in_order(tmp_path: Path, capsys: py
     assert [line.split()[2] for line in told[7:]] == ["drive", "brisk"] * 3
 
 
+@pytest.mark.slow
 def test_repeats_feel_noise_of_their_own_and_the_first_is_that_of_the_run_alone(tmp_path: Path) -> None:
     alone = noise_of(compiled(tmp_path, NOISY, select="hold"))
     repeated = noise_of(compiled(tmp_path, NOISY, "sweep it of hold { repeat 4; }"))

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 import batch
 import ic
 
 
+@pytest.mark.slow
 def test_a_joint_called_recorded_and_a_coordinate_do_not_collide(tmp_path: Path) -> None:
     deck = tmp_path / "deck.ic"
     deck.write_text("""

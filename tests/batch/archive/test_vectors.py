@@ -185,6 +185,7 @@ def shown(figure: Any) -> list[Any]:
     return [ax for ax in figure.axes if ax.get_visible()]
 
 
+@pytest.mark.slow
 def test_components_have_colours_in_turn_and_joints_their_own(
     one: ArchiveFile, figures: list[Any], tmp_path: Path
 ) -> None:
@@ -193,6 +194,7 @@ def test_components_have_colours_in_turn_and_joints_their_own(
     assert colours == [[0, 1, 2], [0, 1, 2], [0, 1], [1]]
 
 
+@pytest.mark.slow
 def test_cases_of_a_vector_have_a_plot_a_component(sweep: ArchiveFile, figures: list[Any], tmp_path: Path) -> None:
     draw(sweep, tmp_path / "a.png", ["q", "x.reaction.force", "links.sled.position"])
     axes = shown(figures[0])

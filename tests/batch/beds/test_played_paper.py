@@ -74,6 +74,7 @@ def test_a_load_that_gives_nothing_is_far_from_all_of_that(tmp_path: Path) -> No
     assert paper.apart(paper.driven(bed, "torques"), paper.alone("plain"))[0] > 0.005
 
 
+@pytest.mark.slow
 def test_a_deck_says_whether_the_bench_is_sent_voltages_or_torques(tmp_path: Path) -> None:
     by_volts, by_torque = (paper.bench("odrive", name, tmp_path) for name in ("volts", "torques"))
     with by_volts, by_torque:

@@ -83,6 +83,7 @@ def test_a_second_bed_model_at_a_port_is_its_simulation_to_the_counts_of_the_wir
     assert bench["shoulder.bed.shaft_rate"].isnull().all(), "what is inside a bed at a port nobody knows"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("installed")
 def test_a_port_that_reads_more_of_a_model_than_it_declares_is_refused_at_the_deck_s_line(
     met_bed: Callable[..., tuple[int, str, str]],

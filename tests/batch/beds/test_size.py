@@ -302,6 +302,7 @@ run both like nominal { duration = 0.2 s;  substitute shoulder { }  substitute e
     assert sized(met_bed, "both", "--joint", "elbow")["joint"] == "elbow"
 
 
+@pytest.mark.slow
 def test_a_joint_that_would_not_tick_with_those_on_beds_is_told(met_bed: Bed, here: Path) -> None:
     deck = """#include <two_link.ic>
 run both like nominal { substitute shoulder { }  servos { elbow = gearbox { rate = 50 Hz; } } }

@@ -121,6 +121,7 @@ class TestWhatItIsCalled:
             "error[E356]: cannot read the Dask scheduler file s.json: it is a named pipe, not a regular file\n"
         )
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("text", ["", "[]", "{}", "\udcff", '{"a":' * 50_000])
     def test_a_file_that_is_no_schedulers(self, many: Any, here: Path, text: str) -> None:
         Path("s.json").write_bytes(text.encode(errors="surrogateescape"))
@@ -217,12 +218,14 @@ class TestWorkersThatCannotServe:
         assert found.why.startswith(f"on {HOST}, cannot keep what was computed in {folder.path}")
         assert found.why.endswith(": no such file or directory")
 
+    @pytest.mark.slow
     def test_one_that_fails_at_dask_itself(self, many: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(executor, "CALL", "1 / 0")
         with cluster(tmp_path) as started:
             found = outcome(Dask(started.scheduler_address), many)
         assert (found.kind, found.why) == ("broken", "Dask cannot run a task: division by zero")
 
+    @pytest.mark.slow
     def test_a_campaign_stops_with_these_words(self, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(executor, "VERSION", "0.0.9")
         with cluster(here) as started, pytest.raises(Problem) as caught:

@@ -217,6 +217,7 @@ class TestTenThousandCases:
 # A few
 
 
+@pytest.mark.slow
 def test_what_is_run_again_does_not_go_over_its_archive(here: Path) -> None:
     path = batch.run(small(here), output="a.h5").path
     before = path.read_bytes()
@@ -274,6 +275,7 @@ class TestSoManyMayFail:
         alone = batch.run(plan, output=here / "b.h5", threads=1)
         assert path.read_bytes() == alone.path.read_bytes()
 
+    @pytest.mark.slow
     def test_the_command_ends_with_1(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         deck(here, 2)
         words = ["run", "door.ic", "-o", "a.h5", "--no-picture", "--threads", "1", "--max-failures"]
@@ -292,6 +294,7 @@ class TestSoManyMayFail:
     def test_a_case_that_is_run_again_for_its_history_failed_once(self, here: Path) -> None:
         batch.run(small(here), output="a.h5", threads=1, max_failures=2, histories="failed")
 
+    @pytest.mark.slow
     def test_a_case_that_two_shards_hold_failed_once(self, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         plan = small(here)
         with pytest.raises(KeyboardInterrupt):

@@ -75,6 +75,7 @@ def warned(folder: Path, name: str, deck: str = DECK) -> list[Diagnostic]:
     return list(perform(prepare(plan, output=folder / f"{name}.h5", verify="none"), executor=Threads(1)).warned)
 
 
+@pytest.mark.slow
 def test_a_joint_that_its_brake_holds_is_told_with_the_limit_and_the_brake(tmp_path: Path) -> None:
     [found] = warned(tmp_path, "parked")
     assert (found.code, found.severity) == ("D348", "warning")
@@ -104,11 +105,13 @@ def test_without_a_limit_the_servo_and_its_load_are_named(tmp_path: Path) -> Non
     assert found.help[0] == "look at its servo's gains, ratio and friction, and at what it has to move"
 
 
+@pytest.mark.slow
 def test_a_joint_that_falls_though_it_is_told_to_stay_is_told(tmp_path: Path) -> None:
     [found] = warned(tmp_path, "hanging")
     assert "rad off, and is told to stay, and `j.servo.tau_max` was reached" in found.message
 
 
+@pytest.mark.slow
 def test_a_rate_that_is_not_come_to_within_the_run_is_told(tmp_path: Path) -> None:
     [found] = warned(tmp_path, "heavy")
     assert " rad/s off, of 0.5 rad/s that it is told, and `j.servo.tau_max`" in found.message

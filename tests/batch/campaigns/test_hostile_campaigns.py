@@ -116,6 +116,7 @@ def test_a_campaign_of_nothing_replaces_no_archive(here: Path, nothing: dict[str
     assert (here / "a.h5").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_history_whose_worker_died_is_not_said_to_be_kept(here: Path) -> None:
     archive = batch.run(plans.plan(plans.gains(6)), output="a.h5", histories="every:2", executor=Losing(1, 1))
     with ArchiveFile(archive.path) as file:
@@ -255,6 +256,7 @@ def test_a_merge_that_comes_too_late_gives_the_verdict(submitted: Path, capsys: 
     assert "40 of 40 cases reached their end" in said.out and "E350" not in said.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [("share", "0", "jobs.json"), ("together",)], ids=" ".join)
 def test_a_job_with_other_code_than_was_submitted_computes_nothing(
     submitted: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...]
@@ -372,6 +374,7 @@ def test_the_commit_of_an_archive_is_mets_own(here: Path, monkeypatch: pytest.Mo
     assert batch.run(plan(), output="b.h5").path.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_what_another_run_has_ended_meanwhile_is_not_run_again(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     look = resuming.finished_state
 
@@ -390,11 +393,13 @@ def test_what_another_run_has_ended_meanwhile_is_not_run_again(here: Path, monke
 # Words
 
 
+@pytest.mark.slow
 def test_two_rules_of_every_so_many_add_up(here: Path) -> None:
     archive = batch.run(plan(), output="a.h5", histories=["every:10", "every:15"])
     assert recorded(archive) == [0, 10, 15, 20, 30]
 
 
+@pytest.mark.slow
 def test_every_so_many_may_be_more_than_there_can_be(here: Path) -> None:
     archive = batch.run(plan(), output="a.h5", histories=["every:99999999999999999999"])
     assert recorded(archive) == [0]
@@ -414,6 +419,7 @@ def test_a_position_counts_where_it_is_run(here: Path) -> None:
     assert first.kept.tolist() == [] and second.kept.tolist() == [0]
 
 
+@pytest.mark.slow
 def test_signals_in_another_order_are_told(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     short_tasks(monkeypatch)
     begin(here / "a.h5")
@@ -438,6 +444,7 @@ def test_the_next_step_is_of_a_case_that_was_run(here: Path, capsys: pytest.Capt
     assert "met run a.kinds.case2.h5 --case '#2'\n" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_replay_that_would_write_over_its_archive_by_a_link(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     batch.run(plan(), output="a.case2.h5")
     (here / "a.h5").symlink_to("a.case2.h5")

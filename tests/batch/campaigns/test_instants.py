@@ -121,6 +121,7 @@ sweep all of swing {{
 """
 
 
+@pytest.mark.slow
 def test_one_row_of_many_that_goes_another_way_is_looked_at(tmp_path: Path) -> None:
     deck = one_of_many(bad=True)
     (tmp_path / "deck.ic").write_text(deck)
@@ -274,6 +275,7 @@ def test_a_loop_is_told_that_a_payload_makes_unstable_when_it_comes_or_goes(
     assert codes(performed(made(tmp_path, stays), tmp_path / "b.h5")) == []
 
 
+@pytest.mark.slow
 def test_a_bed_is_told_that_only_an_arm_which_reaches_out_makes_unstable(tmp_path: Path) -> None:
     deck = FOLDS[: FOLDS.index("servo turn")].replace("0.01, 0.01, 0.01", "700, 700, 700")
     deck = "#include <servos/rigid_gearbox.ic>\n" + deck.replace("link out { mass = 1 kg", "link out { mass = 40 kg")

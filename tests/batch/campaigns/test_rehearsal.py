@@ -128,6 +128,7 @@ def test_a_model_that_leaves_by_an_exception_is_named_in_every_mode(
     assert head in said
 
 
+@pytest.mark.slow
 def test_a_package_that_leaves_while_it_is_loaded_is_named(
     offered: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -84,6 +84,7 @@ class TestWhatIsKept:
             "can be run again alone: `--case '#0'`)",
         )
 
+    @pytest.mark.slow
     def test_what_is_asked_for(self, here: Path) -> None:
         assert campaign.prepare(plans.plan(plans.gains(400_000)), histories="all").parts[0].recorded
         archive = batch.run(plans.plan(plans.gains(5)), output="a.h5", histories="none")

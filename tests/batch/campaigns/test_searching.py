@@ -419,6 +419,7 @@ def test_it_is_said_beforehand_and_afterwards(here: Path, capsys: pytest.Capture
     assert told["serves"] and told["tried"] == told["against"] == 5 and told["case"] == answer.position
 
 
+@pytest.mark.slow
 def test_a_search_of_one_case_has_an_answer(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "d.ic").write_text(DECK.replace(f"at_most = {AT_MOST};", "at_most = 1;"))
     assert main(["run", "d.ic", "back", "--no-picture", "-q"]) == 0
@@ -552,6 +553,7 @@ def test_an_archive_whose_cases_no_search_asks_for_is_no_archive(
     assert [each.code for each in refused.value.diagnostics] == ["E302"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("low", "high"), [(0.0, 9.0), (-1.0, 9.0), (-9.0, 0.0), (math.nan, 9.0), (2.0, math.inf)])
 def test_ends_without_a_ratio_are_none_of_equal_ratios(here: Path, undisturbed: bytes, low: float, high: float) -> None:
     import h5py

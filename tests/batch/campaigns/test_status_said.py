@@ -24,6 +24,7 @@ def test_a_single_case_is_one_case(here: Path, capsys: pytest.CaptureFixture[str
     assert capsys.readouterr().out.startswith("a.h5 is whole: 1 case, begun at ")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_who_names_the_deck_is_told_of_its_archives(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     batch.run(plans.plan(), output="two.h5")

@@ -231,6 +231,7 @@ def test_any_other_case_is_computed_from_its_plan(here: Path) -> None:
         assert one.groups[0].values("volts")[0] == rows.groups[0].values("volts")[other]
 
 
+@pytest.mark.slow
 def test_a_case_without_a_row_is_told_with_the_command_that_runs_it(here: Path) -> None:
     with ArchiveFile("many.summary.h5") as file:
         other = next(case for case in range(600) if case not in file.groups[0].values("case"))
@@ -274,6 +275,7 @@ def test_what_needs_a_row_a_case_is_refused_with_the_remedy(here: Path, what: st
     assert "`met run DECK --rows all` keeps a row a case, and `--rows worst:N:METRIC` a summary" in said.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["many", pytest.param("ways", marks=pytest.mark.slow)])
 def test_python_is_warned_that_its_rows_are_no_sample(here: Path, name: str) -> None:
     archives(name)
@@ -378,6 +380,7 @@ def test_a_forged_summary_is_told(here: Path, tmp_path: Path, what: str) -> None
     assert said.status == 2 and "error[E302]" in said.text and NAME in said.text
 
 
+@pytest.mark.slow
 def test_numbers_that_are_forged_are_only_shown(here: Path, tmp_path: Path) -> None:
     with changed(Path("many.summary.h5"), tmp_path) as (copy, file):
         file[f"{NAME}/judged_mean"][:] = 1e300

@@ -238,6 +238,7 @@ def test_failures_beyond_the_stop_do_not_count(here: Path, monkeypatch: pytest.M
 SLOW = pytest.mark.slow
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "way",
     [{"threads": 2}, pytest.param({"processes": 2}, marks=SLOW), pytest.param({"dask": "local"}, marks=SLOW)],
@@ -330,6 +331,7 @@ def test_what_was_killed_goes_on_to_the_same_bytes(here: Path, place: Path, undi
     assert (here / "a.h5").read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_a_shard_that_is_damaged_between_two_looks_is_made_again(
     here: Path, plan: Plan, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:

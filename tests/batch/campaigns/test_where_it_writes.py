@@ -151,6 +151,7 @@ class TestHowItEnds:
         with batch.open("a.h5") as data:
             assert data.sizes["case"] == 4
 
+    @pytest.mark.slow
     def test_what_a_killed_run_left_is_swept_up_by_the_next(self, here: Path) -> None:
         (here / ".a.h5.tmp").write_bytes(b"half an archive" * 100_000)
         (here / ".a.h5.run.json.tmp").write_bytes(b"{")
@@ -160,6 +161,7 @@ class TestHowItEnds:
         batch.run(plans.plan(plans.gains(3)), output="a.h5")
         assert (here / "a.h5").read_bytes() == fresh
 
+    @pytest.mark.slow
     def test_a_run_that_starts_while_another_writes_is_told_and_the_other_ends_well(
         self, here: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -200,6 +202,7 @@ class TestHowItEnds:
         plan_file.write(ic.compile("two_link.ic", select=["gains"]), here / "p.json")
         assert batch.run("p.json", cases=["#3"]).path == Path("two_link.gains.case3.h5")
 
+    @pytest.mark.slow
     def test_a_deck_is_run_from_its_path(self, here: Path) -> None:
         assert batch.run("two_link.ic", cases=[0]).path == Path("two_link.h5")
         assert batch.run(Path("two_link.ic"), experiments=["gains"], cases=[3]).path == Path("two_link.gains.case3.h5")

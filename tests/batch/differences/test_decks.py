@@ -160,6 +160,7 @@ CHANGES: dict[str, tuple[list[tuple[str, str]], list[str]]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", CHANGES)
 def test_what_was_written_is_told_before_what_follows(here: Path, what: str) -> None:
     changes, expected = CHANGES[what]

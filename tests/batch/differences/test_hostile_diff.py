@@ -99,6 +99,7 @@ def signal(found: Diff, name: str) -> SignalDiff:
 # Verdicts
 
 
+@pytest.mark.slow
 def test_two_that_have_nothing_to_compare_are_not_identical(ran: Callable[..., Path]) -> None:
     a = ran("a.h5", "turning", histories="none")
     b = ran("b.h5", "turning", histories="none", change=("one.qd = 1 rad/s", "one.qd = 2 rad/s"))
@@ -116,6 +117,7 @@ def test_histories_of_other_cases_are_not_identical(two: Callable[..., tuple[Pat
     assert signal(found, "q").verdict == "incomparable" and found.verdict == "incomparable"
 
 
+@pytest.mark.slow
 def test_a_run_that_lasts_longer_is_not_identical(ran: Callable[..., Path]) -> None:
     a, b = (
         ran("a.h5", "sliding"),
@@ -140,6 +142,7 @@ def test_histories_in_one_alone_are_not_identical(two: Callable[..., tuple[Path,
     assert diff_lines(found)[-1] == "equivalent: identical, to the bit, in what both have"
 
 
+@pytest.mark.slow
 def test_no_histories_in_the_second(ran: Callable[..., Path]) -> None:
     a, b = ran("a.h5", "turning"), ran("b.h5", "turning", histories="none")
     assert cli.main(["diff", str(a), str(b)]) == cli.NO
@@ -175,6 +178,7 @@ def test_each_instant_is_compared_once() -> None:
         assert a[rows_a].tolist() == b[rows_b].tolist() == slow.tolist()
 
 
+@pytest.mark.slow
 def test_rows_of_other_instants_are_not_identical(ran: Callable[..., Path]) -> None:
     """q = 0.5 t at 10 Hz, and q = t at 20 Hz for half as long: the same numbers, row by row."""
     a, b = ran("a.h5", "slower"), ran("b.h5", "half")
@@ -182,6 +186,7 @@ def test_rows_of_other_instants_are_not_identical(ran: Callable[..., Path]) -> N
     assert signal(found, "q").compared == 1 and found.verdict != "identical"
 
 
+@pytest.mark.slow
 def test_what_a_passes_through_is_all_of_it(ran: Callable[..., Path]) -> None:
     """b comes 4 ms late, at a fifth of the rate; a's peak between two rows of b is seen."""
     t = np.arange(101) * 0.01
@@ -211,6 +216,7 @@ def test_an_infinity_nearby_allows_nothing() -> None:
     assert found is not None and found.verdict == "different"
 
 
+@pytest.mark.slow
 def test_of_a_tolerance_of_time_no_share_is_told(two: Callable[..., tuple[Path, Path]]) -> None:
     def plant(file: Any) -> None:
         file["qd"][1, 1:] = file["qd"][1, :-1]
@@ -226,6 +232,7 @@ def test_of_a_tolerance_of_time_no_share_is_told(two: Callable[..., tuple[Path, 
 # What is said of a difference
 
 
+@pytest.mark.slow
 def test_what_is_told_of_what_differs_is_beyond_its_tolerance(two: Callable[..., tuple[Path, Path]]) -> None:
     def plant(file: Any) -> None:
         file["q"][1, 3, 1] += 1e-3  # allowed
@@ -238,6 +245,7 @@ def test_what_is_told_of_what_differs_is_beyond_its_tolerance(two: Callable[...,
     assert q.place.time == q.first_beyond == pytest.approx(0.2) and worst.place == q.place
 
 
+@pytest.mark.slow
 def test_an_infinite_difference_is_the_worst(two: Callable[..., tuple[Path, Path]]) -> None:
     def plant(file: Any) -> None:
         file["q"][4, 10, 0] = math.inf
@@ -253,6 +261,7 @@ def test_an_infinite_difference_is_the_worst(two: Callable[..., tuple[Path, Path
     json.dumps(as_data(found), allow_nan=False)
 
 
+@pytest.mark.slow
 def test_a_metric_that_was_infinite_in_all_cases(two: Callable[..., tuple[Path, Path]]) -> None:
     def infinite(file: Any) -> None:
         file["settle"][:] = math.inf
@@ -267,6 +276,7 @@ def test_a_metric_that_was_infinite_in_all_cases(two: Callable[..., tuple[Path, 
     assert signal(found, "settle").largest == math.inf
 
 
+@pytest.mark.slow
 def test_huge_differences_are_told_without_a_warning(two: Callable[..., tuple[Path, Path]]) -> None:
     def plant(sign: float) -> Change:
         def change(file: Any) -> None:
@@ -280,6 +290,7 @@ def test_huge_differences_are_told_without_a_warning(two: Callable[..., tuple[Pa
     assert [each.case_a for each in only(found).worst] == [1]
 
 
+@pytest.mark.slow
 def test_the_span_is_that_of_all_cases(two: Callable[..., tuple[Path, Path]]) -> None:
     def calm(file: Any) -> None:
         """Case 5, which does not differ, spans 100 rad/s; 0 and 1 a hundred thousandth and a tenth of it."""
@@ -299,6 +310,7 @@ def test_the_span_is_that_of_all_cases(two: Callable[..., tuple[Path, Path]]) ->
     assert signal(found, "qd").share == pytest.approx(0.01)
 
 
+@pytest.mark.slow
 def test_a_requirement_that_other_cases_meet_is_told(two: Callable[..., tuple[Path, Path]]) -> None:
     def plant(file: Any) -> None:
         file["met"][:2] = file["met"][:2][::-1]
@@ -324,6 +336,7 @@ def test_a_requirement_whose_limit_is_another_is_a_difference(ran: Callable[...,
     )
 
 
+@pytest.mark.slow
 def test_a_limit_that_a_name_stands_for_is_compared_too(ran: Callable[..., Path]) -> None:
     a = ran("a.h5", "lettered")
     whole = diff(a, ran("b.h5", "lettered", change=("let fastest = 0.5 rad/s", "let fastest = 9 rad/s")))
@@ -335,6 +348,7 @@ def test_a_limit_that_a_name_stands_for_is_compared_too(ran: Callable[..., Path]
     )
 
 
+@pytest.mark.slow
 def test_a_limit_in_another_unit_is_no_difference(ran: Callable[..., Path]) -> None:
     whole = diff(ran("a.h5", "bounded"), ran("b.h5", "milli"))
     assert (whole.verdict, verdict(whole)) == ("identical", "identical, to the bit")

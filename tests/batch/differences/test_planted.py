@@ -214,6 +214,7 @@ def test_the_same_answer_for_programs(monkeypatch: pytest.MonkeyPatch, tmp_path:
     assert (different["name"], different["different"], different["largest"]) == ("q", 1, pytest.approx(1.0))
 
 
+@pytest.mark.slow
 def test_pairs_of_cases_say_which_version_is_better(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Twelve cases of forty whose metric rises, two in which it falls: both tests are exact, corrected by Holm."""
 

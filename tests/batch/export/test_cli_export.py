@@ -40,6 +40,7 @@ def test_programs_are_told_in_json(archive: Path, capsys: pytest.CaptureFixture[
     assert cli.main([*words, "--force"]) == cli.YES
 
 
+@pytest.mark.slow
 def test_signals_are_given_as_lists(archive: Path) -> None:
     words = ["--signals", "qd, elbow.q", "--signals", "shoulder.servo.voltage"]
     assert cli.main(["export", "a.h5", *words]) == cli.YES

@@ -131,6 +131,7 @@ def test_a_channel_says_its_unit_or_that_of_each_joint(pick: tuple[ArchiveFile, 
     }
 
 
+@pytest.mark.slow
 def test_only_the_signals_that_are_asked_for_are_there(pick: tuple[ArchiveFile, Mcap], tmp_path: Path) -> None:
     file, _ = pick
     names = ["swing.qd", "roll.qd", "tool.x", "links.tool.position.z"]
@@ -289,6 +290,7 @@ def test_how_a_case_went_is_logged_and_its_result_is_there_once(pick: tuple[Arch
     assert read.channels["/result"].metadata == {"unit.up": "m", "unit.fast": "rad/s"}
 
 
+@pytest.mark.slow
 def test_a_case_that_failed_ends_where_it_failed_and_says_why(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plans.answering(monkeypatch)
     monkeypatch.setattr(engine, "run", partial(plans.answer, fails=frozenset({1})))
@@ -308,6 +310,7 @@ def test_a_case_that_failed_ends_where_it_failed_and_says_why(here: Path, monkey
     assert {each.outcome for each in result.data.requirements} == {"unknown"}
 
 
+@pytest.mark.slow
 def test_a_case_that_failed_before_its_first_row_has_no_frames(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def lost(*arguments: object, **options: object) -> object:
         found = plans.answer(*arguments, **options)  # type: ignore[arg-type]
@@ -342,6 +345,7 @@ def test_signals_of_one_kind_share_one_schema(reaches: tuple[ArchiveFile, Mcap])
     assert len({(schema.name, schema.data) for schema in read.schemas.values()}) == len(read.schemas)
 
 
+@pytest.mark.slow
 def test_a_link_that_is_called_world_leaves_the_name_to_it(tmp_path: Path) -> None:
     deck = CHAIN.replace("first", "world")
     read = Mcap(export(made(tmp_path, "swing", deck)).path)
@@ -373,6 +377,7 @@ def test_without_positions_there_is_no_arm_to_show(tmp_path: Path, monkeypatch: 
     assert export("picker.blind.h5", form="csv").rows == 51
 
 
+@pytest.mark.slow
 def test_a_case_without_a_history_is_run_again_first(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plans.answering(monkeypatch)
     batch.run(plans.plan(plans.gains(4)), output="a.h5", histories="#1")
@@ -435,6 +440,7 @@ def test_a_plan_that_does_not_tell_the_arm_is_told_of(here: Path, monkeypatch: p
     assert sorted(path.name for path in here.iterdir()) == ["a.h5", "a.h5.run.json"]
 
 
+@pytest.mark.slow
 def test_a_shape_of_a_later_met_is_drawn_as_none(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plans.answering(monkeypatch)
     batch.run(plans.plan(), output="a.h5")

@@ -106,6 +106,7 @@ def test_a_full_disk_is_said_and_leaves_nothing(archive: Path, form: str, monkey
     assert sorted(path.name for path in Path().iterdir()) == ["a.h5", "a.h5.run.json"]
 
 
+@pytest.mark.slow
 def test_two_exports_into_one_file_do_not_mix(archive: Path) -> None:
     other = Sink(temporary_of(Path("a.mcap")))
     with pytest.raises(Problem) as caught:
@@ -119,12 +120,14 @@ def test_two_exports_into_one_file_do_not_mix(archive: Path) -> None:
     other.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["mcap", pytest.param("parquet", marks=pytest.mark.oracle)])
 def test_an_export_of_ours_is_written_over(archive: Path, form: str) -> None:
     first = export(archive, form=form, signals=["qd"]).path.read_bytes()
     assert export(archive, form=form).path.read_bytes() != first
 
 
+@pytest.mark.slow
 def test_half_an_export_of_ours_is_too(archive: Path) -> None:
     path = export(archive).path
     path.write_bytes(path.read_bytes()[:1200])
@@ -150,6 +153,7 @@ def test_what_is_not_ours_is_not_written_over_unless_that_is_said(archive: Path,
     assert export(archive, name, force=True, signals=["q"]).path.read_bytes() != before
 
 
+@pytest.mark.slow
 def test_an_empty_file_is_no_loss(archive: Path) -> None:
     Path("a.csv").touch()
     assert export(archive, "a.csv").rows == 51
@@ -206,6 +210,7 @@ def test_the_name_is_the_archives_unless_it_is_given(archive: Path) -> None:
     assert export(archive, "b.MCAP").path == Path("b.MCAP")
 
 
+@pytest.mark.slow
 def test_an_archive_that_is_damaged_within_leaves_nothing(archive: Path) -> None:
     import h5py
 

@@ -87,6 +87,7 @@ def test_a_case_that_failed_has_its_rows_before_that(here: Path, monkeypatch: py
     assert [sum(row[0] == case for row in rows) for case in "012"] == [51, 5, 51]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_numbers_of_four_bytes_are_as_short_as_they_are(here: Path) -> None:
     batch.run(plans.plan(), output="a.h5", float32=True)
@@ -118,6 +119,7 @@ def test_a_structure_leaves_empty_what_only_another_has(tmp_path: Path) -> None:
         export(archive, tmp_path / "c.csv", signals=["two.q"], cases=["#0"])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_a_name_of_a_deck_stays_in_its_line(here: Path) -> None:
     from dataclasses import replace
@@ -203,6 +205,7 @@ def test_many_cases_are_gathered_into_row_groups(here: Path, monkeypatch: pytest
     file.close()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_without_pyarrow_it_is_said_where_it_comes_from(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     batch.run(plans.plan(), output="a.h5")
@@ -236,6 +239,7 @@ def test_a_case_id_that_reads_as_a_number_stays_a_word() -> None:
     assert _column(TableColumn("macro LINKS", "", "", "str", "LINKS"), ["3"]) == ["3"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_of_a_sweep_a_row_is_a_case_with_what_is_varied_and_its_metrics(here: Path) -> None:
     batch.run(plans.plan(plans.gains(5)), output="a.h5", histories="none")
@@ -266,6 +270,7 @@ def test_of_a_sweep_a_row_is_a_case_with_what_is_varied_and_its_metrics(here: Pa
     assert some == [rows[3], rows[1]]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("engine")
 def test_of_a_run_a_row_is_an_instant_unless_metrics_are_asked_for(here: Path) -> None:
     batch.run(plans.plan(), output="a.h5")
@@ -275,6 +280,7 @@ def test_of_a_run_a_row_is_an_instant_unless_metrics_are_asked_for(here: Path) -
     assert heads == ["case", "case_id", "status", *heads_of_metrics] and len(rows) == 1
 
 
+@pytest.mark.slow
 def test_a_case_that_failed_says_why(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plans.answering(monkeypatch)
     monkeypatch.setattr(engine, "run", partial(plans.answer, fails=frozenset({1})))

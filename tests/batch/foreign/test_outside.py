@@ -130,6 +130,7 @@ def secret(tmp_path: Path) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trap", TRAPS, ids=lambda trap: trap.__name__)
 def test_what_leads_out_of_an_archive_is_refused_by_its_name(
     trap: Trap, archive: Path, secret: str, tmp_path: Path
@@ -150,6 +151,7 @@ def test_a_named_pipe_to_which_an_archive_leads_is_not_waited_for(trap: Trap, ar
     assert said.status == 2 and "error[E308]" in said.text
 
 
+@pytest.mark.slow
 def test_no_reader_of_archives_gives_out_a_file_of_this_machine(archive: Path, secret: str, tmp_path: Path) -> None:
     with changed(archive, tmp_path) as (copy, file):
         external(file, secret)
@@ -172,6 +174,7 @@ def test_nor_does_python(archive: Path, secret: str, tmp_path: Path) -> None:
         assert [each.code for each in caught.value.diagnostics] == ["E308"]
 
 
+@pytest.mark.slow
 def test_nor_does_data_met_of_what_xarray_has_opened(single: Path, secret: str, tmp_path: Path) -> None:
     with changed(single, tmp_path) as (copy, _):
         data = batch.open(copy)

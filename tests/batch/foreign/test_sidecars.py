@@ -55,6 +55,7 @@ def changed(path: Path, **values: Any) -> None:
 # campaign.json
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [DEEP, "1" * 30, '{"schema": NaN}', "[]", "null", '"met.campaign"', "{", "\ufeff{}"])
 def test_a_description_that_is_none_is_told(text: str, campaign: Path) -> None:
     (campaign / "campaign.json").write_text(text, encoding="utf-8")
@@ -62,6 +63,7 @@ def test_a_description_that_is_none_is_told(text: str, campaign: Path) -> None:
     assert refused(Path("a.h5")) == DAMAGED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "value"),
     [
@@ -227,6 +229,7 @@ def test_a_shard_of_other_outputs_than_the_programs_counts_as_none(campaign: Pat
 # Plans
 
 
+@pytest.mark.slow
 def test_plans_with_something_else_in_them_are_read_or_told(here: Path) -> None:
     plan_file.write(plans.plan(plans.gains(6)), "good.json")
     text = Path("good.json").read_text(encoding="utf-8")

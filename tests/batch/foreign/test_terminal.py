@@ -66,6 +66,7 @@ def test_names_with_what_a_terminal_obeys_are_none_of_an_archives(archive: Path,
     )
 
 
+@pytest.mark.slow
 def test_colours_are_only_our_own(archive: Path, tmp_path: Path) -> None:
     with changed(archive, tmp_path) as (copy, file):
         poisoned(file)

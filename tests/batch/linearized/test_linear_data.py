@@ -91,6 +91,7 @@ def test_a_file_of_each_kind_has_the_same_numbers(answer: LinearAnswer, tmp_path
     assert [float(cell) for cell in rows[first + 1][1:]] == found.C[0].tolist() and rows[first + 1][0] == "hinge.q"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -142,12 +143,14 @@ def marks(axis: Any) -> list[float]:
     return [float(each) for each in axis.get_majorticklocs() if low <= each <= high]
 
 
+@pytest.mark.slow
 def test_a_picture_has_a_mark_of_phase_every_45_degrees(answer: LinearAnswer) -> None:
     _, phase, nichols, *_ = picture.figure(answer.found).axes
     assert marks(phase.yaxis) == [-180.0, -135.0, -90.0, -45.0]
     assert set(marks(nichols.xaxis)) >= {-180.0, -135.0, -90.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [0.001, 1.0, 1000.0])
 def test_phases_have_several_marks_however_little_a_loop_turns(answer: LinearAnswer, times: float) -> None:
     """A double integral whose phase is -180 deg nearly everywhere, at several gains."""

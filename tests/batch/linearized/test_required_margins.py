@@ -74,6 +74,7 @@ def test_threads_and_processes_make_the_same_archive(
     assert made.read_bytes() == (folder / "a.h5").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_campaign_that_goes_on_makes_the_same_archive(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -84,6 +85,7 @@ def test_a_campaign_that_goes_on_makes_the_same_archive(
     assert (tmp_path / "b.h5").read_bytes() == (folder / "a.h5").read_bytes()
 
 
+@pytest.mark.slow
 def test_every_case_has_what_it_has_alone(folder: Path) -> None:
     data = batch.open(folder / "a.h5")
     plan = plan_of(folder)
@@ -138,6 +140,7 @@ def test_a_search_finds_the_least_margin_and_a_tuning_keeps_it(folder: Path, tmp
     assert (best.loop_gain_margin.values[kept] > 4.0).all()
 
 
+@pytest.mark.slow
 def test_a_simulation_has_them(folder: Path) -> None:
     data = batch.Simulation(folder / "deck.ic", run="hold").run({"drive.kp": [0.1, 0.9]})
     archive = batch.open(folder / "a.h5")

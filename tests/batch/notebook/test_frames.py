@@ -170,6 +170,7 @@ def test_numbers_of_four_bytes(tmp_path: Path, reaches: xarray.Dataset) -> None:
         np.testing.assert_allclose(frames["position"], reaches.met.frames()["position"], rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_an_arm_whose_joints_are_all_fixed(tmp_path: Path) -> None:
     post = """
     arm post {

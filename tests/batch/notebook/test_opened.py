@@ -102,6 +102,7 @@ def test_who_has_forgotten_the_archive_can_be_told(archive: Path, data: xarray.D
     xarray.testing.assert_identical(lost.met.frames("lower"), data.met.frames("lower"))
 
 
+@pytest.mark.slow
 def test_what_is_of_no_archive(archive: Path) -> None:
     other = xarray.Dataset({"a": ("x", [1.0, 2.0])})
     assert repr(other.met) == "a Dataset that is of no archive of MET"
@@ -123,9 +124,11 @@ def test_what_is_of_no_archive(archive: Path) -> None:
 class TestTheVariableOfVerdicts:
     """An archive has a variable `met`, and `data.met` is no longer it."""
 
+    @pytest.mark.slow
     def test_it_is_had_by_its_name(self, data: xarray.Dataset) -> None:
         assert data["met"].dims == ("case", "requirement")
 
+    @pytest.mark.slow
     def test_who_takes_one_for_the_other_is_told(self, data: xarray.Dataset) -> None:
         with pytest.raises(TypeError) as compared:
             data.met == 1  # noqa: B015
@@ -193,6 +196,7 @@ nominal: 1 case, 1 with a history
 
 
 class TestUnits:
+    @pytest.mark.slow
     def test_a_signal_in_another_unit(self, data: xarray.Dataset) -> None:
         turned = data.met.in_units(qd="deg/s", time="ms")
         np.testing.assert_allclose(turned["qd"], np.degrees(data["qd"]), rtol=1e-15)
@@ -200,6 +204,7 @@ class TestUnits:
         assert turned["qd"].sel(time=400.0).sizes == data["qd"].sel(time=0.4).sizes
         assert turned["q"].attrs == data["q"].attrs
 
+    @pytest.mark.slow
     def test_as_the_deck_writes_them(self, data: xarray.Dataset) -> None:
         deck = data.met.in_units()
         assert deck["gearbox.ki"].attrs["units"] == "mV/rad"
@@ -211,6 +216,7 @@ class TestUnits:
             deck["volts"].drop_vars(list(deck["volts"].coords)), data["volts"].drop_vars(list(data["volts"].coords))
         )
 
+    @pytest.mark.slow
     def test_a_selection_knows_them(self, data: xarray.Dataset) -> None:
         deck = data.met.in_units()
         for value in ("125 mV/rad", "0.125 V/rad", 125):
@@ -226,6 +232,7 @@ class TestUnits:
             turned = tree.met.in_units({"gearbox.kp": "mV*s/rad"})
             assert [node["gearbox.kp"].values.tolist() for node in turned.children.values()] == [[20, 30], [20, 30]]
 
+    @pytest.mark.slow
     def test_units_that_cannot_be(self, data: xarray.Dataset) -> None:
         assert said(lambda: data.met.in_units(qd="rad")) == ("E386", "`qd` cannot be in rad; it is in rad/s")
         assert said(lambda: data.met.in_units(qd="rads")) == (

@@ -112,6 +112,7 @@ def test_what_cannot_be_drawn_is_said(sweep: Path, options: dict[str, Any], said
     assert refused(**options) == said
 
 
+@pytest.mark.slow
 def test_a_parameter_with_one_value_is_named_with_it(here: Path) -> None:
     archives.made(here / "a.h5", archives.grid([0.02, 0.03, 0.04], [20.0]))
     assert refused(over=["links.lower.mass"]) == (
@@ -120,6 +121,7 @@ def test_a_parameter_with_one_value_is_named_with_it(here: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_third_parameter_has_few_values(here: Path) -> None:
     one = archives.grid([0.02, 0.03], np.linspace(20.0, 30.0, 7).tolist())
     kp, mass = one.cases.coordinates

@@ -140,6 +140,7 @@ def test_commands_that_differ_have_their_cases_colours(
     assert [line.get_color() for line in dashed(ax)] == [line.get_color() for line in ax.lines[:3]]
 
 
+@pytest.mark.slow
 def test_a_command_is_shared_by_a_case_that_broke_off(
     here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -170,6 +171,7 @@ def test_many_cases_are_a_fan(here: Path, figures: list[Any]) -> None:
     np.testing.assert_allclose(left.lines[0].get_ydata(), np.median(values, axis=0), rtol=1e-15)
 
 
+@pytest.mark.slow
 def test_one_case_of_a_sweep_is_named(here: Path, figures: list[Any]) -> None:
     with archive(40) as file:
         draw(file, "a.png", ["qd"], cases=["#3"])
@@ -177,6 +179,7 @@ def test_one_case_of_a_sweep_is_named(here: Path, figures: list[Any]) -> None:
     assert any(text.startswith("case #3 ") and "gearbox.kp = 0.01231 V·s/rad" in text for text in words)
 
 
+@pytest.mark.slow
 def test_a_case_that_breaks_off_is_marked(here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
     from functools import partial
 
@@ -205,6 +208,7 @@ def test_the_legend_is_outside_of_the_data(here: Path, figures: list[Any]) -> No
             assert drawn.x1 <= figure.bbox.x1
 
 
+@pytest.mark.slow
 def test_a_row_that_is_zero_throughout_is_low_and_the_others_are_not(
     here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

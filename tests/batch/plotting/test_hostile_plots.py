@@ -136,6 +136,7 @@ class TestMapsOfADifference:
 
 
 class TestNames:
+    @pytest.mark.slow
     def test_that_begin_with_an_underscore_are_in_the_legend(self, here: Path, figures: list[Any]) -> None:
         one = plans.nominal()
         q, *rest = one.structure.record
@@ -173,6 +174,7 @@ class TestNames:
 
 
 class TestOutput:
+    @pytest.mark.slow
     def test_of_more_dots_than_memory_holds_is_refused(self, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         made(monkeypatch, "a.h5", archives.grid(KP, MASS))
         with pytest.raises(Problem) as caught:

@@ -50,6 +50,7 @@ run held like nominal {
 """
 
 
+@pytest.mark.slow
 def test_a_module_says_which_metrics_it_does_not_compute(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "margins.ic").write_text(MARGINS, encoding="utf-8")
     assert met("compile", "margins.ic", "held") == 0

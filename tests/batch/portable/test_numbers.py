@@ -87,6 +87,7 @@ def data_in(page: Path) -> dict[str, Any]:
     return data
 
 
+@pytest.mark.slow
 def test_limits_are_where_the_deck_is_refused() -> None:
     made = varied(given_run("two_link.ic", "nominal")).run
     found = dict(zip((each.path for each in made.experiment.cases.coordinates), limits(made), strict=True))

@@ -96,6 +96,7 @@ def test_a_tuning_says_which_requirement_it_misses_and_in_which_case(archive: Pa
         assert first.said.endswith(f", case #{worst}")
 
 
+@pytest.mark.slow
 def test_a_tuning_without_a_sweep_is_judged_in_its_case(archive: Path) -> None:
     with ArchiveFile(archive) as file:
         _, answer, outcome = group_of(file, "alone")
@@ -103,6 +104,7 @@ def test_a_tuning_without_a_sweep_is_judged_in_its_case(archive: Path) -> None:
         assert re.fullmatch(rf"met; worst .* m, case #{answer.position}", outcome.requirements[0].said)
 
 
+@pytest.mark.slow
 def test_a_search_is_judged_in_the_worst_case_that_it_found(archive: Path) -> None:
     with ArchiveFile(archive) as file:
         _, answer, outcome = group_of(file, "back")
@@ -113,6 +115,7 @@ def test_a_search_is_judged_in_the_worst_case_that_it_found(archive: Path) -> No
         assert outcome.ok and outcome.headline == f"The worst case found, #{answer.position}, meets all requirements"
 
 
+@pytest.mark.slow
 def test_a_search_says_what_another_case_misses(archive: Path) -> None:
     """The quickest case swings a whole turn, and those of half a turn are far back."""
     with ArchiveFile(archive) as file:
@@ -144,6 +147,7 @@ def test_a_requirement_over_a_share_is_asked_of_each_case_and_stands_once(archiv
             assert row.at_least is None and row.at_most is None and row.at == "" and not row.test
 
 
+@pytest.mark.slow
 def test_some_cases_of_a_tuning_are_held_without_a_confidence_too(archive: Path, tmp_path: Path) -> None:
     plan = ic.compile(archive.parent / "d.ic", select=["still"])
     part = batch.run(plan, output=tmp_path / "b.h5", cases=[0, 1, 2]).path
@@ -184,6 +188,7 @@ def test_the_terminal_says_the_requirements_of_the_answer(archive: Path, capsys:
     assert "\nstill: its answer, 5 cases of 1" in said and "0 of 5" in said and "confidence" not in said
 
 
+@pytest.mark.slow
 def test_programs_are_told_the_requirements_of_the_answer(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", str(archive), "--run", "still", "--format", "json"]) == 0
     [told] = json.loads(capsys.readouterr().out)["experiments"]

@@ -63,6 +63,7 @@ def warned(path: Path, plan: Plan) -> list[Diagnostic]:
         return campaign_warnings(file.groups, {each.name: each for each in plan.experiments})
 
 
+@pytest.mark.slow
 def test_a_requirement_whose_extreme_fell_at_a_limit_is_warned_of_with_both_places(tmp_path: Path) -> None:
     [found] = warned(*made(tmp_path, "it"))
     assert (found.code, found.severity) == ("D344", "warning")
@@ -74,6 +75,7 @@ def test_a_requirement_whose_extreme_fell_at_a_limit_is_warned_of_with_both_plac
     assert found.help == ("raise `hinge.servo.tau_max`, or ask for a motion that does not come to it",)
 
 
+@pytest.mark.slow
 def test_of_a_campaign_there_is_one_warning_with_the_count_and_the_worst_case(tmp_path: Path) -> None:
     """10 N m at the joint are 1 N m at the motor: two of three motors are too weak."""
     path, plan = made(tmp_path, "motors")
@@ -105,10 +107,12 @@ def test_a_report_says_it_beside_the_verdict_with_its_line_and_what_to_do(tmp_pa
         assert gather(file).verdicts[0].warnings == ()
 
 
+@pytest.mark.slow
 def test_what_a_run_allows_is_not_warned_of(tmp_path: Path) -> None:
     assert warned(*made(tmp_path, "allowed")) == []
 
 
+@pytest.mark.slow
 def test_a_joint_beyond_its_limits_is_warned_of_once_with_what_else_is_passed(tmp_path: Path) -> None:
     """From 0 at 1 rad/s for 2 s, beyond 1.5 rad by 0.5 rad in the end, and 0.5 rad/s too fast all the time."""
     path, plan = made(tmp_path, "beyond")
@@ -125,6 +129,7 @@ def test_a_joint_beyond_its_limits_is_warned_of_once_with_what_else_is_passed(tm
     assert data["at_limit.hinge.qd_max"].values.tolist() == [1.0]
 
 
+@pytest.mark.slow
 def test_limits_may_vary(tmp_path: Path) -> None:
     path, _ = made(tmp_path, "ranges")
     assert batch.open(path)["excess.hinge.q_max"].values.tolist() == pytest.approx([1.0, 0.0], abs=1e-9)
@@ -139,6 +144,7 @@ def test_what_a_requirement_judges_is_not_warned_of_besides(tmp_path: Path) -> N
     assert data["met"].values.tolist() == [[0]]
 
 
+@pytest.mark.slow
 def test_cases_that_are_at_a_limit_for_most_of_the_time_are_counted(tmp_path: Path) -> None:
     asked = DECK.replace("times = [0, 0.5, 0.501, 2] s", "times = [0, 1.5, 1.501, 2] s")
     (tmp_path / "d.ic").write_text(asked, encoding="utf-8")
@@ -167,6 +173,7 @@ def test_show_and_its_json_list_the_limits(tmp_path: Path, capsys: pytest.Captur
     assert [each["code"] for each in data["warnings"]] == ["D344"]
 
 
+@pytest.mark.slow
 def test_an_archive_with_a_number_of_a_limit_that_is_none_is_refused(tmp_path: Path) -> None:
     path, _ = made(tmp_path, "it")
     with h5py.File(path, "r+") as file:

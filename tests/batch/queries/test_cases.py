@@ -34,6 +34,7 @@ def made(experiment: Experiment, **options: Any) -> ArchiveFile:
     return ArchiveFile("a.h5")
 
 
+@pytest.mark.slow
 def test_failed_cases_stand_before_those_that_miss_more_and_by_more(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -54,6 +55,7 @@ def test_failed_cases_stand_before_those_that_miss_more_and_by_more(
     assert value[missing].tolist() == sorted(value[missing], reverse=True)
 
 
+@pytest.mark.slow
 def test_where_all_requirements_are_met_the_closest_to_a_limit_is_first(here: Path) -> None:
     with made(required(plans.gains(9), Requirement("volts > 1 V", "volts", ">", 1.0))) as file:
         group = file.groups[0]
@@ -62,6 +64,7 @@ def test_where_all_requirements_are_met_the_closest_to_a_limit_is_first(here: Pa
         assert cases.title(group) == "cases, closest to a limit first:"
 
 
+@pytest.mark.slow
 def test_of_cases_that_are_equally_bad_the_first_are_far_from_one_another(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -85,6 +88,7 @@ def test_a_limit_of_zero_has_an_order_too(here: Path) -> None:
         assert ordering.worst_first(group)[0] == np.argmax(group.values("volts"))
 
 
+@pytest.mark.slow
 def test_without_requirements_the_order_is_the_tables(here: Path) -> None:
     with made(required(plans.gains(9))) as file:
         assert ordering.worst_first(file.groups[0]).tolist() == list(range(9))
@@ -117,6 +121,7 @@ def test_by_a_metric_or_what_is_varied_and_without_a_value_last(
     assert [line.split()[0] for line in lines[title + 3 :]] == [f"#{row}" for row in order]
 
 
+@pytest.mark.slow
 def test_by_several_each_its_own_way_round(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from met import run
 
@@ -207,6 +212,7 @@ def test_what_cases_cannot_be_listed_by_is_told(here: Path, capsys: pytest.Captu
     )
 
 
+@pytest.mark.slow
 def test_the_table_is_in_the_decks_units_and_marks_what_is_missed(here: Path) -> None:
     settle = Requirement("settle < 8600 ms", "settle", "<", 8.6)
     ids = keys.case_ids(required(plans.gains(4), settle))
@@ -252,6 +258,7 @@ def test_a_pure_number_has_no_unit_and_may_be_in_per_cent(here: Path) -> None:
         assert f"{said} overshoot of shoulder.qd" in [" ".join(line.split()) for line in lines]
 
 
+@pytest.mark.slow
 def test_the_worst_twenty_are_shown_and_all_on_demand(here: Path) -> None:
     with made(plans.gains(30)) as file:
         some, whole = (show(file, plots=False, all_cases=every).splitlines() for every in (False, True))
@@ -264,6 +271,7 @@ def test_the_worst_twenty_are_shown_and_all_on_demand(here: Path) -> None:
             assert said["cases"] == 30
 
 
+@pytest.mark.slow
 def test_json_says_of_each_case_what_it_met(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from met import run
 
@@ -279,6 +287,7 @@ def test_json_says_of_each_case_what_it_met(here: Path, monkeypatch: pytest.Monk
     assert infinite["coordinates"] == {"gearbox.kp": 0.01, "links.lower.mass": 20.0}
 
 
+@pytest.mark.slow
 def test_one_case_has_its_own_metrics_and_parameters(here: Path) -> None:
     with made(plans.gains(4)) as file:
         text = show(file, case="#1", plots=False)
@@ -321,12 +330,14 @@ def test_a_case_is_shown_of_the_experiments_that_have_it(here: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_cases_that_are_some_of_a_table_are_named(here: Path) -> None:
     with made(plans.gains(9), cases=["#2", "#7"]) as file, pytest.raises(Problem) as caught:
         show(file, case="#3")
     assert caught.value.diagnostics[0].help == ("cases here: #2, #7; or the beginning of a case_id",)
 
 
+@pytest.mark.slow
 def test_few_values_are_read_by_themselves_and_many_at_once(here: Path) -> None:
     with made(plans.gains(250)) as file:
         group = file.groups[0]
@@ -335,6 +346,7 @@ def test_few_values_are_read_by_themselves_and_many_at_once(here: Path) -> None:
                 np.testing.assert_array_equal(group.at(name, positions), group.values(name)[positions])
 
 
+@pytest.mark.slow
 def test_an_archive_that_does_not_say_its_limits_has_a_table_all_the_same(here: Path) -> None:
     import h5py
 
@@ -347,6 +359,7 @@ def test_an_archive_that_does_not_say_its_limits_has_a_table_all_the_same(here: 
     assert text.count("  missed\n") == 4
 
 
+@pytest.mark.slow
 def test_a_run_of_a_sweep_ends_with_its_worst_cases(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plan_file.write(plans.plan(plans.gains(20)), here / "p.json")
     run_and_tell("p.json", no_picture=True)

@@ -40,6 +40,7 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "a.h5"
 
 
+@pytest.mark.slow
 def test_the_archive_has_the_words_where_a_case_is_done_and_doubtful(archive: Path) -> None:
     data = batch.open(str(archive)).load()
     assert data["status"].values.tolist() == [0, 0, 0, 0, 1]

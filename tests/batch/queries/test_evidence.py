@@ -104,6 +104,7 @@ def test_without_draws_each_case_is_judged_by_itself(tmp_path: Path, capsys: pyt
     assert ran(tmp_path, required.replace("5 s", "2.3 s"), sweep="grid")[0] == 1
 
 
+@pytest.mark.slow
 def test_some_cases_of_a_table_give_no_confidence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     required = "require late < 5 s in 95 % of cases with 90 % confidence;"
     ran(tmp_path, required, "--case", "#3", "--case", "#4")
@@ -171,6 +172,7 @@ def test_shares_are_rounded_to_the_safe_side() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_share_of_cases_is_not_missed_by_a_rounding(tmp_path: Path) -> None:
     share = float(np.nextafter(np.nextafter(7 / 11, 1.0), 1.0))
     assert share * 11 > 7

@@ -201,6 +201,7 @@ def test_the_table_fits_a_terminal(
     assert "--evidence is about all cases: of one, or of signals, ask without it" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_evidence_of_some_of_the_cases_is_refused(folder: Path) -> None:
     with pytest.raises(Problem, match="E388: evidence is of all cases, and here are 2 of 120"):
         batch.open(folder / "a.h5").met.sel(case=[1, 2]).met.evidence()
@@ -224,6 +225,7 @@ def test_a_comparison_says_what_the_cases_show_now(
     assert "requirements over cases" not in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_page_has_the_rows_with_the_commands_of_their_worst_cases(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

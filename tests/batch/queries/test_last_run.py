@@ -61,6 +61,7 @@ def test_lenses_say_cases_and_what_the_last_run_said_of_each_requirement(deck: P
         assert editor.end() == 0
 
 
+@pytest.mark.slow
 def test_what_is_no_archive_or_of_another_deck_is_left_out(deck: Path) -> None:
     deck.with_name("arm.h5").write_bytes(b"no archive")
     deck.with_name("arm.bad.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))

@@ -69,16 +69,19 @@ def test_of_those_that_are_asked_for_the_worst(pool: Pool) -> None:
     assert set(found) < set(some) and len(found) == len(set(pool.gathered("links.lower.mass")[some]))
 
 
+@pytest.mark.slow
 def test_the_worst_must_meet_all_and_not_the_best(pool: Pool) -> None:
     worst = CaseSelection(over=("gearbox.kp",)).places(pool)
     met = (pool.outcomes == 1).all(axis=1)
     assert CaseSelection(over=("gearbox.kp",), met=True).places(pool).tolist() == worst[met[worst]].tolist()
 
 
+@pytest.mark.slow
 def test_those_that_meet_all(pool: Pool) -> None:
     assert CaseSelection(met=True).places(pool).tolist() == np.flatnonzero((pool.outcomes == 1).all(axis=1)).tolist()
 
 
+@pytest.mark.slow
 def test_the_table_has_these_cases_alone(sweep: ArchiveFile) -> None:
     some = CaseSelection(where="settle < 3 s")
     lines = show(sweep, some=some, plots=False).splitlines()
@@ -90,6 +93,7 @@ def test_the_table_has_these_cases_alone(sweep: ArchiveFile) -> None:
     assert all(row["metrics"]["settle"] < 3.0 for row in data["experiments"][0]["case_table"])
 
 
+@pytest.mark.slow
 def test_where_there_is_none_it_is_said(sweep: ArchiveFile) -> None:
     lines = show(sweep, some=CaseSelection(where="settle < 0 s"), plots=False).splitlines()
     assert "0 of 20 cases: where settle < 0 s" in lines and not any("#" in line for line in lines)
@@ -159,6 +163,7 @@ def test_a_condition_that_is_none_is_shown_with_its_place(
     assert capsys.readouterr().err == said
 
 
+@pytest.mark.slow
 def test_a_condition_is_not_for_one_case(sweep: ArchiveFile, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["show", "a.h5", "--where", "settle < 4 s", "--case", "#1"]) == 2
     assert "--where, --met and --over are of many cases, and --case of one" in capsys.readouterr().err

@@ -48,6 +48,7 @@ sweep many of nominal {
 """
 
 
+@pytest.mark.slow
 def test_parameters_that_are_zipped_are_one_input(tmp_path: Path) -> None:
     (tmp_path / "zipped.ic").write_text(ZIPPED)
     plan = ic.compile(tmp_path / "zipped.ic")
@@ -65,6 +66,7 @@ def test_a_metric_that_is_not_there_is_told(archive: Path, capsys: pytest.Captur
     assert "no case failed" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_few_cases_are_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     plans.answering(monkeypatch)
     path = batch.run(plans.plan(plans.gains(20)), output=tmp_path / "a.h5", histories="none").path
@@ -94,6 +96,7 @@ def made(folder: Path, vary: str = "", **options: Any) -> Path:
     return batch.run(plan, output=folder / "made.h5", histories="none", **options).path
 
 
+@pytest.mark.slow
 def test_cases_of_saltelli_are_estimated_as_their_design_has_it(tmp_path: Path) -> None:
     with ArchiveFile(made(tmp_path)) as file:
         [group] = file.groups
@@ -106,6 +109,7 @@ def test_cases_of_saltelli_are_estimated_as_their_design_has_it(tmp_path: Path) 
     assert "  note: by the estimators of `saltelli`; with others: with any number of them, and with noise" in said
 
 
+@pytest.mark.slow
 def test_a_pair_of_points_with_a_case_that_failed_is_left_out(tmp_path: Path) -> None:
     path = made(tmp_path)
     with h5py.File(path, "r+") as file:

@@ -63,6 +63,7 @@ def test_evidence_is_that_of_rows_that_are_held(archive: Path, monkeypatch: pyte
         assert dataclasses.replace(one, sigmas=None) == dataclasses.replace(other, sigmas=None)
 
 
+@pytest.mark.slow
 def test_the_outcome_is_that_of_rows_that_are_held(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with ArchiveFile(archive) as file:
         (held,) = summarise(file)
@@ -94,6 +95,7 @@ def test_met_show_lists_those_that_stand_out(archive: Path, many: None) -> None:
         assert "percentile(volts, 95 %)" in show_evidence(file)
 
 
+@pytest.mark.slow
 def test_no_column_of_them_is_read_whole(archive: Path, many: None, monkeypatch: pytest.MonkeyPatch) -> None:
     values, stretch = ArchiveGroup.values, ArchiveGroup.stretch
 

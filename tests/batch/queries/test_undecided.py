@@ -42,6 +42,7 @@ def warned(folder: Path, name: str) -> list[Diagnostic]:
         return campaign_warnings(file.groups, {each.name: each for each in plan.experiments})
 
 
+@pytest.mark.slow
 def test_what_comes_within_the_run_is_judged_and_not_warned_of(tmp_path: Path) -> None:
     assert warned(tmp_path, "go") == []
 
@@ -58,6 +59,7 @@ def test_what_has_not_come_by_the_end_is_warned_of_unless_that_is_late_enough(tm
     assert warned(tmp_path, "allowed") == []
 
 
+@pytest.mark.slow
 def test_of_a_sweep_the_cases_in_which_it_has_not_come_are_counted(tmp_path: Path) -> None:
     [found] = warned(tmp_path, "ways")
     assert "`settle` is not seen by then in 2 of 3 cases, and it may yet come" in found.message

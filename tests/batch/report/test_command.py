@@ -28,12 +28,14 @@ def refused(*words: str, capsys: pytest.CaptureFixture[str]) -> str:
     return capsys.readouterr().err.removesuffix("\n1 error\n")
 
 
+@pytest.mark.slow
 def test_the_page_lies_beside_the_archive(sweep: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["report", sweep.name]) == cli.YES
     size = Path("two_link.gains.html").stat().st_size
     assert capsys.readouterr().out == f"two_link.gains.html  ({size / 1024:.0f} KiB)\n"
 
 
+@pytest.mark.slow
 def test_quiet_says_nothing_and_another_name_and_title_are_taken(
     sweep: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -42,6 +44,7 @@ def test_quiet_says_nothing_and_another_name_and_title_are_taken(
     assert "<h1>Gains &amp; &lt;loads&gt;</h1>" in Path("r.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_one_run_of_several(here: Path) -> None:
     archives.made(here / "a.h5", plans.nominal(), plans.gains(3))
     assert cli.main(["report", "a.h5", "--run", "gains", "-q"]) == cli.YES
@@ -49,6 +52,7 @@ def test_one_run_of_several(here: Path) -> None:
     assert "<title>two_link · gains</title>" in text and "met run a.h5 gains --case" in text
 
 
+@pytest.mark.slow
 def test_a_run_that_is_not_there(sweep: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert refused(sweep.name, "--run", "gain", capsys=capsys) == (
         "error[E325]: no run or sweep `gain` in two_link.gains.h5\n = help: in it: gains\n"
@@ -63,6 +67,7 @@ def test_no_archive(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_folder(sweep: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("out").mkdir()
     assert refused(sweep.name, "-o", "out", capsys=capsys) == (
@@ -70,6 +75,7 @@ def test_a_folder(sweep: Path, capsys: pytest.CaptureFixture[str]) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_folder_that_is_not_there(sweep: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert refused(sweep.name, "-o", "out/r.html", capsys=capsys) == (
         "error[E380]: cannot write out/r.html: out does not exist\n = help: make it first: `mkdir -p out`\n"
@@ -80,6 +86,7 @@ def test_a_folder_that_is_not_there(sweep: Path, capsys: pytest.CaptureFixture[s
     )
 
 
+@pytest.mark.slow
 def test_somebody_elses_page_is_not_written_over(sweep: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("r.html").write_text("<h1>my notes</h1>", encoding="utf-8")
     assert refused(sweep.name, "-o", "r.html", capsys=capsys) == (
@@ -89,6 +96,7 @@ def test_somebody_elses_page_is_not_written_over(sweep: Path, capsys: pytest.Cap
     assert Path("r.html").read_text(encoding="utf-8") == "<h1>my notes</h1>"
 
 
+@pytest.mark.slow
 def test_a_report_and_an_empty_file_are_written_over(sweep: Path) -> None:
     Path("r.html").touch()
     for _ in range(2):
@@ -113,6 +121,7 @@ def test_a_page_is_called_html(sweep: Path, capsys: pytest.CaptureFixture[str]) 
     )
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_what_was_there(sweep: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     batch.report.report(sweep)
     before = Path("two_link.gains.html").read_bytes()
@@ -132,6 +141,7 @@ def test_a_full_disk_leaves_what_was_there(sweep: Path, monkeypatch: pytest.Monk
     assert not list(Path().glob(".*.tmp"))
 
 
+@pytest.mark.slow
 def test_a_killed_writer_leaves_no_page(sweep: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def killed(*_: object) -> None:
         raise KeyboardInterrupt

@@ -40,6 +40,7 @@ def sweep(here: Path, engine: None) -> Path:
 
 
 class TestTheVerdict:
+    @pytest.mark.slow
     def test_counts_the_cases_that_meet_all_that_is_required(self, sweep: Path) -> None:
         [verdict] = gathered(sweep).verdicts
         assert (verdict.ok, verdict.headline) == (False, "0 of 20 cases meet every requirement")
@@ -49,6 +50,7 @@ class TestTheVerdict:
         assert (first.furthest, first.case) == ("∞ s", 0)
         assert (second.text, second.met, second.missed, second.furthest) == ("volts < 5 V", 0, 20, "6.849 V")
 
+    @pytest.mark.slow
     def test_has_failures_by_cause_with_their_cases(
         self, here: Path, engine: None, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -61,6 +63,7 @@ class TestTheVerdict:
         assert verdict.good == 0
         assert verdict.demands[0].unknown == 3
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("limit", "said"), [(10.0, "The case meets its requirement"), (0.001, "The case does not meet its requirement")]
     )
@@ -69,6 +72,7 @@ class TestTheVerdict:
         one = replace(one, requirements=(replace(one.requirements[0], text=f"settle < {limit} s", limit=limit),))
         assert gathered(archives.made(here / "a.h5", one)).verdicts[0].headline == said
 
+    @pytest.mark.slow
     def test_without_requirements_is_that_all_ran(self, here: Path, engine: None) -> None:
         found = gathered(archives.made(here / "a.h5", replace(plans.gains(3), requirements=())))
         assert found.verdicts[0].ok and found.verdicts[0].headline == "All 3 cases reached their end"
@@ -81,6 +85,7 @@ class TestTheVerdict:
 
 
 class TestTheDesignToUse:
+    @pytest.mark.slow
     def test_is_what_met_best_says(self, here: Path, engine: None) -> None:
         one = archives.grid([0.01, 0.02, 0.03, 0.04, 0.05], [20.0, 21.0, 22.0, 23.0])
         one = replace(one, requirements=tuple(replace(each, limit=20.0) for each in one.requirements))
@@ -92,6 +97,7 @@ class TestTheDesignToUse:
             assert found.headline.lower() == answer.headline.lower() and found.why.lower() == answer.why.lower()
             assert found.command.startswith("met run two_link.ic gains -D FAST=1 --set 'gearbox.kp=")
 
+    @pytest.mark.slow
     def test_has_a_map_where_two_are_chosen(self, here: Path, engine: None) -> None:
         one = archives.grid([0.01, 0.02, 0.03, 0.04, 0.05], [20.0, 21.0, 22.0, 23.0])
         one = replace(one, requirements=tuple(replace(each, limit=20.0) for each in one.requirements))
@@ -110,6 +116,7 @@ class TestTheDesignToUse:
         bare = replace(plans.gains(4), requirements=())
         assert gathered(archives.made(here / "b.h5", bare)).sections[0].designs is None
 
+    @pytest.mark.slow
     def test_where_none_is_good_those_that_come_nearest_are_shown(self, sweep: Path) -> None:
         found = gathered(sweep).sections[0].designs
         assert found is not None and found.map is None and found.command == ""
@@ -118,12 +125,14 @@ class TestTheDesignToUse:
 
 
 class TestWorstCases:
+    @pytest.mark.slow
     def test_come_in_the_order_of_met_show(self, here: Path, engine: None, monkeypatch: pytest.MonkeyPatch) -> None:
         archives.failing(monkeypatch, 3, 17)
         with ArchiveFile(archives.made(here / "a.h5", plans.gains(40))) as file:
             [pool] = pools(file.groups)
             assert pool.worst_first.tolist() == ordering.worst_first(file.groups[0]).tolist()
 
+    @pytest.mark.slow
     def test_have_the_command_that_runs_them_again(self, sweep: Path) -> None:
         worst = gathered(sweep).sections[0].worst
         assert worst is not None and worst.cases[0] == 0
@@ -153,6 +162,7 @@ class TestWorstCases:
 
 
 class TestBestCases:
+    @pytest.mark.slow
     def test_are_those_with_most_margin(self, here: Path, engine: None) -> None:
         one = plans.gains(20)
         one = replace(one, requirements=tuple(replace(each, limit=7.0) for each in one.requirements))
@@ -173,6 +183,7 @@ class TestBestCases:
 
 
 class TestThePoints:
+    @pytest.mark.slow
     def test_are_all_cases_of_few(self, sweep: Path) -> None:
         found = gathered(sweep).sections[0].overview
         assert found is not None and found.cases.tolist() == list(range(20)) and found.said == ""
@@ -180,6 +191,7 @@ class TestThePoints:
         [settle] = [column for column in found.columns if column.label == "settle"]
         assert [(limit.text, limit.value, limit.sense) for limit in settle.limits] == [("settle < 10 s", 10.0, "<")]
 
+    @pytest.mark.slow
     def test_of_many_keep_the_extremes_and_the_worst(
         self, here: Path, engine: None, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -207,6 +219,7 @@ class TestThePoints:
         assert sorted(cells[kept]) == sorted(set(cells.tolist()))
         assert all(rank[place] == rank[cells == cells[place]].min() for place in kept)
 
+    @pytest.mark.slow
     def test_say_why_a_case_failed(self, here: Path, engine: None, monkeypatch: pytest.MonkeyPatch) -> None:
         archives.failing(monkeypatch, 2, cause="it broke")
         found = gathered(archives.made(here / "a.h5", plans.gains(5))).sections[0].overview
@@ -215,6 +228,7 @@ class TestThePoints:
 
 
 class TestMaps:
+    @pytest.mark.slow
     def test_hold_the_worst_case_of_each_cell(self, here: Path, engine: None) -> None:
         one = archives.grid([0.02, 0.01, 0.03], [20.0, 21.0])
         found = gathered(archives.made(here / "a.h5", one)).sections[0].overview
@@ -227,11 +241,13 @@ class TestMaps:
         assert np.isinf(map_.values["metric:settle"][:, 0]).all()
         assert map_.missed["metric:settle"].tolist() == [[1, 0, 0], [1, 0, 0]]
 
+    @pytest.mark.slow
     def test_are_not_made_of_parameters_that_go_in_step(self, here: Path, engine: None) -> None:
         one = plans.gains(3)
         found = gathered(archives.made(here / "a.h5", one)).sections[0].overview
         assert found is not None and found.maps == ()
 
+    @pytest.mark.slow
     def test_share_cells_where_there_are_many_values(self, here: Path, engine: None) -> None:
         one = archives.grid(np.linspace(0.01, 0.04, 100).tolist(), [20.0, 21.0, 22.0])
         found = gathered(archives.made(here / "a.h5", one, histories="none")).sections[0].overview
@@ -287,6 +303,7 @@ def test_colours_of_a_logarithmic_sweep_are_logarithmic() -> None:
 
 
 class TestSignals:
+    @pytest.mark.slow
     def test_are_of_the_worst_cases_and_of_the_middle_one(self, sweep: Path) -> None:
         found = gathered(sweep).sections[0].signals
         assert found is not None and len(found.histories) == 20 and found.said == ()
@@ -300,6 +317,7 @@ class TestSignals:
         with ArchiveFile(sweep) as file:
             assert found.histories[0].values[1] == pytest.approx(file.groups[0].signal("qd", 0), nan_ok=True)
 
+    @pytest.mark.slow
     def test_that_are_too_many_are_of_fewer_cases_and_that_is_said(self, sweep: Path) -> None:
         with ArchiveFile(sweep) as file:
             [pool] = pools(file.groups)
@@ -308,6 +326,7 @@ class TestSignals:
         assert found.middle in {each.case for each in found.histories}
         assert found.said == ("Signals of the worst of 20 recorded cases are in this page, 6 of them.",)
 
+    @pytest.mark.slow
     def test_that_are_long_are_thinned_and_that_is_said(self, here: Path, engine: None) -> None:
         path = archives.made(here / "a.h5", plans.gains(4, ticks=80_000))
         with ArchiveFile(path) as file:
@@ -342,6 +361,7 @@ class TestSignals:
         values = np.array([[0.0], [np.inf], [2.0]])
         assert thin(values, 10)[[0, 2]].tolist() == [[0.0], [2.0]] and np.isnan(thin(values, 10)[1])
 
+    @pytest.mark.slow
     def test_that_were_not_kept_are_told_of(self, here: Path, engine: None) -> None:
         section = gathered(archives.made(here / "a.h5", plans.gains(3), histories="none")).sections[0]
         assert section.signals is None
@@ -475,10 +495,12 @@ class TestStability:
         assert found is not None and found.cases.tolist() == [0, 2, 4]
         assert found.said == "Computed for 3 of 6 cases, spread over all."
 
+    @pytest.mark.slow
     def test_is_not_there_without_a_bed(self, sweep: Path) -> None:
         assert gathered(sweep).sections[0].stability is None
 
 
+@pytest.mark.slow
 def test_a_plan_that_cannot_be_read_here_leaves_the_rest(sweep: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from met.diagnostic import Problem, error
 

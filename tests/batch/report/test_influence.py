@@ -32,6 +32,7 @@ def made(folder: Path, sweep: str, count: int = 100) -> Path:
     return batch.run(plan, output=folder / "a.h5", histories="none").path
 
 
+@pytest.mark.slow
 def test_the_parts_are_what_met_sensitivity_says(tmp_path: Path) -> None:
     with ArchiveFile(made(tmp_path, "drawn")) as file:
         parts = {each.metric: each for each in influences(pools(file.groups)[0])}
@@ -46,6 +47,7 @@ def test_the_parts_are_what_met_sensitivity_says(tmp_path: Path) -> None:
             assert (row.low, row.high) == (share.low / one.scale, share.high / one.scale)
 
 
+@pytest.mark.slow
 def test_the_bars_of_a_tornado_go_from_the_mean_to_both_ends(tmp_path: Path) -> None:
     archive = made(tmp_path, "drawn")
     page = report(archive, tmp_path / "a.html").read_text(encoding="utf-8")

@@ -164,6 +164,7 @@ def test_it_reads_without_scripts(found: Report) -> None:
         assert said in re.sub(r"\s+", " ", words)
 
 
+@pytest.mark.slow
 def test_answers_come_first(here: Path, engine: None) -> None:
     one = archives.grid([0.01, 0.02, 0.03, 0.04], [20.0, 21.0, 22.0])
     one = replace(one, requirements=tuple(replace(each, limit=20.0) for each in one.requirements))

@@ -104,12 +104,14 @@ class TestWhatIsInIt:
         assert section.simulation.structures[0].cases.tolist() == list(section.signals.shown)
         assert section.simulation.said == ("3 of 8 cases can be run again in this page.",)
 
+    @pytest.mark.slow
     def test_is_left_out_where_it_is_not_asked_for(self, sent: Path) -> None:
         source = report(sent / "ways.h5", sent / "without.html", simulate=False).read_text(encoding="utf-8")
         assert "unsafe" not in source and "MET.modules" not in source and "No histories were kept." in source
         words = ["report", str(sent / "ways.h5"), "-o", str(sent / "command.html"), "--no-simulation", "-q"]
         assert cli.main(words) == cli.YES and (sent / "command.html").read_text(encoding="utf-8") == source
 
+    @pytest.mark.slow
     def test_stands_under_the_digest_of_the_page_s_script(self, sent: Path) -> None:
         source = (sent / "ways.html").read_text(encoding="utf-8")
         [rules] = re.findall(r'http-equiv="Content-Security-Policy" content="([^"]*)"', source)

@@ -59,6 +59,7 @@ def test_its_heading_says_what_was_asked(archive: Path, tmp_path: Path, name: st
     assert ("The worst of search <code>slowest</code>: far = " in page) == (name == "slowest")
 
 
+@pytest.mark.slow
 def test_a_search_that_found_a_case_that_fails_opens_with_it(archive: Path, tmp_path: Path) -> None:
     page = report(archive, tmp_path / "r.html", experiments=["wild"]).read_text(encoding="utf-8")
     opens = page[page.index("<main") :].partition("</section>")[0]
@@ -66,6 +67,7 @@ def test_a_search_that_found_a_case_that_fails_opens_with_it(archive: Path, tmp_
     assert "<h4>Did not reach their end</h4>" in opens and "not known in the worst case found" in opens
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["slowest", "still"])
 def test_every_row_is_a_change_and_the_curve_has_the_best_by_then(archive: Path, name: str) -> None:
     with ArchiveFile(archive) as file:

@@ -147,6 +147,7 @@ def test_what_another_campaign_has_begun_is_not_tidied_up(archive: Path, undistu
 # Earlier work is not lost to a later end
 
 
+@pytest.mark.slow
 def test_an_interrupt_while_shards_are_found_keeps_them(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(performing, "WORTH_SECONDS", 1e-9)
     kept = begin(archive)
@@ -157,6 +158,7 @@ def test_an_interrupt_while_shards_are_found_keeps_them(archive: Path, monkeypat
     assert whole.shards(archive) == kept
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_when_it_goes_on_keeps_what_there_is(
     archive: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

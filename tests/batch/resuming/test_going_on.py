@@ -31,6 +31,7 @@ def test_only_what_is_missing_is_run(archive: Path, undisturbed: bytes) -> None:
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_what_is_there_is_not_touched(archive: Path) -> None:
     kept = begin(archive, after=1)
     assert kept.items() < begin(archive, after=1).items()
@@ -155,6 +156,7 @@ def test_no_byte_of_a_shard_may_change_and_none_may_lack(tmp_path: Path) -> None
     assert (found.key, found.seconds, found.fates) == ("5a" * 32, 0.25, {1: (3, "gone")})
 
 
+@pytest.mark.slow
 def test_a_shard_that_is_damaged_after_it_was_counted(archive: Path, undisturbed: bytes) -> None:
     """Merging proves each shard once more."""
     shards = whole.folder_of(archive).shards
@@ -176,6 +178,7 @@ def test_a_shard_that_is_damaged_before_histories_are_chosen(archive: Path) -> N
     assert archive.read_bytes() == alone.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_shard_of_the_second_pass_that_does_not_count(archive: Path) -> None:
     begin(archive, after=7, histories="every:2")
     name = "1-000000000-000000008"
@@ -188,6 +191,7 @@ def test_a_shard_of_the_second_pass_that_does_not_count(archive: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_what_workers_had_begun_to_write_is_swept_away(archive: Path, undisturbed: bytes) -> None:
     begin(archive)
     left = whole.folder_of(archive).shards / ".0-000000032-000000040.elsewhere.4711.tmp"
@@ -247,6 +251,7 @@ def test_a_damaged_description_is_refused(archive: Path, undisturbed: bytes) -> 
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_a_description_that_is_gone_is_written_anew(archive: Path, undisturbed: bytes) -> None:
     """The shards prove themselves."""
     kept = begin(archive)

@@ -44,6 +44,7 @@ def test_a_campaign_that_is_half_done_goes_on_after_a_cell_is_renamed(
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.slow
 def test_one_that_other_code_began_is_left_alone(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kept = begin(archive)
     another_constant(monkeypatch)

@@ -38,6 +38,7 @@ class TestLikeAnArchive:
         data = arm.run({"gearbox.kp": [0.01, 0.02, 0.03], "load": ["10 kg", "20000 g", 30]}, histories=True)
         xarray.testing.assert_identical(data, of_archive(ARM, "in_step", "reach", tmp_path))
 
+    @pytest.mark.slow
     def test_a_product_gives_what_an_archive_of_the_axes_holds(self, arm: batch.Simulation, tmp_path: Path) -> None:
         data = arm.run({"gearbox.kp": [0.01, 0.02, 0.03], "load": [10, 20]}, product=True)
         kept = of_archive(ARM, "each_with_each", "reach", tmp_path, histories="none")
@@ -76,12 +77,14 @@ class TestLikeAnArchive:
     def test_without_values_it_is_the_run_of_the_deck(self, arm: batch.Simulation, tmp_path: Path) -> None:
         xarray.testing.assert_identical(arm.run(histories=True), of_archive(ARM, "reach", "reach", tmp_path))
 
+    @pytest.mark.slow
     def test_some_signals_are_kept_by_name(self, arm: batch.Simulation) -> None:
         whole, some = arm.run({"load": 25}, histories=True), arm.run({"load": 25}, histories=["qd"])
         assert {"qd", "q", "tau"} <= set(whole.data_vars) and {"q", "tau"}.isdisjoint(some.variables)
         np.testing.assert_array_equal(some.qd, whole.qd)
         assert "time" in some.dims and "time" not in arm.run({"load": 25}).dims
 
+    @pytest.mark.slow
     def test_a_case_that_fails_says_why_and_leaves_the_others(self, arm: batch.Simulation) -> None:
         data = arm.run({"initial.elbow.qd": [0.0, 1e200]}, histories="q")
         assert data.status.values.tolist() == [0, 1]
@@ -92,6 +95,7 @@ class TestLikeAnArchive:
 
 
 class TestCallAfterCall:
+    @pytest.mark.slow
     def test_a_set_of_paths_is_compiled_once(self, arm: batch.Simulation, monkeypatch: pytest.MonkeyPatch) -> None:
         from ic.driver import given_values
 
@@ -153,6 +157,7 @@ def nested(depth: int) -> list[object]:
 
 
 class TestValues:
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         "given",
         [
@@ -182,6 +187,7 @@ class TestValues:
     def test_a_list_has_one_value_a_case(self, arm: batch.Simulation, given: object) -> None:
         assert arm.run({"load": given})["load"].values.tolist() == [10.0, 20.0]
 
+    @pytest.mark.slow
     def test_one_value_is_for_all_cases(self, arm: batch.Simulation) -> None:
         data = arm.run({"load": [10, 20], "gearbox.kp": 0.03})
         assert data["gearbox.kp"].values.tolist() == [0.03, 0.03]
@@ -332,6 +338,7 @@ class TestValues:
             )
         assert shown == [["     gearbox.kt"], ["nobody"], ["repeat"]]
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("calls_before", [0, 1])
     def test_a_value_out_of_range_is_refused_in_every_call(self, arm: batch.Simulation, calls_before: int) -> None:
         for _ in range(calls_before):
@@ -430,6 +437,7 @@ class TestWhichRun:
         xarray.testing.assert_identical(data, plain)
         assert sim.run({"load": 25})["settle"].item() not in plain["settle"].values
 
+    @pytest.mark.slow
     def test_a_part_of_what_is_set_may_be_given(self) -> None:
         sim = batch.Simulation("two_link.ic", set={"shoulder.servo.command": "rate(step(to = 10 mrad/s, at = 0.1 s))"})
         data = sim.run({"shoulder.servo.command.to": [0.02, 0.03]}, histories="qd")

@@ -44,6 +44,7 @@ def arm() -> batch.Simulation:
 
 
 class TestSameAsARun:
+    @pytest.mark.slow
     def test_steady_commands_give_the_bits_of_a_run_with_them_as_inputs(self, arm: batch.Simulation) -> None:
         state = arm.start({"load": "25 kg"}, commands=BOTH)
         seen = [state.seen]
@@ -144,6 +145,7 @@ class TestBeginningsAndEnds:
         np.testing.assert_array_equal(one.seen.row, again.seen.row)
         assert one.seen.q[0] > 0.0 > other.seen.q[0]
 
+    @pytest.mark.slow
     def test_a_case_that_fails_is_done_and_says_why(self, arm: batch.Simulation) -> None:
         state = arm.start({"initial.elbow.qd": 1e200}, commands=BOTH)
         while not state.done:
@@ -253,6 +255,7 @@ class TestWhatIsRefused:
         (found,) = caught.value.diagnostics
         assert found.code == "D152" and found.message.endswith("takes no command `acceleration`")
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("kinds", [["shoulder"], {"shoulder": "torque"}])
     def test_a_given_command_of_a_joint_that_is_commanded_from_outside(self, arm: batch.Simulation, kinds: Any) -> None:
         with pytest.raises(Problem) as caught:

@@ -24,6 +24,7 @@ def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "a.h5"
 
 
+@pytest.mark.slow
 def test_they_are_archived_and_shown(archive: Path) -> None:
     with ArchiveFile(archive) as file:
         assert file.groups[0].attributes["allowed"] == (
@@ -34,12 +35,14 @@ def test_they_are_archived_and_shown(archive: Path) -> None:
     assert "  allowed: D102, because no end is needed" in lines
 
 
+@pytest.mark.slow
 def test_a_report_has_them(archive: Path) -> None:
     report(archive, archive.with_suffix(".html"))
     page = archive.with_suffix(".html").read_text(encoding="utf-8")
     assert "D105, because the paper" in page and "D102, because no end is needed" in page
 
 
+@pytest.mark.slow
 def test_an_archive_of_a_run_that_allows_none_has_no_such_attribute(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

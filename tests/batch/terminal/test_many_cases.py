@@ -42,6 +42,7 @@ def test_the_verdict_is_that_of_an_archive_that_is_read(
     assert one["metrics"] and not two["metrics"]
 
 
+@pytest.mark.slow
 def test_it_says_where_the_rest_is(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(running, "MOST_READ", 2)
     said = met("run", "deck.ic", "some", "-o", "a.h5")

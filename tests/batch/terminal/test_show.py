@@ -41,6 +41,7 @@ def sweep(here: Path) -> Iterator[ArchiveFile]:
         yield file
 
 
+@pytest.mark.slow
 def test_the_numbers_of_a_sweep(sweep: ArchiveFile) -> None:
     lines = show(sweep, width=100, plots=False).splitlines()
     assert lines[0].startswith("a.h5  (") and lines[0].endswith("), from two_link.ic")
@@ -68,12 +69,14 @@ def test_a_plot_in_the_terminal(sweep: ArchiveFile) -> None:
     assert text[text.index("qd  (rad/s)") :] == "qd  (rad/s)  joint rate\n" + QD_PLOT
 
 
+@pytest.mark.slow
 def test_a_plot_fits_the_width(sweep: ArchiveFile) -> None:
     for width in (60, 80, 100):
         lines = show(sweep, ["q", "tau"], width=width).splitlines()
         assert max(len(line) for line in lines if line[:1] >= "⠀" or "│" in line or "┤" in line) <= width
 
 
+@pytest.mark.slow
 def test_failed_cases_are_named_with_their_cause(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from met import run
 
@@ -87,6 +90,7 @@ def test_failed_cases_are_named_with_their_cause(here: Path, monkeypatch: pytest
     assert "  require settle < 10 s  met by 2 of 10 (20 %), not known of 7" in lines
 
 
+@pytest.mark.slow
 def test_json_has_what_the_text_has(sweep: ArchiveFile) -> None:
     said = json.loads(as_json(sweep))
     assert said["experiments"][0]["cases"] == 20
@@ -96,6 +100,7 @@ def test_json_has_what_the_text_has(sweep: ArchiveFile) -> None:
     ][0]["variables"]
 
 
+@pytest.mark.slow
 def test_a_signal_that_is_not_there(sweep: ArchiveFile) -> None:
     with pytest.raises(Problem) as caught:
         show(sweep, ["shoulder.gd"])
@@ -107,6 +112,7 @@ def test_a_signal_that_is_not_there(sweep: ArchiveFile) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_case_that_is_not_there(sweep: ArchiveFile) -> None:
     with pytest.raises(Problem) as caught:
         show(sweep, case="#20")
@@ -122,6 +128,7 @@ def test_a_position_that_no_table_has(sweep: ArchiveFile, case: str) -> None:
     assert caught.value.diagnostics[0].code == "E321"
 
 
+@pytest.mark.slow
 def test_an_archive_without_histories_says_how_to_get_them(here: Path) -> None:
     batch.run(plans.plan(plans.gains(3)), output="a.h5", histories="none")
     with ArchiveFile("a.h5") as file:
@@ -131,6 +138,7 @@ def test_an_archive_without_histories_says_how_to_get_them(here: Path) -> None:
     assert caught.value.diagnostics[0].message == "no histories of `gains` are in the archive"
 
 
+@pytest.mark.slow
 def test_joints_of_unlike_unit_are_drawn_apart(here: Path) -> None:
     from dataclasses import replace
 
@@ -213,6 +221,7 @@ def test_units_are_typeset(unit: str, text: str) -> None:
     assert pretty_unit(unit) == text
 
 
+@pytest.mark.slow
 def test_an_unknown_signal_is_told_without_plots_too(sweep: ArchiveFile) -> None:
     for plots in (True, False):
         with pytest.raises(Problem) as caught:

@@ -23,6 +23,7 @@ class TestWhatIsSaid:
         plan_file.write(plans.plan(*experiments), here / "p.json")
         return "p.json"
 
+    @pytest.mark.slow
     def test_a_single_case(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert run_and_tell(self.plan(here, plans.nominal()), no_picture=True)
         said = capsys.readouterr().out
@@ -42,6 +43,7 @@ class TestWhatIsSaid:
             "next     met show two_link.h5\n"
         )
 
+    @pytest.mark.slow
     def test_a_sweep_that_misses_says_why_it_ends_with_1(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert not run_and_tell(self.plan(here, plans.gains(20)), no_picture=True)
         said = capsys.readouterr().out.splitlines()
@@ -49,10 +51,12 @@ class TestWhatIsSaid:
         assert "  require settle < 10 s  met by 19 of 20 (95 %)" in said
         assert said[-1] == "exit 1: not met everywhere: settle < 10 s, volts < 5 V"
 
+    @pytest.mark.slow
     def test_quiet_says_nothing(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         run_and_tell(self.plan(here, plans.nominal()), quiet=True, no_picture=True)
         assert capsys.readouterr() == ("", "")
 
+    @pytest.mark.slow
     def test_json(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         run_and_tell(self.plan(here, plans.gains(20)), json=True, no_picture=True)
         said = json.loads(capsys.readouterr().out)
@@ -82,6 +86,7 @@ class TestWhatIsSaid:
         told = "picture  two_link.png, of nominal alone: `met plot two_link.h5 --run other` draws another\n"
         assert told in capsys.readouterr().out
 
+    @pytest.mark.slow
     def test_a_picture_of_somebody_elses_is_left_alone(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (here / "two_link.png").write_bytes(b"\x89PNG mine")
         run_and_tell(self.plan(here, plans.nominal()))
@@ -109,6 +114,7 @@ class TestWhatIsSaid:
         said = capsys.readouterr().out
         assert "  require settle < 10 s  met by 3 of 4 (75 %), not known of 1 (its metric has no value in 1)\n" in said
 
+    @pytest.mark.slow
     def test_names_that_look_like_options_are_quoted(self, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         run_and_tell(self.plan(here, plans.nominal()), output="-x y.h5", no_picture=True)
         assert "next     met show './-x y.h5'\n" in capsys.readouterr().out

@@ -73,6 +73,7 @@ def test_the_exit_status_says_so(
     assert capsys.readouterr().out.splitlines()[-1] == "exit 1: not met, or not known: step_error(turn) < 0.1 %"
 
 
+@pytest.mark.slow
 def test_a_report_says_so(tmp_path: Path) -> None:
     with ArchiveFile(made(tmp_path, "require step_error(turn) < 0.1 %;").path) as file:
         [found] = gather(file, (), "").verdicts
@@ -80,6 +81,7 @@ def test_a_report_says_so(tmp_path: Path) -> None:
     assert found.notes == ("step_error(turn) < 0.1 %: missed, 0.21 % in case #0.",)
 
 
+@pytest.mark.slow
 def test_an_infinite_value_at_one_step_alone_misses_and_at_every_step_has_no_error(tmp_path: Path) -> None:
     archive = made(tmp_path, "require step_error(settle) < 0.1 s;", "gain", "all")
     assert said(archive) == [

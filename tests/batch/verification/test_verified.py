@@ -193,6 +193,7 @@ def test_what_is_damaged_is_told(sweep: Plan, tmp_path: Path) -> None:
         assert caught.value.diagnostics[0].message == f"the archive {copy} is damaged: {why}"
 
 
+@pytest.mark.slow
 def test_a_metric_that_an_older_archive_calls_verification_is_none(sweep: Plan, tmp_path: Path) -> None:
     archive = batch.run(sweep, output=tmp_path / "a.h5", verify="none").path
     with h5py.File(archive, "r+") as file:
@@ -226,6 +227,7 @@ def test_what_is_not_finite_has_no_error(values: tuple[float, float, float], why
     assert found.error is None and found.why == why
 
 
+@pytest.mark.slow
 def test_the_figure_of_a_campaign_is_that_of_its_worst_case(sweep: Plan, tmp_path: Path) -> None:
     archive = batch.run(sweep, output=tmp_path / "a.h5", verify="all").path
     with ArchiveFile(archive) as file:

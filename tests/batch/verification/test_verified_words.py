@@ -88,6 +88,7 @@ def test_structures_are_told_of_together() -> None:
     assert together([None, one]) is one and together([None]) is None
 
 
+@pytest.mark.slow
 def test_no_sign_stands_beside_what_is_never_reached(tmp_path: Path) -> None:
     never = "#include <two_link.ic>\nrun brief like nominal { duration = 1 s; }\n"
     with ArchiveFile(made(tmp_path, "n", "some", never, "brief")) as file:
@@ -98,6 +99,7 @@ def test_no_sign_stands_beside_what_is_never_reached(tmp_path: Path) -> None:
     assert any("of settle not known: infinite at every step" in line for line in lines)
 
 
+@pytest.mark.slow
 def test_programs_read_the_same(archive: Path) -> None:
     with ArchiveFile(archive) as file:
         [summary] = summarise(file)
@@ -122,6 +124,7 @@ def test_a_report_has_a_column_and_a_sentence(archive: Path) -> None:
     assert html.count("± by the step</th>") == 1 and f"{about(verified)}.".replace("'", "&#x27;") in html
 
 
+@pytest.mark.slow
 def test_a_report_of_what_was_not_verified_says_nothing_of_it(tmp_path: Path) -> None:
     with ArchiveFile(made(tmp_path, "n", "none")) as file:
         assert "by the step" not in str(page(gather(file, (), "")))

@@ -102,6 +102,7 @@ def test_a_limit_that_is_far_warns_of_nothing(tmp_path: Path) -> None:
     assert warned(batch.run(plan, output=tmp_path / "a.h5", verify="some").path, plan) == []
 
 
+@pytest.mark.slow
 def test_what_is_turned_round_by_another_step_is_told_of_the_worst_case(tmp_path: Path) -> None:
     plan = planned(tmp_path, DECK.replace("0.0721", "0.09"), "gain")
     path = batch.run(plan, output=tmp_path / "a.h5", verify="all").path
@@ -179,6 +180,7 @@ def test_a_case_that_fails_with_a_shorter_step(tmp_path: Path, share: str, said:
     )
 
 
+@pytest.mark.slow
 def test_a_case_that_fails_with_a_shorter_step_is_none_of_the_campaign_s_failures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -228,6 +228,7 @@ def test_a_deck_that_has_no_run_says_so_on_the_page(tmp_path: Path) -> None:
 # Several at once, and the end
 
 
+@pytest.mark.slow
 def test_of_a_deck_that_is_saved_again_and_again_the_cases_of_one_are_run_at_a_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -276,6 +277,7 @@ def test_a_save_ends_a_long_case_of_the_deck_before_it(tmp_path: Path, count: in
     assert list(answers.run_cases(prepared, asked.is_set)) == []  # a billion steps, which would take a minute or more
 
 
+@pytest.mark.slow
 def test_a_defect_is_told_in_terminal_and_page_and_the_next_save_is_shown(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -70,6 +70,7 @@ def on(tmp_path: Path) -> Iterator[Callable[..., Bench]]:
         assert each.played.off
 
 
+@pytest.mark.slow
 def test_it_is_told_what_an_armature_would_take(on: Callable[..., Bench]) -> None:
     """The shaft goes as one with a motor of kt and resistance: to the rate where back-EMF and friction balance."""
     bench = on()
@@ -306,6 +307,7 @@ sweep cuts of bench { vary shoulder.bed.f_cut = [50, 80] Hz; }
 """
 
 
+@pytest.mark.slow
 def test_a_filter_that_is_not_the_deck_s_is_refused(tmp_path: Path) -> None:
     path = bench_file(tmp_path)
     text = path.read_text().replace('rate_max = "380 rad/s"', 'rate_max = "380 rad/s"\nfilter   = "50 Hz"')

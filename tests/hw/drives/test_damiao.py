@@ -55,6 +55,7 @@ def go(bed: CanBed, line: PlayedLine, seconds: float, voltage: float) -> None:
             return
 
 
+@pytest.mark.slow
 def test_its_angle_goes_on_where_its_range_ends(tmp_path: Path) -> None:
     bed, line, played, _ = bench(tmp_path)
     with bed:

@@ -366,6 +366,7 @@ class _Babbling:
         pass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("said", [b"x" * 4096, b"rcv 0100 24 e B F r x-1 and more\r\n" * 100, b"\n" * 4096])
 def test_a_line_that_is_never_quiet_is_left_when_the_time_is_over(said: bytes) -> None:
     line = _Babbling(said)

@@ -129,6 +129,7 @@ def test_a_tighter_limit_of_the_rate_is_one_of_the_rates_that_are_told(tmp_path:
     assert played.off
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dialect", TOLD)
 def test_each_arming_proves_the_watchdog_of_a_drive_that_closes_its_loop(tmp_path: Path, dialect: str) -> None:
     bed, played, line = bed_of(tmp_path, dialect)
@@ -304,6 +305,7 @@ def test_an_odrive_whose_loop_has_no_gain_is_refused(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_dialect_that_is_told_no_rate_is_refused_at_the_bench_s_file(tmp_path: Path) -> None:
     path = bench_file(tmp_path, "damiao")
     words = refusal(lambda: check_model(f"can:{path}", experiment(tmp_path, "bench"), "shoulder"))
@@ -377,6 +379,7 @@ def test_a_drive_weaker_than_the_deck_s_motor_by_its_own_limits_is_told_when_it_
     }
 
 
+@pytest.mark.slow
 def test_a_loop_that_is_not_the_deck_s_is_told_when_the_drive_is_greeted(tmp_path: Path) -> None:
     path, line = bench_file(tmp_path), PlayedLine(played_bench())
     said = {}

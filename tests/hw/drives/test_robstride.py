@@ -117,6 +117,7 @@ def test_it_says_what_it_is_and_what_a_step_is(tmp_path: Path) -> None:
     assert about.deadman == 0.020 and about.limits.rate == pytest.approx(45.0)
 
 
+@pytest.mark.slow
 def test_its_angle_goes_on_where_its_range_ends(tmp_path: Path) -> None:
     bed, line, played, _ = bench(tmp_path)
     with bed:

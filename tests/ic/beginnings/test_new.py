@@ -161,6 +161,7 @@ def test_its_deck_checks_without_a_word_and_runs_and_is_laid_out(kind: str, begi
     assert batch.run(ic.compile(deck), output="begun.h5").ok
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", MODELS)
 def test_its_file_passes_the_projects_own_linter(kind: str, folder: Path) -> None:
     cli.main(["new", kind, "begun", "-q"])

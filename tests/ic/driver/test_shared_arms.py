@@ -31,6 +31,7 @@ def test_only_what_changes_an_arm_resolves_it_again(monkeypatch: pytest.MonkeyPa
     assert len(times) == once + sweep_of_the_mass
 
 
+@pytest.mark.slow
 def test_a_shared_arm_makes_the_plan_of_one_that_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
     shared = compiled(ARM + RUN + MORE)
     monkeypatch.setattr(arms, "_shared", lambda scope, definition: None)

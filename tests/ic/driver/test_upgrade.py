@@ -160,6 +160,7 @@ error[E346]: `part.ic` stays in its edition: in `../deck.ic`, which includes it,
 """
 
 
+@pytest.mark.slow
 def test_a_file_with_a_run_is_proved_within_decks_that_include_it_too(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

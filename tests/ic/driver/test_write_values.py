@@ -101,6 +101,7 @@ def test_what_comes_through_a_macro_is_left_to_its_author(tmp_path: Path) -> Non
     ]
 
 
+@pytest.mark.slow
 def test_a_let_a_link_and_a_start_are_replaced(tmp_path: Path) -> None:
     values = ("slow", 0.05, "rad/s"), ("links.rod.mass", 3.5, "kg"), ("initial.hinge.q", 0.3490658503988659, "rad")
     found = made(tmp_path, *values)

@@ -22,6 +22,7 @@ def of(text: str) -> dict[tuple[str, int], tuple[str, int]]:
     return {(token.text, token.offset): (kind, bits) for token, kind, bits in meanings(deck, NamesInTexts([deck]))}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mark", "kind", "bits"),
     [
@@ -69,6 +70,7 @@ def test_an_index_of_a_loop_is_a_parameter_of_it() -> None:
     assert found["seg_{i}", CHAIN.index("seg_{i} {")] == ("struct", DEFINES)
 
 
+@pytest.mark.slow
 def test_each_key_that_stands_in_a_shipped_deck_is_known() -> None:
     for path in sorted(LIBRARY.glob("*.ic")):
         text = DeckText(path.name, path.read_text())

@@ -110,6 +110,7 @@ def test_a_deck_that_takes_too_much_memory_is_a_fault() -> None:
     assert done.stderr.endswith("MemoryError\n")
 
 
+@pytest.mark.slow
 def test_a_soundly_compiled_deck_is_no_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("deck.ic").write_text("#include <two_link.ic>\n")

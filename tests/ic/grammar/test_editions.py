@@ -163,6 +163,7 @@ def test_a_deck_declares_units_in_any_order(size: str, number: float, unit: str,
     assert (found.number, units.text(found.dimension)) == (number, unit)
 
 
+@pytest.mark.slow
 def test_a_declared_unit_is_as_exact_as_one_of_the_language(tmp_path: Path) -> None:
     pick = random.Random(24)
     for _ in range(200):
@@ -171,6 +172,7 @@ def test_a_declared_unit_is_as_exact_as_one_of_the_language(tmp_path: Path) -> N
         assert value(tmp_path, text).number == float(Fraction(str(size)) * Fraction(str(count)) / 1000)
 
 
+@pytest.mark.slow
 def test_a_hostile_declaration_ends_in_a_message(tmp_path: Path) -> None:
     grown = "".join(f"unit u{n} = 1 u{n + 1}^9;\n" for n in range(60))
     for text in (f"{grown}unit u60 = 1e9 m;\n", "".join(f"unit u{n} = 2 u{n + 1};\n" for n in range(3000)),

@@ -107,6 +107,7 @@ def test_a_mistake_of_usage_is_said_in_the_form_that_was_asked_for(capsys: pytes
     assert (status, err) == (cli.BAD_INPUT, "") and out.startswith("::error title=D173::no deck `none.ic`%0Ahelp: ")
 
 
+@pytest.mark.slow
 def test_github_has_a_line_for_each_message(capsys: pytest.CaptureFixture[str]) -> None:
     assert asked(capsys, "bad.ic", "--format", "github") == (
         cli.BAD_INPUT,

@@ -31,6 +31,7 @@ def explained(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, obje
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("path", "value", "unit", "line"),
     [
@@ -92,6 +93,7 @@ def test_a_swept_size_of_a_shape_is_shown_over_its_cases(capsys: pytest.CaptureF
     assert "a sweep varies it, here" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "run"), [("hold", "hold"), ("hold", "sizes"), ("sizes", "sizes")])
 def test_the_name_of_a_run_is_no_path(name: str, run: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["explain", "a.ic", name, "--run", run]) == 2

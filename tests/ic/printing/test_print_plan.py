@@ -279,6 +279,7 @@ def test_cases_lists_position_id_and_coordinates_in_the_units_of_the_deck(capsys
     assert lines[-1] == f"  #59  {near[59]}                  5        60"
 
 
+@pytest.mark.slow
 def test_a_long_table_shows_head_and_tail_and_all_of_it_when_asked(capsys: pytest.CaptureFixture[str]) -> None:
     short = printed(capsys, "cases", "swing.ic").splitlines()
     whole = printed(capsys, "cases", "swing.ic", "--all").splitlines()
@@ -293,6 +294,7 @@ def test_cases_as_json_are_in_si(capsys: pytest.CaptureFixture[str]) -> None:
     assert told["cases"][1]["values"] == [1.0, pytest.approx(0.06, rel=1e-15)]  # 60 mV: one rounding
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
@@ -387,6 +389,7 @@ def test_dump_knows_every_stage_of_the_way_in_order(capsys: pytest.CaptureFixtur
     )
 
 
+@pytest.mark.slow
 def test_a_deck_is_a_file_first_and_then_one_of_the_standard_library(capsys: pytest.CaptureFixture[str]) -> None:
     assert "two_link.ic" in standard_decks()
     assert printed(capsys, "check", "two_link.ic").endswith("no errors, 1 warning allowed\n")
@@ -482,6 +485,7 @@ def test_explain_of_a_component_names_only_what_it_is_written_with(
     assert "boom = 1 m" not in y + z
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("asked", "same"),
     [("camera", "links.camera"), ("camera.mass", "links.camera.mass"), ("top", "metrics.top"), ("slow", "knee.servo")],
@@ -601,6 +605,7 @@ Base: moves freely, at the start with
     )
 
 
+@pytest.mark.slow
 def test_a_sweep_of_one_case_shows_the_vectors_that_follow_from_what_varies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

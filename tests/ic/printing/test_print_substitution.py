@@ -97,6 +97,7 @@ def test_a_bed_tells_what_is_the_servos_and_which_words_its_faults_have(capsys: 
     assert (faults["shape"], faults["words"]) == ("word", ["none", "typical"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("path", "value", "note"), [
     ("hinge.bed.model", "emulated", ""),
     ("hinge.law.model", "torque_balance", ""),

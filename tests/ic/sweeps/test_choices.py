@@ -103,6 +103,7 @@ def test_words_of_a_model_may_vary(tmp_path: Path) -> None:
     assert [each.structure.velocity_products for each in found] == [True, False]
 
 
+@pytest.mark.slow
 def test_a_bed_and_its_law_may_vary(tmp_path: Path) -> None:
     on_bed = changed(
         RUN, ("duration", "substitute hinge { bed = emulated(faults = typical); law = torque_balance; }\n    duration")

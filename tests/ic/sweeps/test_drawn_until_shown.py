@@ -82,6 +82,7 @@ def test_a_sample_without_its_most_cases_is_told_how_it_is_written(tmp_path: Pat
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sweep", "code", "part"), [
     (EARLY.replace(", at_most = 100", ""), "D224", "`until_shown` takes the most cases of a design point, `at_most`"),
     (EARLY.replace("100", "100, by = 3"), "D224", "`until_shown` takes the most cases of a design point, `at_most`"),

@@ -89,6 +89,7 @@ def test_what_is_wrong_with_a_file_is_told(tmp_path: Path, table: str, message: 
 # Ranges
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("written", "numbers"), [
     ("(0.1 .. 0.5 by 0.1) V*s/rad", [0.1, 0.2, 0.3, 0.4, 0.5]),
     ("5 V*s/rad .. 3 V*s/rad by -0.5 V*s/rad", [5, 4.5, 4, 3.5, 3]),

@@ -88,6 +88,7 @@ def test_explain_shows_the_axis_as_the_engine_has_it(tmp_path: Path) -> None:
     assert (x.value, y.value, z.value) == ((0.0, pytest.approx(0.6)), (0.0, 0.0), (pytest.approx(0.8), 1.0))
 
 
+@pytest.mark.slow
 def test_gravity_varies_under_the_name_that_the_deck_gives_it(tmp_path: Path) -> None:
     run = swept(tmp_path, "vary environment.gravity.x = [1, 2] m/s^2; exclude when environment.gravity.x > 1.5 m/s^2;")
     (coordinate,) = run.cases.coordinates

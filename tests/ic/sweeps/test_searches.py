@@ -99,6 +99,7 @@ def test_a_run_is_the_same_with_searches_beside_it(tmp_path: Path) -> None:
     assert one == other
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["search", "tune", "between", "choose", "against", "at_most", "margin", "maximise"])
 def test_the_new_words_are_soft(tmp_path: Path, name: str) -> None:
     text = (
@@ -132,6 +133,7 @@ def test_the_ends_of_what_is_chosen_are_checked_with_the_run(tmp_path: Path) -> 
     assert "  = help: a case that may be chosen: links.bar.mass = -0.0001 kg\n" in found
 
 
+@pytest.mark.slow
 def test_the_commands_know_them(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -165,6 +167,7 @@ def lines(text: str) -> list[str]:
     return [line.strip() for line in text.splitlines() if line.startswith("error") or "= help" in line]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

@@ -98,6 +98,7 @@ def test_beds_laws_and_the_seed_of_noise_are_set_too(setting: str, old: str, new
     assert same(made(tmp_path, text, settings=[setting]), made(tmp_path, changed(text, (old, new))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("settings", "old", "new"), [
     (["slow=0.2 rad/s"], "slow = 0.1", "slow = 0.2"),
     (["times_of=[0, 2] s", "slow=0.2 rad/s"], "slow = 0.1 rad/s;\nlet times_of = [0, 1] s",
@@ -409,6 +410,7 @@ def test_however_a_sweep_varies_it(setting: str, body: str, said: str, tmp_path:
     assert refused(tmp_path, setting, text=text, select=["it"]).startswith(f"error[D233]: {said}\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("settings", "body", "rest"), [
     (["drive.ki=3 V/rad"], "vary drive.ki = [1, 2] V/rad; vary drive.kp = [0.1, 0.2] V*s/rad;",
      "vary drive.kp = [0.1, 0.2] V*s/rad;"),

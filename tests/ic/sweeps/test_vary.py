@@ -53,6 +53,7 @@ def refused(folder: Path, *vary: str, text: str = DECK, select: Select = None, *
     return messages(compiled)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("vary", "body"), [
     (["drive.kp=0.1..0.4 by 0.1 V*s/rad"], "vary drive.kp = (0.1 .. 0.4 by 0.1) V*s/rad;"),
     (["drive.kp=linspace(0.1, 0.4, 4) V*s/rad"], "vary drive.kp = linspace(0.1, 0.4, 4) V*s/rad;"),
@@ -122,6 +123,7 @@ def test_values_may_come_from_python(tmp_path: Path) -> None:
     assert same(found.experiments, plan(tmp_path, DECK + text, ("it",)).experiments)
 
 
+@pytest.mark.slow
 def test_batch_runs_it(deck: str) -> None:
     made = batch.run(deck, experiments=["hold"], vary={"long": "[1, 2] m"}, set={"duration": "0.5 s"}, verify="none")
     assert made.path == Path("deck.hold_varied.h5")

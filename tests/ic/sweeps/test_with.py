@@ -63,6 +63,7 @@ def test_the_outermost_deck_counts() -> None:
     assert length('param reach = 3 m;\n#include "middle.ic"\n') == 3.0
 
 
+@pytest.mark.slow
 def test_what_sets_it_counts_in_this_order() -> None:
     text = 'param reach = 2 m;\n#include "swing.ic"\nrun far like hold { with reach = 3 m; }\n'
     text += "run farther like far { with reach = 4 m; }\nsweep them of farther { vary reach = [5, 6] m; }\n"

@@ -359,6 +359,7 @@ error[D006]: includes go deeper than 50 files
 # what a plan keeps
 
 
+@pytest.mark.slow
 def test_a_plan_holds_the_text_and_the_hash_of_every_file_that_was_read(desk: Desk) -> None:
     deck = b'\xef\xbb\xbf#include <two_link.ic>\r\n#include "mine.ic"\r\n#if 0\r\n#include "left_out.ic"\r\n#endif\r\n'
     mine = "// \u00b5\nlet span = 1 m;\n"

@@ -81,6 +81,7 @@ def test_lines_and_columns_count_characters_from_one_through_tabs_comments_and_j
     assert places["z"] == (3, 12, 1)
 
 
+@pytest.mark.slow
 @given(st.text(alphabet=st.sampled_from("ab1. \t\n\"'/*\\#+-=e\u00e9{}()"), max_size=60))
 def test_every_token_stands_where_it_says(text):
     lines = text.split("\n")

@@ -453,6 +453,7 @@ warning[D015]: careful
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "codes"),
     [

@@ -59,6 +59,7 @@ def test_chains_on_a_base_that_stands_are_experiments_of_their_own(
     assert "environment.gravity.g.z" in first.parameters.keys() & second.parameters.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "run",
     [
@@ -71,6 +72,7 @@ def test_what_may_couple_chains_makes_them_one(tmp_path: Path, monkeypatch: pyte
     assert chains.chains(made(tmp_path, deck(run), monkeypatch)) == ()
 
 
+@pytest.mark.slow
 def test_a_small_arm_and_one_chain_are_looked_at_as_a_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert chains.chains(made(tmp_path, deck(chain=4, count=1), monkeypatch)) == ()
     monkeypatch.setattr(chains, "MANY_JOINTS", 5)
@@ -184,6 +186,7 @@ def test_no_more_than_a_chain_is_recorded_where_each_input_has_an_effect_on_it(
     assert recorded == [2]
 
 
+@pytest.mark.slow
 def test_an_input_that_has_an_effect_on_no_chain_is_looked_for_in_the_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -166,6 +166,7 @@ def test_what_falls_by_itself_is_no_loops_fault(servos: str, tmp_path: Path) -> 
     assert check(tmp_path, falls, select="all").diagnostics == ()
 
 
+@pytest.mark.slow
 def test_a_loop_that_is_too_weak_to_hold_its_joint_is_told(tmp_path: Path) -> None:
     """With k_position alone: it falls where k (N Kt/R) kp N < m g l, and N^2 Kt/R kp k = 9.81 N m/rad is the limit."""
     weak = "servos { hinge = drive { kp = 0.1 V*s/rad;  k_position = 1 1/s;  command = position(0 rad); } }"
@@ -198,6 +199,7 @@ def test_a_sensors_filter_and_its_delay_are_part_of_a_loop(tmp_path: Path) -> No
             assert np.abs(sizes - root).min() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "sensor", ["encoder { step = 0.01 rad/s; }", "tachometer { resolution = 0.03 rad/s;  noise = 0.1 rad/s; }"]
 )

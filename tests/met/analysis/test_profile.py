@@ -23,6 +23,7 @@ def gains() -> RunProfile:
     return profile(experiment("two_link.ic", "gains"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("deck", "name"), [("two_link.ic", "gains"), ("panda.ic", "payload")])
 def test_the_operations_of_a_sections_parts_are_all_that_the_section_computes(deck: str, name: str) -> None:
     for section in record(build(experiment(deck, name))).sections:

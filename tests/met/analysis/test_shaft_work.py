@@ -134,6 +134,7 @@ def test_both_motors_together_give_what_the_shaft_and_friction_take(tmp_path: Pa
     assert abs(left) < 2e-4 * given_at_all
 
 
+@pytest.mark.slow
 def test_the_two_link_arms_load_is_its_mass_matrix_times_its_accelerations(tmp_path: Path) -> None:
     """By the closed form of Lagrange's equations; the deck's arm has no velocity products."""
     experiment = compiled(tmp_path, ARMS["two_link"][0], "fine")

@@ -141,6 +141,7 @@ def test_it_is_the_difference_of_runs_of_one_step(integrator: str, tmp_path: Pat
     np.testing.assert_allclose(found.step[0], np.array(columns).T, rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_swing_is_found_grown_damped_or_followed_and_a_rate_that_does(tmp_path: Path) -> None:
     """What runs of 5 s with these steps make of a spring's swing, h w = 0.5 and 0.25, and the truth, 1."""
     for hz, integrator in ((100, "modified_euler"), (100, "rk4"), (200, "modified_euler"), (800, "rk4")):
@@ -179,6 +180,7 @@ run hold { arm = swing; servos { hinge = drive; } rates { dynamics = 100 Hz; ser
     assert loose[1, 1] == pytest.approx(-(0.5**2) * 100.0 / 2.0, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("brake", "held"),
     [

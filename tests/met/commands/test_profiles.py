@@ -84,6 +84,7 @@ def test_the_trapezoid_integrates_an_acceleration_that_is_either_the_limit_or_no
     assert np.abs(slope).max() <= max_rate
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("start", "to", "max_rate", "max_acceleration"), MOVES)
 def test_the_trapezoid_begins_and_ends_exactly_and_at_rest(
     start: float, to: float, max_rate: float, max_acceleration: float
@@ -216,6 +217,7 @@ def points(rng: np.random.Generator, n: int) -> tuple[tuple[float, ...], tuple[f
     return tuple((np.cumsum(rng.uniform(0.01, 1.0, n)) - 0.3).tolist()), tuple(rng.normal(size=n).tolist())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [2, 3, 4, 5, 8, 9, 31, 32, 33, 1000])
 def test_the_segment_is_the_one_that_numpys_search_finds(n: int) -> None:
     times, _ = points(np.random.default_rng(n), n)
@@ -280,6 +282,7 @@ RECORDED = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "varied", "given"), RECORDED, ids=[f"{n} {len(g)}" for n, _, g in RECORDED])
 def test_what_is_recorded_gives_what_plain_floats_give_lane_by_lane(
     name: str, varied: dict[str, Any], given: dict[str, Any]

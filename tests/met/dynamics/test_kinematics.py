@@ -52,6 +52,7 @@ def test_links_and_points_of_them_move_as_in_pinocchio(seed: int) -> None:
         assert np.allclose(motion.position(point), p + R @ point, rtol=CLOSE, atol=20 * CLOSE), f"seed {seed}, {name}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_jacobian_times_the_rates_is_the_points_velocity(seed: int) -> None:
     arm = random_tree(seed)

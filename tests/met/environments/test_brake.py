@@ -35,6 +35,7 @@ def of(run: Run, name: str) -> np.ndarray:
     return run.signals[name][0, :, 0]
 
 
+@pytest.mark.slow
 def test_it_stops_what_moves_holds_it_and_lets_it_go(tmp_path: Path) -> None:
     """3 N m push; from 0.2 s the brake takes 4 off, so the joint stops, and stays till 1 s."""
     run = ran(tmp_path)
@@ -72,6 +73,7 @@ def test_it_adds_to_the_friction_of_the_joints_servo(tmp_path: Path) -> None:
     np.testing.assert_allclose(of(run, "qdd")[t > 1.0], 5.0 / INERTIA, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_what_a_brake_bears_is_no_torque_of_the_servo(tmp_path: Path) -> None:
     """Held or sliding, the servo has its share of the level alone; a joint without one has none."""
     assert (of(ran(tmp_path), "tau") == 0.0).all()
@@ -87,6 +89,7 @@ def test_what_a_brake_bears_is_no_torque_of_the_servo(tmp_path: Path) -> None:
     np.testing.assert_allclose(of(run, "tau")[t > 0.5], -2.0, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_two_brakes_on_a_joint_add_up(tmp_path: Path) -> None:
     run = ran(
         tmp_path,

@@ -37,6 +37,7 @@ def of(run: Run, name: str) -> np.ndarray:
 WINDOW = "joint = hinge;  from = 0.3 s;  until = 0.6 s;"
 
 
+@pytest.mark.slow
 def test_a_joint_that_swings_freely_feels_the_push_and_its_rotor_alone(tmp_path: Path) -> None:
     run = ran(tmp_path, f"free_swinging {{ {WINDOW} }}", changed(SERVO, RUB))
     t, inside = run.time, (run.time >= 0.3) & (run.time < 0.6)
@@ -46,6 +47,7 @@ def test_a_joint_that_swings_freely_feels_the_push_and_its_rotor_alone(tmp_path:
     assert abs(of(run, "qd")[-1] - 0.1) < 0.05, "and afterwards brought back"
 
 
+@pytest.mark.slow
 def test_a_window_within_a_step_acts_in_proportion(tmp_path: Path) -> None:
     run = ran(tmp_path, "free_swinging { joint = hinge;  from = 0.3 s;  until = 0.3005 s; }")
     whole = ran(tmp_path, "free_swinging { joint = hinge;  from = 0.3 s;  until = 0.301 s; }")
@@ -137,6 +139,7 @@ def test_a_law_that_does_not_see_goes_by_nothing_or_by_what_it_saw_last(
     assert np.ptp(of(run, "servo.voltage")[~inside]) > 0.0
 
 
+@pytest.mark.slow
 def test_a_continuous_law_fails_as_a_sampled_one(tmp_path: Path) -> None:
     analog = ("servos = 1 kHz", "servos = continuous")
     run = ran(tmp_path, f"runaway {{ {WINDOW} }}", SERVO, analog)
@@ -165,6 +168,7 @@ def test_a_failure_of_what_is_not_there_is_told(failure: str, servo: str, said: 
     assert text.startswith("error[D247]: ") and said in text
 
 
+@pytest.mark.slow
 def test_what_is_on_a_bed_is_not_let_go_but_may_run_away(tmp_path: Path) -> None:
     bed = changed(RUN, ("duration = 1 s;", "duration = 1 s;  substitute hinge { }"))
     assert codes(tmp_path, ARM, SERVO, changed(bed, ("FAILURE", "free_swinging { joint = hinge; }"))) == ["D247"]

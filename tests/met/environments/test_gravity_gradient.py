@@ -148,6 +148,7 @@ def flown(tmp_path: Path, frame: str, initial: dict[str, float]) -> tuple[np.nda
     return found.time, found.signals["links.body.position"][0], np.array(turns), found.signals["q"][0]
 
 
+@pytest.mark.slow
 def test_a_free_point_follows_clohessy_and_wiltshire(tmp_path: Path) -> None:
     """The closed form for n = 1/s; the body's centre is where its frame is."""
     text = changed(FLYER, ("com = [0.1, -0.2, 0.3] m", "com = [0, 0, 0] m"))

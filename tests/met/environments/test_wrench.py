@@ -102,6 +102,7 @@ def test_a_window_that_begins_and_ends_with_steps_is_met_exactly(tmp_path: Path,
     np.testing.assert_allclose(pushed[20:50], 3.0, rtol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("begin", "end"), [(0.2013, 0.5), (0.2, 0.4991), (0.2013, 0.4987), (0.2032, 0.2071)])
 def test_a_window_between_steps_gives_its_impulse_and_is_off_by_the_step_squared(
     tmp_path: Path, begin: float, end: float

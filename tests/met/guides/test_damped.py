@@ -28,6 +28,7 @@ def solved(J: np.ndarray, damping: float, v: np.ndarray) -> np.ndarray:
     return np.array(damped(rows, gram(rows), damping, v.tolist()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rows", "columns"), SHAPES)
 def test_it_is_the_solution_of_the_damped_least_squares(rows: int, columns: int) -> None:
     random = np.random.default_rng(1)
@@ -69,6 +70,7 @@ def test_the_smallest_singular_value_is_never_overstated_and_at_most_seven_perce
     assert worst < 0.999 or rows < 3, "the bound is no equality: some of these matrices have several small values"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rows", "columns"), SHAPES)
 def test_with_the_threshold_as_damping_no_rate_is_larger_than_the_task_over_the_threshold(
     rows: int, columns: int

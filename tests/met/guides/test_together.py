@@ -62,6 +62,7 @@ def test_all_arrive_together_within_their_limits_and_one_is_at_its_own(seed: int
     assert max(rates.max(), accelerations.max()) == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_rate_is_the_slope_of_the_position() -> None:
     joints, begins = random_moves(3)
     times = BEGIN + np.linspace(-0.1, length(joints, begins) + 0.1, 4001)
@@ -106,6 +107,7 @@ run it {
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate", "away"), [("500 Hz", 1e-15), ("continuous", 1e-15)])
 def test_servos_are_told_the_course_itself(rate: str, away: float, tmp_path: Path) -> None:
     run = engine.run(experiment(tmp_path, DECK.replace("RATE", rate)))

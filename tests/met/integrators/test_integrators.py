@@ -163,6 +163,7 @@ error[D104]: servo `quick` is unstable with {model.name} at this rate of the dyn
     )
 
 
+@pytest.mark.slow
 @EACH
 def test_a_servo_just_below_the_limit_is_warned_of_and_runs(tmp_path: Path, model: Integrator) -> None:
     text = ARM + FAST.format(w=1000 * model.real_limit * 0.99, integrator=model.name)

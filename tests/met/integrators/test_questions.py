@@ -92,6 +92,7 @@ def without_end(slope: Ask, h: Real, y: Motion, k1: Slope) -> Motion:
         k1 = slope(1.0, ahead(y, h, k1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("advance", [by_kind, more_where_split, without_end])
 def test_the_number_of_slopes_is_the_same_at_all_times(run, advance) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(Problem) as problem:

@@ -53,6 +53,7 @@ def test_limits_that_leave_nothing_are_told() -> None:
     assert least_within(np.zeros((1, 1)), np.ones(1), rows, np.array([-1.0, -1.0])) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dimension", [2, 4, 8])
 def test_a_bent_valley_is_followed_to_its_floor(dimension: int) -> None:
     def rosenbrock(point: np.ndarray) -> LocalModel:

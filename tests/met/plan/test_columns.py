@@ -48,6 +48,7 @@ def alike(one: list[list[np.ndarray]], two: list[list[np.ndarray]]) -> bool:
     return first == second
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_rows_of_a_product_have_the_values_that_counting_through_it_gives(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -91,6 +92,7 @@ def test_bits_of_rows_are_counted_over_more_than_a_block() -> None:
     assert bits.rank(some).tolist() == (np.cumsum(flags) - flags)[some].tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", ["kg", "deg", "rpm", "mm", "V*s/rad", "%", "km"])
 def test_numbers_are_rounded_in_a_unit_as_one_by_one(unit: str) -> None:
     rng, measure = np.random.default_rng(1), parse_unit(unit)
@@ -109,6 +111,7 @@ def test_points_of_a_stream_are_those_of_the_generator_from_its_beginning() -> N
         assert drawing.points(7, "gearbox.kp", 2, first, last).tolist() == whole[first:last].tolist()
 
 
+@pytest.mark.slow
 def test_any_draws_are_had_in_any_order() -> None:
     column = drawing.DrawnColumn(300_000, 3, "a", 1, "normal", (1.0, 0.1), "kg")
     rows = np.random.default_rng(0).integers(0, len(column), 300)

@@ -54,6 +54,7 @@ def test_a_plan_with_sensors_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert plan_file.dumps(plan_file.loads(written, "p.json")) == written
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"),
     [

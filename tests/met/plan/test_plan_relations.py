@@ -47,6 +47,7 @@ def coordinate(number: int, **new: Any) -> Change:
     return lambda e: e["cases"]["coordinates"][number].update(new)
 
 
+@pytest.mark.slow
 def test_a_plan_with_all_of_them_is_read_as_it_was_written(tmp_path: Path) -> None:
     written = text(tmp_path)
     assert plan_file.dumps(plan_file.loads(written, "p.json")) == written

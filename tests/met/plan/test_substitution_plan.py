@@ -58,6 +58,7 @@ def substitution(**new: Any) -> Change:
     return lambda e: e["structure"]["substitutions"][1].update(new)
 
 
+@pytest.mark.slow
 def test_a_plan_from_a_deck_reads_back_as_it_was(tmp_path: Path) -> None:
     swept = experiment(tmp_path, ARM, SERVO, RUN, SWEEP, select=["motors"])
     text = plan_file.dumps(Plan("deck.ic", (swept,)))
@@ -68,6 +69,7 @@ def test_a_plan_from_a_deck_reads_back_as_it_was(tmp_path: Path) -> None:
     assert not any("faults" in path for path in back.parameters)
 
 
+@pytest.mark.slow
 def test_a_parameter_that_is_missing_is_the_servos_or_the_models_default(tmp_path: Path) -> None:
     swept = experiment(tmp_path, ARM, SERVO, RUN, SWEEP, select=["motors"])
     told = json.loads(plan_file.dumps(Plan("deck.ic", (swept,))))

@@ -66,6 +66,7 @@ def swung(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     return Swung(experiment, recording, inputs, rows, outputs)
 
 
+@pytest.mark.slow
 def test_cases_of_one_block_have_events_of_their_own(swung: Swung) -> None:
     """What the other tests rest on: steps split twice in some lanes while others do without; cases with no events."""
     assert len({row.tobytes() for row in swung.rows}) == CASES, "no two cases are alike"
@@ -130,6 +131,7 @@ def test_bits_do_not_depend_on_stretches_or_recording(swung: Swung, monkeypatch:
             assert swung.differences(*swung.run(made, threads=threads)) == 0
 
 
+@pytest.mark.slow
 def test_results_are_put_together_from_the_same_bits(swung: Swung) -> None:
     reference = engine.run(swung.experiment, threads=1, lanes=8)
     columns = np.concatenate([reference.signals[name] for name in ("q", "qd", "qdd", "tau")], axis=2)

@@ -65,6 +65,7 @@ def test_cells_of_payloads_are_declared(tmp_path: Path) -> None:
     assert {family.pattern for family in FAMILIES if family.pattern.startswith("payload:")} <= used
 
 
+@pytest.mark.slow
 def test_cells_of_motors_on_beds_are_declared() -> None:
     used = assert_declared(
         compiled(deck(("shoulder", "elbow"), law="torque_balance_observer", sweep=loads([1.5, 2.0])), "bench")

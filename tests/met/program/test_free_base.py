@@ -112,6 +112,7 @@ def test_a_symmetric_top_precesses_as_eulers_solution(tmp_path: Path) -> None:
     np.testing.assert_allclose(w, expected, rtol=0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_free_base_falls_with_its_arm_in_gravity(tmp_path: Path) -> None:
     # in its own axes nothing is felt of it: joints at rest stay so, whatever way up
     still = [
@@ -130,6 +131,7 @@ def test_a_free_base_falls_with_its_arm_in_gravity(tmp_path: Path) -> None:
     np.testing.assert_allclose(energy, energy[0], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_wrench_on_the_base_moves_all_of_it(tmp_path: Path) -> None:
     push = "push = wrench { link = base; force = [3, 2, 1] N; point = [0.5, 0, 0] m; axes = link; until = 1 s; }"
     run = flown(tmp_path, ("environment {}", f"environment {{ {push} }}"), *at_rate(400, "rk4"))
@@ -205,6 +207,7 @@ def test_a_base_without_inertia_fails_and_says_so(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_base_that_runs_away_fails_and_says_so(tmp_path: Path) -> None:
     text = changed(
         SPINNING.format(inertia="[2, 3, 4]", integrator="modified_euler", rate=[1, 2, 3], hz=10),
@@ -287,6 +290,7 @@ run hard {
 """
 
 
+@pytest.mark.slow
 def test_a_base_that_diverges_is_not_said_to_have_no_inertia(tmp_path: Path) -> None:
     run = engine.run(experiment(tmp_path, STIFF))
     assert run.cause[0].replace(str(tmp_path), "") == (
@@ -296,6 +300,7 @@ def test_a_base_that_diverges_is_not_said_to_have_no_inertia(tmp_path: Path) -> 
     )
 
 
+@pytest.mark.slow
 def test_a_joint_that_is_driven_is_not_blamed_for_its_base(tmp_path: Path) -> None:
     run = engine.run(experiment(tmp_path, STIFF.replace("arm = a;", "arm = a; servos { j = still; }")))
     assert run.cause[0].replace(str(tmp_path), "") == (
@@ -347,6 +352,7 @@ servo drive {
     assert margin.r < held.r, "a base that yields is lighter"
 
 
+@pytest.mark.slow
 def test_the_base_is_no_body_where_it_is_fixed(tmp_path: Path) -> None:
     text = changed(
         RUN,
@@ -365,6 +371,7 @@ def test_the_base_is_no_body_where_it_is_fixed(tmp_path: Path) -> None:
     assert [d.code for d in check(tmp_path, ARM, text, sweep, select=["heavy"]).diagnostics] == ["D137"]
 
 
+@pytest.mark.slow
 def test_a_fixed_joint_holds_the_bases_matter_as_well(tmp_path: Path) -> None:
     mount = "}\n    joint mount fixed { parent = base; child = hull; }\n    link upper"
     mounted = changed(ARM, ("link base ", "link hull "), ("}\n    link upper", mount))

@@ -73,6 +73,7 @@ def test_tables_end(tmp_path: Path) -> None:
     assert found.at_limit["environment.push.times"][0] == pytest.approx(0.25, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_an_attitude_hold_is_at_its_limit_while_it_wants_more(tmp_path: Path) -> None:
     """From 1 rad off it wants 4 N m/rad 2 sin(phi/2), so 1 N m until phi is 2 asin(1/8): at 0.5 rad/s^2 for
     sqrt(2 (1 - phi)/0.5) s."""

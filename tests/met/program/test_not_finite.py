@@ -162,6 +162,7 @@ def test_a_state_that_no_acceleration_depends_on_hides_nothing(tmp_path: Path, p
     assert np.isnan(run.signals["qd"][1]).all() and np.isfinite(run.signals["q"][[0, 2]]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 def test_constants_that_overflow_say_nothing_while_a_program_is_made(tmp_path: Path) -> None:
     """They are folded as a kernel would compute them: infinity, and no warning of numpy's beside what MET prints."""

@@ -227,6 +227,7 @@ def test_kernel_and_plain_floats_agree(tmp_path: Path, seed: int) -> None:
     assert np.abs(kernel - rows).max() / np.abs(rows).max() < 1e-10, seed
 
 
+@pytest.mark.slow
 def test_a_link_fixed_to_the_base_stands_still(tmp_path: Path) -> None:
     text = recording(DECK, "links.foot.position", "links.foot.velocity", "links.foot.orientation", "links.foot.rate")
     run = engine.run(experiment(tmp_path, text))
@@ -249,6 +250,7 @@ run hold like nominal {
 """
 
 
+@pytest.mark.slow
 def test_two_rods_by_their_closed_form(tmp_path: Path) -> None:
     run = engine.run(experiment(tmp_path, TWO_RODS, "hold"))
     m, n, length, r = 40.0, 20.0, 2.0, 1570.0**2 * 6.38e-5

@@ -57,6 +57,7 @@ def test_the_first_row_of_a_case_has_w_of_at_least_0(tmp_path: Path) -> None:
         assert jumps(run.signals[name]) == 0, name
 
 
+@pytest.mark.slow
 def test_the_bits_of_an_orientation_are_the_case_s_own(tmp_path: Path) -> None:
     every = experiment(tmp_path, DECK, SWEEP, select="starts")
     together = engine.run(every)
@@ -75,6 +76,7 @@ def test_kernel_and_plain_floats_turn_the_same_way(tmp_path: Path) -> None:
     np.testing.assert_allclose(kernel, rows, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_one_component_is_that_of_the_whole(tmp_path: Path) -> None:
     whole = engine.run(experiment(tmp_path, DECK))
     part = engine.run(experiment(tmp_path, DECK.replace(TURNED[1], TURNED[1] + ".w")))
@@ -90,6 +92,7 @@ def test_a_metric_changes_no_bit_of_what_is_recorded_and_sees_it_without_a_jump(
     assert watched.metrics["end"][0] == plain.signals[TURNED[0]][0, -1, 0]
 
 
+@pytest.mark.slow
 def test_rows_between_instants_hold_the_last_one(tmp_path: Path) -> None:
     run = engine.run(
         experiment(
@@ -102,6 +105,7 @@ def test_rows_between_instants_hold_the_last_one(tmp_path: Path) -> None:
         assert len(np.unique(q, axis=0)) == 301
 
 
+@pytest.mark.slow
 def test_what_turns_more_than_half_a_turn_from_row_to_row_is_as_near_the_row_before_as_can_be(tmp_path: Path) -> None:
     slow = changed(
         DECK,
@@ -114,6 +118,7 @@ def test_what_turns_more_than_half_a_turn_from_row_to_row_is_as_near_the_row_bef
         assert jumps(run.signals[name]) == 0
 
 
+@pytest.mark.slow
 def test_a_base_that_tumbles_does_not_jump_either(tmp_path: Path) -> None:
     fast = changed(FREE, ("base.rate", "base.rate = [4, 2, -3] rad/s;  // "))
     run = engine.run(experiment(tmp_path, ARM, "", fast))

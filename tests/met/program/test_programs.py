@@ -41,6 +41,7 @@ def test_kernel_and_plain_floats_agree_on_random_decks(tmp_path: Path, seed: int
         assert count[0] == out[f"friction.{name}"], (seed, name)
 
 
+@pytest.mark.slow
 def test_a_run_records_both_ends_and_holds_between_ticks(tmp_path: Path) -> None:
     text = """
     #include <two_link.ic>
@@ -59,6 +60,7 @@ def test_a_run_records_both_ends_and_holds_between_ticks(tmp_path: Path) -> None
     assert all(i % 2 == 0 for i in moved) and len(moved) >= 99
 
 
+@pytest.mark.slow
 def test_a_failed_case_says_when_and_where_and_the_others_go_on(tmp_path: Path) -> None:
     text = """
     #include <two_link.ic>
@@ -97,6 +99,7 @@ def test_a_case_whose_friction_a_sweep_puts_to_zero_has_none(tmp_path: Path) -> 
         assert np.abs(run.signals[name][1] - plain.signals[name][0]).max() < 1e-12 * size, "rounding alone"
 
 
+@pytest.mark.slow
 def test_a_servo_that_ticks_between_instants_sees_the_state_carried_forward(tmp_path: Path) -> None:
     coarse = engine.run(compiled(tmp_path, REVERSING, "swing")).signals["qd"][0]
     finer = REVERSING.replace("dynamics = 400", "dynamics = 1200")
@@ -105,6 +108,7 @@ def test_a_servo_that_ticks_between_instants_sees_the_state_carried_forward(tmp_
     assert np.abs(coarse - fine).max() < 1.5e-3 * np.abs(fine).max()
 
 
+@pytest.mark.slow
 def test_a_step_at_a_whole_number_of_milliseconds_is_not_a_tick_late(tmp_path: Path) -> None:
     text = """
     #include <two_link.ic>

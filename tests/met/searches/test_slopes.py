@@ -173,6 +173,7 @@ def test_cases_that_are_left_at_a_corner_go_into_fresh_beginnings(seed: int) -> 
         assert early == pytest.approx(1.0, rel=1e-5) and late == pytest.approx(0.8, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_limit_is_kept_and_a_margin_is_paid_for() -> None:
     """kp + ki < 2 cuts the bowl's floor off: its margin's edge, at 1.9, costs less than 5 % of the goal."""
     search, source = tuning((0.5,)), Bowl((Limit("load", "<", 2.0),))

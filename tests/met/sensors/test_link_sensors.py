@@ -211,6 +211,7 @@ def test_turning_it_feels_what_holds_it_in_its_circle(tmp_path: Path) -> None:
 # Filters and ticks
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cutoff", "hz"), [(20.0, 8.0), (20.0, 20.0), (50.0, 12.0)])
 def test_the_filter_answers_as_its_transfer_function_does(cutoff: float, hz: float, tmp_path: Path) -> None:
     w = 2.0 * math.pi * hz
@@ -292,6 +293,7 @@ def test_a_reading_has_bias_scale_steps_and_delay_at_its_own_rate(tmp_path: Path
     assert (read[:10:5] == digital[0]).all()
 
 
+@pytest.mark.slow
 def test_noise_is_its_size_white_and_the_same_wherever_else_cases_differ(tmp_path: Path) -> None:
     sensors = (
         "sensor a = gyroscope { link = bar; along = [0, 1, 0]; noise = 0.05 rad/s; }\n"

@@ -69,6 +69,7 @@ def test_a_converter_gives_the_nearest_step_and_an_encoder_the_last_line(tmp_pat
     assert np.ptp(of(run, "servo.sensor.qd")) > 1.0 and np.unique(of(run, "servo.sensor.q")).size > 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ticks", [1, 2, 3])
 def test_a_delay_is_whole_ticks_and_begins_with_the_first_reading(ticks: int, tmp_path: Path) -> None:
     run = moved(tmp_path, f"sensor qd = tachometer {{ delay = {ticks}; }}", "servo.sensor.qd")

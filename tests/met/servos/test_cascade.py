@@ -77,6 +77,7 @@ def test_current_and_voltage_keep_to_their_limits_and_integrals_do_not_wind_up(t
     assert (np.diff(of(limited, "servo.integral"))[50:] == 0.0).all()
 
 
+@pytest.mark.slow
 def test_a_gear_that_is_stiff_moves_as_a_rigid_one(tmp_path: Path) -> None:
     rigid = ran(tmp_path, ("stiffness = 20000 N*m/rad;  damping = 20 N*m*s/rad;", "gear = rigid;"))
     away = []

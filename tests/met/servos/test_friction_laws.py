@@ -52,6 +52,7 @@ def level(law: str, w: np.ndarray) -> np.ndarray:
     return curve if law == "coulomb" else curve + (F_S - F_C) * np.exp(-((w / RATE_S) ** 2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", sorted(LAWS))
 def test_the_torque_of_a_steady_rate_is_the_laws_curve(law: str, tmp_path: Path) -> None:
     run = ran(tmp_path, law, select="rates")
@@ -103,6 +104,7 @@ def test_friction_takes_energy_out_or_stores_what_it_gives_back(law: str) -> Non
         assert least > -1e-6 and taken > 0.0
 
 
+@pytest.mark.slow
 def test_bristles_bent_beyond_what_they_bear_fail_the_case(tmp_path: Path) -> None:
     """At h sigma_0 |w|/g of 31 they are bent to a thousand times; a step that is short enough is true."""
     stiff = ("sigma_0 = 2 N*m/rad;  sigma_1 = 0.002 N*m*s/rad;", "sigma_0 = 50 N*m/rad;  sigma_1 = 0.01 N*m*s/rad;")

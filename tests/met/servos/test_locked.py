@@ -125,6 +125,7 @@ error[D119]: joint `push` begins with a rate, and servo `lock` (locked) needs it
     )
 
 
+@pytest.mark.slow
 def test_a_joint_that_is_free_from_the_start_may_move(tmp_path: Path) -> None:
     free = changed(MOVING, ("raise = lock;", "raise = lock { release = 0 s; };"))
     assert engine.run(experiment(tmp_path, TREE, free)).signals["qd"][0, 0, RAISE] == 0.1

@@ -35,6 +35,7 @@ def test_a_damped_spring_swings_about_its_rest(tmp_path: Path) -> None:
     np.testing.assert_allclose(tau, -0.4 * qd - 30.0 * (q - 0.2), rtol=0, atol=1e-12)  # roundings of 30 N m
 
 
+@pytest.mark.slow
 def test_one_with_nothing_set_is_a_joint_without_a_servo(tmp_path: Path) -> None:
     run = """\
 servo none { model = passive; }

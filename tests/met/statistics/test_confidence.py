@@ -37,6 +37,7 @@ def test_cases_needed_are_those_of_the_tables_and_no_fewer_do(wanted: tuple[floa
         assert binom.cdf(missed, cases, 1.0 - share) <= 1.0 - confidence < binom.cdf(missed, cases - 1, 1.0 - share)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cases", [1, 2, 17, 300])
 @pytest.mark.parametrize("confidence", [0.5, 0.9, 0.99])
 def test_bounds_are_those_of_clopper_and_pearson(cases: int, confidence: float) -> None:

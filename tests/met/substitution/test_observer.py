@@ -106,6 +106,7 @@ def fine(w: float, drive: float, time: float, steps: int = 200_000) -> float:
     return w
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("w", "drive"), [(0.0, 0.05), (0.0, 0.0204), (0.0, -0.04), (20.0, 0.05), (-20.0, -0.01)])
 def test_the_shaft_is_exact_while_it_does_not_turn_back(w: float, drive: float) -> None:
     found = shaft.slid(w, drive - DAMPING * w, F_C, inertia=J, decay=DAMPING / J, time=5e-3)

@@ -127,6 +127,7 @@ def test_what_is_recorded_and_measured_changes_no_decks_state(name: str) -> None
         assert state_key(record(build(experiment))) == state_key(record(build(bare(experiment))))
 
 
+@pytest.mark.slow
 def test_what_is_recorded_and_measured_changes_no_bit() -> None:
     (whole,) = ic.compile(DECKS / "two_link.ic").experiments
     only = [each for each in whole.structure.record if each.name == "q"]

@@ -110,6 +110,7 @@ def test_what_is_no_place_of_a_draw_gives_no_number(seed, repeat, tick):
     assert np.isnan(list(execute(one, [seed, repeat, tick], 0)[1].values())).all()
 
 
+@pytest.mark.slow
 def test_machine_code_draws_what_plain_numbers_draw():
     def draw(t):
         return (*uniform_pair(stream_of(t), t.tick), *normal_pair(stream_of(t), t.tick))
@@ -150,6 +151,7 @@ def test_cases_that_differ_in_a_gain_feel_the_same_noise_and_repeats_another():
         assert not (other[:, 0] == rows[0, :, 0]).any()
 
 
+@pytest.mark.slow
 def test_another_channel_or_another_order_changes_no_draw():
     alone = drawn(lambda t: [normal(stream_of(t), t.tick)], [(1.0, 2.0, 0.0)], 50)
     among = drawn(
@@ -273,6 +275,7 @@ def test_the_two_of_a_pair_and_neighbours_in_time_and_repeat_are_independent(dev
         assert independent(a[:, lag:], b[:, :-lag]) and independent(a[lag:], b[:-lag]), lag
 
 
+@pytest.mark.slow
 def test_channels_and_seeds_are_independent_of_each_other():
     names = ("a", "b", "joint1.servo.tachometer", "joint2.servo.tachometer")
     x = drawn(

@@ -63,6 +63,7 @@ def test_an_arm_beyond_the_limit_is_told_and_one_within_is_not(
     assert margins(experiment)[0][0].stable == (not weight)
 
 
+@pytest.mark.slow
 def test_of_a_sweep_the_ends_are_looked_at(tmp_path: Path) -> None:
     deck = BENCH.replace("[1, 1, 1] kg*m^2", "[J_bar, J_bar, J_bar]").replace(
         "arm one", f"let J_bar = {0.1 * ROTOR} kg*m^2;\narm one"

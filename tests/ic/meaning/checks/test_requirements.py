@@ -44,6 +44,7 @@ warning[D340]: `require most >= 0 rad/s` cannot be missed: a metric `peak` is ne
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -80,6 +81,7 @@ warning[D341]: `require over < 2 %` cannot be told from this run: `over` is no n
     )
 
 
+@pytest.mark.slow
 def test_a_command_that_comes_to_the_target_after_the_end(tmp_path: Path) -> None:
     slow = changed(SERVO, ("rate(0.1 rad/s)", "rate(ramp(to = 0.1 rad/s, over = 3 s))"))
     assert (

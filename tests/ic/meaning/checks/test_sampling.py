@@ -68,6 +68,7 @@ to 0.5065 s, and its servo ticks at 0.5 s and 0.51 s
     assert codes(tmp_path, ARM, servo, changed(RUN, ("servos = 1 kHz", "servos = 250 Hz"))) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [
@@ -83,6 +84,7 @@ def test_a_command_that_changes_after_the_end_is_told(tmp_path: Path, command: s
     assert codes(tmp_path, ARM, under(command), changed(RUN, ("1 s;", "10 s;"))) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [
@@ -154,6 +156,7 @@ def test_two_joints_with_one_servo_are_told_once(tmp_path: Path) -> None:
     assert codes(tmp_path, arm, servo, changed(RUN, ("hinge = drive", "hinge = drive; wrist = drive"))) == ["D334"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100))
 def test_humps_of_random_tables_rise_from_their_feet_and_come_back(seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -185,6 +188,7 @@ is 0.028, and its servo ticks every 0.01 s make it 0.02, 28.6 % less
     assert codes(tmp_path, ARM, under(f"rate({PULSE})"), changed(RUN, ("servos = 1 kHz", "servos = 500 Hz"))) == []
 
 
+@pytest.mark.slow
 def test_what_is_told_of_a_pulse_is_how_far_the_joint_goes(tmp_path: Path) -> None:
     """An `ideal` servo's way is the integral of the rate that it is asked, whatever its bandwidth."""
     ideal = f"servo drive {{ model = ideal; bandwidth = 100 1/s; command = rate({PULSE}); }}\n"

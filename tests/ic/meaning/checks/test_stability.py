@@ -141,6 +141,7 @@ warning[D249]: the gear of servo `drive` swings, and this step of modified_euler
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("integrator", "hz"), [
     ("modified_euler", 300), ("modified_euler", 400), ("midpoint", 300), ("semi_implicit_euler", 2000),
 ])  # fmt: skip

@@ -57,6 +57,7 @@ def test_without_a_scale_nothing_of_it_is_in_the_plan(tmp_path: Path) -> None:
     assert not [path for path in made.parameters if "scale" in path]
 
 
+@pytest.mark.slow
 def test_a_scale_is_taken_over_changed_and_removed_as_any_block(tmp_path: Path) -> None:
     base = "run base_run like hold { substitute hinge { scale { torque = 25;  rate = 2; } } }\n"
     changed = base + "run it like base_run { hinge { scale { rate = 5; } } }\n"
@@ -80,6 +81,7 @@ def test_a_sweep_varies_scales_and_what_follows_from_them(tmp_path: Path) -> Non
     assert made.column(torque)[:].tolist() == [10.0, 10.0, 20.0, 20.0]
 
 
+@pytest.mark.slow
 def test_set_and_with_reach_a_scale(tmp_path: Path) -> None:
     more = "run it like hold { substitute hinge { scale { } }  with hinge.bed.scale.torque = 4; }\n"
     made = experiment(tmp_path, DECK, more, select=["it"])
@@ -221,6 +223,7 @@ error[D128]: no parameter `hinge.bed.scale.torque` in this run
     )
 
 
+@pytest.mark.slow
 def test_a_motor_that_is_at_its_limit_before_the_joint_s_is_warned_of(tmp_path: Path) -> None:
     more = "run it like hold { substitute hinge { bed = emulated(tau_max = 0.03 N*m);  scale { torque = 25; } } }"
     assert (
@@ -239,6 +242,7 @@ warning[D366]: the bed's motor of joint `hinge` gives 0.03 N*m at most, which st
     assert said(tmp_path, more.replace(" } } }", ' } }  allow D366 because "it stays below"; }')) == "\n"
 
 
+@pytest.mark.slow
 def test_a_swept_motor_is_warned_of_with_its_case(tmp_path: Path) -> None:
     more = (
         "run it like hold { substitute hinge { bed = emulated(tau_max = 0.04 N*m);  scale { torque = 25; } } }\n"
@@ -248,6 +252,7 @@ def test_a_swept_motor_is_warned_of_with_its_case(tmp_path: Path) -> None:
     assert "in case #1" in said(tmp_path, more, "motors")
 
 
+@pytest.mark.slow
 def test_explain_and_plan_tell_of_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

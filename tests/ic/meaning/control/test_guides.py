@@ -95,6 +95,7 @@ def test_a_path_comes_from_a_file(tmp_path: Path) -> None:
     assert found["guides.tip.y.values"] == (0.0, 0.1)
 
 
+@pytest.mark.slow
 def test_a_sweep_varies_its_numbers_those_of_all_joints_too(tmp_path: Path) -> None:
     sweep = "sweep s of it { vary guides.tip.max_damping = [0, 0.1] m; vary guides.tip.max_rate = [0.1, 1] rad/s;"
     sweep += " vary guides.tip.x.to = [10, 20] cm; }"
@@ -451,6 +452,7 @@ error[D271]: `tip` is a value, so no guide can be called so
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "instead", "expected"), MISTAKES)
 def test_a_mistake_is_told_with_its_place_and_a_remedy(tmp_path: Path, text: str, instead: str, expected: str) -> None:
     assert messages(check(tmp_path, ARM, changed(RUN, (text, instead)))) == expected
@@ -488,6 +490,7 @@ error[D271]: `{name}` is {what}, so no guide can be called so
         )
 
 
+@pytest.mark.slow
 def test_at_a_singularity_a_damped_guide_stays_and_another_fails(tmp_path: Path) -> None:
     stretched = changed(RUN, ("low.q = 20 deg", "low.q = 0 deg"), ("high.q = 60 deg", "high.q = 0 deg"))
     run = engine.run(experiment(tmp_path, ARM, stretched))

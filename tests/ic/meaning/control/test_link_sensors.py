@@ -75,6 +75,7 @@ def test_sensors_stands_for_what_all_of_them_read(tmp_path: Path) -> None:
     assert [each.name for each in experiment(tmp_path, deck).structure.record] == ["q", "sensors.up", "sensors.spin"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("path", "values"), [
     ("sensors.up.noise", "[0, 0.1] m/s^2"), ("sensors.up.along.x", "[0, 1]"), ("sensors.up.at.x", "[0, 1] m"),
     ("sensors.up.bias", "[0, 1] m/s^2"), ("sensors.up.cutoff", "[10, 20] Hz"), ("sensors.up.delay", "[0, 2]"),
@@ -119,6 +120,7 @@ def test_what_cannot_vary_is_told(sweep: str, said: str, tmp_path: Path) -> None
     assert (found.code, found.help) == ("D122", (said,))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "instead", "expected"), [
     ("link = bar", "link = barr", """\
 error[D159]: no link `barr` in arm `swing`

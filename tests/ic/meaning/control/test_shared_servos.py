@@ -73,6 +73,7 @@ def test_all_is_as_if_each_joint_had_its_servo_by_itself(monkeypatch: pytest.Mon
         assert repr(one.names.found.worth) == repr(other.names.found.worth)
 
 
+@pytest.mark.slow
 def test_a_servo_is_resolved_once_for_joints_of_a_kind_in_all_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     joints: list[str] = []
     own = servos._use

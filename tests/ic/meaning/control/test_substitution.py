@@ -102,6 +102,7 @@ def test_bed_and_law_that_are_left_out_are_the_defaults(tmp_path: Path) -> None:
         assert (hybrid.parameters["one.bed.i_max"].value, hybrid.parameters["one.law.gain"].value) == (3.0, 0.3)
 
 
+@pytest.mark.slow
 def test_joints_stand_in_the_arms_order(tmp_path: Path) -> None:
     hybrid = compiled(tmp_path, "run hybrid like base_run { substitute two {} substitute one {} }")
     assert [use.joint for use in hybrid.structure.substitutions] == ["one", "two"]
@@ -117,6 +118,7 @@ def test_a_parameter_of_the_motor_that_is_not_written_is_the_servos_origin_and_a
     assert hybrid.parameters["one.bed.kt"].value == 0.065 and hybrid.parameters["one.servo.kt"].value == 0.05
 
 
+@pytest.mark.slow
 def test_the_word_of_the_faults_sizes_those_that_are_not_written(tmp_path: Path) -> None:
     preset = BEDS[0].presets["typical"]
     hybrid = compiled(tmp_path, HYBRID)
@@ -136,6 +138,7 @@ def test_an_expression_may_name_what_a_servo_writes(tmp_path: Path) -> None:
     assert hybrid.parameters["one.bed.kt"].value == pytest.approx(0.0535, rel=1e-15)  # two roundings
 
 
+@pytest.mark.slow
 def test_a_run_that_is_like_another_changes_its_block_by_joint_and_key(tmp_path: Path) -> None:
     like = "run again like hybrid { one { bed { kt = 0.06 N*m/A; } law = torque_balance; } substitute two { law = torque_balance; } }"
     again = compiled(tmp_path, HYBRID + like, "again")
@@ -148,6 +151,7 @@ def test_a_run_that_is_like_another_changes_its_block_by_joint_and_key(tmp_path:
     assert removed.structure.substitutions == () and "one.bed.kt" not in removed.parameters
 
 
+@pytest.mark.slow
 def test_channels_of_a_joint_on_a_bed_tick_with_its_servo(tmp_path: Path) -> None:
     more = changed(HYBRID, ("torque_balance(", "velocity_tracking("))
     hybrid = compiled(tmp_path, more.replace("    }\n}", "    }\n    record = [one.bed.shaft_rate, law.rate]; }"))
@@ -171,6 +175,7 @@ def test_channels_of_a_joint_on_a_bed_tick_with_its_servo(tmp_path: Path) -> Non
     assert channels(measured.structure)["one.law.acceleration"].unit == "rad/s^2"
 
 
+@pytest.mark.slow
 def test_the_step_need_not_be_short_for_a_motor_that_is_on_a_bed(tmp_path: Path) -> None:
     fast = ("kt = 0.05 N*m/A", "kt = 1 N*m/A")
     alone = check(tmp_path, ARM, changed(SERVOS, fast), RUN)
@@ -190,6 +195,7 @@ def replayed(swept: Experiment, path: str) -> list[float]:
     return [float(x) for x in swept.formulas.replay(columns)[value.output]]
 
 
+@pytest.mark.slow
 def test_what_a_sweep_varies_of_a_servo_its_bed_follows_unless_it_has_its_own(tmp_path: Path) -> None:
     more = HYBRID + "sweep s of hybrid { vary drive.resistance = [1, 2] ohm; vary drive.kt = [0.04, 0.05] N*m/A; }"
     swept = compiled(tmp_path, more, "s")
@@ -200,6 +206,7 @@ def test_what_a_sweep_varies_of_a_servo_its_bed_follows_unless_it_has_its_own(tm
     assert kt.sets == ("one.servo.kt", "two.servo.kt")
 
 
+@pytest.mark.slow
 def test_a_sweep_varies_the_motor_on_the_bed_alone(tmp_path: Path) -> None:
     more = (
         HYBRID

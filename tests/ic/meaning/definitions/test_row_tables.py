@@ -147,6 +147,7 @@ sweep two of fall {
     assert found.requirements[0].limit == 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("entry", "whole"),
     [

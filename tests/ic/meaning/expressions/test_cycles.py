@@ -163,6 +163,7 @@ def test_hertz_that_come_by_a_let_are_told_where_they_are_used(tmp_path: Path, w
     assert codes(tmp_path, text) == ["D305"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [
     "vary still.bandwidth = [5, 6] Hz;", "vary still.bandwidth = linspace(5, 6, 3) Hz;",
     "vary still.bandwidth = (5 .. 6 by 1) Hz;", "zip { still.bandwidth = [5, 6] Hz; }",
@@ -178,6 +179,7 @@ def test_hertz_set_on_the_command_line_are_told(tmp_path: Path) -> None:
     assert found(tmp_path, set=("still.bandwidth=6 Hz",))[0] == ["D305"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("written", ["sin(90)", "cos(-45)", "sin(ninety)", "cos(2 * ninety)", "-sin(90) + 1"])
 def test_a_sine_of_more_than_a_turn_of_bare_radians(tmp_path: Path, written: str) -> None:
     text = f"let ninety = 90;\nlet it = {written};\n" + deck()
@@ -190,6 +192,7 @@ def test_a_sine_of_more_than_a_turn_of_bare_radians(tmp_path: Path, written: str
         assert codes(tmp_path, text.replace(call[0], instead)) == [], instead
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("written", [
     "sin(90 deg)", "sin(6)", "cos(2*pi*9)", "sin(100 rad)", "(sin(0.5) * 90) deg", "sqrt(90)", "sin(3 1/s * 5 s)",
     "cos(7 m / 90 cm)", "sin(3 rad/s * 5 s)", "cos(4 * 3.1416)",
@@ -221,6 +224,7 @@ def test_the_band_of_a_settling_time_is_a_share_too(tmp_path: Path) -> None:
     assert helps == [("if per cent are meant, write `2 %`", "if that is meant, write `200 %`")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [
     "vary metrics.done.band = [1, 2, 5];", "sample random(3) { metrics.done.band = uniform(1.5, 5); }",
     "zip { metrics.done.band = linspace(1, 5, 3); }",

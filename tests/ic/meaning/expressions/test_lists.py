@@ -38,6 +38,7 @@ def test_lists_are_computed_number_by_number(tmp_path: Path, expression: str, si
     assert numbers(tmp_path, expression) == pytest.approx(si, rel=4e-16)
 
 
+@pytest.mark.slow
 def test_each_number_has_the_bits_of_the_same_arithmetic_on_numbers(tmp_path: Path) -> None:
     pick = random.Random(7)
     for _ in range(60):
@@ -89,6 +90,7 @@ def random_vector(pick: random.Random, depth: int) -> Written:
     return f"({deck}) / (3 + abs({factor}))", f"({numpy}) / (3 + np.abs({also}))"
 
 
+@pytest.mark.slow
 def test_random_arithmetic_of_vectors_is_that_of_numpy(tmp_path: Path) -> None:
     named = {"v": np.array([1.5, -2.0, 0.25]), "w": np.array([0.1, 0.2, 0.3])}
     lets = "".join(f"let {name} = {values.tolist()};\n" for name, values in named.items())

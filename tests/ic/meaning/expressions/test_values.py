@@ -162,11 +162,13 @@ def test_a_let_that_needs_itself_is_told_once_with_the_way_round(tmp_path: Path)
     assert diagnostic.message == "`a` needs itself: `a` needs `b` needs `c` needs `a`"
 
 
+@pytest.mark.slow
 def test_a_long_chain_of_lets_written_backwards_ends_in_a_diagnostic(tmp_path: Path) -> None:
     chain = "".join(f"let a{n} = a{n + 1} + 1;\n" for n in range(3000)) + "let a3000 = 0;"
     assert code(tmp_path, "a0", chain) == "D073"
 
 
+@pytest.mark.slow
 def test_a_long_chain_of_lets_written_forwards_is_fine(tmp_path: Path) -> None:
     path = tmp_path / "deck.ic"
     path.write_text("let a0 = 0;" + "".join(f"let a{n + 1} = a{n} + 1;\n" for n in range(3000)), encoding="utf-8")

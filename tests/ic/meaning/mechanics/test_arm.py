@@ -122,6 +122,7 @@ def test_a_thin_rod_may_be_written_as_its_inertia_too(tmp_path: Path) -> None:
         assert codes(tmp_path, changed(ARM, (rod, f"inertia = {six} kg*m^2;")), SERVO, RUN) == [], six
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("link", "code"),
     [

@@ -74,6 +74,7 @@ def at(frame: JointFrame, kind: str, q: float) -> np.ndarray:
 RIGHT = (0.0, np.pi / 2, -np.pi / 2, np.pi)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["R", "P"])
 @pytest.mark.parametrize("convention", list(CONVENTIONS))
 def test_a_joints_frame_moves_as_the_product_of_its_row(convention: str, kind: str) -> None:
@@ -131,6 +132,7 @@ def test_every_link_is_where_the_product_of_the_published_rows_has_it(
             np.testing.assert_allclose(pose, wanted[int(name[1:])], atol=1e-13, err_msg=f"{name}, {SEED=}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rows", "kinds"), [(dh.PUMA_CLASSIC, "RRRRRR"), (dh.STANFORD, dh.STANFORD_KINDS)])
 def test_both_conventions_end_at_one_point(tmp_path: Path, rows: tuple[dh.Row, ...], kinds: str) -> None:
     classic = experiment(tmp_path, arm("classic", rows, kinds), RUN)

@@ -361,6 +361,7 @@ error[D159]: no link `bix` in arm `crane`
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mistake", WRONG)
 def test_a_mistake_is_told_whole(tmp_path: Path, mistake: str) -> None:
     changes, message = WRONG[mistake]

@@ -105,6 +105,7 @@ def test_a_margin_without_its_loop_is_told_where_this_run_can_open_one(tmp_path:
     assert "= help: write `linear b { open = hinge.servo.voltage; }`" in said(tmp_path, "require disk_margin(b) > 1;")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("entry", WRONG)
 def test_what_is_wrong_is_said_where_it_is_written(entry: str, tmp_path: Path) -> None:
     first, place, *_ = said(tmp_path, entry).splitlines()
@@ -155,6 +156,7 @@ DAMAGED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", DAMAGED)
 def test_a_plan_that_was_damaged_is_refused(what: str, tmp_path: Path) -> None:
     made = experiment(tmp_path, ARM, SERVO, run_with(LOOP, "require phase_margin(loop) > 30 deg;"))

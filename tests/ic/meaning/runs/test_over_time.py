@@ -283,6 +283,7 @@ MISTAKES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("entry", MISTAKES)
 def test_mistakes_are_told_with_their_place(tmp_path: Path, entry: str) -> None:
     text = said(tmp_path, entry)

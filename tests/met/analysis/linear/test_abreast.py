@@ -140,6 +140,7 @@ def test_cases_that_stand_on_kinks_that_are_none_are_carried_together(
     assert all(isinstance(each, PeriodMap) for each in period_maps(stops, flows))
 
 
+@pytest.mark.slow
 def test_an_instant_has_the_bits_of_the_case_by_itself() -> None:
     made = shipped_experiment("panda.ic", "reach")
     program = PeriodProgram(made)

@@ -93,6 +93,7 @@ def test_a_motor_that_is_far_from_what_its_law_takes_it_for_is_as_in_the_whole_p
     np.testing.assert_allclose(loop.radii(loads), largest, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_tick_in_which_the_shaft_of_a_bed_turns_back_has_no_derivative(tmp_path: Path) -> None:
     """As an emulated bed stops it for the rest of a substep: nothing of its rate comes out of that tick."""
     deck = OTHER.replace("LAW", "torque_balance").replace("RATE", "1 kHz").replace("delay = DELAY", "kt = 0.065 N*m/A")

@@ -141,6 +141,7 @@ def refusals(found: MetricGradients) -> dict[tuple[str, str], str]:
     return {(found.metrics[metric], found.paths[number]): words for (_, metric, number), words in found.why_not.items()}
 
 
+@pytest.mark.slow
 def test_a_metric_that_counts_and_a_number_that_only_decides_when_are_refused() -> None:
     text = changed(
         SWAY,

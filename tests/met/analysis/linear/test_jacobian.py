@@ -247,6 +247,7 @@ run hold {
 """
 
 
+@pytest.mark.slow
 def test_a_locked_joint_is_held_until_it_is_released(tmp_path: Path) -> None:
     """Then it is named, and no two poles of it stay; the rest moves as before."""
     made = experiment(tmp_path, LOCKED)

@@ -99,6 +99,7 @@ def test_the_gain_at_which_runs_grow_is_where_the_margin_ends(tmp_path: Path) ->
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_case_without_an_answer_says_why_and_its_requirement_is_open(tmp_path: Path) -> None:
     """Where the joint breaks away there is no derivative; where it sticks nothing comes back; where a law is at its
     limit neither."""
@@ -154,6 +155,7 @@ def test_a_gain_is_told_as_far_as_its_limit_was_looked_for(tmp_path: Path) -> No
     assert "  #0    more than 10,000 times" in case_lines(question, [found])
 
 
+@pytest.mark.slow
 def test_they_move_no_bit_and_no_key_of_a_run(tmp_path: Path) -> None:
     """The program is what it is without them; and without them a plan has no word of them."""
     peak = "    metric top = peak { of = hinge.q; }\n"

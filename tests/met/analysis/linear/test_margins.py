@@ -81,6 +81,7 @@ def test_an_unstable_loop_has_no_margins() -> None:
     assert margins(integrator(1.01, delay=1)) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loop", stable_loops(3, 12))
 def test_at_each_limit_the_closed_loop_is_on_the_unit_circle(loop: ScalarLoop) -> None:
     found = margins(loop)
@@ -177,6 +178,7 @@ def test_a_pole_that_a_loop_does_not_see_hides_no_limit_at_rest(moved: float) ->
     assert found.gain_up == pytest.approx(own.gain_up, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_two_integrals_have_no_limit_at_rest_that_rounding_makes() -> None:
     """Their double pole comes out as two beside it; what a loop gives there is no number."""
     for seed in range(20):

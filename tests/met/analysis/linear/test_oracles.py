@@ -54,6 +54,7 @@ def test_the_poles_of_one_axis_of_the_manutec_r3_are_the_closed_form() -> None:
     np.testing.assert_allclose(sorted_poles(np.linalg.eigvals(found.A)), of_step, rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_the_poles_of_the_two_link_arm_are_the_closed_form(tmp_path: Path) -> None:
     """Lagrange's inertia at the pose, motors by table 1 of the paper, Heun under a held voltage, and the PI law's tick,
     at 100 Hz each. To 1e-10."""
@@ -139,6 +140,7 @@ def test_multirate_poles_are_those_of_the_monodromy_matrix_of_a_simulated_period
         assert np.min(np.abs(own - pole)) < 1e-6
 
 
+@pytest.mark.slow
 def test_the_gain_limit_of_a_law_that_ticks_twice_a_period_is_where_a_pole_leaves_the_unit_circle(
     tmp_path: Path,
 ) -> None:

@@ -112,6 +112,7 @@ def test_a_motor_too_weak_has_none(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.0, 0.02])
 def test_a_servo_that_is_commanded_a_torque_is_commanded_the_weight(friction: float, tmp_path: Path) -> None:
     """In closed form, also where the weight is more than its friction holds."""

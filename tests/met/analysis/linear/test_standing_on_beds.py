@@ -78,6 +78,7 @@ def _refused(folder: Path, run: str) -> str:
     return said.message
 
 
+@pytest.mark.slow
 def test_a_shaft_that_no_friction_holds_has_no_derivative_at_rest(tmp_path: Path) -> None:
     assert _refused(tmp_path, "smooth") == (
         "`smooth` has no operating point in this pose: no dry friction, `f_c`, holds the shaft of the bed of `hinge`, "
