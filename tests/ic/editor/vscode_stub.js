@@ -74,7 +74,7 @@ const wait = (seconds) => new Promise((done) => setTimeout(done, 1000 * seconds)
 
 (async () => {
   loaded.activate({ subscriptions: [] });
-  for (let n = 0; n < 600 && !shown.diagnostics[document.uri]; n += 1) await wait(0.1);
+  for (let n = 0; n < 2000 && !shown.diagnostics[document.uri]; n += 1) await wait(0.1);
   const provider = (kind) => made[kind][0].language === 'met' && made[kind][1];
   const place = at('motor like');
   const completed = await provider('CompletionItem').provideCompletionItems(document, at('kp ='), never);
