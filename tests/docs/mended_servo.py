@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "diff.md").read_text(encoding="utf-8")
+from tests.docs.pages import ROOT, Page
 
-
-def shown(name: str) -> str:
-    """A file of the page."""
-    found = re.search(rf"<!-- {re.escape(name)} -->\n```\w+\n(.*?)```", PAGE, re.DOTALL)
-    assert found is not None
-    return found[1]
+PAGE = Page("diff.md")
 
 
 def install(folder: Path, version: int, text: str) -> None:
@@ -40,9 +33,9 @@ def met(folder: Path, *words: str, status: int | None) -> str:
 
 def told(folder: Path) -> Path:
     """The folder, in which before.h5 and after.h5 are made as the page says."""
-    (folder / "drive.ic").write_text(shown("drive.ic"))
-    install(folder, 1, shown("arm_drive.py"))
+    (folder / "drive.ic").write_text(PAGE.files["drive.ic"])
+    install(folder, 1, PAGE.files["arm_drive.py"])
     met(folder, "run", "drive.ic", "tuning", "-o", "before.h5", "-q", "--no-picture", status=1)
-    install(folder, 2, shown("arm_drive.py, version 2"))
+    install(folder, 2, PAGE.files["arm_drive.py, version 2"])
     met(folder, "run", "before.h5", "--all", "-o", "after.h5", "-q", "--no-picture", status=1)
     return folder

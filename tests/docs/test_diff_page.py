@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
@@ -19,10 +18,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_the_page_shows_what_is_said(folder: Path) -> None:
-    found = re.search(r"\$ met diff before\.h5 after\.h5\n(.*?)```", PAGE, re.DOTALL)
-    assert found is not None
+    [(_, shown)] = PAGE.shown
     said = met(folder, "diff", "before.h5", "after.h5", status=1)
-    assert "".join(line for line in said.splitlines(keepends=True) if "MET's commit" not in line) == found[1]
+    assert "".join(line for line in said.splitlines(keepends=True) if "MET's commit" not in line) == shown
 
 
 @pytest.mark.slow
@@ -53,9 +51,7 @@ def test_an_archive_that_is_run_again_by_the_same_version_is_identical(folder: P
 def test_the_deck_with_tolerances_compiles(tmp_path: Path) -> None:
     import ic
 
-    found = re.search(r"<!-- allowed\.ic -->\n```c\n(.*?)```", PAGE, re.DOTALL)
-    assert found is not None
-    (tmp_path / "allowed.ic").write_text(found[1])
+    PAGE.put(tmp_path)
     [experiment] = ic.compile(tmp_path / "allowed.ic").experiments
     assert [each.of for each in experiment.tolerances] == ["qd", "elbow.q", "settle", "rel", "time"]
 
@@ -72,4 +68,4 @@ def test_the_page_says_what_another_limit_makes_of_the_standard_sweep(tmp_path: 
     for path, limit in ((before, "10 s"), (after, "1 s")):
         (tmp_path / "arm.ic").write_text(deck.replace("require settle < 10 s", f"require settle < {limit}"))
         batch.run(ic.compile(tmp_path / "arm.ic", select=["gains"]), output=path)
-    assert f"\n{verdict(batch.diff(before, after))}\n" in PAGE
+    assert f"\n{verdict(batch.diff(before, after))}\n" in PAGE.text

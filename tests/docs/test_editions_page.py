@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 
 import ic
 from ic.grammar.declared_units import TAKEN
 from met.units import measure
+from tests.docs.pages import Page
 
-ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "editions.md").read_text(encoding="utf-8")
-DECKS = dict(re.findall(r"^<!-- (\w+\.ic) -->\n```c\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE))
+PAGE = Page("editions.md").text
+DECKS = {name: text for name, text in Page("editions.md").files.items() if name.endswith(".ic")}
 
 
 @pytest.mark.parametrize("name", DECKS)

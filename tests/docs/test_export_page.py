@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import re
-import shlex
 from pathlib import Path
 
 import pytest
 
 from met import cli
 from tests.batch.export.decks import Mcap
+from tests.docs.pages import Page, printed
 
-PAGE = (Path(__file__).parents[2] / "docs" / "export.md").read_text(encoding="utf-8")
+PAGE = Page("export.md").text
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where the page's deck was run and exported."""
     where = tmp_path_factory.mktemp("page")
-    [(name, deck)] = re.findall(r"<!-- (\S+\.ic) -->\n```c\n(.*?)```", PAGE, re.DOTALL)
-    (where / name).write_text(deck, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(where)
-        for command in re.findall(r"^\$ met (.*)$", PAGE, re.MULTILINE):
-            assert cli.main(shlex.split(command)) == cli.YES
+    Page("export.md").put(where)
+    for command, _ in Page("export.md").shown:
+        printed(where, command, (cli.YES,))
     return where
 
 

@@ -10,20 +10,18 @@ import pytest
 
 from batch.notebook.accessor import DatasetAccessor
 from met import cli
+from tests.docs.pages import Page, printed
 
-PAGE = (Path(__file__).parents[2] / "docs" / "notebooks.md").read_text(encoding="utf-8")
+PAGE = Page("notebooks.md").text
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where the page's deck was run."""
     where = tmp_path_factory.mktemp("page")
-    [(name, deck)] = re.findall(r"<!-- (\S+\.ic) -->\n```c\n(.*?)```", PAGE, re.DOTALL)
+    Page("notebooks.md").put(where)
     [command] = re.findall(r"^After `met (run .*)`:$", PAGE, re.MULTILINE)
-    (where / name).write_text(deck, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(where)
-        assert cli.main([*command.split(), "-q", "--no-picture"]) == cli.NO  # not all cases meet both requirements
+    printed(where, f"{command} -q --no-picture", (cli.NO,))  # not all cases meet both requirements
     return where
 
 

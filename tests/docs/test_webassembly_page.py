@@ -10,31 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from met import cli
 from met.backends.wasm.module import KERNEL_JS
+from tests.docs.pages import Page, differs
 
-PAGE = (Path(__file__).parents[2] / "docs" / "webassembly.md").read_text(encoding="utf-8")
-
-
-def shown(name: str) -> str:
-    """The block that stands under a file's name."""
-    found = re.search(rf"<!-- {re.escape(name)} -->\n```\w+\n(.*?)```", PAGE, re.DOTALL)
-    assert found is not None, name
-    return found[1]
+PAGE = Page("webassembly.md").text
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Path:
-    """A folder with the page's deck, in which its command was run."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "quick.ic").write_text(shown("quick.ic"), encoding="utf-8")
-    consoles = re.findall(r"```console\n(.*?)```", PAGE, re.DOTALL)
-    assert len(consoles) == 2
-    for console in consoles:
-        said = [line for line in console.splitlines(keepends=True) if not line.startswith("$")]
-        for command in re.findall(r"^\$ met (.*)", console, re.MULTILINE):
-            assert cli.main(command.split()) == 0
-        assert re.sub(r"\([\d.]+ KiB\)", "(SIZE)", capsys.readouterr().out) == "".join(said)
+def folder(tmp_path: Path) -> Path:
+    """A folder with the page's files, in which its commands were run."""
+    for command, shown, said in Page("webassembly.md").follow(tmp_path):
+        assert not shown or not differs(shown, said), f"met {command}"
     return tmp_path
 
 
@@ -52,8 +38,7 @@ def test_the_script_prints_what_the_page_shows(folder: Path) -> None:
     node = shutil.which("node")
     if node is None:
         pytest.skip("no node; on Debian or Ubuntu: apt-get install nodejs")
-    (folder / "run.js").write_text(shown("run.js"), encoding="utf-8")
     shutil.copy(KERNEL_JS, folder)
-    said = subprocess.run([node, "run.js"], capture_output=True, text=True, check=True).stdout
+    said = subprocess.run([node, "run.js"], cwd=folder, capture_output=True, text=True, check=True).stdout
     answer = re.search(r"```text\n(.*?)```", PAGE, re.DOTALL)
     assert answer is not None and said == answer[1]

@@ -14,31 +14,20 @@ from tempfile import TemporaryDirectory
 from textwrap import indent
 
 from tests.docs.mended_servo import met
+from tests.docs.pages import DOCS, Page
 
-DOCS = Path(__file__).parents[2] / "docs"
-PAGE = (DOCS / "tutorial.md").read_text(encoding="utf-8")
+PAGE = Page("tutorial.md")
 MISSED = ("-o ramp.h5", "-o worst.h5")
 """Ends of commands that end with 1, for a requirement is missed, as the one that compares does."""
 
 
-def commands() -> Iterator[tuple[str, list[str]]]:
-    """The commands of the page in order, each with the lines that are shown of what it prints."""
-    for block in re.findall(r"```console\n(.*?)```", PAGE, re.DOTALL):
-        for part in re.split(r"^\$ met ", block, flags=re.MULTILINE)[1:]:
-            command, *lines = part.rstrip("\n").split("\n")
-            yield command, lines
-
-
-def follow(folder: Path) -> Iterator[tuple[str, list[str], str]]:
+def follow(folder: Path) -> Iterator[tuple[str, str, str]]:
     """Do in this folder what the page says: each command, what the page shows of it, and what it prints."""
-    found = re.search(r"<!-- pick\.ic -->\n```c\n(.*?)```", PAGE, re.DOTALL)
-    mended = re.search(r"<!-- the command of joint2 -->\n```c\n(.*?)```", PAGE, re.DOTALL)
-    assert found is not None and mended is not None
-    deck, new = found[1], indent(mended[1], " " * 8)
+    deck, new = PAGE.files["pick.ic"], indent(PAGE.files["the command of joint2"], " " * 8)
     after = re.sub(r" {8}joint2 \{\n.*?\n {8}\}\n", lambda _: new, deck, count=1, flags=re.DOTALL)
     assert deck != after
     (folder / "pick.ic").write_text(deck, encoding="utf-8")
-    for command, shown in commands():
+    for command, shown in PAGE.shown:
         if command.endswith("-o smooth.h5"):
             (folder / "pick.ic").write_text(after, encoding="utf-8")
         status = 1 if command.endswith(MISSED) or command.startswith("diff") else 0
