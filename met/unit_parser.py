@@ -4,7 +4,8 @@ descent."""
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from types import MappingProxyType
 
 from met.units import ALL_UNITS, ONE, Measure
@@ -89,22 +90,21 @@ class _UnitReader:
 
 
 def written(si: float, unit: str) -> str:
-    """An SI value in a unit, in the fewest digits that give the same value again: `0.33 V*s/rad`; the number alone for
-    an unreadable unit, which MET never writes."""
-    try:
-        measure = parse_unit(unit or "1")
-    except ValueError:
-        return f"{si!r}"
-    rough = si / measure.to_si(1.0)
-    texts = (_plain(float(f"{rough:.{digits}g}")) for digits in range(1, 18))
-    text = next((each for each in texts if measure.to_si(float(each), each.lstrip("-")) == si), f"{rough!r}")
+    """An SI value in a unit, in the fewest digits that give the same value again: `0.33 V*s/rad`."""
+    [text] = decimals([si], unit)
     return text if unit in ("", "1") else f"{text} {unit}"
 
 
-def _plain(value: float) -> str:
-    """A number's own digits, without an exponent where it reads well without."""
-    from decimal import Decimal  # imported late: a start does not need it
+def decimals(values: Iterable[float], unit: str) -> list[str]:
+    """SI values as numbers of a unit, each in the fewest digits that give the same value again; of an unreadable unit,
+    which MET never writes, in SI."""
+    measure = _readable(unit)
+    return [measure.decimal(float(value)) for value in values]
 
-    if value and not 1e-4 <= abs(value) < 1e7:
-        return repr(value)
-    return format(Decimal(repr(value)).normalize(), "f")
+
+@lru_cache
+def _readable(unit: str) -> Measure:
+    try:
+        return parse_unit(unit or "1")
+    except ValueError:
+        return ONE

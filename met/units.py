@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Mapping
+from decimal import Context, Decimal
 from fractions import Fraction
 from functools import lru_cache
 from types import MappingProxyType
@@ -110,6 +111,46 @@ class Measure:
         except OverflowError:
             size = math.inf
         return math.copysign(size, number)
+
+    def decimal(self, si: float) -> str:
+        """The shortest decimal number of this unit that `to_si` converts to this SI value: `0.05`, `-2.5e-07`.
+
+        At most one decimal of 15 digits or less converts to a double, and always one of 17. An infinite value and
+        not-a-number are as `repr` writes them.
+        """
+        si = float(si)
+        if si == 0.0 or not math.isfinite(si):
+            return f"{si + 0.0:g}"
+        if (self.over, self.under, self.turns) == (1, 1, 0):
+            return _plainly(Decimal(repr(si)))
+        exact, text = _EXACTLY.multiply(Decimal(si), _units_in_si(self)), ""
+        for rounding in _ROUNDINGS:
+            text = _plainly(rounding.plus(exact))
+            if self.to_si(float(text), text) == si:
+                break
+        return text
+
+
+_EXACTLY = Context(prec=60)
+_ROUNDINGS = tuple(Context(prec=digits) for digits in (15, 16, 17))
+
+
+@lru_cache
+def _units_in_si(measure: Measure) -> Decimal:
+    """How many of this unit one SI unit is."""
+    exact = 1 / measure.exact
+    return _EXACTLY.divide(Decimal(exact.numerator), Decimal(exact.denominator))
+
+
+def _plainly(number: Decimal) -> str:
+    """A decimal without zeros at its end; with an exponent only below 1e-4 or from 1e7 on, where it is no longer so."""
+    number = number.normalize()
+    plain, power = format(number, "f"), number.adjusted()
+    if -5 < power < 7:
+        return plain
+    digits = "".join(map(str, number.as_tuple().digits))
+    rest = f".{digits[1:]}" if digits[1:] else ""
+    return min(f"{'-' * number.is_signed()}{digits[0]}{rest}e{power:+03d}", plain, key=len)
 
 
 def fraction(decimal: str) -> tuple[int, int]:

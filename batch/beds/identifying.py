@@ -16,7 +16,7 @@ from batch.beds.chosen_bed import chosen_bed
 from hw.bed import About, Capability, Limits, Scales
 from hw.identify.driving import MovesRequest
 from hw.process import talk
-from ic.printing.columns import columns, quantity
+from ic.printing.columns import columns
 from met import models
 from met.analysis.shaft_work import of_cases, scale_of
 from met.diagnostic import Problem, error
@@ -28,6 +28,7 @@ from met.plan import Experiment, Formula, Plan, Substitution
 from met.plan import file as plan_file
 from met.plant import bed_values
 from met.substitution.bed_scale import BedScale
+from met.unit_parser import written
 
 if TYPE_CHECKING:
     from hw.identify.fit import Estimate, FitResult
@@ -335,7 +336,7 @@ def _believed(experiment: Experiment, use: Substitution) -> list[str]:
         if path.startswith(f"{use.joint}.bed.") and ".scale." not in path and each.origin.kind == "deck"
     }
     own = [
-        f"{name} = {quantity(each.value, each.unit)}"
+        f"{name} = {written(each.value, each.unit)}"
         for name, each in said.items()
         if name not in UNITS and not each.origin.note and isinstance(each.value, float)
     ]

@@ -14,6 +14,7 @@ from batch.queries import requirements
 from batch.queries.failures import STATUS
 from batch.queries.groups import cases_named, groups_named
 from met.frozen import frozen
+from met.unit_parser import decimals
 
 BLOCK = 10_000
 """Rows that are in memory at once."""
@@ -24,14 +25,29 @@ OUTCOME = {1: "met", 0: "missed"}
 @frozen
 class TableColumn:
     """A column of the table. kind: "float", "int" or "str"; variable: the archive's, which some structures may lack;
-    scale: what SI values are divided by."""
+    in_unit: whether SI values become numbers of the unit."""
 
     name: str
     unit: str
     about: str
     kind: str
     variable: str = ""
-    scale: float = 1.0
+    in_unit: bool = False
+
+
+class NumberOfUnit(float):
+    """A number of a unit, nearest to an SI value. Its `repr` is the decimal that gives the SI value again, which a
+    double may miss by its last bit."""
+
+    text: str
+
+    def __new__(cls, text: str) -> NumberOfUnit:
+        made = super().__new__(cls, text)
+        made.text = text if not text.lstrip("-").isdecimal() else f"{text}.0"
+        return made
+
+    def __repr__(self) -> str:
+        return self.text
 
 
 @frozen
@@ -98,8 +114,8 @@ def _fields(groups: Sequence[ArchiveGroup], *, deck: bool) -> Iterator[TableColu
         yield TableColumn("repeat", "1", "repeat of noise", "int", "repeat")
     yield TableColumn("status", "", "how it ended", "str", "status")
     for variable in {v.name: v for group in groups for v in group.role("metric")}.values():
-        unit, scale = in_unit(variable, deck=deck)
-        yield TableColumn(variable.name, unit, variable.long_name, "float", variable.name, scale)
+        unit, converted = in_unit(variable, deck=deck)
+        yield TableColumn(variable.name, unit, variable.long_name, "float", variable.name, converted)
     watched = [v for role in ("limit", "grapple") for group in groups for v in group.role(role)]
     for variable in {v.name: v for v in watched}.values():
         yield TableColumn(variable.name, variable.unit, variable.long_name, "float", variable.name)
@@ -119,15 +135,15 @@ def of_varied(variable: Stored, *, deck: bool) -> TableColumn:
     name = f"coordinates.{variable.name}" if variable.name == "run" else variable.name
     if variable.role == "choice":
         return TableColumn(name, "", variable.long_name, "str", variable.name)
-    unit, scale = in_unit(variable, deck=deck)
-    return TableColumn(name, unit, variable.long_name, "float", variable.name, scale)
+    unit, converted = in_unit(variable, deck=deck)
+    return TableColumn(name, unit, variable.long_name, "float", variable.name, converted)
 
 
-def in_unit(variable: Stored, *, deck: bool) -> tuple[str, float]:
-    """The unit of a variable, and the divisor of its SI values. deck: the deck's unit, if it has one"""
+def in_unit(variable: Stored, *, deck: bool) -> tuple[str, bool]:
+    """The unit of a variable's numbers, and whether it is another than SI. deck: the deck's unit, if it has one"""
     if not deck or "deck_unit" not in variable.attributes:
-        return variable.unit, 1.0
-    return str(variable.attributes["deck_unit"]), float(variable.attributes.get("deck_scale", 1.0))
+        return variable.unit, False
+    return str(variable.attributes["deck_unit"]), float(variable.attributes.get("deck_scale", 1.0)) != 1.0
 
 
 def value_of(field: TableColumn, group: ArchiveGroup, position: int) -> object:
@@ -150,7 +166,7 @@ def _values(group: ArchiveGroup, field: TableColumn, positions: np.ndarray) -> l
         return [str(value) for value in values]
     if field.kind == "int":
         return [int(value) for value in values]
-    return [float(value) for value in (values / field.scale if field.scale != 1.0 else values)]
+    return [NumberOfUnit(text) for text in decimals(values, field.unit)] if field.in_unit else list(map(float, values))
 
 
 def _outcomes(group: ArchiveGroup, text: str, positions: np.ndarray) -> list[object]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from batch.archive.read import ArchiveFile
-from batch.export.case_table import TableColumn
+from batch.export.case_table import NumberOfUnit, TableColumn
 from batch.queries.evidence_table import RequirementEvidence, requirement_evidence
 from batch.queries.groups import groups_named
 from met.frozen import frozen
+from met.unit_parser import decimals
 
 
 @frozen
@@ -33,7 +34,7 @@ class EvidenceColumns:
         if field.name == "unit":
             return row.unit if self.deck else row.si_unit
         if field.name in IN_UNIT and value is not None and self.deck:
-            return float(value) / row.scale
+            return NumberOfUnit(decimals([value], row.unit)[0]) if row.scale != 1.0 else float(value)
         return None if value == "" else value
 
 

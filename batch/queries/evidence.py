@@ -21,12 +21,13 @@ from batch.archive.summarised import CaseSummary
 from batch.queries import requirements
 from batch.queries.requirements import GroupRequirement
 from batch.queries.search_answers import SearchAnswer
-from batch.queries.signals import deck_unit, number_text
+from batch.queries.signals import deck_unit
 from batch.queries.streamed import summed_up
 from met.frozen import frozen
 from met.statistics import confidence as fixed
 from met.statistics import sequential
 from met.statistics.design_points import design_points
+from met.unit_parser import written
 
 Verdict = Literal["met", "missed", "demonstrated", "not shown", "refuted"]
 """`met` and `missed` refer to the cases that were run; the others to all cases that may be drawn."""
@@ -199,8 +200,7 @@ def _why_without_confidence(group: ArchiveGroup, coordinates: Sequence[Stored]) 
 
 
 def _shown(variable: Stored, value: float) -> str:
-    scale, unit = deck_unit(variable)
-    return f"{number_text(value / scale)} {unit}".removesuffix(" 1")
+    return written(value, str(variable.attributes.get("deck_unit", variable.unit)))
 
 
 def _judged(each: GroupRequirement, values: np.ndarray, outcomes: np.ndarray, why: str, early: bool) -> dict[str, Any]:

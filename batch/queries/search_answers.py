@@ -111,15 +111,6 @@ class SearchAnswer:
             found.append(WrittenValue(each.path, value, str(variable.attributes.get("deck_unit", variable.unit))))
         return found
 
-    def shown(self, case: int | None = None) -> list[tuple[str, str]]:
-        """The chosen values, to four digits, of the answer or of a case: each path, and its value as a deck would
-        write it."""
-        found = []
-        for each, variable in zip(self.values(case), self.group.role("coordinate"), strict=False):
-            scale = float(variable.attributes.get("deck_scale", 1.0))
-            found.append((each.path, f"{number_text(each.si / scale)} {each.unit}".removesuffix(" 1")))
-        return found
-
     @property
     def draws(self) -> bool:
         """True if a tuning was judged against drawn cases, so that other draws may confirm it or not."""
@@ -160,7 +151,7 @@ class SearchAnswer:
         if miss is None:
             return ["  none of the candidates that were tried misses a requirement"] if self.required else []
         case = int(self.group.values("case")[miss.case])
-        values = ", ".join(f"{path} = {value}".replace(" ", KEPT) for path, value in self.shown(miss.case))
+        values = ", ".join(f"{each.path} = {each.text}".replace(" ", KEPT) for each in self.values(miss.case))
         misses = f"misses {miss.text}" if miss.text else "fails"
         text = f"nearest tried that {misses}: {100.0 * miss.distance:.2g} % of a range away, case #{case} with {values}"
         return [
@@ -189,7 +180,7 @@ class SearchAnswer:
 
     @property
     def _chosen(self) -> str:
-        return ", ".join(f"{path} = {value}" for path, value in self.shown())
+        return ", ".join(f"{each.path} = {each.text}" for each in self.values())
 
     def _tuned(self) -> list[str]:
         found, search = self.found, self.search

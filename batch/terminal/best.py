@@ -122,7 +122,7 @@ class BestAnswer:
         """The headline, `use drive.kp = 0.33 V*s/rad`, or that no design is good."""
         if self.best is None:
             return f"none of {self.designs.count:,} designs meets all requirements"
-        return f"use {', '.join(f'{path} = {value}' for path, value in self.settings(self.best, exact=False))}"
+        return f"use {', '.join(f'{path} = {value}' for path, value in self.settings(self.best))}"
 
     def stretches(self) -> list[list[str]]:
         """The range of the best along each axis, all else unchanged: the parameter, its ends, and the obstacles
@@ -261,18 +261,14 @@ class BestAnswer:
         variables = {each.path: each for each in self.designs.pool.variables("metric")}
         return ((column, variables[column.label]) for column in self.designs.pool.metrics())
 
-    def settings(self, design: int, *, exact: bool = True) -> list[tuple[str, str]]:
-        """The choices that make a design: each path, and its value as a deck would write it; exact, or to four
-        digits."""
+    def settings(self, design: int) -> list[tuple[str, str]]:
+        """The choices that make a design: each path, and its value as a deck would write it."""
         out = []
         for column, si, unit in self._chosen(design):
             if column.role == "choice":
                 out.append((column.label, column.words[int(si)]))
-            elif exact:
-                out.append((column.label, written(si, unit)))
             else:
-                shown = number_text(column.values[int(self.designs.first[design])])
-                out.append((column.label, f"{shown} {unit}".removesuffix(" 1")))
+                out.append((column.label, written(si, unit)))
         return out
 
     def values(self, design: int) -> list[WrittenValue]:

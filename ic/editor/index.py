@@ -10,13 +10,14 @@ from itertools import islice
 from ic.driver.compile import Compiled
 from ic.driver.explain import explanations_of
 from ic.meaning.parameters.owner import Settled
-from ic.printing.columns import quantity, vector
+from ic.printing.columns import vector
 from met.diagnostic import Place
 from met.frozen import frozen
 from met.messages.message import shown_place
 from met.plan import Plan
 from met.plan.channel import recordable
 from met.trace import Scalar
+from met.unit_parser import written
 from met.units import size_in_si
 
 MOST_VALUES = 20_000  # of a deck
@@ -125,7 +126,7 @@ def _text(value: float | tuple[float, ...] | str | None, unit: str) -> str:
     if isinstance(value, tuple):
         more = f", ... ({len(value)} in all)" if len(value) > MOST_NUMBERS else ""
         return vector(value[:MOST_NUMBERS], unit) + more
-    return quantity(float(value), unit)
+    return written(float(value), unit)
 
 
 def _said(settled: Settled, run: str) -> Iterator[str]:

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ic.printing.columns import columns, count, number, size
+from ic.printing.columns import columns, count, size
 from ic.printing.searches import budget
 from ic.sweeps.confidences import OF_CASES
 from met.plan import Coordinate, Experiment, keys
 from met.plan.columns import row_at
+from met.unit_parser import decimals
 
 HEAD, TAIL = 30, 10
 SHORTEST = 4
@@ -85,10 +86,10 @@ class _Rows:
     def chosen(self, position: int) -> dict[str, str]:
         return self._chosen[self.groups[position]]
 
-    def value(self, position: int, path: str) -> tuple[float, float] | None:
-        """A coordinate in SI, and the deck's unit in SI; None where this case has no such coordinate."""
+    def value(self, position: int, path: str) -> float | None:
+        """A coordinate in SI; None where this case has no such coordinate."""
         coordinate = self._columns[self.groups[position]].get(path)
-        return None if coordinate is None else (float(coordinate.values[self.rows[position]]), coordinate.scale)
+        return None if coordinate is None else float(coordinate.values[self.rows[position]])
 
     def repeat(self, position: int) -> int:
         repeats = self.experiments[self.groups[position]].cases.repeats
@@ -97,8 +98,8 @@ class _Rows:
     def shown(self, position: int) -> list[str]:
         """Cells of the row after its id."""
         made = [self.chosen(position).get(path, "") for path in self.choices]
-        found = [self.value(position, path) for path, _ in self.coordinates]
-        made += ["" if value is None else number(value[0] / value[1]) for value in found]
+        found = [(self.value(position, path), unit) for path, unit in self.coordinates]
+        made += ["" if value is None else decimals([value], unit)[0] for value, unit in found]
         return [*made, *([str(self.repeat(position))] if self.repeated else [])]
 
 
@@ -116,7 +117,7 @@ def cases_json(groups: Sequence[Experiment]) -> dict[str, Any]:
     made = []
     for position, case_id in enumerate(rows.ids):
         found = [rows.value(position, path) for path in paths]
-        case: dict[str, Any] = {"position": position, "id": case_id, "values": [x and x[0] for x in found]}
+        case: dict[str, Any] = {"position": position, "id": case_id, "values": found}
         if len(groups) > 1:
             case["group"] = groups[rows.groups[position]].name
         if rows.repeated:

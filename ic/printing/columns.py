@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from met.unit_parser import decimals
+
 
 def columns(rows: Sequence[Sequence[str]], *, right: Iterable[int] = (), indent: str = "  ") -> list[str]:
     """The rows as lines with aligned columns; those with numbers in `right` are flush right."""
@@ -21,24 +23,20 @@ def columns(rows: Sequence[Sequence[str]], *, right: Iterable[int] = (), indent:
 
 
 def number(value: float) -> str:
-    """A number to six digits, without rounding noise: `0.3`, `1e-05`, `-0` as `0`."""
+    """A computed or measured number to six digits: `0.3`, `1e-05`, `-0` as `0`. (A value of a deck, which someone may
+    write again, is `met.unit_parser.written`.)"""
     return f"{value + 0.0:.6g}"
 
 
-def exactly(value: float) -> str:
-    """A number in the fewest digits, but at least six, that read back the same: `0.1`, `3.986004418e+14`."""
-    texts = (f"{value + 0.0:.{digits}g}" for digits in range(6, 17))
-    return next((text for text in texts if float(text) == value), f"{value + 0.0:.17g}")
-
-
 def quantity(value: float, unit: str) -> str:
-    """A number with its unit, if it has one."""
+    """A computed or measured number to six digits, with its unit if it has one."""
     return number(value) if unit in ("1", "") else f"{number(value)} {unit}"
 
 
-def vector(values: Iterable[float], unit: str) -> str:
-    """A vector with its unit: `[2, 0, 0] m`."""
-    text = f"[{', '.join(number(value) for value in values)}]"
+def vector(values: Iterable[float], unit: str, *, computed: bool = False) -> str:
+    """SI values as a vector of a unit, in the fewest digits that give the same values again: `[2, 0, 0] m`. computed:
+    for the eye alone, in six digits of SI"""
+    text = f"[{', '.join(map(number, values) if computed else decimals(values, unit))}]"
     return text if unit in ("1", "") else f"{text} {unit}"
 
 

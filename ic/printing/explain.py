@@ -25,6 +25,7 @@ from met.plan import Coordinate, Experiment, Formula, Origin, Quantity
 from met.plan.channel import recordable
 from met.plan.columns import span
 from met.substitution import bed_scale
+from met.unit_parser import decimals, written
 
 SAID = {
     "deck": "written here",
@@ -239,7 +240,8 @@ def _one(
     origin = found.origin
     if len(names) > 1:
         parts = [experiment.parameters[each].value for each in names]
-        yield f"{name.rpartition('.')[0]} = {vector([part for part in parts if isinstance(part, float)], found.unit)}"
+        numbers = [part for part in parts if isinstance(part, float)]
+        yield f"{name.rpartition('.')[0]} = {vector(numbers, found.unit, computed=origin.kind == 'derived')}"
     else:
         yield f"{name} = {_shown(experiment, found)}"
     parameter, owner = _declaration(experiment, name)
@@ -292,18 +294,21 @@ def _with_source(place: Place, said: str, also: tuple[Label, ...], sources: Mapp
 
 
 def _shown(experiment: Experiment, found: Quantity) -> str:
+    computed = found.origin.kind == "derived"  # nobody writes it
     match found.value:
         case str():
             return found.value
         case tuple() if len(found.value) > MOST_LISTED:
-            return f"{_series(np.array(found.value))}{'' if found.unit == '1' else f' {found.unit}'}"
+            return f"{_series(np.array(found.value), found.unit)}{'' if found.unit == '1' else f' {found.unit}'}"
         case tuple():
-            return vector(found.value, found.unit)
+            return vector(found.value, found.unit, computed=computed)
         case Formula():
             low, high = span(experiment.column(found.value))
-            return f"{number(low)} to {quantity(high, found.unit)}, varies with the case"
+            if computed:
+                return f"{number(low)} to {quantity(high, found.unit)}, varies with the case"
+            return f"{decimals([low], found.unit)[0]} to {written(high, found.unit)}, varies with the case"
         case float() | int():
-            return quantity(found.value, found.unit)
+            return quantity(found.value, found.unit) if computed else written(found.value, found.unit)
     raise AssertionError(found)
 
 
@@ -315,14 +320,16 @@ def _series_of(coordinate: Coordinate) -> str:
     """A coordinate's values in the deck's unit; for a long table its ends."""
     values = coordinate.values
     if isinstance(values, np.ndarray):
-        return _series(values / coordinate.scale)
-    low, high = span(values)
-    return f"{number(low / coordinate.scale)} to {number(high / coordinate.scale)}, {len(values):,} cases"
+        return _series(values, coordinate.unit)
+    low, high = decimals(span(values), coordinate.unit)
+    return f"{low} to {high}, {len(values):,} cases"
 
 
-def _series(values: np.ndarray) -> str:
-    shown = [number(float(value)) for value in dict.fromkeys(values.tolist())]
-    return ", ".join(shown) if len(shown) <= 8 else f"{shown[0]}, {shown[1]} ... {shown[-1]} ({len(shown)} values)"
+def _series(values: np.ndarray, unit: str) -> str:
+    """SI values as numbers of a unit; of many, the first and the last."""
+    found = list(dict.fromkeys(values.tolist()))
+    shown = decimals(found if len(found) <= 8 else [*found[:2], found[-1]], unit)
+    return ", ".join(shown) if len(found) <= 8 else f"{shown[0]}, {shown[1]} ... {shown[2]} ({len(found)} values)"
 
 
 def _declaration(experiment: Experiment, name: str) -> tuple[Parameter | None, str]:

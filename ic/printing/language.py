@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from ic.language import BLOCKS, BlockDeclaration, Entry
-from ic.printing.columns import columns, exactly
+from ic.printing.columns import columns
 from ic.printing.wrapping import described, terminal_width
 from met.parameter import Parameter
+from met.units import ONE
 
 PAGE = Path(__file__).parents[2] / "docs" / "deck.md"
 MARK = "<!-- table of {} -->"
@@ -103,8 +104,8 @@ def default(entry: Entry) -> str:
 def _bounds(wanted: Parameter | None) -> str:
     if wanted is None:
         return ""
-    above = f"above {exactly(wanted.above)}" if wanted.above is not None else ""
-    least = f"at least {exactly(wanted.at_least)}" if wanted.at_least is not None else ""
+    above = f"above {ONE.decimal(wanted.above)}" if wanted.above is not None else ""
+    least = f"at least {ONE.decimal(wanted.at_least)}" if wanted.at_least is not None else ""
     return above or least
 
 

@@ -9,13 +9,13 @@ from dataclasses import fields
 from typing import Any, get_args
 
 from ic.language import BLOCKS
-from ic.printing.columns import exactly
 from ic.printing.glossary import entries
 from ic.printing.wrapping import described, paragraphs, terminal_width
 from met import models
 from met.diagnostic import Problem, did_you_mean, error
 from met.parameter import Parameter
 from met.plan.channel import watched_unit
+from met.units import ONE
 
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
 WHERE_WRITTEN = {
@@ -175,7 +175,7 @@ def declared_facts(kind: models.Kind, model: Any) -> Iterator[str]:
         value = getattr(model, words, None)
         if value:
             text = "Kinds of command that it gives" if kind == "guide" else text
-            yield f"{text}: {', '.join(value) if isinstance(value, tuple) else exactly(value)}"
+            yield f"{text}: {', '.join(value) if isinstance(value, tuple) else ONE.decimal(value)}"
     if kind == "sensor" and model.unit:
         yield f"Unit of the reading: {model.unit}"
     if kind == "metric":
@@ -213,7 +213,7 @@ def default(parameter: Parameter) -> str:
     if value == ():
         return "none"
     needed = f"; needed under {', '.join(parameter.needed_for)}" if parameter.needed_for else ""
-    return f"[{', '.join(map(exactly, value))}]" if isinstance(value, tuple) else f"{exactly(value)}{needed}"
+    return f"[{', '.join(map(ONE.decimal, value))}]" if isinstance(value, tuple) else f"{ONE.decimal(value)}{needed}"
 
 
 def range_(parameter: Parameter) -> str:
@@ -224,9 +224,9 @@ def range_(parameter: Parameter) -> str:
         return " | ".join(parameter.words)
     whole = ["whole"] if parameter.whole else []
     bounds = (("> ", parameter.above), (">= ", parameter.at_least), ("< ", parameter.below), ("<= ", parameter.at_most))
-    bounded = ", ".join(whole + [f"{sign}{exactly(bound)}" for sign, bound in bounds if bound is not None])
+    bounded = ", ".join(whole + [f"{sign}{ONE.decimal(bound)}" for sign, bound in bounds if bound is not None])
     needed = parameter.above_where_needed
-    return bounded if needed is None else f"{bounded}; > {exactly(needed)} where needed".removeprefix("; ")
+    return bounded if needed is None else f"{bounded}; > {ONE.decimal(needed)} where needed".removeprefix("; ")
 
 
 def meaning(parameter: Parameter) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Iterable, Iterator
 
@@ -18,6 +17,7 @@ from met.plan.columns import different, span
 from met.plan.defaults import OF_FREE_BASE
 from met.plan.uses import sensor_parts
 from met.substitution import bed_scale
+from met.unit_parser import decimals, written
 
 CHOSEN = 88  # columns, of parameters that stand in one cell
 FIXED_SPACE = "\u00a0"  # no line ends at one
@@ -48,7 +48,13 @@ class _Values:
             return ""
         unit = self._parameters[path].unit
         low, high = float(values.min()), float(values.max())
-        return quantity(low, unit) if low == high else f"{number(low)} to {quantity(high, unit)}"
+        if self.is_computed(path):
+            return quantity(low, unit) if low == high else f"{number(low)} to {quantity(high, unit)}"
+        return written(low, unit) if low == high else f"{decimals([low], unit)[0]} to {written(high, unit)}"
+
+    def is_computed(self, path: str) -> bool:
+        """True for a value that follows from others: nobody writes it."""
+        return self._parameters[path].origin.kind == "derived"
 
     def vector(self, path: str) -> tuple[float, ...] | None:
         """Three numbers `.x .y .z`; None where one of them differs between the cases."""
@@ -106,7 +112,7 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
         yield "Set by the run, and not the default"
         rows = []
         for key, value in chosen:
-            shown = value if isinstance(value, str) else quantity(value, key.parameter.unit)
+            shown = value if isinstance(value, str) else written(value, key.parameter.unit)
             rows.append((key.path, shown, key.parameter.doc))
         yield from columns(rows)
     yield ""
@@ -159,7 +165,7 @@ def _arm(experiment: Experiment) -> Iterator[str]:
         mass = values.shown(f"links.{joint.child}.mass")
         branch = f"{stem}{'└─' if last else '├─'} {joint.name}"
         turned = values.vector(f"{joint.name}.rpy")
-        turn = "varies" if turned is None else vector((math.degrees(x) for x in turned), "deg") if any(turned) else ""
+        turn = "varies" if turned is None else vector(turned, "deg") if any(turned) else ""
         rows.append((branch, _moves(joint, values), place, turn, joint.child, mass, servo))
         waiting += [(child, stem + ("   " if last else "│  ")) for child in reversed(children.get(joint.child, []))]
     moving = f"{count(len(structure.moving), 'joint')} that move{'s' if len(structure.moving) == 1 else ''}"
@@ -173,14 +179,17 @@ def _bodies(experiment: Experiment) -> Iterator[str]:
     values = _Values(experiment)
     rows = [("link", "mass", "com", "inertia about it: xx, yy, zz, xy, xz, yz")]
     for link in experiment.structure.links:
-        com = values.numbers(f"links.{link.name}.com", ("x", "y", "z"))
-        moments = values.numbers(f"links.{link.name}.inertia", ("xx", "yy", "zz", "xy", "xz", "yz"))
+        head = f"links.{link.name}"
+        com = values.numbers(f"{head}.com", ("x", "y", "z"))
+        moments = values.numbers(f"{head}.inertia", ("xx", "yy", "zz", "xy", "xz", "yz"))
         rows.append(
             (
                 link.name,
                 values.shown(f"links.{link.name}.mass"),
-                "varies" if com is None else vector(com, "m"),
-                "varies" if moments is None else vector(moments, "kg*m^2"),
+                "varies" if com is None else vector(com, "m", computed=values.is_computed(f"{head}.com.x")),
+                "varies"
+                if moments is None
+                else vector(moments, "kg*m^2", computed=values.is_computed(f"{head}.inertia.xx")),
             )
         )
     yield from columns(rows)
@@ -195,7 +204,7 @@ def _base(experiment: Experiment, base: Base) -> Iterator[str]:
         for name, unit in OF_FREE_BASE:
             found = values.vector(f"initial.{BASE}.{name}")
             if found is not None and unit.startswith("rad"):
-                found, unit = tuple(map(math.degrees, found)), unit.replace("rad", "deg")
+                unit = unit.replace("rad", "deg")
             rows.append((name, "varies" if found is None else vector(found, unit)))
         yield from columns(rows)
         return
@@ -411,20 +420,21 @@ def _cases(experiment: Experiment) -> Iterator[str]:
         yield from search_lines(experiment, experiment.search)
         return
     each = experiment.structure.history_bytes
-    written = f"{size(cases.count * each)} of histories" if each else "metrics alone are written"
-    yield f"Cases: {'at most ' * (cases.until_shown > 0)}{cases.count}, {written}"
+    kept = f"{size(cases.count * each)} of histories" if each else "metrics alone are written"
+    yield f"Cases: {'at most ' * (cases.until_shown > 0)}{cases.count}, {kept}"
     rows = [(choice.path, choice.value) for choice in cases.choices]
     for coordinate in cases.coordinates:
         if not cases.count:
             continue
         many = coordinate.design == "random" and cases.count > COUNTED
-        shown = (np.array(span(coordinate.values)) if many else different(coordinate.values)) / coordinate.scale
+        found = span(coordinate.values) if many else different(coordinate.values)
+        shown = decimals(found if len(found) <= 4 else (found[0], found[-1]), coordinate.unit)
         if many:
-            several = f"drawn, from {number(float(shown[0]))} to {number(float(shown[-1]))}"
-        elif shown.size <= 4:
-            several = f"{', '.join(number(float(value)) for value in shown)}"
+            several = f"drawn, from {shown[0]} to {shown[-1]}"
+        elif len(found) <= 4:
+            several = ", ".join(shown)
         else:
-            several = f"{shown.size} values from {number(float(shown[0]))} to {number(float(shown[-1]))}"
+            several = f"{len(found)} values from {shown[0]} to {shown[-1]}"
         rows.append((coordinate.path, f"{several} {coordinate.unit}" if coordinate.unit != "1" else several))
     if cases.repeats is not None:
         rows.append(("repeat", f"{different(cases.repeats).size} times each"))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ic.printing.columns import columns, count, number, size
+from ic.printing.columns import columns, count, size
 from met.plan import Experiment
 from met.plan.searches import Search
+from met.unit_parser import decimals, written
 
 
 def budget(search: Search) -> str:
@@ -20,12 +21,10 @@ def search_lines(experiment: Experiment, search: Search) -> Iterator[str]:
     histories = f"; {size(each)} of histories a case" if each else ""
     yield f"{search.kind.capitalize()}: {budget(search)}{histories}"
     rows = []
-    scales = {coordinate.path: (coordinate.scale, coordinate.unit) for coordinate in experiment.cases.coordinates}
+    units = {coordinate.path: coordinate.unit for coordinate in experiment.cases.coordinates}
     for each_parameter in search.parameters:
-        scale, unit = scales[each_parameter.path]
-        ends = f"{number(each_parameter.low / scale)} to {number(each_parameter.high / scale)} {unit}".removesuffix(
-            " 1"
-        )
+        unit = units[each_parameter.path]
+        ends = f"{decimals([each_parameter.low], unit)[0]} to {written(each_parameter.high, unit)}"
         rows.append((each_parameter.path, f"{ends}{', by equal ratios' * each_parameter.logarithmic}"))
     yield from columns(rows)
     if search.against:

@@ -12,7 +12,7 @@ from typing import Any
 from ic.language import BLOCKS
 from ic.meaning.control.substitution import DEFAULTS
 from ic.meaning.mechanics import dh, shapes
-from ic.printing.columns import columns, exactly
+from ic.printing.columns import columns
 from ic.printing.language import block_json, print_block
 from ic.printing.models import FIELDS, OF_LANGUAGE, UNIT_WORDS, default, rows, summary, unit_in_words
 from ic.printing.sweeps import print_words, words_json
@@ -20,6 +20,7 @@ from ic.printing.wrapping import described, paragraphs, terminal_width
 from met import models, units
 from met.plan import channel
 from met.plan.linear_uses import FIGURES
+from met.units import ONE
 
 OF_ANY = (
     (
@@ -192,7 +193,7 @@ def print_units() -> Iterator[str]:
 
 def in_si(unit: Mapping[str, Any]) -> str:
     """The size of a unit in SI: `0.001 m`; for a share `0.01`."""
-    return f"{exactly(unit['scale'])} {unit['si']}" if unit["si"] != "1" else exactly(unit["scale"])
+    return f"{ONE.decimal(unit['scale'])} {unit['si']}" if unit["si"] != "1" else ONE.decimal(unit["scale"])
 
 
 Subject = tuple[Callable[[], Iterator[str]], Callable[[], list[Any]]]

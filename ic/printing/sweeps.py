@@ -10,10 +10,10 @@ from types import MappingProxyType
 
 from ic.meaning.definitions.row_tables import CSV
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, USAGE
-from ic.printing.columns import exactly
 from ic.printing.wrapping import described, terminal_width
 from ic.sweeps.designs import AT_MOST, DESIGNS, DIGITS, DISTRIBUTIONS, UNTIL_SHOWN
 from met.frozen import frozen
+from met.units import ONE
 
 Row = tuple[str, str, str]
 """A name, its syntax, and its meaning."""
@@ -70,7 +70,7 @@ def _functions() -> list[Row]:
         f"{CSV}({', '.join(USAGE[CSV])})",
         "table of a CSV file, for a `let NAME`; its values are NAME.ROW.COLUMN, by the names of rows and columns",
     )
-    return [*calls, table, *((name, name, exactly(value)) for name, value in CONSTANTS.items())]
+    return [*calls, table, *((name, name, ONE.decimal(value)) for name, value in CONSTANTS.items())]
 
 
 def _designs() -> list[Row]:

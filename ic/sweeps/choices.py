@@ -224,14 +224,9 @@ def _number(value: Value, unit: Unit | None) -> Option:
             )
         )
     measure = measure_of(unit) if unit is not None else units.ONE
-    number = float(value.number) / measure.scale
-    text = f"{number:.12g}"
+    text = measure.decimal(float(value.number))
     shown = f"{text} {unit.text}" if unit is not None else text
-    if measure.to_si(float(text), text) == value.number:
-        number = float(text)
-    return Option(
-        shown, Number(number, unit, value.place, text if number == float(text) else repr(number)), value.place
-    )
+    return Option(shown, Number(float(text), unit, value.place, text), value.place)
 
 
 # A run with its choices put in

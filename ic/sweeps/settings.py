@@ -226,7 +226,7 @@ def applies_to(definitions: Definitions, run: Definition, entry: Setting) -> boo
 def _of_another_dimension(path: str, old: Value, new: Value, defined) -> Problem:  # type: ignore[no-untyped-def]
     wanted, also = units.text(old.dimension), [Label(defined, "defined here")]
     if new.bare:
-        number = "..." if isinstance(new.number, Scalar) else f"{new.number:g}"
+        number = "..." if isinstance(new.number, Scalar) else units.ONE.decimal(new.number)
         unit = old.unit.text if old.unit is not None else wanted
         return Problem(
             error(

@@ -10,7 +10,7 @@ import pytest
 
 from met import units
 from met.unit_parser import parse_unit
-from met.units import ALL_UNITS, UNITS, Dimension, same, text
+from met.units import ALL_UNITS, ONE, UNITS, Dimension, same, text
 from tests.oracles.package import Package
 
 pint = Package("pint")
@@ -129,6 +129,21 @@ def test_a_product_with_a_name_that_is_no_unit_is_refused():
     assert units.measure([("N", 1), ("m", 1), ("A", -1)]) == parse_unit("N*m/A")
     with pytest.raises(ValueError, match="foo"):
         units.measure([("foo", 1)])
+
+
+def test_a_number_of_a_unit_is_written_so_that_it_reads_back_to_the_bit_in_the_fewest_digits():
+    rng = random.Random(8)
+    for name in ("deg", "rpm", "g", "kg*cm^2", "V*s/rad", "%", "1"):
+        measure = parse_unit(name)
+        for literal in ("0.05", "30", "1e+09", "2.5e-07", "-17.25", "1234567", "0.0001"):
+            assert measure.decimal(measure.to_si(float(literal), literal.lstrip("-"))) == literal, name
+        for _ in range(60):
+            si = measure.scale * rng.uniform(-100.0, 100.0)
+            text = measure.decimal(si)
+            assert measure.to_si(float(text), text) == si and len(text.strip("-0.").replace(".", "")) <= 17, (si, name)
+    assert [ONE.decimal(x) for x in (0.0, -0.0, 0.1 + 0.2, math.inf, 5e-324)] == [
+        "0", "0", "0.30000000000000004", "inf", "5e-324"
+    ]  # fmt: skip
 
 
 PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459230781640628620899862803")

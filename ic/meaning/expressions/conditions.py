@@ -9,13 +9,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from ic.grammar.syntax import Unit
-from ic.meaning.expressions.quantity import Value
+from ic.meaning.expressions.quantity import Value, measure_of
 from ic.text.complaints import PROVISIONAL, Complaints
 from met.diagnostic import Diagnostic, Label, Place
 from met.frozen import frozen
 from met.plan.columns import AxisColumn, CaseValues, ends
 from met.plan.swept import blocks
 from met.trace import Formulas, Graph, Real, Scalar
+from met.units import ONE
 
 Test = Callable[[np.ndarray], tuple[np.ndarray, list[str]]]
 """A test: values [n, k] -> a truth for each bad row [n], and the reason of the first in words."""
@@ -279,7 +280,7 @@ class Checks:
     def shown(self, path: str, value: float) -> str:
         """A coordinate's value in the unit of the deck."""
         varied = self.varied[path]
-        return f"{value / varied.scale:g}{' ' + varied.unit.text if varied.unit else ''}"
+        return f"{measure_of(varied.unit).decimal(value)} {varied.unit.text}" if varied.unit else ONE.decimal(value)
 
     def first(self, value: Real) -> float:
         """A number's value in the first case."""

@@ -154,12 +154,12 @@ def _unit(value: Value) -> Unit | None:
 
 def _number(value: Value) -> str:
     """The number in SI, in a deck's notation."""
-    return "[...]" if isinstance(value.number, Scalar) else f"{value.number:.12g}"
+    return "[...]" if isinstance(value.number, Scalar) else units.ONE.decimal(value.number)
 
 
 def _in(value: Value, unit: Unit) -> str:
     """The number in its unit."""
-    return "[...]" if isinstance(value.number, Scalar) else f"{value.number / measure_of(unit).scale:.12g}"
+    return "[...]" if isinstance(value.number, Scalar) else measure_of(unit).decimal(value.number)
 
 
 def _written(value: Value) -> str:

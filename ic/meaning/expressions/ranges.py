@@ -12,7 +12,7 @@ from ic.meaning.expressions.quantity import Value, ValueList, in_words, measure_
 from met import units
 from met.diagnostic import Label, Problem, error
 from met.trace import Scalar
-from met.units import PURE
+from met.units import PURE, Measure
 
 MOST_POINTS = 100_000
 
@@ -41,10 +41,9 @@ def range_of(expression: Range, first: Value, last: Value, step: Value) -> Value
             )
         )
     a, b, by = (float(value.number) for value in (first, last, step))
-    turning = measure_of(step.unit) if step.unit is not None else units.ONE
-    if turning.turns and turning.dimension == step.dimension:  # a multiple of pi is not a decimal
+    if (turning := _turning(step)) is not None:
         scale = turning.scale
-        low, high, stride = (float(f"{x / scale:.15g}") for x in (a, b, by))
+        low, high, stride = (float(turning.decimal(x)) for x in (a, b, by))
         between = list(_steps(low, high, stride, expression, first, scale))[1:-1]
         points: Iterable[float] = (a, *(turning.to_si(x) for x in between), *((b,) if low != high else ()))
     else:
@@ -52,6 +51,12 @@ def range_of(expression: Range, first: Value, last: Value, step: Value) -> Value
     bare = first.bare and last.bare and step.bare
     made = (Value(x, first.dimension, place, bare, first.unit, hertz=first.hertz) for x in points)
     return ValueList(tuple(made), place, first.unit)
+
+
+def _turning(value: Value) -> Measure | None:
+    """The unit of a value where it is a multiple of pi, so that the value is a decimal in it alone; else None."""
+    measure = measure_of(value.unit) if value.unit is not None else units.ONE
+    return measure if measure.turns and measure.dimension == value.dimension else None
 
 
 def _steps(a: float, b: float, step: float, expression: Range, first: Value, scale: float = 1.0) -> Iterable[float]:
@@ -141,7 +146,12 @@ def spaced(call: Call, start: Value, end: Value, count: Value) -> ValueList:
                 help=[*_not_exponents(start, end, n), "linspace(...) has no such limit"],
             )
         )
-    points = series.even(a, b, n) if name == "linspace" else series.by_ratio(a, b, n)
+    made_by = series.even if name == "linspace" else series.by_ratio
+    if (turning := _turning(start)) is not None:
+        inner = list(made_by(*(float(turning.decimal(x)) for x in (a, b)), n))[1:-1]
+        points: Iterable[float] = (a, *(turning.to_si(x) for x in inner), b)
+    else:
+        points = made_by(a, b, n)
     bare = start.bare and end.bare
     made = (Value(x, start.dimension, call.place, bare, start.unit, hertz=start.hertz) for x in points)
     return ValueList(tuple(made), call.place, start.unit)

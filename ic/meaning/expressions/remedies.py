@@ -11,7 +11,7 @@ from ic.meaning.definitions.merge import Item
 from ic.meaning.expressions.quantity import Value
 from met.diagnostic import Help, write
 from met.trace import Scalar
-from met.units import PURE, Dimension
+from met.units import ONE, PURE, Dimension
 
 
 def components(item: Item | None, count: int) -> tuple[Expression | None, ...]:
@@ -39,10 +39,11 @@ def unit_remedy(value: Value, text: str, dimension: Dimension) -> Help:
     if value.dimension == Dimension(s=-1, rad=1) and dimension == Dimension(s=-1):
         if text == "Hz":
             why = "a frequency counts cycles, without an angle"
-            hertz = "" if number is None else f"{number / (2.0 * math.pi):g} Hz"
+            hertz = "" if number is None else f"{ONE.decimal(number / (2.0 * math.pi))} Hz"
             return write(hertz, f"{why}: write `{hertz}`", where="value") if hertz else Help(why)
         if number is None:
             return Help(f"leave the angle out: write `... {text}`")
-        return write(f"{number:g} {text}", f"leave the angle out: write `{number:g} {text}`", where="value")
+        same = f"{ONE.decimal(number)} {text}"
+        return write(same, f"leave the angle out: write `{same}`", where="value")
     known = list(dict.fromkeys((text, *sorted(in_degrees(text)), *units_of(dimension))))
     return Help(f"write it in {', '.join(known[:-1])} or {known[-1]}" if len(known) > 1 else f"write it in {known[0]}")

@@ -22,6 +22,7 @@ from met.diagnostic import Help, Place, Problem, TextChange, error, write, write
 from met.parameter import Parameter
 from met.plan import JointKind
 from met.trace import Real, Scalar
+from met.unit_parser import parse_unit
 from met.units import PURE
 
 
@@ -51,7 +52,7 @@ class ValueChecks:
         if value.dimension == PURE:
             wrote: Help | str = f"write a number in {text}"
             if not isinstance(value.number, Scalar):
-                written = f"{value.number:.12g}"
+                written = units.ONE.decimal(value.number)
                 stands = (iteration.macro for iteration in value.place.iterations if iteration.iteration == written)
                 index = next((each for each in stands if each == self.definitions.text_at(value.place)), written)
                 wrote = write_either((f"{index} {each}" for each in in_degrees(text)), where="value")
@@ -229,7 +230,7 @@ class ValueChecks:
             number = max(next(found, np.zeros(1)).tolist(), key=abs, default=0.0)
         if abs(number) <= 1.0:
             return
-        shown, per_cent = f"{number:.12g}", f"{100.0 * number:.12g} %"
+        shown, per_cent = units.ONE.decimal(number), f"{parse_unit('%').decimal(number)} %"
         helps: list[str] = [
             write(f"{shown} %", f"if per cent are meant, write `{shown} %`", where="value"),
             write(per_cent, f"if that is meant, write `{per_cent}`", where="value"),

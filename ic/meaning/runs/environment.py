@@ -21,6 +21,7 @@ from met import models
 from met.parameter import WORLD
 from met.plan import Base, EnvironmentUse, Payload
 from met.trace import Scalar
+from met.units import ONE
 
 
 def resolve_environment(
@@ -60,7 +61,7 @@ def _environment_use(
         with scope.complaints.gather():
             found = scope.evaluate(item)
             if isinstance(found, Value):
-                size = "9.81" if isinstance(found.number, Scalar) else f"{abs(found.number):g}"
+                size = "9.81" if isinstance(found.number, Scalar) else ONE.decimal(abs(found.number))
                 scope.complaints.error(
                     "D071",
                     "`gravity` is a list of 3 numbers",

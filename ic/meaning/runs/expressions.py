@@ -246,7 +246,8 @@ class ChannelTable:
             helps = Help("both must be of one dimension")
             for one, other in ((left, right), (right, left)):
                 if one.bare and one.dimension == PURE and not isinstance(one.number, Scalar):
-                    helps = write(f"{one.number:g} {units.text(other.dimension)}", at=one.place, where="value")
+                    told = f"{units.ONE.decimal(one.number)} {units.text(other.dimension)}"
+                    helps = write(told, at=one.place, where="value")
             message = f"`{comparison.operator}` of {in_words(left)} and {in_words(right)}"
             also = [Label(side.place, in_words(side)) for side in (left, right)]
             raise Problem(error("D063", message, comparison.place, also=also, help=helps))

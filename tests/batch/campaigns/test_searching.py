@@ -72,12 +72,11 @@ tune still of swing {{
 
 @dataclass(frozen=True)
 class Said:
-    """The answer of a search with one parameter: its value exactly, and rounded."""
+    """The answer of a search with one parameter, whose value reads back to the bit."""
 
     found: Answer
     position: int
     exact: str
-    rounded: str
 
 
 @pytest.fixture(scope="module")
@@ -115,8 +114,8 @@ def answers(path: Path) -> dict[str, Said]:
         for group in file.groups:
             each = SearchAnswer.of(group)
             assert each is not None
-            [chosen], [(_, rounded)] = each.values(), each.shown()
-            found[group.name] = Said(each.found, each.position, chosen.text, rounded)
+            [chosen] = each.values()
+            found[group.name] = Said(each.found, each.position, chosen.text)
     return found
 
 
@@ -211,7 +210,7 @@ def test_a_case_that_fails_hurts_most(here: Path, capsys: pytest.CaptureFixture[
     data = batch.open(here / "w.h5")
     failed = int((data["status"] != 0).sum())
     assert 0 < failed < data.sizes["case"]
-    where = f"case #{answer.position} with environment.held.stiffness = {answer.rounded}"
+    where = f"case #{answer.position} with environment.held.stiffness = {answer.exact}"
     _, _, told = said.partition(f"the worst of search `wild`: {where} fails\n")
     cause, _, rest = told.partition(f"  {failed} of {data.sizes['case']} cases in ")
     assert rest and " ".join(cause.split()) == str(data["cause"].values[answer.found.case])
@@ -408,12 +407,12 @@ def test_it_is_said_beforehand_and_afterwards(here: Path, capsys: pytest.Capture
         "writing d.still.h5, at most about "
     )
     answer = answers(here / "d.still.h5")["still"]
-    assert f"\nuse environment.held.stiffness = {answer.rounded}\n" in said
+    assert f"\nuse environment.held.stiffness = {answer.exact}\n" in said
     assert " in the worst of 5 cases of loads; " in said
     assert f"run it: met run d.ic loads --set 'environment.held.stiffness={answer.exact}' -o chosen.h5\n" in said
     assert "demonstrated" not in said
     assert main(["show", "d.still.h5", "--no-plots"]) == 0
-    assert f"\nuse environment.held.stiffness = {answer.rounded}" in capsys.readouterr().out
+    assert f"\nuse environment.held.stiffness = {answer.exact}" in capsys.readouterr().out
     assert main(["run", "d.ic", "still", "--format", "json"]) == 0
     told = json.loads(capsys.readouterr().out)["experiments"][0]["answer"]
     assert told["serves"] and told["tried"] == told["against"] == 5 and told["case"] == answer.position

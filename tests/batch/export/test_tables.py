@@ -20,6 +20,7 @@ from batch.export.case_table import TableColumn
 from batch.export.csv import _column
 from met import run as engine
 from met.diagnostic import Problem
+from met.unit_parser import parse_unit
 from tests.batch import plans
 from tests.batch.export.decks import CHAIN, made, said
 
@@ -318,7 +319,7 @@ def test_metrics_and_what_is_varied_may_be_in_the_deck_s_units(here: Path) -> No
     batch.run(plans.plan(replace(sweep, cases=replace(sweep.cases, coordinates=(kp, grams)))), output="a.h5")
     si, deck = (table(export("a.h5", f"{units}.csv", units=units).path) for units in ("si", "deck"))
     assert (si[0][1].split(",")[3], deck[0][1].split(",")[3]) == ("kg", "g")
-    assert [float(row[3]) for row in deck[2]] == [float(row[3]) / 1e-3 for row in si[2]]
+    assert [parse_unit("g").to_si(float(row[3]), row[3]) for row in deck[2]] == [float(row[3]) for row in si[2]]
     comments, _, rows = table(export("a.h5", "h.csv", units="deck", signals=["elbow.q"]).path)
     assert comments[1] == "# units: 1,V*s/rad,g,s,rad" and rows[0][2] == deck[2][0][3]
 

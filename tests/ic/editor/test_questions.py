@@ -243,7 +243,7 @@ def test_a_word_is_shown_with_what_it_means(editor: Editor, deck: Path) -> None:
     assert "unit `kg`: kilogram, 1 in SI" in hovered(editor, deck, "kg")
     assert f"unit `deg`: {UNITS['deg'].word}" in hovered(editor, deck, "deg/s")
     assert "let slow = 3 deg/s;" in hovered(editor, deck, "slow")
-    assert "`slow` = 0.0523599 rad/s" in hovered(editor, deck, "slow =")
+    assert "`slow` = 0.05235987755982989 rad/s" in hovered(editor, deck, "slow =")
     assert "#define ROD(NAME, MASS)" in hovered(editor, deck, "ROD(upper")
     assert "let reach = 2 m;" in hovered(editor, deck, "reach, 0")
 

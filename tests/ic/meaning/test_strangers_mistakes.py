@@ -116,7 +116,7 @@ error[D077]: `tau_max` of servo `drive` must be above 0 N*m; case #8 breaks it, 
    |
 18 | default sweep spread of hold { sample lhs(20) { drive.tau_max = normal(0.02, 0.03) N*m; } }
    |                                                 ^^^^^^^^^^^^^ this is -0.00740745 N*m
-   = help: case #8: drive.tau_max = -0.00740745 N*m
+   = help: case #8: drive.tau_max = -0.00740744883737 N*m
    = help: a normal distribution has no bounds: `truncated(mean, deviation, from, to) N*m` has two
 """
     )

@@ -42,8 +42,8 @@ def test_the_plan_tells_what_was_chosen_of_bed_and_law(capsys: pytest.CaptureFix
 
 On a bed: the motor of hinge; what is not told here is the servo's, or the default
   hinge  bed  emulated        kt = 0.06 N*m/A, unevenness = 0.02, once = 0.002 N*m, twice = 0.001 N*m,
-                              tachometer = 0.1 rad/s, converter_in = 0.195312 rad/s, converter_voltage = 0.00976562 V,
-                              converter_current = 0.00146484 A
+                              tachometer = 0.1 rad/s, converter_in = 0.1953125 rad/s,
+                              converter_voltage = 0.009765625 V, converter_current = 0.00146484375 A
          law  torque_balance
 
 Environment""" in printed(capsys, "plan", "a.ic")

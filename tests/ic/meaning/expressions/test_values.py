@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from ic.read import read
 from ic.text.complaints import Complaints
 from met import units
 from met.diagnostic import Place, Problem
+from met.unit_parser import parse_unit
 
 SOMEWHERE = Place("test", 1, 1)
 
@@ -88,9 +90,17 @@ def test_linspace_has_the_decimals_that_one_would_write(tmp_path: Path) -> None:
 
 
 def test_logspace_goes_by_one_ratio_and_keeps_its_ends(tmp_path: Path) -> None:
-    found = numbers(tmp_path, "logspace(0.1, 10, 3) Hz")
-    assert found[0] == 0.1 and found[2] == 10.0
-    assert found[1] == pytest.approx(1.0, rel=1e-15)  # exp of a logarithm: some roundings
+    assert numbers(tmp_path, "logspace(0.1, 10, 3) Hz") == [0.1, 1.0, 10.0]
+    assert numbers(tmp_path, "logspace(0.025, 0.1, 3)") == [0.025, 0.05, 0.1]
+    assert numbers(tmp_path, "logspace(-1, -1000, 4)") == [-1.0, -10.0, -100.0, -1000.0]
+    ratio = numbers(tmp_path, "logspace(0.2, 7, 50)")
+    exact = [0.2 * 35 ** (i / 49) for i in range(50)]
+    assert ratio == pytest.approx(exact, rel=1e-15) and all(a < b for a, b in itertools.pairwise(ratio))
+
+
+@pytest.mark.parametrize("written", ["logspace(10 deg, 90 deg, 3)", "linspace(10 deg, 50 deg, 3)", "[10, 30, 90] deg"])
+def test_values_between_ends_in_degrees_are_those_of_the_degrees(tmp_path: Path, written: str) -> None:
+    assert numbers(tmp_path, written)[1] == parse_unit("deg").to_si(30.0)
 
 
 def test_the_count_of_a_linspace_takes_no_unit_from_behind_its_brackets(tmp_path: Path) -> None:
