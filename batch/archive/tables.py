@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.hdf5 import h5py
+from batch.archive.hdf5 import h5py, put_attributes
 from batch.archive.stored import Unlike
 
 COUNT, NUMBER, WORDS = "<i8", "<f8", "|O"
@@ -24,7 +24,7 @@ def write(node: Any, declared: Declared, values: Mapping[str, np.ndarray]) -> No
     for name, (_, kind, words) in declared.items():
         dtype = h5py().string_dtype("utf-8") if kind == WORDS else kind
         dataset = node.create_dataset(name, data=values[name], dtype=dtype, track_order=True)
-        dataset.attrs["long_name"] = words
+        put_attributes(dataset, {"long_name": words})
     for name in scales:
         node[name].make_scale(name)
     for name, (dims, _, _) in declared.items():

@@ -17,7 +17,7 @@ import numpy as np
 
 from batch.archive import layout as archive_layout
 from batch.archive import summarised, verified
-from batch.archive.hdf5 import LIBVER, h5py
+from batch.archive.hdf5 import LIBVER, h5py, put_attributes
 from batch.archive.layout import Layout, Variable
 from batch.archive.provenance import Revision, version
 from batch.archive.sink import Sink
@@ -164,9 +164,8 @@ class ArchiveWriter:
 
     def _nodes(self) -> list[Any]:
         root = self._file
-        root.attrs["schema"] = archive_layout.SCHEMA
-        root.attrs["schema_version"] = archive_layout.VERSION
-        root.attrs["deck"] = self.plan.deck
+        root.attrs["schema"] = archive_layout.SCHEMA  # of variable length, so that it lies near the head (`is_archive`)
+        put_attributes(root, {"schema_version": archive_layout.VERSION, "deck": self.plan.deck})
         paths = archive_layout.group_names(self.plan)
         return [root if path == "/" else root.create_group(path, track_order=True) for path in paths]
 
@@ -174,12 +173,10 @@ class ArchiveWriter:
         """Lay out a group: every variable in its order, the signals with all their chunks."""
         layout = archive_layout.layout(part.experiment, len(part.rows), len(part.kept), part.single)
         early = {"until_shown": part.until_shown} if part.until_shown else {}
-        for name, value in {**layout.attributes, **early, "code_key": part.code}.items():
-            node.attrs[name] = value
+        put_attributes(node, {**layout.attributes, **early, "code_key": part.code})
         made = {variable.name: _make(node, layout, variable) for variable in layout.variables}
         for variable in layout.variables:
-            for name, key in variable.code_key(part.results).items():
-                made[variable.name].attrs[name] = key
+            put_attributes(made[variable.name], variable.code_key(part.results))
         for variable in layout.role("dimension"):
             made[variable.name].make_scale(variable.name)
         for variable in layout.variables:
@@ -197,11 +194,10 @@ class ArchiveWriter:
         commit, changed = self._revision.read()
         versions = {"met": _met_version(), **backends.find().libraries(), "numpy": np.__version__}
         versions |= {name: version(name) for name in packages(e.structure for e in self.plan.experiments)}
-        for name, value in versions.items():
-            group.attrs[f"version_{name}"] = value
-        group.attrs["git_commit"] = commit
-        group.attrs["git_dirty"] = changed
-        group.attrs["defines"] = " ".join(self.plan.defines)
+        about = {f"version_{name}": value for name, value in versions.items()}
+        put_attributes(
+            group, {**about, "git_commit": commit, "git_dirty": changed, "defines": " ".join(self.plan.defines)}
+        )
 
         summed = any(each.part.summed for each in self.groups)
         tables: dict[str, tuple[Experiment, str]] = {}
@@ -285,8 +281,7 @@ def _make(group: Any, layout: Layout, variable: Variable) -> Any:
         options = {"chunks": chunks, "dcpl": early, "fill_time": "never", "fletcher32": True}
     dtype = module.string_dtype("utf-8") if variable.kind == "str" else np.dtype(variable.kind).newbyteorder("<")
     dataset = group.create_dataset(variable.name, layout.shape(variable), dtype=dtype, track_order=True, **options)
-    for name, value in variable.written_attributes.items():
-        dataset.attrs[name] = value
+    put_attributes(dataset, variable.written_attributes)
     return dataset
 
 

@@ -9,13 +9,15 @@ import time
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
 import batch
 from batch.archive import limits
+from batch.archive.hdf5 import put_attributes
 from batch.archive.provenance import UNKNOWN, Revision
-from batch.archive.read import ArchiveFile
+from batch.archive.read import ArchiveFile, _plain
 from batch.campaigns import tasks
 from met.diagnostic import Problem
 from met.plan import file as plan_file
@@ -53,6 +55,26 @@ def test_xarray_opens_a_single_experiment_as_it_is(here: Path, engine_name: str)
         assert {"case_id", "case_key", "gearbox.kp", "links.lower.mass"} <= set(data.coords)
         assert list(data.case_id.values) == keys.case_ids(plans.gains(7))
         assert data.qd.sel(joint="elbow", recorded_case=3).attrs["units"] == "rad/s"
+
+
+def test_texts_of_attributes_are_characters_of_fixed_length(here: Path) -> None:
+    """netCDF takes texts of variable length for strings, which NCO does not accept as CF's `coordinates`, and Octave's
+    `ncreadatt` not at all."""
+    batch.run(plans.plan(plans.gains(3)), output="a.h5")
+    with h5py.File("a.h5") as file:
+        every = [file, file["provenance"], *file.values(), *file["provenance"].values()]
+        for name, kind in ((name, node.attrs.get_id(name).get_type()) for node in every for name in node.attrs):
+            single = kind.get_class() == h5py.h5t.STRING and name not in ("schema", "metric", "comparison", "CLASS")
+            assert not single or not kind.is_variable_str(), name
+        own = file["gearbox.kp"].attrs.get_id("units").get_type()
+        assert (own.get_size(), own.get_cset()) == (len("V*s/rad"), h5py.h5t.CSET_ASCII)
+
+
+def test_attributes_of_any_text_come_back(here: Path) -> None:
+    texts = {"empty": "", "letters": "N·m, 3 µs", "long": "x" * 70_000, "list": ["a", "bc"], "number": 0.5}
+    with h5py.File("a.h5", "w", track_order=True) as file:
+        put_attributes(file, texts)
+        assert {name: _plain(value) for name, value in file.attrs.items()} == texts
 
 
 @pytest.mark.slow
