@@ -4,7 +4,7 @@ for comparisons of archives."""
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,6 +19,8 @@ from met.plan.keys import in_key, inputs, structure_key
 from met.plan.linear_uses import LinearUse
 from met.plan.searches import Search
 from met.plan.swept import blocks
+from met.trace import Formulas
+from met.unit_parser import decimals
 
 AXES = ("x", "y", "z")
 
@@ -303,11 +305,12 @@ def _count(cases: Cases) -> str:
 
 def _span(coordinate: Any) -> str:
     """The values of a varied parameter in words, in the deck's unit."""
-    values = different(coordinate.values) / coordinate.scale
+    values = different(coordinate.values)
     unit = f" {coordinate.unit}" if coordinate.unit not in ("", "1") else ""
     if len(values) <= 3:
-        return f"[{', '.join(f'{value:g}' for value in values)}]{unit}"
-    return f"{len(values):,} values from {values.min():g} to {values.max():g}{unit}"
+        return f"[{', '.join(decimals(values, coordinate.unit))}]{unit}"
+    low, high = decimals((values.min(), values.max()), coordinate.unit)
+    return f"{len(values):,} values from {low} to {high}{unit}"
 
 
 def _array(values: CaseValues | None) -> CaseValues:
@@ -327,6 +330,7 @@ ENTITIES = {
     "payloads": ("payload", ("payloads.{}.",)),
     "guides": ("guide", ("guides.{}.",)),
     "sensors": ("sensor", ("sensors.{}.",)),
+    "expressions": ("expression", ()),
 }
 """The fields of a structure that hold several things: the word for one of them, and the prefixes of its parameters'
 paths."""
@@ -417,6 +421,8 @@ def _thing(field: str, old: Any, new: Any, before: Structure, now: Structure) ->
                 yield each.name, f"rate {rates[0]} -> {rates[1]}"
         elif one == two or in_key(each) == "never" or each.name in NOT_TOLD:
             continue
+        elif isinstance(one, Formulas):
+            yield each.name, f"{old.text} -> {new.text}" if old.text != new.text else "computed otherwise"
         elif each.name == "courses":
             yield from (("courses", text.removeprefix(": ")) for _, text in _courses("", "", one, two))
         elif field == "servos" and each.name == "sensors":
@@ -452,11 +458,16 @@ def _name(each: Any) -> str:
 
 
 def _word(value: Any) -> str:
-    """A field's value in words."""
-    words: dict[type, Callable[[Any], str]] = {
-        bool: lambda each: "on" if each else "off",
-        tuple: lambda each: ", ".join(map(str, each)) or "none",
-        Command: lambda each: f"{each.kind}({each.model or f'guide {each.guide}'})",
-        type(None): lambda each: "none",
-    }
-    return words.get(type(value), str)(value)
+    """A field's value in words; of a part of a plan its name, never its Python."""
+    match value:
+        case None:
+            return "none"
+        case bool():
+            return "on" if value else "off"
+        case str() | int() | float():
+            return str(value)
+        case tuple():
+            return ", ".join(map(_word, value)) or "none"
+        case Command():
+            return f"{value.kind}({value.model or f'guide {value.guide}'})"
+    return str(getattr(value, "name", "another"))

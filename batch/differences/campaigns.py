@@ -38,11 +38,15 @@ from met.diagnostic import Problem
 from met.distinct import distinct
 from met.plan import Plan
 from met.plan.outputs import joint_parts
+from met.unit_parser import decimals, written
 
 WORST = 20
 """Number of cases that are ranked."""
 
 NO_CASE = "no case is in both"
+
+ROUNDING = 1e-9
+"""Largest relative difference of varied values that is taken for rounding."""
 
 LARGEST = float(np.finfo(float).max)
 """Upper bound of a span, so that a share of it is a number."""
@@ -118,6 +122,7 @@ def _experiment(
         out.notes.append("what its deck allows is not known, for the plan cannot be read")
     out.only_a = a.values("case")[matched.only_a].tolist()
     out.only_b = b.values("case")[matched.only_b].tolist()
+    out.last_digits = _last_digits(a, b, matched)
     if any(group.attributes.get("until_shown") for group in (a, b)):
         out.notes.append("cases were run until it was shown what is required: chances are those of a fixed number")
     scores = _Scores(matched.count)
@@ -140,6 +145,30 @@ def _experiment(
     if distributions or _other_noise(a, b):
         out.samples = samples(a, b)
     return out
+
+
+def _last_digits(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases) -> str:
+    """Words for cases at the same place in both tables that are unmatched because of rounding in what is varied; empty
+    where there are none."""
+    rows_a, rows_b = a.values("case")[matched.only_a], b.values("case")[matched.only_b]
+    rows, in_a, in_b = np.intersect1d(rows_a, rows_b, return_indices=True)
+    there = {variable.path: variable for variable in b.role("coordinate")}
+    both = [(variable, there[variable.path]) for variable in a.role("coordinate") if variable.path in there]
+    if not len(rows) or not both or len(both) < max(len(a.role("coordinate")), len(there)):
+        return ""
+    columns = [
+        (one, a.values(one.name)[matched.only_a[in_a]], b.values(two.name)[matched.only_b[in_b]]) for one, two in both
+    ]
+    near = np.all([np.abs(x - y) <= ROUNDING * np.maximum(np.abs(x), np.abs(y)) for _, x, y in columns], axis=0)
+    near &= np.any([x != y for _, x, y in columns], axis=0)
+    if not near.any():
+        return ""
+    first = int(np.argmax(near))
+    variable, before, now = next((v, x[first], y[first]) for v, x, y in columns if x[first] != y[first])
+    unit = str(variable.attributes.get("deck_unit", variable.unit))
+    [text] = decimals([before], unit)
+    some = f"{near.sum():,} cases have" if near.sum() > 1 else f"case #{rows[first]} has"
+    return f"{some} other last digits in what is varied, {variable.path} = {text}, now {written(now, unit)}"
 
 
 def _how(scores: _Scores, matched: MatchedCases, b: ArchiveGroup, found: ExperimentDiff) -> np.ndarray:
@@ -348,6 +377,8 @@ def _signals(
         about.notes.append(f"signals are compared at the {len(rows_a):,} instants that both have, {of}")
         about.partial = True
     aligned = len(rows_a) == len(time_a) == len(time_b)
+    if len(rows_a) and (other := _instants(time_a[rows_a], time_b[rows_b], allowed, len(places))) is not None:
+        yield other
     whole = slice(None)
     at_a, at_b = (
         whole if np.array_equal(rows, np.arange(len(time))) else rows
@@ -398,6 +429,18 @@ def _signals(
             for most, place, where, largest in worst:
                 scores.take(place, most / unit_of, name, where, largest)
         yield out
+
+
+def _instants(a: np.ndarray, b: np.ndarray, allowed: Tolerances, cases: int) -> SignalDiff | None:
+    """The recorded instants as a signal, where a bit of them differs."""
+    found = compare(a[:, None], b[:, None], SignalTolerance(absolute=allowed.time or 0.0))
+    if found is None:
+        return None
+    out = SignalDiff("time", "s", False, SignalTolerance(time=allowed.time or 0.0), compared=cases)
+    out.deck_unit, out.low, out.high = "s", float(a.min()), float(a.max())
+    _add(out, found, DiffPlace(0, "", float(found.before), found.before, found.after))
+    out.equivalent, out.different = (0, cases) if found.beyond else (cases, 0)
+    return out
 
 
 def _histories(group: ArchiveGroup, name: str, places: np.ndarray) -> np.ndarray:

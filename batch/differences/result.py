@@ -171,7 +171,8 @@ class EvidenceDiff:
 class ExperimentDiff:
     """Two matched experiments. tolerances: what the deck of b and the command line allow; partial: whether one has
     instants or histories that the other lacks, or something that is counted differs, so that they are not identical;
-    required_in_one: requirements that one archive has alone, in words."""
+    required_in_one: requirements that one archive has alone, in words; last_digits: that cases are unmatched because
+    of last digits of what is varied, in words."""
 
     name_a: str
     name_b: str
@@ -188,6 +189,7 @@ class ExperimentDiff:
     only_a: list[int] = field(default_factory=list)
     only_b: list[int] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    last_digits: str = ""
     cases_different: int = 0
     how: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int8))
 

@@ -471,6 +471,21 @@ def _of_values(found: Diff) -> str:
     if of_values == INCOMPARABLE and lost < len(signals):
         return f"incomparable: {lost} of {len(signals)} signals and metrics; no other is different"
     given = any(experiment.tolerances.given for experiment in found.experiments)
-    if of_values in (EQUIVALENT, DIFFERENT) and not given:
+    of_size = of_values == EQUIVALENT or any(signal.different for signal in signals)
+    if of_values == DIFFERENT and (others := _beyond_any_tolerance(found)):
+        said += f": {'; '.join([*others, *(['values differ'] if of_size else [])])}"
+    if of_size and not given:
         said += "; no tolerance was given"
     return said
+
+
+def _beyond_any_tolerance(found: Diff) -> list[str]:
+    """What differs other than values: runs and cases that one archive has alone, and how cases end."""
+    out = unmatched_runs(found)
+    several = len(found.experiments) > 1
+    for each in found.experiments:
+        of = f" of `{each.name_b}`" if several else ""
+        out += [f"{text}{of}" for text in unmatched_cases(found, each)]
+        out += [f"{kind.text}{of}: {kind.cases}" for kind in endings(each)]
+        out += [f"{each.last_digits}{of}"] if each.last_digits else []
+    return out

@@ -155,6 +155,10 @@ CHANGES: dict[str, tuple[list[tuple[str, str]], list[str]]] = {
             "follows: shoulder.servo.command.value is gone: 0.03 rad/s (deck.ic:4)",
         ],
     ),
+    "an expression": (
+        [("    metric settle", "    metric top = max { of = abs(elbow.q) + 0.1 rad; }\n    metric settle")],
+        ["changed: metric top is new", "changed: expression abs(elbow.q) + 0.1 rad is new"],
+    ),
     "a comment": ([("let slow", "// as slow as it gets\nlet slow")], []),
     "a let that nothing needs": ([("let slow", "let unused = 3 m;\nlet slow")], []),
 }

@@ -18,7 +18,7 @@ import batch
 import ic
 from batch.differences import matching
 from batch.differences.campaigns import diff
-from batch.differences.compare import compare
+from batch.differences.compare import DIFFERENT, EQUIVALENT, compare
 from batch.differences.data import as_data
 from batch.differences.decks import decks
 from batch.differences.result import Diff, ExperimentDiff, RequirementDiff, SignalDiff
@@ -97,6 +97,41 @@ def signal(found: Diff, name: str) -> SignalDiff:
 
 
 # Verdicts
+
+
+@pytest.mark.parametrize("last_digits", [False, True])
+def test_the_verdict_names_cases_that_no_tolerance_could_match(
+    two: Callable[..., tuple[Path, Path]], last_digits: bool
+) -> None:
+    def change(file: Any) -> None:
+        file["case_key"][1] = "0123456789abcdef"
+        if last_digits:
+            file["gearbox.kp"][1] = np.nextafter(file["gearbox.kp"][1], 1.0)
+
+    found = diff(*two(change))
+    [was], [is_] = ([f"{float(x)!r}" for x in h5py.File(name)["gearbox.kp"][1:2]] for name in ("a.h5", "b.h5"))
+    said = f"; case #1 has other last digits in what is varied, gearbox.kp = {was}, now {is_} V*s/rad"
+    expected = "different: 1 case only in a.h5: #1; 1 case only in b.h5: #1" + said * last_digits
+    assert found.verdict == DIFFERENT and diff_lines(found)[-1] == expected
+
+
+def test_the_verdict_names_how_cases_end_and_that_values_differ(two: Callable[..., tuple[Path, Path]]) -> None:
+    def change(file: Any) -> None:
+        file["status"][1], file["volts"][0] = 2, 1.0
+
+    assert diff_lines(diff(*two(change)))[-1] == (
+        "different: 1 case is timed out that was done: #1; values differ; no tolerance was given"
+    )
+
+
+def test_instants_are_compared_to_the_bit(two: Callable[..., tuple[Path, Path]]) -> None:
+    def change(file: Any) -> None:
+        file["time"][3] *= 1.0 + 1e-13
+
+    one, several = diff(*two(change)), diff("a.h5", "b.h5", tolerances(["time=1us"]))
+    assert (signal(one, "time").verdict, one.verdict) == (DIFFERENT, DIFFERENT)
+    assert (signal(several, "time").verdict, several.verdict) == (EQUIVALENT, EQUIVALENT)
+    assert not [each for each in only(diff(*two(untouched))).signals if each.name == "time"]
 
 
 @pytest.mark.slow
