@@ -46,7 +46,7 @@ class TomlFile:
     def __init__(self, path: str | os.PathLike[str], *, code: str, most: int, kind: str, about: str) -> None:
         self.name, self.code = os.fspath(path), code
         try:
-            self.text = read_regular(path, most).decode()
+            self.text = read_regular(path, most).decode("utf-8-sig")
             self.tables: dict[str, Any] = tomllib.loads(self.text)
         except UnicodeDecodeError as reason:
             raise Problem(error(code, f"{self.name} is no text in UTF-8", help=kind)) from reason

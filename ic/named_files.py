@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import Generic, TypeVar
 
 from ic.grammar.syntax import Deck, String
-from ic.text.files import LIBRARY, Files, FoundFile
+from ic.text.files import LIBRARY, Files, FoundFile, folders_by_slash
 from ic.text.lexer import COMMAND_LINE
 from ic.text.source import SourceFile
 from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
@@ -67,7 +67,8 @@ class NamedFiles(Generic[T]):
         folders = self._files.where(FoundFile(path, file), False)
         found = self._files.find(named.value, folders) if named.value.strip() else None
         if found is None:
-            near = did_you_mean(named.value, self._files.listed(folders, self._ending))
+            near = folders_by_slash(named.value, f'"{named.value}"')
+            near = near or did_you_mean(named.value, self._files.listed(folders, self._ending))
             looked = f"looked in {', '.join(dict.fromkeys(folder.in_words for folder in folders))}"
             raise Problem(error(self._missing, f'cannot find "{named.value}"', named.place, help=(*near, looked)))
         return found

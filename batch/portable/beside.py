@@ -127,7 +127,7 @@ def _with_units(table: CsvTable) -> CsvTable:
     if any(each.unit is not None for each in table.columns) or line < 2:
         return table
     with open_regular(table.file) as file:
-        above = [file.readline(LONGEST_LINE).decode("utf-8", "replace") for _ in range(min(line - 1, MOST_REMARKS))]
+        above = [file.readline(LONGEST_LINE).decode("utf-8-sig", "replace") for _ in range(min(line - 1, MOST_REMARKS))]
     number, told = next(((n, each) for n, each in enumerate(above, 1) if each.startswith(UNITS)), (0, ""))
     if not number:
         return table

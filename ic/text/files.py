@@ -199,6 +199,13 @@ def add_include(file: str, place: Place, what: str = "it") -> Help:
     return write(f"#include <{file}>\n", text, at=head, where="before")
 
 
+def folders_by_slash(name: str, quoted: str) -> tuple[Help, ...]:
+    """The remedy for a file's name with a backslash, which is a letter of a name here. quoted: as the deck writes it"""
+    slashed = quoted.replace("\\\\", "/").replace("\\", "/")
+    text = f"`\\` does not part folders here: write `{slashed}`"
+    return (write(slashed, text),) if "\\" in name else ()
+
+
 def _shown(names: Iterable[str], ending: str) -> list[str]:
     """Names that a message can show and a deck can write, in order."""
     return sorted(name for name in names if name.endswith(ending) and name.isprintable())

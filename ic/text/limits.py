@@ -15,8 +15,6 @@ from met.diagnostic import Diagnostic
 
 MOST_BYTES = 2 << 20  # of one file
 MOST_TOKENS = 500_000  # of all files together, white space included
-MOST_CSV_BYTES = 16 << 20  # of one CSV file
-MOST_CSV_ROWS = 100_000
 MOST_URDF_BYTES = 8 << 20  # of one URDF file
 MOST_ELEMENTS = 50_000  # of one XML file
 MOST_LINKS = 1_000  # of one robot

@@ -18,7 +18,7 @@ from pcpp import Action, OutputDirective
 from ic.text.complaints import Complaints
 from ic.text.conditions import Refused, evaluate, well_formed, with_defined
 from ic.text.edition import EDITIONS, LATEST
-from ic.text.files import LIBRARY, Files, FoundFile
+from ic.text.files import LIBRARY, Files, FoundFile, folders_by_slash
 from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, NAME, NOTHING, SPACE, STRING, Text, Token, logical_lines
 from ic.text.limits import (
     CONDITION_DEPTH,
@@ -118,7 +118,7 @@ def find_file(
         quoted = f"<{name}>" if angled else f'"{name}"'
         link = files.dangling(name, directories)
         near = (
-            did_you_mean(name, files.listed(directories))
+            folders_by_slash(name, quoted) or did_you_mean(name, files.listed(directories))
             if link is None
             else (f"`{link}` is a link to a file that is not there",)
         )

@@ -106,11 +106,11 @@ def read_json(path: str | os.PathLike[str], most: int = MOST_JSON_BYTES) -> Any:
 
 
 def parse_json(text: str | bytes) -> Any:
-    """Data from JSON, all of whose numbers are finite and fit into 64 bits. Raises ValueError for anything else, and
-    for nesting of any depth."""
+    """Data from JSON, all of whose numbers are finite and fit into 64 bits; bytes may begin with a byte order mark.
+    Raises ValueError for anything else, and for nesting of any depth."""
     try:
         if isinstance(text, bytes):
-            text = text.decode("utf-8")
+            text = text.decode("utf-8-sig")
         return json.loads(text, parse_constant=_no_number, parse_float=_finite, parse_int=_whole)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None

@@ -90,7 +90,7 @@ def read(path: str | os.PathLike[str], *, every_case: bool = True) -> Plan:
     checked before. Raises Problem E301 (no file), E302 (damaged), E303 (newer), E304 (a model's parameter)."""
     path = Path(path)
     try:
-        text = read_regular(path).decode("utf-8")
+        text = read_regular(path).decode("utf-8-sig")
     except OSError as reason:
         raise Problem(error("E301", f"cannot read the plan {path}: {_why(reason)}")) from reason
     except UnicodeDecodeError as reason:

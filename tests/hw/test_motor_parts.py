@@ -32,6 +32,12 @@ def complained(path: Path, text: str) -> str:
     return render(found.value.diagnostics, found.value.sources)
 
 
+def test_a_byte_order_mark_is_no_part_of_a_file(tmp_path: Path) -> None:
+    (tmp_path / "marked.toml").write_text(MINE, encoding="utf-8-sig")
+    assert "mine" in parts_list(tmp_path / "marked.toml").motors
+    assert complained(tmp_path / "wrong.toml", "\ufeff[[motor]]\nnam = 1\n").splitlines()[1].endswith("wrong.toml:2:1")
+
+
 def test_every_motor_that_is_shipped_has_a_source_and_what_a_verdict_needs() -> None:
     listed = parts_list()
     assert set(listed.benches) == {"small", "medium", "industrial"}

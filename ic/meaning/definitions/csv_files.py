@@ -5,8 +5,9 @@
     0,        0,              10
 
 The first line that is neither empty nor begins with `#` names the columns, each with its unit in square brackets.
-Commas part them; spaces around a cell do not count, nor do double quotes around all of it. A line has as many cells as
-the first. UTF-8, with or without a byte order mark, lines ended in any of the three ways.
+Commas part them, but not between double quotes; spaces around a cell do not count, nor do double quotes around all of
+it. A line has as many cells as the first. UTF-8, with or without a byte order mark, lines ended in any of the three
+ways.
 """
 
 from __future__ import annotations
@@ -22,11 +23,10 @@ from ic.language.unit_words import in_degrees
 from ic.named_files import NamedFiles
 from ic.text.complaints import known_words
 from ic.text.files import decode
-from ic.text.limits import MOST_CSV_BYTES, MOST_CSV_ROWS
 from met import units
 from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error, write, write_either
 from met.frozen import frozen
-from met.host.files import read_regular
+from met.host.files import memory, read_regular
 from met.messages.other_units import suggest
 from met.unit_parser import parse_unit
 from met.units import PURE, Dimension, Measure
@@ -34,6 +34,7 @@ from met.units import PURE, Dimension, Measure
 LONGEST_NAME = 40  # characters of a column's name that a message shows
 
 _HEADER = re.compile(r"(?P<name>[^\[\]]*)(?:\[(?P<unit>[^\[\]]*)\])?")  # spaces are cut off later, not tried here
+_CELL = re.compile(r',((?:[^",]|"[^"]*")*)')  # with the comma before it
 _WORD = re.compile(r"[^\W\d]\w*")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
@@ -85,7 +86,7 @@ class CsvTable:
     def cell(self, column: CsvColumn, number: int) -> CsvCell:
         """The cell of a column in the row of this number, from 0."""
         line, row = self.rows[number]
-        return CsvCell(column, _stripped(row.split(",")[column.number])[0], self._cell(line, row, column.number))
+        return CsvCell(column, _stripped(_cells(row)[column.number])[0], self._cell(line, row, column.number))
 
     def quantity(self, cell: CsvCell) -> tuple[float, Measure]:
         """The number of a cell in SI, and the meaning of its column's unit. Raises Problem D193, D194."""
@@ -108,7 +109,7 @@ class CsvTable:
 
         Raises Problem D194 for a cell that is not a word below one that is.
         """
-        cells = [(_stripped(row.split(",")[column.number])[0], line, row) for line, row in self.rows]
+        cells = [(_stripped(_cells(row)[column.number])[0], line, row) for line, row in self.rows]
         if column.unit is not None or not cells or not _WORD.fullmatch(cells[0][0]):
             return None
         first = Label(self._cell(*cells[0][1:], column.number), "this column begins with one")
@@ -135,7 +136,7 @@ class CsvTable:
         return tuple(made)
 
     def _text(self, column: CsvColumn, number: int) -> str:
-        return _stripped(self.rows[number][1].split(",")[column.number])[0]
+        return _stripped(_cells(self.rows[number][1])[column.number])[0]
 
     def rising(self, column: CsvColumn, times: tuple[float, ...]) -> None:
         """Raise Problem D195 where the column's numbers, its times, do not rise."""
@@ -153,7 +154,7 @@ class CsvTable:
                 )
 
     def _cell(self, line: int, row: str, number: int) -> Place:
-        cells = row.split(",")
+        cells = _cells(row)
         text, gap = _stripped(cells[number])
         start = sum(len(cell) + 1 for cell in cells[:number]) + gap
         return Place(self.file, line, start + 1, max(len(text), 1))
@@ -191,7 +192,7 @@ def csv_files(deck: Deck) -> NamedFiles[CsvTable]:
         partial(_table, declared=frozenset(deck.units)),
         kind="CSV file",
         ending=".csv",
-        most=MOST_CSV_BYTES,
+        most=memory(),
         missing="D190",
     )
 
@@ -199,7 +200,7 @@ def csv_files(deck: Deck) -> NamedFiles[CsvTable]:
 def read_csv(path: str) -> CsvTable:
     """A CSV file from a command line. Raises Problem D190 where it cannot be read, and D002, D191 to D198."""
     try:
-        data = read_regular(path, MOST_CSV_BYTES)
+        data = read_regular(path)
     except OSError as reason:
         raise Problem(error("D190", f"cannot read the CSV file `{path}`: {reason.strerror}")) from None
     text, fault = decode(data, path, "CSV file")
@@ -221,20 +222,11 @@ def _table(file: str, text: str, declared: Collection[str] = ()) -> CsvTable:
                 help="its first line names the columns, as in `time [s], shoulder [deg]`",
             )
         )
-    if len(rows) > MOST_CSV_ROWS + 1:
-        raise Problem(
-            error(
-                "D018",
-                f"a CSV file has at most {MOST_CSV_ROWS:,} rows",
-                Place(file, rows[MOST_CSV_ROWS + 1][0], 1),
-                help="thin them out, or split the file",
-            )
-        )
     head = rows.pop(0)
     columns = tuple(_columns(file, *head, declared))
     for line, row in rows:
-        if row.count(",") + 1 != len(columns):
-            count = row.count(",") + 1
+        count = len(_cells(row))
+        if count != len(columns):
             raise Problem(
                 error(
                     "D197",
@@ -249,7 +241,7 @@ def _table(file: str, text: str, declared: Collection[str] = ()) -> CsvTable:
 
 
 def _columns(file: str, line: int, row: str, declared: Collection[str]) -> Iterator[CsvColumn]:
-    if all(_NUMBER.fullmatch(_stripped(cell)[0]) for cell in row.split(",")):
+    if all(_NUMBER.fullmatch(_stripped(cell)[0]) for cell in _cells(row)):
         raise Problem(
             error(
                 "D191",
@@ -260,7 +252,7 @@ def _columns(file: str, line: int, row: str, declared: Collection[str]) -> Itera
         )
     seen: dict[str, Place] = {}
     start = 0
-    for number, cell in enumerate(row.split(",")):
+    for number, cell in enumerate(_cells(row)):
         text, gap = _stripped(cell)
         place = Place(file, line, start + gap + 1, max(len(text), 1))
         start += len(cell) + 1
@@ -291,6 +283,14 @@ def _columns(file: str, line: int, row: str, declared: Collection[str]) -> Itera
         seen[name] = place
         own = tuple(each for each in re.findall(r"\w+", unit) if each in declared)
         yield CsvColumn(number, name, unit or None, place, own)
+
+
+def _cells(row: str) -> list[str]:
+    """The cells of a line, with the spaces and quotes around them: `"1,000"` is one. A quote without its other is a
+    letter."""
+    if '"' not in row or row.count('"') % 2:
+        return row.split(",")
+    return _CELL.findall(f",{row}")
 
 
 def _stripped(cell: str) -> tuple[str, int]:

@@ -53,6 +53,26 @@ error[D005]: cannot find <x.ic>
     )
 
 
+def test_a_backslash_in_a_files_name_is_named_with_what_to_write(desk: Desk) -> None:
+    files = {"sub/part.ic": "let a = 1;", "a.ic": '#include "sub\\part.ic"'}
+    told = desk.told(files["a.ic"], (), files)
+    assert (
+        told
+        == """\
+error[D005]: cannot find "sub\\part.ic"
+ --> a.ic:1:10
+  |
+1 | #include "sub\\part.ic"
+  |          ^^^^^^^^^^^^^
+  = help: `\\` does not part folders here: write `"sub/part.ic"`
+  = help: looked in `.`, the standard library
+
+1 error
+"""
+    )
+    assert not desk.told('#include "sub/part.ic"', (), files)
+
+
 def test_a_link_that_leads_nowhere_is_told_as_one(desk: Desk) -> None:
     (desk.directory / "sub").mkdir()
     (desk.directory / "sub" / "x.ic").symlink_to("gone.ic")

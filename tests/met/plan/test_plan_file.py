@@ -39,6 +39,12 @@ def test_a_plan_comes_back_equal(tmp_path: Path) -> None:
     assert same(plan_file.read(tmp_path / "p.json"), plan)
 
 
+def test_a_byte_order_mark_is_no_part_of_a_plan(tmp_path: Path) -> None:
+    plan_file.write(plans.plan(plans.nominal()), tmp_path / "a.json")
+    (tmp_path / "b.json").write_bytes(b"\xef\xbb\xbf" + (tmp_path / "a.json").read_bytes())
+    assert plan_file.read(tmp_path / "b.json") == plan_file.read(tmp_path / "a.json")
+
+
 def test_writing_what_was_read_gives_the_same_bytes(tmp_path: Path) -> None:
     plan_file.write(plans.plan(plans.gains(9)), tmp_path / "a.json")
     plan_file.write(plan_file.read(tmp_path / "a.json"), tmp_path / "b.json")
