@@ -31,6 +31,9 @@ from met.version import VERSION
 MAGIC = b"PAR1"
 ABOUT = "met.export"
 
+COMPRESSION = "snappy"
+"""Compression of the columns, which every reader of Parquet has; ZSTD packs better, but some lack it."""
+
 GROUP_ROWS = 100_000
 """Approximate number of rows of a row group, which holds whole cases."""
 
@@ -43,7 +46,7 @@ def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, dec
     fields = [of_varied(variable, deck=deck) for variable in varied([case.group for case in _one_each(cases)])]
     schema = _schema(arrow, cases, fields, columns).with_metadata(_about(file, runs))
     with whole(output) as sink:
-        with parquet.ParquetWriter(str(temporary_of(output)), schema, compression="zstd") as writer:
+        with parquet.ParquetWriter(str(temporary_of(output)), schema, compression=COMPRESSION) as writer:
             waiting: list[Any] = []
             for case in cases:
                 waiting.append(_table(arrow, schema, case, fields))
@@ -63,7 +66,7 @@ def write_rows(file: ArchiveFile, table: CaseTable | EvidenceColumns, output: Pa
     fields = [arrow.field(each.name, kinds[each.kind], metadata=_told(each.unit, each.about)) for each in table.fields]
     schema = arrow.schema(fields).with_metadata(_about(file, table.runs))
     with whole(output) as sink:
-        with parquet.ParquetWriter(str(temporary_of(output)), schema, compression="zstd") as writer:
+        with parquet.ParquetWriter(str(temporary_of(output)), schema, compression=COMPRESSION) as writer:
             for columns in table.blocks():
                 arrays = [arrow.array(values, field.type) for values, field in zip(columns, schema, strict=True)]
                 writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
