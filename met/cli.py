@@ -11,7 +11,9 @@ import gc
 import io
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any, TypeVar
 
@@ -236,13 +238,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if getattr(sys, name) is None:  # closed by the shell, `met ... >&-`: output is discarded
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115  # as long as the process lives
     try:
-        status = _run(given)
+        with _without_library_warnings(given):
+            status = _run(given)
         sys.stdout.flush()
         return status
     except BrokenPipeError:
         # The reader of our output has gone (`met cases | head`). Output that Python still buffers must be discarded.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return PIPE_CLOSED
+
+
+@contextmanager
+def _without_library_warnings(arguments: Sequence[str]) -> Iterator[None]:
+    """Leave out the warnings of libraries about numbers and about what is old: they are of MET's code, which a user
+    cannot change. `-v` and PYTHONWARNINGS show them; a warning of MET or of a model (UserWarning) is said without the
+    line of code that gave it."""
+
+    def show(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+        if category is UserWarning:
+            say(f"met: warning: {message}", err=True)
+
+    shown = warnings.showwarning
+    if not (sys.warnoptions or "-v" in arguments or "--verbose" in arguments):
+        warnings.showwarning = show
+    try:
+        yield
+    finally:
+        warnings.showwarning = shown
 
 
 def _form_asked(arguments: Sequence[str]) -> str:

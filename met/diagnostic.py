@@ -67,7 +67,7 @@ class Problem(Exception):
             return super().__str__() + "".join(helps)
         from met.messages.render import render
 
-        return "\n" + render(self.diagnostics, self.sources).rstrip("\n")
+        return render(self.diagnostics, self.sources).rstrip("\n")
 
 
 def error(

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import click
@@ -211,6 +212,24 @@ def test_a_closed_pipe_ends_quietly() -> None:
     )
     os.close(writer)
     assert (done.returncode, done.stderr) == (cli.PIPE_CLOSED, "")
+
+
+def test_warnings_of_libraries_are_left_out_and_those_of_models_said(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def run(arguments: list[str]) -> int:
+        warnings.warn("invalid value encountered in cast", RuntimeWarning, stacklevel=1)
+        warnings.warn("this motor has no source", stacklevel=1)
+        return 0
+
+    monkeypatch.setattr(cli, "_run", run)
+    monkeypatch.setattr(sys, "warnoptions", [])
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        assert cli.main([]) == 0
+        assert capsys.readouterr().err == "met: warning: this motor has no source\n"
+        with pytest.warns(RuntimeWarning, match="invalid value encountered in cast"):
+            cli.main(["-v"])
 
 
 SLOW_TO_IMPORT = {"llvmlite", "h5py", "h5netcdf", "xarray", "pandas", "dask", "matplotlib", "scipy", "pint"}

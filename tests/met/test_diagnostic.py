@@ -17,7 +17,6 @@ def test_with_sources_a_problem_shows_the_line() -> None:
     found = error("D060", "a mass in metres", Place("arm.ic", 2, 8, 3), help="write `kg`")
     problem = Problem(found, {"arm.ic": "link a {\n  mass 2 m;\n}\n"})
     assert str(problem) == (
-        "\n"
         "error[D060]: a mass in metres\n"
         " --> arm.ic:2:8\n"
         "  |\n"

@@ -85,7 +85,8 @@ class ScalarLoop:
 
         n = len(self.A)
         moves = np.block([[self.A - np.eye(n), self.B[:, None]], [self.C[None, :], np.zeros((1, 1))]])
-        _, (scale, _) = matrix_balance(moves, permute=False, separate=True)
+        with np.errstate(invalid="ignore"):  # scipy takes scales above 2^63 for permutations too, which are not used
+            _, (scale, _) = matrix_balance(moves, permute=False, separate=True)
         by = scale[:n] / scale[n]
         A, B, C = self.A * (by[None, :] / by[:, None]), self.B / by, self.C * by
         moved = _krylov(A, B)

@@ -195,3 +195,10 @@ def test_a_loop_at_its_edge_has_the_limit_1() -> None:
     found = margins(loop)
     assert found is not None
     assert (found.gain_up, found.at_gain_up, found.gain_down) == (1.0, 0.0, None)
+
+
+def test_states_of_very_other_sizes_are_reduced_without_a_warning() -> None:
+    """Balancing them takes scales above 2^63, of which scipy warns."""
+    A, B, C = np.array([[0.9, 1e60], [1e-62, 0.5]]), np.array([0.0, 1e-60]), np.array([1.0, 0.0])
+    loop = ScalarLoop(A, B, C, 0.0, PERIOD)
+    assert loop.minimal().response([3.0, 50.0]) == pytest.approx(loop.response([3.0, 50.0]), rel=1e-9)
