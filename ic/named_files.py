@@ -67,8 +67,8 @@ class NamedFiles(Generic[T]):
         folders = self._files.where(FoundFile(path, file), False)
         found = self._files.find(named.value, folders) if named.value.strip() else None
         if found is None:
-            near = folders_by_slash(named.value, f'"{named.value}"')
-            near = near or did_you_mean(named.value, self._files.listed(folders, self._ending))
+            slashed = folders_by_slash(named.value, f'"{named.value}"')
+            near = slashed or did_you_mean(named.value, self._files.listed(folders, self._ending))
             looked = f"looked in {', '.join(dict.fromkeys(folder.in_words for folder in folders))}"
             raise Problem(error(self._missing, f'cannot find "{named.value}"', named.place, help=(*near, looked)))
         return found

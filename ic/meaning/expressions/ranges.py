@@ -148,7 +148,8 @@ def spaced(call: Call, start: Value, end: Value, count: Value) -> ValueList:
         )
     made_by = series.even if name == "linspace" else series.by_ratio
     if (turning := _turning(start)) is not None:
-        inner = list(made_by(*(float(turning.decimal(x)) for x in (a, b)), n))[1:-1]
+        low, high = (float(turning.decimal(x)) for x in (a, b))
+        inner = list(made_by(low, high, n))[1:-1]
         points: Iterable[float] = (a, *(turning.to_si(x) for x in inner), b)
     else:
         points = made_by(a, b, n)
