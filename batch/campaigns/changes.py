@@ -228,7 +228,7 @@ def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
             yield f"{path}: {' -> '.join(spans)}" if spans[0] != spans[1] else f"{path}: other values ({spans[1]})"
     for name in ("seed", "seeds"):
         if getattr(before, name) != getattr(now, name):
-            yield f"{name}: {getattr(before, name)} -> {getattr(now, name)}"
+            yield f"{name}: {_word(getattr(before, name))} -> {_word(getattr(now, name))}"
     if not _alike(*(_array(each.repeats) for each in (before, now))):
         repeats = [len(different(_array(each.repeats))) for each in (before, now)]
         yield f"repeats: {repeats[0]} -> {repeats[1]}" if repeats[0] != repeats[1] else "repeats: in other cases"
@@ -271,7 +271,7 @@ def _searches(before: Search, now: Search) -> Iterator[str]:
         yield f"against: other cases of {now.against}"
     for name in ("at_most", "seed", "margin", "gradients"):
         if getattr(before, name) != getattr(now, name):
-            yield f"{name}: {getattr(before, name)} -> {getattr(now, name)}"
+            yield f"{name}: {_word(getattr(before, name))} -> {_word(getattr(now, name))}"
 
 
 def _tuned_limits(before: Experiment, now: Experiment) -> Iterator[str]:
