@@ -539,7 +539,8 @@ def _kept(name: str, product: str, make: Callable[[Path], None]) -> Path:
         make(made)
         (made / _SUM).write_bytes(cache.digest_of(name, (made / product).read_bytes()))
         for each in (made / product, made / _SUM):  # whatever the umask lets others do
-            each.chmod(0o700)
+            with contextlib.suppress(OSError):  # a file system without permissions
+                each.chmod(0o700)
         with contextlib.suppress(OSError):  # another process was faster
             made.rename(found.parent)
     finally:

@@ -13,7 +13,6 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-import os
 import struct
 import zlib
 from collections.abc import Callable, Mapping
@@ -23,7 +22,7 @@ from typing import Any
 from hw.line import BedLine
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.host.files import parse_json, read_regular
+from met.host.files import parse_json, read_regular, settle
 
 MAGIC = b"MET bed transcript 1\n"
 
@@ -89,7 +88,7 @@ class TranscriptFile:
 
     def close(self) -> None:
         """Put all of it on the disk, and close it."""
-        os.fsync(self._file.fileno())
+        settle(self._file.fileno())
         self._file.close()
 
 

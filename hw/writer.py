@@ -23,6 +23,7 @@ from hw import records, ring
 from hw.ring import Ring, RingFull
 from met.diagnostic import Problem, error
 from met.host import interpreter
+from met.host.files import settle
 
 RING_BYTES = 64 << 20
 """Largest size of the ring, bytes: records of some minutes may wait for the disk."""
@@ -41,7 +42,7 @@ def write(through: Ring, pipe: int, path: Path, head: bytes) -> None:
             waiting = b"".join(through.take())
             while waiting:
                 waiting = waiting[file.write(waiting) :]
-        os.fsync(file.fileno())
+        settle(file.fileno())
 
 
 _LOOK = 64

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from met.diagnostic import Problem, error
+from met.host.files import settle_folder
 
 
 def check_place(output: Path, *, code: str, inside: Path | None = None) -> None:
@@ -71,6 +72,16 @@ def not_overwritten(
 def cannot_write(output: Path, reason: OSError, *, code: str, help: str | Sequence[str] = ()) -> Problem:
     """The problem that the system refuses to write a file, in the system's words."""
     return Problem(error(code, f"cannot write {output}: {refusal_text(reason)}", help=help))
+
+
+def settle_named(output: Path, *, code: str) -> None:
+    """Wait until a whole file that has got its name is on the disk under it. Raises Problem where the disk has
+    failed."""
+    try:
+        settle_folder(output.parent)
+    except OSError as reason:
+        message = f"{output} is whole, but its disk may lose it: {refusal_text(reason)}"
+        raise Problem(error(code, message, help="copy it to another disk")) from reason
 
 
 def refusal_text(reason: OSError) -> str:

@@ -15,6 +15,8 @@ import fcntl
 import os
 from pathlib import Path
 
+from met.host.files import settle
+
 
 class FileBusy(Exception):
     """Raised where another run has the file, in this process or in another."""
@@ -98,7 +100,7 @@ class Sink:
     def settle(self) -> None:
         """Write everything to the disk."""
         self.check()
-        os.fsync(self._file)
+        settle(self._file)
 
     def remove(self) -> None:
         """Remove the file of the temporary name, unless that is another's by now."""

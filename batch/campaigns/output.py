@@ -54,14 +54,14 @@ def publish(output: Path, temporary: Path, sidecar: dict[str, Any]) -> None:
         with new_file(beside_temporary) as file:
             file.write(f"{json.dumps(sidecar, indent=1)}\n".encode())
         temporary.replace(output)
-        beside_temporary.replace(beside)
+        try:
+            beside_temporary.replace(beside)
+        except OSError as reason:
+            message = f"{output} is whole, but {beside} cannot be written: {outputs.refusal_text(reason)}"
+            raise Problem(error("E305", message, help="without it the same command runs all cases again")) from reason
     finally:
         beside_temporary.unlink(missing_ok=True)
-    folder = os.open(output.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
+    outputs.settle_named(output, code="E305")
 
 
 def sidecar_path(output: Path) -> Path:
@@ -107,8 +107,12 @@ def _check_output(output: Path, plan: Plan) -> None:
 def check_room(output: Path, needed: int) -> None:
     """Refuse an output that does not fit on the disk. needed: bytes, approximately, until it is whole. Raises Problem
     E306."""
-    free = shutil.disk_usage(output.parent).free
-    if needed > free:
+    try:
+        total, _, free = shutil.disk_usage(output.parent)
+    except OSError:  # a file system that does not tell
+        return
+    known = total > 0 and free >= 0  # others answer 0 of 0 blocks, or all ones, which is -1
+    if known and needed > free:
         needs, has = size_text(needed), size_text(free)
         message = f"cannot write {output}: it needs about {needs} until it is whole, and the disk has {has} left"
         helps = (

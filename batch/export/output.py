@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from batch.archive.sink import FileBusy, Sink, temporary_of
 from met.diagnostic import Problem, error
-from met.outputs import cannot_write, check_overwrite, check_place
+from met.outputs import cannot_write, check_overwrite, check_place, settle_named
 
 
 def check(output: Path, archive: Path, own: Callable[[Path], bool], *, force: bool | None) -> None:
@@ -49,11 +48,7 @@ def whole(output: Path) -> Iterator[Sink]:
             raise
         finally:
             sink.close()
-        folder = os.open(output.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
+        settle_named(output, code="E305")
     except FileBusy:
         helps = "wait until it is done, or give another name with `-o`"
         raise Problem(error("E307", f"cannot write {output}: another export is writing it now", help=helps)) from None

@@ -91,13 +91,52 @@ def whole_file(path: str | os.PathLike[str], *, mode: int | None = None) -> Iter
             yield file
             file.flush()
             if mode is not None:
-                os.fchmod(file.fileno(), mode)
-            os.fsync(file.fileno())
+                _set_mode(file.fileno(), mode)
+            settle(file.fileno())
         os.replace(temporary, name)
     except BaseException:
         with contextlib.suppress(FileNotFoundError):
             os.unlink(temporary)
         raise
+
+
+_UNSUPPORTED = frozenset({errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP})
+"""Errors of `fsync` by which a file system says that it does not have it."""
+
+_UNSUPPORTED_OF_FOLDERS = _UNSUPPORTED | {errno.EBADF, errno.EPERM, errno.EACCES, errno.EISDIR}
+
+
+def _set_mode(file: int, mode: int) -> None:
+    """Set the permissions of a file of ours, unless its file system keeps none and refuses."""
+    try:
+        os.fchmod(file, mode)
+    except OSError as reason:
+        if reason.errno not in _UNSUPPORTED | {errno.EPERM}:
+            raise
+
+
+def settle(file: int) -> None:
+    """Wait until the contents of an open file are on the disk, if its file system can tell. Raises OSError where the
+    disk has failed."""
+    try:
+        os.fsync(file)
+    except OSError as reason:
+        if reason.errno not in _UNSUPPORTED:
+            raise
+
+
+def settle_folder(path: str | os.PathLike[str]) -> None:
+    """Wait until the names of the files in a folder are on the disk, if its file system can tell: CIFS, VirtualBox and
+    some of FUSE refuse, and a folder may be closed to readers. Raises OSError where the disk has failed."""
+    try:
+        folder = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    except OSError as reason:
+        if reason.errno not in _UNSUPPORTED_OF_FOLDERS:
+            raise
 
 
 def read_json(path: str | os.PathLike[str], most: int = MOST_JSON_BYTES) -> Any:

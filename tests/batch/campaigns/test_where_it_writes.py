@@ -2,6 +2,7 @@
 
 import errno
 import os
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 
 import batch
 from batch.campaigns import campaign, tasks
+from batch.campaigns.output import check_room, publish
 from batch.campaigns.performing import perform
 from batch.executors.threads import Threads
 from met.diagnostic import Problem
@@ -115,6 +117,69 @@ class TestRefusedBeforeAnythingRuns:
             "`rates.record`, take less\n"
             "\n1 error\n"
         )
+
+
+def fail_for_folders(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
+    """Let the system refuse to flush folders, as CIFS, VirtualBox and some file systems of FUSE do."""
+    flush = os.fsync
+
+    def refuse(file: int) -> None:
+        if stat.S_ISDIR(os.fstat(file).st_mode):
+            raise OSError(number, os.strerror(number))
+        flush(file)
+
+    monkeypatch.setattr(os, "fsync", refuse)
+
+
+class TestNaming:
+    """The end of a campaign: its archive is written, and gets its name."""
+
+    def publish(self) -> str:
+        """Name a new archive; what is refused."""
+        Path("new").write_bytes(b"archive")
+        try:
+            publish(Path("a.h5"), Path("new"), {})
+        except Problem as problem:
+            return problem.diagnostics[0].message + "; " + "; ".join(problem.diagnostics[0].help)
+        finally:
+            assert Path("a.h5").read_bytes() == b"archive"
+        return ""
+
+    @pytest.mark.parametrize("number", [errno.EINVAL, errno.EBADF])
+    def test_a_folder_that_cannot_be_flushed_does_not_matter(
+        self, here: Path, monkeypatch: pytest.MonkeyPatch, number: int
+    ) -> None:
+        fail_for_folders(monkeypatch, number)
+        assert self.publish() == ""
+        assert sorted(path.name for path in here.iterdir()) == ["a.h5", "a.h5.run.json"]
+
+    def test_a_disk_that_fails_then_takes_nothing_back(self, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        fail_for_folders(monkeypatch, errno.EIO)
+        assert self.publish() == "a.h5 is whole, but its disk may lose it: input/output error; copy it to another disk"
+        assert sorted(path.name for path in here.iterdir()) == ["a.h5", "a.h5.run.json"]
+
+    def test_an_archive_whose_sidecar_is_refused_is_whole(self, here: Path) -> None:
+        (here / "a.h5.run.json").mkdir()
+        assert self.publish() == (
+            "a.h5 is whole, but a.h5.run.json cannot be written: is a directory; without it the same command runs all "
+            "cases again"
+        )
+        assert sorted(path.name for path in here.iterdir()) == ["a.h5", "a.h5.run.json"]
+
+
+@pytest.mark.parametrize("told", [(0, 0, 0), (-4096, 0, -4096), (1 << 40, 0, -4096), None])
+def test_a_disk_that_does_not_tell_its_room_is_not_full(
+    monkeypatch: pytest.MonkeyPatch, told: tuple[int, ...] | None
+) -> None:
+    """File systems that do not know their size answer 0 of 0 blocks, all ones, or nothing."""
+
+    def usage(_: object) -> tuple[int, ...]:
+        if told is None:
+            raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+        return told
+
+    monkeypatch.setattr("shutil.disk_usage", usage)
+    check_room(Path("a.h5"), 1 << 30)
 
 
 @pytest.mark.usefixtures("engine")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ import batch
 from batch.archive.sink import Sink, temporary_of
 from batch.export import export
 from batch.export.formats import ExportFormat, ExportRequest
+from batch.export.output import whole
 from met.diagnostic import Problem
 from tests.batch import plans
 from tests.batch.export.decks import Mcap, said
@@ -104,6 +106,28 @@ def test_a_full_disk_is_said_and_leaves_nothing(archive: Path, form: str, monkey
         "\n1 error\n"
     )
     assert sorted(path.name for path in Path().iterdir()) == ["a.h5", "a.h5.run.json"]
+
+
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.EIO])
+def test_an_export_that_has_its_name_is_whole(number: int, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some file systems cannot flush a folder; on a disk that fails in it, the file is there nevertheless."""
+    flush = os.fsync
+
+    def refuse(file: int) -> None:
+        if stat.S_ISDIR(os.fstat(file).st_mode):
+            raise OSError(number, os.strerror(number))
+        flush(file)
+
+    monkeypatch.setattr(os, "fsync", refuse)
+    refused = []
+    try:
+        with whole(Path("a.csv")) as sink:
+            sink.write(memoryview(b"time"))
+    except Problem as problem:
+        refused = [each.message for each in problem.diagnostics]
+    assert refused == ["a.csv is whole, but its disk may lose it: input/output error"] * (number == errno.EIO)
+    assert Path("a.csv").read_bytes() == b"time"
+    assert not temporary_of(Path("a.csv")).exists()
 
 
 @pytest.mark.slow

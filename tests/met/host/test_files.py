@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import socket
 import stat
@@ -131,3 +132,46 @@ def test_a_link_that_lies_where_a_file_is_made_is_not_written_through(tmp_path: 
     with files.whole_file(tmp_path / "a.txt") as file:
         file.write(b"ours")
     assert (other.read_text(), (tmp_path / "a.txt").read_text()) == ("theirs", "ours")
+
+
+def refuse(monkeypatch: pytest.MonkeyPatch, call: str, number: int) -> None:
+    """Let a system call fail as it does on some file systems."""
+
+    def refused(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, call, refused)
+
+
+@pytest.mark.parametrize(
+    ("number", "of_files", "of_folders"),
+    [
+        *((each, True, True) for each in (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP)),
+        *((each, False, True) for each in (errno.EBADF, errno.EPERM, errno.EACCES)),
+        *((each, False, False) for each in (errno.EIO, errno.ENOSPC)),
+    ],
+)
+def test_a_file_system_that_cannot_tell_what_is_on_the_disk_has_not_failed(
+    number: int, of_files: bool, of_folders: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refuse(monkeypatch, "fsync", number)
+    for settled, call in ((of_files, lambda: files.settle(0)), (of_folders, lambda: files.settle_folder(tmp_path))):
+        if settled:
+            call()
+        else:
+            with pytest.raises(OSError, match=os.strerror(number)):
+                call()
+
+
+def test_a_folder_that_may_be_written_to_but_not_read_is_no_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refuse(monkeypatch, "open", errno.EACCES)
+    files.settle_folder(tmp_path)
+
+
+def test_a_file_system_without_permissions_takes_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    refuse(monkeypatch, "fchmod", errno.EPERM)
+    with files.whole_file(tmp_path / "a.txt", mode=0o640) as file:
+        file.write(b"text")
+    assert (tmp_path / "a.txt").read_text() == "text"
