@@ -23,6 +23,7 @@ from met.cli import (
 )
 from met.diagnostic import Diagnostic, Problem, did_you_mean, error
 from met.frozen import frozen
+from met.host.streams import kept
 from met.messages.visible import say
 from met.settings import settings_of
 
@@ -190,7 +191,8 @@ def plan(
     if output is not None:
         plan_file.write(made, output)
         if not quiet and form == "text":
-            say(f"wrote {output}")
+            with kept(f"{output} is whole"):
+                say(f"wrote {output}")
     elif form == "json":
         say(plan_file.dumps(made), end="", exact=True)
     elif not quiet:

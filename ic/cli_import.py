@@ -8,6 +8,7 @@ import click
 
 from met.cli import loudness_options
 from met.diagnostic import Problem, error
+from met.host.streams import kept
 from met.messages.visible import say
 
 
@@ -44,4 +45,5 @@ def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet
         raise Problem(error("D216", f"`{output}` is there already", help="--force writes over it, -o names another"))
     put(output, text)
     if not quiet:
-        say(f"wrote {output}")
+        with kept(f"{output} is whole"):
+            say(f"wrote {output}")

@@ -9,6 +9,7 @@ import sys
 import click
 
 from met.cli import loudness_options
+from met.host.streams import kept
 from met.messages.visible import say
 
 KINDS = ["deck", "servo", "sensor", "environment", "command", "guide", "metric", "integrator"]
@@ -34,11 +35,12 @@ def new(kind: str, name: str, output: str | None, force: bool, quiet: bool, verb
     files.write(texts, force=force)
     if quiet:
         return
-    for path in texts:
-        say(f"wrote {path}")
-    click.echo()
-    for line in columns(_next(kind, name, list(texts))):
-        click.echo(line)
+    with kept(f"{', '.join(texts)}: all is written"):
+        for path in texts:
+            say(f"wrote {path}")
+        click.echo()
+        for line in columns(_next(kind, name, list(texts))):
+            click.echo(line)
 
 
 def _next(kind: str, name: str, paths: list[str]) -> list[tuple[str, str]]:

@@ -22,7 +22,9 @@ import click
 from met.diagnostic import Diagnostic, Problem, error, nearest
 from met.host.entry_points import EntryPoint, offered
 from met.host.sources import names_archive, names_plan
+from met.host.streams import OutputLost, standard_streams
 from met.messages.visible import say
+from met.outputs import refusal_text
 from met.settings import VARY, setting_option, to_set, varies
 from met.version import VERSION
 
@@ -234,18 +236,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("HDF5_PLUGIN_PRELOAD", "::")
     # A start makes many objects and drops few: by default the garbage collector runs some 30 times, 15 ms of a start.
     gc.set_threshold(50_000)
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:  # closed by the shell, `met ... >&-`: output is discarded
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115  # as long as the process lives
-    try:
-        with _without_library_warnings(given):
-            status = _run(given)
-        sys.stdout.flush()
-        return status
-    except BrokenPipeError:
-        # The reader of our output has gone (`met cases | head`). Output that Python still buffers must be discarded.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return PIPE_CLOSED
+    with standard_streams() as output:
+        status, said = BAD_INPUT, ""
+        try:
+            with _without_library_warnings(given):
+                status = _run(given)
+            sys.stdout.flush()
+        except OutputLost as lost:
+            said = str(lost)
+        if output is None or output.refusal is None:
+            return status
+        if isinstance(output.refusal, BrokenPipeError):  # the reader of our output has gone (`met cases | head`)
+            if said:
+                say(said, err=True)
+            return PIPE_CLOSED
+        message = f"cannot write the standard output: {refusal_text(output.refusal)}"
+        helps = "send it elsewhere, or free the disk that it goes to"
+        complain([error("E338", message, help=[said, helps] if said else helps)], {})
+        return BAD_INPUT
 
 
 @contextmanager
@@ -298,11 +306,11 @@ def _run(arguments: list[str]) -> int:
             mistake.show(shown)
             say(shown.getvalue(), end="", err=True)
         return BAD_INPUT
+    except OutputLost:
+        raise
     except (KeyboardInterrupt, click.Abort):
         print("\nmet: interrupted", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:
-        raise
     except (MemoryError, OSError) as lacking:
         if verbose:
             _show_traceback()
@@ -362,11 +370,14 @@ def confess(defect: Exception, arguments: Sequence[str], *, verbose: bool) -> st
         _show_traceback()
         where = "The traceback is above."
     else:
-        handle, path = tempfile.mkstemp(prefix="met-defect-", suffix=".txt")
-        with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
-            file.write(f"{command}\nmet {VERSION}, Python {platform.python_version()}, {platform.platform()}\n\n")
-            traceback.print_exception(defect, file=file)
-        where = f"The traceback is in {path}."
+        try:
+            handle, path = tempfile.mkstemp(prefix="met-defect-", suffix=".txt")
+            with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
+                file.write(f"{command}\nmet {VERSION}, Python {platform.python_version()}, {platform.platform()}\n\n")
+                traceback.print_exception(defect, file=file)
+            where = f"The traceback is in {path}."
+        except OSError as reason:
+            where = f"Its traceback cannot be written ({refusal_text(reason)}): `-v` prints it."
     words = (
         f"met: this is a defect of MET, not of what you gave it: {type(defect).__name__}: {defect}. {where} "
         f"Please report it together with the deck and the command, `{command}`."

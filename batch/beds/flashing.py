@@ -8,6 +8,7 @@ from hw.pico import pico_image, uf2
 from hw.pico_bench import SHIPPED, pico_bench
 from met.diagnostic import Problem, error
 from met.host.files import whole_file
+from met.host.streams import kept
 from met.messages.visible import say
 from met.outputs import check_overwrite, check_place
 
@@ -36,14 +37,15 @@ def firmware_and_tell(bench: str | None, output: str | None, *, show: bool, quie
         message = f"cannot write {target}: {(reason.strerror or str(reason)).lower()}"
         raise Problem(error("E448", message, help="give another name with `-o`")) from None
     if not quiet:
-        limits = found.config.limits
-        say(
-            f"bed `{name}`: {limits.voltage:g} V, {limits.current:g} A, {limits.rate:g} rad/s, "
-            f"ticks of {found.config.tick_hz:g} Hz\n"
-            f"image  {target}  ({len(image) // 512 * 256 / 1024:.1f} KiB of flash)\n"
-            "next   hold BOOTSEL while the Pico is plugged in, and drag the image onto the drive that appears\n"
-            "before a motor is connected, see the checks with a meter in docs/pico.md"
-        )
+        with kept(f"{target} is whole"):
+            limits = found.config.limits
+            say(
+                f"bed `{name}`: {limits.voltage:g} V, {limits.current:g} A, {limits.rate:g} rad/s, "
+                f"ticks of {found.config.tick_hz:g} Hz\n"
+                f"image  {target}  ({len(image) // 512 * 256 / 1024:.1f} KiB of flash)\n"
+                "next   hold BOOTSEL while the Pico is plugged in, and drag the image onto the drive that appears\n"
+                "before a motor is connected, see the checks with a meter in docs/pico.md"
+            )
 
 
 def _is_uf2(path: Path) -> bool:

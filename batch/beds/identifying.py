@@ -22,6 +22,7 @@ from met.analysis.shaft_work import of_cases, scale_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import new_file
+from met.host.streams import kept
 from met.messages import visible
 from met.outputs import check_place
 from met.plan import Experiment, Formula, Plan, Substitution
@@ -140,12 +141,13 @@ def identify_and_tell(
     origin = origin_of(about, ended, estimates)
     with new_file(deck) as file:
         file.write(included(deck, which.experiment, which.joint, estimates, origin).encode())
-    if form == "json":
-        visible.say(json.dumps(as_data(found, estimates, sheet, deck, records), indent=2))
-        return
-    for line in table_lines(found, estimates, sheet):
-        say(line)
-    say(f"{deck} is a deck to include; what was told and read is in {records}")
+    with kept(f"{deck} is whole"):
+        if form == "json":
+            visible.say(json.dumps(as_data(found, estimates, sheet, deck, records), indent=2))
+            return
+        for line in table_lines(found, estimates, sheet):
+            say(line)
+        say(f"{deck} is a deck to include; what was told and read is in {records}")
 
 
 def _check_sheet(sheet: DataSheet, joint: str) -> None:

@@ -23,7 +23,9 @@ from hw.drivers import check_model, in_lock_step, kind_of, ports_in_words
 from met.analysis.margin import margins, remedy
 from met.diagnostic import Problem, error
 from met.host.files import read_json
+from met.host.streams import kept
 from met.messages import visible
+from met.outputs import quoted
 from met.plan import Experiment, Plan
 
 
@@ -138,16 +140,17 @@ def run_and_tell(
         say=telling.say,
         more=lambda: sidecar_entries(executor),
     )
-    if performed.whole:
-        executor.check(_ports_before(campaign.output), f"{campaign.output} holds this campaign")
-        say(f"nothing is missing: {campaign.output} has all of it (`--fresh` drives it again)")
-    with ArchiveFile(campaign.output) as file:
-        summaries, worst = summarise(file), worst_cases(file)
-        picture, excuse = (None, "") if no_picture else first_picture(file)
-    for line in timing_lines(executor):
-        say(line)
-    ok = all(summary.ok for summary in summaries)
-    say("\n".join(result_lines(campaign, summaries, worst, picture, excuse, None, performed.seconds, ok, ())))
+    with kept(f"{campaign.output} is whole: `met show {quoted(campaign.output)}` prints what came of it"):
+        if performed.whole:
+            executor.check(_ports_before(campaign.output), f"{campaign.output} holds this campaign")
+            say(f"nothing is missing: {campaign.output} has all of it (`--fresh` drives it again)")
+        with ArchiveFile(campaign.output) as file:
+            summaries, worst = summarise(file), worst_cases(file)
+            picture, excuse = (None, "") if no_picture else first_picture(file)
+        for line in timing_lines(executor):
+            say(line)
+        ok = all(summary.ok for summary in summaries)
+        say("\n".join(result_lines(campaign, summaries, worst, picture, excuse, None, performed.seconds, ok, ())))
     return ok
 
 

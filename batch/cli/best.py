@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from met.cli import NO, YES, format_option
+from met.host.streams import kept
 from met.messages.visible import line, say
 
 if TYPE_CHECKING:
@@ -158,4 +159,5 @@ def _tell(
     if deck is not None and write:
         deck.write()
         if form != "json":
-            say(line(f"{deck.target}: written; it {deck.changes()}"))
+            with kept(f"{deck.target} is written"):
+                say(line(f"{deck.target}: written; it {deck.changes()}"))

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from met.cli import YES, check_options, deck_options, format_option, loudness_options
+from met.host.streams import kept
 from met.messages.visible import say
 
 
@@ -48,14 +49,17 @@ def compile(
     if output is None:
         files.check(target)
     done = files.write(experiment, target)
-    if form == "json":
-        told = {"module": str(done.module), "description": str(done.description), **done.described["kernel"]}
-        click.echo(json.dumps(told, indent=1))
-    elif not quiet:
-        of = done.described
-        what = f"{len(of['inputs'])} inputs, {len(of['columns'])} recorded numbers, {len(of['metrics'])} metrics"
-        say(f"{done.module}  ({size(done.module.stat().st_size)})  {what}")
-        if of["not_computed"]:
-            say(f"  not computed in it: {', '.join(each['name'] for each in of['not_computed'])}, of linear answers")
-        say(f"{done.description}  ({size(done.description.stat().st_size)})")
+    with kept(f"{done.module} and {done.description} are whole"):
+        if form == "json":
+            told = {"module": str(done.module), "description": str(done.description), **done.described["kernel"]}
+            click.echo(json.dumps(told, indent=1))
+        elif not quiet:
+            of = done.described
+            what = f"{len(of['inputs'])} inputs, {len(of['columns'])} recorded numbers, {len(of['metrics'])} metrics"
+            say(f"{done.module}  ({size(done.module.stat().st_size)})  {what}")
+            if of["not_computed"]:
+                say(
+                    f"  not computed in it: {', '.join(each['name'] for each in of['not_computed'])}, of linear answers"
+                )
+            say(f"{done.description}  ({size(done.description.stat().st_size)})")
     return YES

@@ -8,6 +8,7 @@ import click
 
 from batch.formats import FORMATS
 from met.cli import YES, format_option, loudness_options
+from met.host.streams import kept
 from met.messages.visible import say
 
 if TYPE_CHECKING:
@@ -98,10 +99,16 @@ def export(
         force=force,
     )
     written = [path for path in (done.path, done.layout) if path is not None]
-    if form == "json":
-        told = {"written": [str(path) for path in written], "cases": done.cases, "rows": done.rows, "table": done.table}
-        click.echo(json.dumps(told, indent=1))
-    elif not quiet:
-        for path in written:
-            say(f"{path}  ({size(path.stat().st_size)}){summary(done) if path == done.path else ''}")
+    with kept(f"{done.path} is whole"):
+        if form == "json":
+            told = {
+                "written": [str(path) for path in written],
+                "cases": done.cases,
+                "rows": done.rows,
+                "table": done.table,
+            }
+            click.echo(json.dumps(told, indent=1))
+        elif not quiet:
+            for path in written:
+                say(f"{path}  ({size(path.stat().st_size)}){summary(done) if path == done.path else ''}")
     return YES

@@ -6,6 +6,7 @@ import click
 
 from batch.cli.instant import Instant
 from met.cli import YES, loudness_options
+from met.host.streams import kept
 from met.messages.visible import say
 
 
@@ -84,5 +85,6 @@ def plot(
     drawn = {"run": run, "against": against}
     target = plot(archive, output, names, **drawn, cases=cases, over=parameters, size=size, dpi=dpi, arm=arm, at=at)
     if not quiet:
-        say(f"{target}")
+        with kept(f"{target} is whole"):
+            say(f"{target}")
     return YES

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from met.cli import YES, loudness_options
+from met.host.streams import kept
 from met.messages.visible import say
 
 
@@ -61,5 +62,6 @@ def report(
         progress=told,
     )
     if not quiet:
-        say(f"{target}  ({size(target.stat().st_size)})")
+        with kept(f"{target} is whole"):
+            say(f"{target}  ({size(target.stat().st_size)})")
     return YES

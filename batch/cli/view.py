@@ -11,6 +11,7 @@ import click
 
 from met.cli import YES, check_options, confess, deck_options, loudness_options
 from met.host.sources import names_archive, names_plan
+from met.host.streams import kept
 from met.messages.visible import say
 
 
@@ -93,8 +94,12 @@ def _write(
     files.check_page(target)
     files.write_page(page(archive, () if name is None else (name,), against, numbers, include_dirs), target)
     if not quiet:
-        say(f"{target}  ({size(target.stat().st_size)})")
-        say(f"One file, to open in a browser or to send. All cases at once: `met report {quoted(archive)}`", err=True)
+        with kept(f"{target} is whole"):
+            say(f"{target}  ({size(target.stat().st_size)})")
+            say(
+                f"One file, to open in a browser or to send. All cases at once: `met report {quoted(archive)}`",
+                err=True,
+            )
     return YES
 
 

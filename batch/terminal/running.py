@@ -31,6 +31,7 @@ from batch.terminal.verdict import WorstCaseLines, announcement, result_lines, v
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 from met.host.sources import names_archive, names_plan
+from met.host.streams import OutputLost, kept
 from met.messages import visible
 from met.outputs import quoted
 
@@ -122,23 +123,26 @@ def run_and_tell(
     performed = _performed(campaign, executor, fresh, max_failures, bar, json, say)
     if performed is None:
         return False
-    result = _result(campaign, performed, no_picture, say)
-    exported, refused = _exported(campaign, target, bool(histories), json, say)
-    unlike = differences(again.archive, campaign.output) if again is not None else []
-    compared = _compared(again, unlike, campaign.output)
-    missing = target is not None and exported is None
-    ok = result.ok and not unlike and not missing
-    if json:
-        print(_json(campaign, result, exported, performed, [*compared, *refused], ok))
+    with kept(f"{campaign.output} is whole: `met show {quoted(campaign.output)}` prints what came of it"):
+        if performed.whole:
+            say(f"nothing is missing: {campaign.output} has all of it (`--fresh` runs it again)")
+        result = _result(campaign, performed, no_picture, say)
+        exported, refused = _exported(campaign, target, bool(histories), json, say)
+        unlike = differences(again.archive, campaign.output) if again is not None else []
+        compared = _compared(again, unlike, campaign.output)
+        missing = target is not None and exported is None
+        ok = result.ok and not unlike and not missing
+        if json:
+            print(_json(campaign, result, exported, performed, [*compared, *refused], ok), flush=True)
+            return ok
+        say("\n".join(_lines(campaign, result, exported, performed)))
+        if result.warned and not quiet:
+            _complain(Problem(result.warned, {each.name: each.text for each in campaign.plan.sources}), json)
+        for line in compared:
+            say(line)
+        if missing and target is not None:
+            say(f"exit 1: {target} is missing: `{export_command(campaign, target, histories=bool(histories))}`")
         return ok
-    say("\n".join(_lines(campaign, result, exported, performed)))
-    if result.warned and not quiet:
-        _complain(Problem(result.warned, {each.name: each.text for each in campaign.plan.sources}), json)
-    for line in compared:
-        say(line)
-    if missing and target is not None:
-        say(f"exit 1: {target} is missing: `{export_command(campaign, target, histories=bool(histories))}`")
-    return ok
 
 
 def _of_archive(
@@ -191,12 +195,12 @@ def _performed(
     except TooMany as problem:
         _complain(problem, json)
         return None
+    except OutputLost:
+        raise
     except KeyboardInterrupt as interrupt:
         if str(interrupt) and not json:
             visible.say(f"\n{interrupt}", err=True)
         raise
-    if performed.whole:
-        say(f"nothing is missing: {campaign.output} has all of it (`--fresh` runs it again)")
     return performed
 
 
@@ -348,17 +352,19 @@ def submit_and_tell(
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
     done = submit(campaign, jobs=jobs, options=options, timeout=timeout, fresh=fresh, say=say)
     archive = str(campaign.output)
-    if json:
-        about = {} if done is None else dataclasses.asdict(done)
-        print(json_module.dumps({"archive": archive, "whole": done is None, **about}, indent=1))
-    elif done is None:
-        say(f"nothing is missing: {archive} has all of it (`--fresh` runs it again)")
-    else:
-        if done.array:
-            many = f"{done.jobs} job{'s' if done.jobs > 1 else ''}"
-            say(f"submitted  array {done.array}: {many} for {done.cases:,} cases")
-        say(f"           job {done.end}: merges them into {archive}")
-        say(f"next       met status {quoted(archive)}")
+    told = "is whole" if done is None else f"is submitted: `met status {quoted(archive)}` says how far it is"
+    with kept(f"{archive} {told}"):
+        if json:
+            about = {} if done is None else dataclasses.asdict(done)
+            print(json_module.dumps({"archive": archive, "whole": done is None, **about}, indent=1), flush=True)
+        elif done is None:
+            say(f"nothing is missing: {archive} has all of it (`--fresh` runs it again)")
+        else:
+            if done.array:
+                many = f"{done.jobs} job{'s' if done.jobs > 1 else ''}"
+                say(f"submitted  array {done.array}: {many} for {done.cases:,} cases")
+            say(f"           job {done.end}: merges them into {archive}")
+            say(f"next       met status {quoted(archive)}")
 
 
 def _of_deck(

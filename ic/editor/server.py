@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
@@ -327,6 +328,8 @@ def make(
 
 def serve(include_dirs: Sequence[str] = (), defines: Sequence[str] = (), last_runs: FindLastRuns | None = None) -> None:
     """Serve an editor until it ends the session, or has gone. last_runs: reads archives, for lenses"""
+    if sys.stdin is None:  # closed by whoever started it: there is no editor
+        return
     server = make(include_dirs, defines, last_runs)
     logging.getLogger(PYGLS_LOG).addFilter(_is_no_refusal)
     out = os.fdopen(os.dup(1), "wb")

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
 import sys
 import warnings
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import click
@@ -15,6 +18,7 @@ import pytest
 from met import cli
 from met.diagnostic import Place, Problem, error
 from met.host.entry_points import EntryPoint, offered
+from met.host.streams import kept
 from met.version import VERSION
 
 ROOT = Path(__file__).parents[2]
@@ -202,16 +206,131 @@ def test_a_stream_that_the_shell_has_closed_is_no_defect(closed: str) -> None:
     assert (done.returncode, getattr(done, closed)) == (0, "")
 
 
-@pytest.mark.slow
-def test_a_closed_pipe_ends_quietly() -> None:
-    """`met doc | true`: nobody reads what is printed."""
+@contextlib.contextmanager
+def standard_files(monkeypatch: pytest.MonkeyPatch, **to: int) -> Iterator[None]:
+    """A block in which the files under Python's own `stdout` or `stderr` are these instead."""
+    numbers = {"stdout": 1, "stderr": 2}
+    with monkeypatch.context() as patch:
+        before = {name: os.dup(numbers[name]) for name in to}
+        for name, file in to.items():
+            patch.setattr(sys, name, getattr(sys, f"__{name}__"))
+            os.dup2(file, numbers[name])
+            os.close(file)
+        try:
+            yield
+        finally:
+            for name, file in before.items():
+                os.dup2(file, numbers[name])
+                os.close(file)
+
+
+def full() -> int:
+    return os.open("/dev/full", os.O_WRONLY)
+
+
+def unread() -> int:
+    """The writing end of a pipe whose reader has gone."""
     reader, writer = os.pipe()
     os.close(reader)
-    done = subprocess.run(
-        [sys.executable, "-m", "met.cli", "doc"], cwd=ROOT, stdout=writer, stderr=subprocess.PIPE, text=True
+    return writer
+
+
+def prints_and_keeps() -> None:
+    with kept("a.h5 is whole"):
+        print("one line", flush=True)
+
+
+def prints_to_the_end() -> None:
+    print("one line")
+
+
+def refuses() -> None:
+    raise Problem(error("D000", "nothing is right"))
+
+
+FULL = "error[E338]: cannot write the standard output: no space left on device\n"
+SEND = " = help: send it elsewhere, or free the disk that it goes to\n\n1 error\n"
+
+
+@pytest.mark.parametrize(
+    ("function", "output", "status", "said"),
+    [
+        (prints_to_the_end, full, 2, FULL + SEND),
+        (prints_and_keeps, full, 2, f"{FULL} = help: a.h5 is whole\n{SEND}"),
+        (prints_to_the_end, unread, 141, ""),
+        (prints_and_keeps, unread, 141, "a.h5 is whole\n"),
+        (refuses, full, 2, "error[D000]: nothing is right\n\n1 error\n"),
+    ],
+)
+def test_output_that_cannot_be_written_is_named_and_a_reader_that_has_gone_is_no_error(
+    function: object,
+    output: Callable[[], int],
+    status: int,
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    offer(monkeypatch, do=command(function))
+    with standard_files(monkeypatch, stdout=output()):
+        assert cli.main(["do"]) == status
+    assert capsys.readouterr().err == said
+
+
+@pytest.mark.parametrize("errors", [full, unread])
+@pytest.mark.parametrize(("function", "status"), [(refuses, 2), (lambda: 1, 1), (lambda: print("x") or 0, 0)])
+def test_errors_that_cannot_be_written_change_no_answer(
+    function: object,
+    status: int,
+    errors: Callable[[], int],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def do() -> object:
+        print("a warning", file=sys.stderr)
+        return function()  # type: ignore[operator]
+
+    offer(monkeypatch, do=command(do))
+    with standard_files(monkeypatch, stderr=errors()):
+        assert cli.main(["do"]) == status
+    assert capsys.readouterr().out == "x\n" * (status == 0)
+
+
+def test_a_pipe_that_does_not_wait_is_written_to_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As programs leave a pipe that they share with us; 1 MB is more than it holds."""
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    offer(monkeypatch, do=command(lambda: print("x" * 1_000_000)))
+    with open(reader, "rb") as file, ThreadPoolExecutor() as pool, standard_files(monkeypatch, stdout=writer):
+        read = pool.submit(file.read)
+        assert cli.main(["do"]) == 0
+        os.close(os.dup2(full(), 1))  # the pipe's last writer
+        assert len(read.result()) == 1_000_001
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("closed", ["0 1 2", "1", "2"])
+def test_no_file_of_a_command_gets_the_number_of_a_closed_stream(closed: str, tmp_path: Path) -> None:
+    """Else what a library prints would get into an archive."""
+    program = (
+        f"import os, sys; [os.close(int(each)) for each in {closed.split()!r}];"
+        f"{''.join(f'sys.std{name} = None;' for n, name in enumerate(('in', 'out', 'err')) if str(n) in closed)}"
+        "from met.cli import main; status = main(['plan', 'two_link.ic', '-o', sys.argv[1]]);"
+        "sys.exit(status or os.open(sys.argv[1], os.O_RDONLY) < 3)"
     )
-    os.close(writer)
-    assert (done.returncode, done.stderr) == (cli.PIPE_CLOSED, "")
+    done = subprocess.run([sys.executable, "-c", program, tmp_path / "p.json"], cwd=ROOT, capture_output=True)
+    assert done.returncode == 0
+
+
+def test_a_defect_whose_traceback_cannot_be_kept_is_a_defect(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def divide() -> float:
+        return 1 / 0
+
+    monkeypatch.setattr("tempfile.tempdir", "/no/such/folder")
+    offer(monkeypatch, divide=command(divide))
+    assert cli.main(["divide"]) == cli.DEFECT
+    assert "Its traceback cannot be written (no such file or directory): `-v` prints it. " in capsys.readouterr().err
 
 
 def test_warnings_of_libraries_are_left_out_and_those_of_models_said(
