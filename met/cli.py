@@ -27,6 +27,7 @@ from met.messages.visible import say
 from met.outputs import refusal_text
 from met.settings import VARY, setting_option, to_set, varies
 from met.version import VERSION
+from met_arm import REMEDY, find_own_packages, hiding
 
 YES, NO, BAD_INPUT = 0, 1, 2
 INTERRUPTED, PIPE_CLOSED = 130, 141  # 128 + the signal, as a shell counts
@@ -290,6 +291,7 @@ def _run(arguments: list[str]) -> int:
         if "_MET_COMPLETE" in os.environ:
             met.main(arguments, prog_name="met")  # a shell asks for completions; click answers and ends
         # Not `met.main`, which would print errors and choose many exit statuses itself.
+        find_own_packages()
         with met.make_context("met", arguments) as context:
             status = met.invoke(context)
         return status if isinstance(status, int) else YES
@@ -317,6 +319,9 @@ def _run(arguments: list[str]) -> int:
         complain([of_machine(lacking)], {}, form=form)
         return BAD_INPUT
     except Exception as defect:
+        if words := hiding(defect):
+            complain([error("E339", words, help=REMEDY)], {}, form=form)
+            return BAD_INPUT
         confess(defect, arguments, verbose=verbose)
         return DEFECT
 

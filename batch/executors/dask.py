@@ -38,6 +38,8 @@ FETCHES = 50
 # and to the scheduler.
 ERRAND = f"""
 try:
+    from met_arm import find_own_packages
+    find_own_packages()
     from batch.executors.dask_worker import carry_out
 except ImportError as reason:
     from socket import gethostname

@@ -12,10 +12,13 @@ import site
 import sys
 from pathlib import Path
 
+import met_arm
+
 
 def command(module: str, *arguments: str) -> list[str]:
-    """The command line that runs a module in a Python like this one; it needs the variables of `environment`."""
-    return [sys.executable, "-P", "-m", module, *arguments]
+    """The command line that runs a module in a Python like this one; it needs the variables of `environment`. MET's own
+    packages are found first, whatever PYTHONPATH names."""
+    return [sys.executable, "-P", met_arm.__file__, module, *arguments]
 
 
 def environment() -> dict[str, str]:

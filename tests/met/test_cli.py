@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import ModuleType
 
 import click
 import pytest
@@ -349,6 +350,53 @@ def test_warnings_of_libraries_are_left_out_and_those_of_models_said(
         assert capsys.readouterr().err == "met: warning: this motor has no source\n"
         with pytest.warns(RuntimeWarning, match="invalid value encountered in cast"):
             cli.main(["-v"])
+
+
+@pytest.mark.parametrize("package", [False, True])
+@pytest.mark.parametrize("code", ["import ring9.inner", "from ring9 import inner", "import ring9; ring9.inner"])
+def test_a_module_that_hides_one_that_is_needed_is_named(
+    code: str, package: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """As `numpy.py` in a folder of PYTHONPATH; the remedy, done, works."""
+    (tmp_path / "needed" / "ring9").mkdir(parents=True)
+    needed = tmp_path / "needed" / "ring9" / "__init__.py"
+    needed.write_text("from ring9 import inner")
+    needed.with_name("inner.py").touch()
+    hiding = tmp_path / "users" / ("ring9/__init__.py" if package else "ring9.py")
+    hiding.parent.mkdir(parents=True)
+    hiding.write_text("x = 1")
+    for folder in ("needed", "users"):
+        monkeypatch.syspath_prepend(tmp_path / folder)
+    offer(monkeypatch, do=command(lambda: exec(code, {})))
+    try:
+        assert cli.main(["do"]) == 2
+        assert capsys.readouterr().err == (
+            f"error[E339]: `ring9` is {hiding} here, which hides {needed}\n"
+            " = help: rename that file, or take its folder off PYTHONPATH\n\n1 error\n"
+        )
+        for name in [each for each in sys.modules if each.startswith("ring9")]:
+            del sys.modules[name]
+        sys.path.remove(str(tmp_path / "users"))
+        assert cli.main(["do"]) == 0
+    finally:
+        for name in [each for each in sys.modules if each.startswith("ring9")]:
+            del sys.modules[name]
+
+
+def test_where_mets_name_is_another_modules_already_that_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """As in a program of a user that has imported a `batch.py` of its own and calls the command."""
+    (tmp_path / "batch.py").touch()
+    other = ModuleType("batch")
+    other.__file__ = str(tmp_path / "batch.py")
+    monkeypatch.setitem(sys.modules, "batch", other)
+    monkeypatch.syspath_prepend(tmp_path)
+    assert cli.main(["check", "two_link.ic"]) == 2
+    assert capsys.readouterr().err == (
+        f"error[E339]: `batch` is {tmp_path / 'batch.py'} here, which hides {ROOT / 'batch' / '__init__.py'}\n"
+        " = help: rename that file, or take its folder off PYTHONPATH\n\n1 error\n"
+    )
 
 
 SLOW_TO_IMPORT = {"llvmlite", "h5py", "h5netcdf", "xarray", "pandas", "dask", "matplotlib", "scipy", "pint"}

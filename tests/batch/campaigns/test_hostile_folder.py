@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -11,13 +12,14 @@ from pathlib import Path
 
 import pytest
 
+import met_arm
 from met.host import entry_points, interpreter
 from met.plan import file as plan_file
 from tests.batch import plans
 
 ROOT = Path(__file__).resolve().parents[3]
 
-MET = "import sys\nfrom met.cli import main\nsys.exit(main())\n"
+MET = "import sys\nfrom met_arm import main\nsys.exit(main())\n"
 """The script that an installer writes for `met`."""
 
 SBATCH = """#!/bin/sh
@@ -132,6 +134,29 @@ def test_a_campaign_runs_nothing_of_the_folder(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "p.json", "-o", "a.h5", "--no-picture", "--processes", "1"),
+        ("run", "p.json", "-o", "a.h5", "--no-picture", "--dask", "local"),
+        ("submit", "--slurm", "p.json", "-o", "a.h5", "--jobs", "1"),
+        ("bed", "run", "deck.ic", "wired", "--port", "emulated", "-o", "a.h5", "--no-picture"),
+    ],
+    ids=" ".join,
+)
+def test_modules_of_mets_names_on_pythonpath_are_not_taken_for_it(
+    met: Callable[..., subprocess.CompletedProcess[str]], words: tuple[str, ...], folder: Path
+) -> None:
+    others = folder.with_name("others")
+    others.mkdir()
+    for name in met_arm.PACKAGES:
+        shutil.copy(folder / f"{name}.py", others)
+    done = met(*words, "--quiet", PYTHONPATH=str(others))
+    assert (done.stdout, done.stderr) == ("", "")
+    assert (folder / "a.h5").exists()
+
+
+@pytest.mark.slow
 def test_a_picture_takes_nothing_of_the_folder(
     met: Callable[..., subprocess.CompletedProcess[str]], folder: Path
 ) -> None:
@@ -173,7 +198,8 @@ def test_an_empty_folder_of_pythonpath_is_no_working_folder_of_a_child(
 def test_a_child_finds_what_pythonpath_names_and_nothing_beside_it(tmp_path: Path, folder: Path) -> None:
     (tmp_path / "own").mkdir()
     (tmp_path / "own" / "mine.py").write_text("import met, json\nprint(met.__file__)\n")
-    environment = {**interpreter.environment(), "PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path / 'own'}"}
+    (tmp_path / "own" / "met.py").write_text("")  # where MET is installed, the user's folders come before it
+    environment = {**interpreter.environment(), "PYTHONPATH": str(tmp_path / "own")}
     done = subprocess.run(interpreter.command("mine"), cwd=folder, env=environment, capture_output=True, text=True)
     assert (done.stdout, done.stderr) == (f"{ROOT / 'met' / '__init__.py'}\n", "")
     assert not (tmp_path / "ran").exists()
