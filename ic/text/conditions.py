@@ -66,7 +66,7 @@ def well_formed(directive: Token, args: Sequence[Token], findings: Findings) -> 
     return _each_defined(written, findings) is not None
 
 
-def with_defined(tokens: Sequence[Token], is_macro: Callable[[str], bool], findings: Findings) -> list[Token]:
+def with_defined(tokens: Sequence[Token], is_defined: Callable[[Token], bool], findings: Findings) -> list[Token]:
     """The condition with a number in place of each `defined NAME`; raises Refused where no name follows."""
     written = [token for token in tokens if token.kind != SPACE]
     stretches = _each_defined(written, findings)
@@ -76,7 +76,7 @@ def with_defined(tokens: Sequence[Token], is_macro: Callable[[str], bool], findi
     for first, name, end in stretches:
         made += written[at:first]
         truth = written[first].__copy__()
-        truth.kind, truth.text = WHOLE, "1" if is_macro(written[name].text) else "0"
+        truth.kind, truth.text = WHOLE, "1" if is_defined(written[name]) else "0"
         made.append(truth)
         at = end
     return [*made, *written[at:]]

@@ -43,6 +43,8 @@ DIRECTIVES = (*CONDITIONALS, "define", "undef", "include", "pragma", "error", "w
 _LONG_LINE = re.compile(rf"^[^\n]{{{LONGEST_LINE + 1}}}", re.MULTILINE)
 _INCLUDES = 'write `#include "beside.ic"` or `#include <servos/rigid_gearbox.ic>`'
 TRUTH = "TRUTH"  # the kind of a condition's value
+NAMING = ("let", "param", "arm", "link", "joint", "servo", "run", "sweep", "search", "tune")
+"""Words before a name that the deck defines, which no condition can see."""
 
 
 @frozen
@@ -157,6 +159,8 @@ class _Preprocessor(Macros):
         self._directive: Token | None = None
         self._conditions = 0
         self._zeros: dict[str, Place] = {}  # names in conditions that are no macros
+        # names that a condition asked for as macros and that were none, with the number of tokens handed over before
+        self._not_defined: list[tuple[Token, int]] = []
         super().__init__(findings)
 
     # reading
@@ -182,17 +186,22 @@ class _Preprocessor(Macros):
 
     def warn_of_names(self) -> None:
         """Warn about names in conditions that are not macros, and macros on the command line that nothing uses."""
-        named = ((word.text, name) for word, name in pairwise(self.output) if name.kind == NAME)
-        lets = {name.text: name for word, name in named if word in ("let", "param")}
+        named: dict[str, tuple[int, str, Token]] = {}
+        for n, (word, name) in enumerate(pairwise(self.output)):
+            if name.kind == NAME and word.text in NAMING:
+                named.setdefault(name.text, (n, word.text, name))
+        lets = [name for name, (_, word, _) in named.items() if word in ("let", "param")]
         for name, place in self._zeros.items():
             message = f"`{name}` is no macro, so it counts as 0 in this condition"
-            help = f"ask `defined({name})`, or define it before: `#define {name} 1`, `-D {name}=1`"
-            if name in lets:
-                label = Label(lets[name].place, "this `let` is a value; a condition sees macros alone")
-                help = "define a macro for it, `#define NAME ...`, and ask that"
-                self.findings.warn("D036", message, place, also=(label,), help=help)
+            if name in named:
+                self._warn_of_definition(message, place, *named[name][1:])
             else:
+                help = f"ask `defined({name})`, or define it before: `#define {name} 1`, `-D {name}=1`"
                 self.findings.warn("D036", message, place, help=[*did_you_mean(name, self.macros), help])
+        for token, before in self._not_defined:
+            if token.text in named and (named[token.text][0] < before or _stands_before(named[token.text][2], token)):
+                message = f"`{token.text}` is no macro, so it counts as not defined in this condition"
+                self._warn_of_definition(message, token.place, *named.pop(token.text)[1:])
         for name, token in self.given.items():
             if name not in self.asked:
                 near = did_you_mean(name, [*self.asked, *self._zeros])
@@ -204,6 +213,13 @@ class _Preprocessor(Macros):
                     token.place,
                     help=[*near, *values],
                 )
+
+    def _warn_of_definition(self, message: str, at: Place, word: str, name: Token) -> None:
+        """Warn about a condition that asks for the macro of a name which the deck defines otherwise."""
+        what = f"this `{word}` is a value" if word in ("let", "param") else f"this is the name of a `{word}`"
+        label = Label(name.place, f"{what}; a condition sees macros alone")
+        help = "define a macro for it, `#define NAME ...`, and ask that"
+        self.findings.warn("D036", message, at, also=(label,), help=help)
 
     def _read(self, file: FoundFile, source: Text, at: Place) -> None:
         self._including.append((file, source))
@@ -475,7 +491,14 @@ class _Preprocessor(Macros):
             args[:] = [Token(NAME, "__nothing__", directive.source, directive.offset, directive.length)]
             return False
         self._nothing_after(args[1:], f"#{name} {args[0].text}")
-        return self.is_macro(args[0].text)
+        return self._is_defined(args[0])
+
+    def _is_defined(self, name: Token) -> bool:
+        """Return True if there is a macro of this name; a name without is noted, for `warn_of_names`."""
+        defined = self.is_macro(name.text)
+        if not defined:
+            self._not_defined.append((name, len(self.output)))
+        return defined
 
     def _condition(self, directive: Token, args: list[Token]) -> bool:
         """Return True if the condition of an `#if` or `#elif` holds; False, with an error, where it has no meaning."""
@@ -485,9 +508,9 @@ class _Preprocessor(Macros):
         if self._conditions > MOST_CONDITIONS:
             self._give_up("D018", f"more than {MOST_CONDITIONS} conditions", directive.place)
         try:
-            before = with_defined(args, self.is_macro, self.findings)
+            before = with_defined(args, self._is_defined, self.findings)
             self.in_condition = True
-            expanded = with_defined(self.expand_macros(before), self.is_macro, self.findings)
+            expanded = with_defined(self.expand_macros(before), self._is_defined, self.findings)
             if expanded:
                 zeros: list[Token] = []
                 truth = evaluate(expanded, self.findings, zeros.append)
@@ -518,6 +541,12 @@ def _as_elif(line: list[Token], at: int) -> None:
     directive = next((token for token in line[at:] if token.kind != SPACE), None)
     if directive is not None and directive.text in ("elifdef", "elifndef"):
         directive.kind, directive.text = directive.text, "elif"
+
+
+def _stands_before(name: Token, asked: Token) -> bool:
+    """Return True if a name of the output stands in the same file as a condition, and before it."""
+    at = name.place.macros[-1].use if name.place.macros else name.place
+    return at.file == asked.place.file and (at.line, at.column) < (asked.place.line, asked.place.column)
 
 
 def _shown(directive: Token) -> str:
