@@ -257,6 +257,7 @@ _FURTHER_ROWS: tuple[tuple[str, str, Dimension, int, int], ...] = (
     ("inch", "inch", _LENGTH, 254, 10_000),
     ("ft", "foot", _LENGTH, 3048, 10_000),
     ("mg", "milligram", _MASS, 1, 1_000_000),
+    ("ns", "nanosecond", _TIME, 1, 10**9),
     ("rev", "revolution, a cycle", _ANGLE, 2, 1),
     ("MHz", "megahertz", _TIME**-1, 1_000_000, 1),
     ("lbf", "pound of force", _FORCE, 44_482_216_152_605, 10**13),

@@ -33,7 +33,7 @@ from met.parameter import Parameter
 from met.plan.channel import COMMAND_UNIT, MOTION, OF_JOINT
 from met.plan.linear_uses import FIGURES
 from met.unit_parser import parse_unit
-from met.units import UNITS
+from met.units import ALL_UNITS
 
 GOALS = ("minimise", "maximise")
 
@@ -150,7 +150,7 @@ def _of_entry(
     if last.kind in NUMBERS or (last.text in ("]", ")") and "=" in texts):
         yield from _units(_parameter(texts, around, names), names)
         return
-    if last.text in ("*", "/") and len(words) > 1 and (words[-2].text in UNITS or words[-2].kind in NUMBERS):
+    if last.text in ("*", "/") and len(words) > 1 and (words[-2].text in ALL_UNITS or words[-2].kind in NUMBERS):
         yield from _units(None, names)
         if words[-2].kind not in NUMBERS:
             return
@@ -274,12 +274,12 @@ def _units(wanted: Parameter | None, names: NamesInTexts) -> Iterator[Offer]:
         ):
             yield Offer(shown, types.CompletionItemKind.Unit, f"the unit of `{wanted.name}`")
         if fit:
-            yield from (Offer(each, types.CompletionItemKind.Unit, UNITS[each].word) for each in fit)
-            if shown in UNITS:
+            yield from (Offer(each, types.CompletionItemKind.Unit, ALL_UNITS[each].word) for each in fit)
+            if shown in ALL_UNITS:
                 yield from _named(names, UNIT)
                 return  # other units may be a factor: `deg/s`
     yield from _named(names, UNIT)
-    yield from (Offer(each, types.CompletionItemKind.Unit, UNITS[each].word) for each in UNITS)
+    yield from (Offer(each, types.CompletionItemKind.Unit, ALL_UNITS[each].word) for each in ALL_UNITS)
 
 
 def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:

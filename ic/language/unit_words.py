@@ -25,7 +25,7 @@ def either(texts: Iterable[str]) -> str:
 
 def units_of(dimension: Dimension) -> list[str]:
     """The units of the table that have this dimension."""
-    return [name for name, unit in units.UNITS.items() if unit.measure.dimension == dimension]
+    return [name for name, unit in units.ALL_UNITS.items() if unit.measure.dimension == dimension]
 
 
 @lru_cache(maxsize=4096)

@@ -12,13 +12,14 @@ from types import MappingProxyType
 
 from met.messages.alike import nearest
 from met.messages.message import write
-from met.units import UNITS, is_unit
+from met.units import ALL_UNITS, UNITS, is_unit
 
 LONGEST = 16  # longest word that is looked up
 _FUZZY = 4  # fewest letters of a word that may be misspelt
 
 _SAME: Mapping[str, str] = MappingProxyType({
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "msecs": "ms", "usec": "us", "hr": "h",
+    "usecs": "us", "nsec": "ns", "nsecs": "ns",
     "hrs": "h", "hour": "h", "hours": "h", "mins": "min", "minute": "min", "minutes": "min", "meter": "m",
     "metre": "m", "meters": "m", "metres": "m", "micron": "um", "microns": "um", "degree": "deg", "degrees": "deg",
     "degs": "deg", "radian": "rad", "radians": "rad", "rads": "rad", "rev": "cycle", "revs": "cycle",
@@ -131,6 +132,9 @@ def suggest(name: str) -> str | None:
     """The unit of the table with the same meaning and size: `sec` -> `s`, `Nm` -> `N*m`; None where there is none."""
     if name in _SAME:
         return _SAME[name]
+    if name[:1] in ("\N{MICRO SIGN}", "\N{GREEK SMALL LETTER MU}"):
+        name = f"u{name[1:]}"
+        return name if is_unit(name) else suggest(name)
     if len(name) > LONGEST or name in _OTHERS or name in _NOT_HERE:
         return None
     prefixed = _with_prefix(name)
@@ -144,9 +148,10 @@ def suggest(name: str) -> str | None:
     splits = _splits(name)
     if splits:
         return "*".join(splits[0]) if len(splits) == 1 else None
-    whole = {unit.word: unit.name for unit in UNITS.values()}
-    if name.lower() in whole:
-        return whole[name.lower()]
+    whole = {unit.word: unit.name for unit in ALL_UNITS.values()}
+    for word in (name.lower(), name.lower().removesuffix("s")):
+        if word in whole:
+            return whole[word]
     folded = [unit for unit in UNITS if unit.lower() == name.lower() and (unit[0] == name[0] or len(name) == 1)]
     if len(folded) == 1 and not (len(name) == 1 and name.isupper()):
         return folded[0]

@@ -12,12 +12,15 @@ import numpy as np
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression, Name
 from ic.meaning.control.trajectories import use_file, with_file_named
+from ic.meaning.control.wraps import warn_of_wraps
 from ic.meaning.definitions.merge import Item, MergedBlock, open_call
+from ic.meaning.expressions.remedies import components
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.commands.profile import Profile
+from met.diagnostic import Place
 from met.instants import ROUNDING
 
 
@@ -69,7 +72,23 @@ def use_course(
     values = use_model(scope, course, profile.parameters, opened)
     if values is not None and profile.shortest is not None:
         _check_room(scope, course, profile, values, opened)
+    if values is not None and {"times", "values"} <= values.keys():
+        _check_wraps(scope, course, profile, values, opened)
     return profile.name
+
+
+def _check_wraps(scope: Scope, owner: Owner, profile: Profile, values: Mapping[str, Any], body: MergedBlock) -> None:
+    """Warn where angles that a deck lists over time are those of a wrapped log."""
+    declared = next(each for each in profile.parameters if each.name == "values")
+    times, angles = values["times"], values["values"]
+    if owner.unit(declared)[0] == "rad" and len(times) == len(angles):
+        written = components(body.get("values"), len(angles))
+
+        def place(n: int) -> Place:
+            expression = written[n]
+            return owner.place if expression is None else place_of(expression)
+
+        warn_of_wraps(scope, f"`values` of {owner.label}", times, angles, place)
 
 
 def _check_room(scope: Scope, owner: Owner, profile: Profile, values: Mapping[str, Any], body: MergedBlock) -> None:

@@ -4,10 +4,12 @@ them."""
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Name, String, Word
+from ic.meaning.control.wraps import warn_of_wraps
 from ic.meaning.definitions.csv_files import missing_column
 from ic.meaning.definitions.merge import Item, MergedBlock, refuse_block
 from ic.meaning.parameters import not_sweepable
@@ -75,6 +77,7 @@ def _columns(
     table = scope.definitions.csv_files.get(named)
     here = Label(named.place, "read here")  # the same for all joints, so that the file's own faults are reported once
     columns = {}
+    angle = None
     for name, column_name, at in zip(LISTS, (TIME, wanted), (named.place, place), strict=True):
         declared = parameter(profile, name)
         column = table.column(column_name)
@@ -86,6 +89,8 @@ def _columns(
             raise missing_column(table, column_name, at, why)
         label = here if column_name == TIME else Label(named.place, f"read here for {kind} `{own}`")
         columns[name] = keep_column(scope, owner, declared, table, column, label)
+        if owner.unit(declared)[0] == "rad":
+            angle = column
     if len(table.rows) < FEWEST:
         raise Problem(
             error(
@@ -96,6 +101,9 @@ def _columns(
                 help=f"a trajectory has {FEWEST} at least; `table` takes a single point",
             )
         )
+    if angle is not None:
+        cells = partial(table.cell, angle)
+        warn_of_wraps(scope, f"column `{angle.name}`", *columns.values(), lambda n: cells(n).place)
     scope.keep_setting(owner.join(FILE.name), table.file, item=file)
     scope.keep_setting(owner.join(COLUMN.name), wanted, item=body.get(COLUMN.name), note=f"the {kind}'s name")
     return columns

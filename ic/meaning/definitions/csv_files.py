@@ -19,12 +19,12 @@ from collections.abc import Collection, Iterable, Iterator
 from functools import partial
 
 from ic.grammar.syntax import Deck
-from ic.language.unit_words import in_degrees
+from ic.language.unit_words import in_degrees, units_of
 from ic.named_files import NamedFiles
 from ic.text.complaints import known_words
 from ic.text.files import decode
 from met import units
-from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error, write, write_either
+from met.diagnostic import Label, Place, Problem, did_you_mean, error, write, write_either
 from met.frozen import frozen
 from met.host.files import memory, read_regular
 from met.messages.other_units import suggest
@@ -80,7 +80,7 @@ class CsvTable:
 
     def quantities(self, column: CsvColumn) -> tuple[tuple[float, ...], Measure]:
         """The column in SI, and the meaning of its own unit. Raises Problem D193, D194."""
-        measure = units.ONE if column.unit is None else _meaning(column, "", ())
+        measure = units.ONE if column.unit is None else _meaning(column, (), ())
         return self._numbers(column, measure), measure
 
     def cell(self, column: CsvColumn, number: int) -> CsvCell:
@@ -90,7 +90,7 @@ class CsvTable:
 
     def quantity(self, cell: CsvCell) -> tuple[float, Measure]:
         """The number of a cell in SI, and the meaning of its column's unit. Raises Problem D193, D194."""
-        measure = units.ONE if cell.column.unit is None else _meaning(cell.column, "", ())
+        measure = units.ONE if cell.column.unit is None else _meaning(cell.column, (), ())
         number = _si(cell.text, measure)
         if number is None:
             raise _no_number(cell, measure)
@@ -98,7 +98,7 @@ class CsvTable:
 
     def check_numbers(self, column: CsvColumn) -> None:
         """Raise Problem D193, D194 where a cell of the column is neither a number nor empty."""
-        measure = _meaning(column, "", ())
+        measure = _meaning(column, (), ())
         for number in range(len(self.rows)):
             text = self._text(column, number)
             if text and _si(text, measure) is None:
@@ -305,12 +305,18 @@ def _stripped(cell: str) -> tuple[str, int]:
 
 def _measure(column: CsvColumn, text: str, dimension: Dimension, label: Label) -> Measure:
     """The measure of a column's unit. Raises Problem D193 where it has none, or a different one from the wanted one."""
-    helps = write_either((f"{column.name} [{each}]" for each in in_degrees(text)), old=column.name)
+    usual = in_degrees(text)
+    helps = write_either((f"{column.name} [{each}]" for each in usual), old=column.name)
+    others = [each for each in units_of(dimension) if each not in usual]
+    further = [f"other units of this kind: {', '.join(others)}"] if others else []
     if column.unit is None:
         if dimension == PURE:
             return units.ONE
-        raise Problem(error("D193", f"column `{column.name}` has no unit", column.place, also=[label], help=helps))
-    measure = _meaning(column, Help(str(helps)), [label], dimension)
+        raise Problem(
+            error("D193", f"column `{column.name}` has no unit", column.place, also=[label], help=[helps, *further])
+        )
+    in_it = [f"{helps}, with numbers in that unit", *further]
+    measure = _meaning(column, in_it, [label], dimension)
     if not units.same(measure.dimension, dimension):
         found = "a pure number" if measure.dimension == PURE else f"in {units.text(measure.dimension)}"
         raise Problem(
@@ -319,25 +325,29 @@ def _measure(column: CsvColumn, text: str, dimension: Dimension, label: Label) -
                 f"column `{column.name}` is {found}, and {text} is needed",
                 column.place,
                 also=[label],
-                help=f"{helps}, with numbers in that unit",
+                help=in_it,
             )
         )
     return measure
 
 
-def _meaning(column: CsvColumn, remedy: str, also: Iterable[Label], dimension: Dimension | None = None) -> Measure:
-    """The measure of a column's unit. remedy: for a unit without a similar known one; dimension: the required one"""
+def _meaning(
+    column: CsvColumn, known: Iterable[str], also: Iterable[Label], dimension: Dimension | None = None
+) -> Measure:
+    """The measure of a column's unit. known: the remedy that names units, for one without a similar known one;
+    dimension: the required one"""
     assert column.unit is not None
     try:
         return parse_unit(column.unit)
     except (ValueError, OverflowError, ZeroDivisionError):
         near = suggest(column.unit)
-        if near is not None and (dimension is None or units.same(parse_unit(near).dimension, dimension)):
-            remedy = write(near, f"did you mean `{column.name} [{near}]`?", old=column.unit)
         if column.declared:
-            remedy = Help("CSV files have the units of the language alone: write the numbers in one of these")
-        known = remedy or f"the units: {', '.join(units.ALL_UNITS)}"
-        raise Problem(error("D193", f"`{column.unit}` is not a unit", column.place, also=also, help=known)) from None
+            helps = ["CSV files have the units of the language alone: write the numbers in one of these"]
+        elif near is not None and (dimension is None or units.same(parse_unit(near).dimension, dimension)):
+            helps = [write(near, f"did you mean `{column.name} [{near}]`?", old=column.unit)]
+        else:
+            helps = [*known] or [f"the units: {', '.join(units.ALL_UNITS)}"]
+        raise Problem(error("D193", f"`{column.unit}` is not a unit", column.place, also=also, help=helps)) from None
 
 
 def _short(name: str) -> str:

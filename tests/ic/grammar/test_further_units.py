@@ -26,6 +26,7 @@ def value(folder: Path, text: str, name: str = "it") -> Value:
 @pytest.mark.parametrize(("written", "number", "unit"), [
     ("3 MPa", 3e6, "Pa"),
     ("5MHz", 5e6, "1/s"),
+    ("2.5 ns", 2.5e-9, "s"),
     ("1 inch", 0.0254, "m"),
     ("(1/2) ft", 0.1524, "m"),
     ("2 lbf*ft", 2 * 1.3558179483314004, "N*m"),
