@@ -56,6 +56,7 @@ class Cursor:
         self.operators = 0
         self.peak = 0
         self.misindented: tuple[Token, Token] | None = None
+        self.unopened: list[Place] = []  # where a `{` may be missing, if a `}` proves to be too many
         self.unbalanced = False  # whether a brace is missing somewhere, or a bracket too many
         self.indices: Mapping[str, str] = {}  # of the loops around: the value of each in this iteration
         self.declared: Mapping[str, Measure] = {}  # units that the deck declares

@@ -16,7 +16,7 @@ import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import field
-from itertools import takewhile
+from itertools import pairwise, takewhile
 from types import MappingProxyType
 from typing import NoReturn
 
@@ -116,6 +116,8 @@ def parse_expression(
 
 
 class _Parser(Uses):
+    closed_within_line: Token | None = None  # a `}` that ends a block and a line that has not begun with it
+
     def entries(self, into: list[Entry]) -> None:
         """Entries up to the closing brace of the block they stand in, or to the end."""
         depth = len(self.open)
@@ -190,6 +192,10 @@ class _Parser(Uses):
         self.entries(body)
         self.end_items(outer)
         closing = self.leave()
+        before = self.tokens[self.at - 2]
+        on_lines = [self.line_of(each) for each in (opening, before, closing)]
+        if not self.open and on_lines[0] != on_lines[1] == on_lines[2] and not closing.expansions:
+            self.closed_within_line = closing
         if self.misindented is None and not (opening.expansions or closing.expansions):
             before, after = opening.source.indent(opening.offset), closing.source.indent(closing.offset)
             if after < before and opening.line != closing.line:
@@ -215,9 +221,15 @@ class _Parser(Uses):
         raise EndedInsideBlock
 
     def closes_nothing(self) -> None:
+        """Report a `}` too many, with the place where a `{` may be missing; what was reported there follows from it."""
         token = self.advance()
         self.unbalanced = True
-        self.tell("D022", f"this `{token.text}` closes nothing", token, help=_NOT_OPEN)
+        also = [Label(place, "perhaps a `{` is missing here") for place in self.unopened[-1:]]
+        if self.unopened:
+            self.findings.withdraw("D021", self.unopened.pop())
+        elif self.closed_within_line is not None:
+            also = [Label(self.closed_within_line.place, "perhaps the `{` to this one is missing")]
+        self.tell("D022", f"this `{token.text}` closes nothing", token, also=also, help=_NOT_OPEN)
 
     # entries
 
@@ -366,12 +378,15 @@ class _Parser(Uses):
         words, path = names[:-1], [names[-1], *tail]
         if words and words[0].text in COMPARE and operator.text == "=":
             self.fail("D023", "`=` sets a value", operator, help=write("==", "to compare, write `==`"))
+        if len(words) > 1:
+            self.unopened.append(self.behind(words[-1]))
         value = self.value()
-        self.semicolon(value)
+        self.semicolon(value, may_open=bool(words))
         return Setting(_words(words), _words(path), operator.text, value, span(names[0], path[-1]))
 
     def group(self, names: list[Token], tail: list[Token]) -> Group:
         base = _base_at(names)
+        self.unopened += [self.behind(a) for a, b in pairwise(names) if self.line_of(a) != self.line_of(b)]
         if tail and (base is None or base + 2 != len(names)):
             self.fail(
                 "D020",
@@ -441,7 +456,7 @@ class _Parser(Uses):
             self.unexpected("`;`", help="a sample names its design: `sample lhs(200) { ... }`")
         if words[0].text == "require":
             value = self.over_cases(value)
-        self.semicolon(value)
+        self.semicolon(value, may_open=True)
         return Statement(_words(words), value, span(words[0], words[-1]))
 
     def named_requirement(self, names: list[Token]) -> Statement:
@@ -484,8 +499,9 @@ class _Parser(Uses):
             self.fail("D020", f"expected {wanted} after `{last.text[:40]}`", self.behind(last))
         self.unexpected(f"{wanted} after `{last.text[:40]}`")
 
-    def semicolon(self, value: Expression) -> None:
-        """Read the end of an entry. A missing semicolon at a line's end is noted and forgiven."""
+    def semicolon(self, value: Expression, *, may_open: bool = False) -> None:
+        """Read the end of an entry. A missing semicolon at a line's end is noted and forgiven. may_open: whether it may
+        be a block's head without its `{` if it ends in a name"""
         token = self.token
         if token.text == ";":
             self.advance()
@@ -494,6 +510,8 @@ class _Parser(Uses):
             return
         if token.kind == BAD:
             raise Unreadable
+        if may_open and isinstance(value, Name):
+            self.unopened.append(self.behind(self.previous))
         if token.text == "}" or token.kind == END or self.on_new_line(self.at):
             self.tell("D021", "expected `;`", self.behind(self.previous), help=write(";", _SEMICOLON, where="before"))
             return

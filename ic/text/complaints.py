@@ -296,6 +296,10 @@ class Complaints:
         if not self.is_known_to_lack(of, *names):
             self.error(code, message, at or of, also=also, help=help)
 
+    def withdraw(self, code: str, at: Place) -> None:
+        """Take back what was reported with this code at a place, where another message turns out to say why."""
+        self._found = {each: None for each in self._found if (each.code, each.at and each.at.place) != (code, at)}
+
     def lack(
         self, of: Place, name: str, code: str, message: str, at: Label | Place, *, also: Iterable[Label], help: str
     ) -> None:
