@@ -52,7 +52,7 @@ error[D061]: `duration` of run `swing` is in s, and this is in m
    |
 13 |     duration = 1 m;
    |                ^^^
-   = help: write it in s, ms, us, min or h
+   = help: write it in s, ms, us, min, h or ns
 
 1 error
 """,

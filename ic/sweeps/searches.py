@@ -432,7 +432,7 @@ def with_corners(search: Search, columns: Mapping[str, CaseValues]) -> tuple[dic
 def check_goal(complaints: Complaints, name: str, search: Search, metrics: Sequence[MetricUse]) -> None:
     """Report a goal that is not a metric of the run."""
     known = [use.name for use in metrics]
-    if search.metric not in known:
+    if search.metric not in known and not complaints.is_lost(search.metric):
         missing = ["a run has one by `metric NAME = MODEL { of = ...; }`"] if not known else []
         helps = [
             *did_you_mean(search.metric, known),

@@ -38,6 +38,11 @@ UNKNOWN_WORDS = ("D044", "D045", "D082", "D108", "D136", "D157")
 """Codes of messages about unknown words of the language, which no deck defines."""
 
 
+MAY_FOLLOW = ("D114", "D125", "D132", "D144", "D362", "D375", "D376")
+"""Codes of messages that a run has no joint, initial value, channel, metric or linear answer of a name, which an error
+in what would define it may bring about."""
+
+
 _BEFORE = error("", "an error outside of the definition")
 
 
@@ -147,7 +152,17 @@ class Complaints:
     def all(self) -> tuple[Diagnostic, ...]:
         """All findings; of a mistake in several iterations of a loop, or under several roofs of a file, only the first,
         which names the others."""
-        return tuple(once_for_all_roofs(map(self._with_iterations, self._found)))
+        return tuple(once_for_all_roofs(map(self._with_iterations, self._without_guesses())))
+
+    def _without_guesses(self) -> Iterator[Diagnostic]:
+        """All findings; those that may follow from an error of another kind without a guess of what was meant, which
+        would change what a sound entry means."""
+        others = any(each.severity == "error" and each.code not in MAY_FOLLOW for each in self._found)
+        for each in self._found:
+            plain = tuple(line for line in each.help if not getattr(line, "changes", ()))
+            if others and each.code in MAY_FOLLOW and len(plain) < len(each.help):
+                each = replace(each, help=(*plain, "it may follow from another error here: mend that first"))
+            yield each
 
     @property
     def errors(self) -> tuple[Diagnostic, ...]:
@@ -211,6 +226,10 @@ class Complaints:
     def note_lost_names(self, *names: str) -> None:
         """Note names that may be defined by something that could not be taken in, already reported."""
         self._lost.update(names)
+
+    def is_lost(self, name: str) -> bool:
+        """Return True if this name may be defined by something that could not be taken in."""
+        return name in self._lost
 
     def note_base(self, of: Place, base: Place) -> None:
         """Note that the definition at `of` inherits its base's entries, and lacks those that the base lacks."""

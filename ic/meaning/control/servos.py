@@ -226,6 +226,7 @@ def moving_kind(scope: Scope, item: Item, arm: ResolvedArm, so: str) -> str | No
             item.place,
             help=[*did_you_mean(item.name, moving), known_words("joints", moving)],
         )
+        scope.complaints.note_lost_names(item.name)  # what else names it follows from this
     if kind == "fixed":
         scope.complaints.error(
             "D145",

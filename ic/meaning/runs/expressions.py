@@ -63,6 +63,8 @@ def resolve_signals(scope: Scope, block: MergedBlock, structure: Structure, name
         with scope.complaints.gather():
             signals.enter(path, item)
             signals.lost.discard(path)
+        if path in signals.lost:
+            scope.complaints.note_lost_names(item.name)
     return signals
 
 

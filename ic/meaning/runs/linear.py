@@ -171,7 +171,8 @@ def resolve_linear_metrics(
     """The metrics of a run that are figures of linear answers."""
     figures = [item for item in block.of_kind("metric") if is_figure_metric(item)]
     places = [each.path for each in input_signals(structure) if each.is_output] if figures else []
-    found = (_metric(scope, item, block, places, answers) for item in figures)
+    found = [_metric(scope, item, block, places, answers) for item in figures]
+    scope.complaints.note_lost_names(*(item.name for item, use in zip(figures, found, strict=True) if use is None))
     return tuple(use for use in found if use is not None)
 
 

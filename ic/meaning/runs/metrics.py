@@ -28,8 +28,9 @@ def resolve_metrics(
     """The metrics that are computed during the run, and the watched expressions that are not yet channels of the
     run."""
     made: dict[str, SignalExpression] = {}
-    own = (item for item in block.of_kind("metric") if not is_figure_metric(item))
-    found = (_metric(scope, item, signals, made) for item in own)
+    own = [item for item in block.of_kind("metric") if not is_figure_metric(item)]
+    found = [_metric(scope, item, signals, made) for item in own]
+    scope.complaints.note_lost_names(*(item.name for item, use in zip(own, found, strict=True) if use is None))
     return tuple(use for use in found if use is not None), tuple(made.values())
 
 

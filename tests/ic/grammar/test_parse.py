@@ -437,6 +437,22 @@ def test_one_mistake_is_one_message_with_its_remedy(desk: Desk, text: str, line:
     assert told.endswith("\n1 error\n"), told
 
 
+@pytest.mark.parametrize(("text", "place"), [
+    ("servo motor\n    kp = 3;\n}", "1:12  perhaps a `{` is missing here"),
+    ("arm crane\n    link bar { mass = 2; }\n}", "1:10  perhaps a `{` is missing here"),
+    ("arm a {\n    link bar mass = 2; }\n}", "2:13  perhaps a `{` is missing here"),
+    ("arm a {\n    joint j revolute parent = base; }\n}", "2:21  perhaps a `{` is missing here"),
+    ("servo b like a kp = 3; }", "1:15  perhaps a `{` is missing here"),
+    ("run r {\n    metric m = peak of = q; }\n    record = [q];\n}", "2:20  perhaps a `{` is missing here"),
+    ("run r {\n    rates dynamics = 1 kHz; }\n    record = [q];\n}", "2:29  perhaps the `{` to this one is missing"),
+])  # fmt: skip
+def test_a_brace_too_many_names_the_place_where_one_may_be_missing(desk: Desk, text: str, place: str):
+    told = desk.told(text)
+    assert told.startswith("error[D022]: this `}` closes nothing\n"), told
+    assert f" ::: a.ic:{place}\n" in told
+    assert told.endswith("\n1 error\n"), told
+
+
 def test_several_mistakes_are_told_in_one_run_and_what_is_right_between_them_is_not(desk: Desk):
     text = """\
 run a {

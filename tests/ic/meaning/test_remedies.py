@@ -46,7 +46,7 @@ def only_help(folder: Path, *parts: str) -> tuple[str, tuple[str, ...]]:
         (None, None, ("    record =", "    initial { q = 30; }\n    record ="), "write `30 deg` or `30 rad`"),
         (None, None, ("    record =", "    environment { gravity = -9.81 m/s^2; }\n    record ="),
          "write `gravity = [0, 0, -9.81] m/s^2;`"),
-        (("2 kg", "2 m"), None, None, "write it in kg, g or t"),
+        (("2 kg", "2 m"), None, None, "write it in kg, g, t or mg"),
         (None, ("0.1 rad/s", "sine(amplitude = 1 rad/s, frequency = 0.5 cycle/s)"), None,
          "a frequency counts cycles, without an angle: write `0.5 Hz`"),
         (None, ("kp = ", "k_position = 15 rad/s; kp = "), None, "leave the angle out: write `15 1/s`"),

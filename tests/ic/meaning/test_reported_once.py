@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.ic.small_decks import SERVO, changed, check, codes, messages
 
 ARM = """\
@@ -120,3 +122,45 @@ def test_a_duration_that_is_out_of_range_is_used_by_no_run_like_the_one_that_wri
     run = changed(RUN, ("duration = 1 s;", f"duration = -1e305 s; {felt}"), ("lift = slide;", ""))
     more = "run again like hold { seed = 1; }\nsweep seeds of again { vary links.bar.mass = [1] kg; }\n"
     assert codes(tmp_path, ARM, SERVO, SLIDE, run, more, select="all") == ["D077"]
+
+
+WATCHED = """\
+run hold {
+    arm = swing;
+    servos { hinge = drive; elbow = drive; lift = slide; }
+    initial { elbow.q = 10 deg; }
+    rates { dynamics = 1 kHz; servos = 1 kHz; record = 100 Hz; }
+    duration = 1 s;
+    signal amps_1 = hinge.servo.motor_torque / hinge.servo.kt;
+    signal amps_2 = elbow.servo.motor_torque / elbow.servo.kt;
+    record = [q, signals.amps_1, signals.amps_2];
+    metric most = max { of = max(abs(signals.amps_1), abs(signals.amps_2)); }
+    require most < 5 A;
+}
+search worst of hold { drive.kp = between(0.1, 0.2) V*s/rad; maximise most; at_most = 5; }
+"""
+
+
+@pytest.mark.parametrize(("change", "code"), [
+    (("parent = bar;", "parent = baar;"), "D094"),
+    (("joint elbow", "joint elbw"), "D144"),
+    (("kt = 0.05 N*m/A", "kt = 0.05 N*m"), "D061"),
+    (("kt = 0.05 N*m/A", "ktt = 0.05 N*m/A"), "D141"),
+    (("link tip  {", "link tipp {"), "D094"),
+    (("signal amps_2 = elbow", "signal amps_2 = elbw"), "D125"),
+    (("of = max(", "of = maxx("), "D069"),
+])  # fmt: skip
+def test_what_follows_from_a_mistake_is_not_told_beside_it(tmp_path: Path, change: tuple[str, str], code: str) -> None:
+    assert codes(tmp_path, ARM, SERVO, SLIDE, WATCHED, select="all") == []
+    assert set(codes(tmp_path, changed(ARM + SERVO + SLIDE + WATCHED, change), select="all")) == {code}
+
+
+def test_an_unknown_name_beside_another_kind_of_mistake_carries_no_fix(tmp_path: Path) -> None:
+    run = changed(RUN, ("record = [q]", "record = [qq]"))
+    (alone,) = check(tmp_path, ARM, SERVO, SLIDE, run, select="all").diagnostics
+    assert any(getattr(line, "changes", ()) for line in alone.help)
+    servo = changed(SERVO, ("ratio = 100;", "ratio = 100 m;"))
+    _, beside = check(tmp_path, ARM, servo, SLIDE, run, select="all").diagnostics
+    assert beside.code == alone.code == "D125"
+    assert not any(getattr(line, "changes", ()) for line in beside.help)
+    assert beside.help[-1] == "it may follow from another error here: mend that first"

@@ -34,7 +34,7 @@ error[D061]: `at` of joint `hinge` is in m, and this is in s
   |
 3 |     joint hinge revolute { parent = base; child = bar; axis = z; at = [1, 2, 3] s; }
   |                                                                       ^^^^^^^^^
-  = help: write it in m, km, cm, mm or um
+  = help: write it in m, km, cm, mm, um, inch or ft
 """
     )
 

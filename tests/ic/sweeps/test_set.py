@@ -546,7 +546,7 @@ def test_the_decks_own_value_may_be_set(tmp_path: Path) -> None:
      "  = help: write it in rad/s, deg/s or rpm\n\n1 error\n"),
     ("links.bar.mass=2 m", "error[D061]: `mass` of link `bar` is in kg, and this is in m\n"
      " --> <command line>:1:16\n  |\n1 | links.bar.mass=2 m\n  |                ^^^\n"
-     "  = help: write it in kg, g or t\n\n1 error\n"),
+     "  = help: write it in kg, g, t or mg\n\n1 error\n"),
     ("links.bar.mass=-2 kg", "error[D077]: `mass` of link `bar` must be at least 0 kg\n"
      " --> <command line>:1:16\n  |\n1 | links.bar.mass=-2 kg\n  |                ^^^^^ this is -2 kg\n"
      "  = help: write a number of at least 0 kg (mass of the link)\n\n1 error\n"),

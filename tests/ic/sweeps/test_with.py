@@ -165,7 +165,7 @@ error[D061]: `reach` is in m, and this is in s
 1 | param reach = 2 s;
   |               ^^^
  ::: swing.ic:2:7  defined here
-  = help: write it in m, km, cm, mm or um
+  = help: write it in m, km, cm, mm, um, inch or ft
 """
     )
 
@@ -269,7 +269,7 @@ error[D061]: `reach` is in m, and this is in s
 2 | run it like hold { with reach = 2 s; }
   |                                 ^^^
  ::: swing.ic:2:7  defined here
-  = help: write it in m, km, cm, mm or um
+  = help: write it in m, km, cm, mm, um, inch or ft
 """),
     ("with links.bar.mass = 3 kg; } run them like it { links.bar.mass += 4 kg;", """\
 error[D056]: nothing is in `links.bar.mass` yet to append to
@@ -357,7 +357,7 @@ error[D061]: `mass` of link `bar` is in kg, and this is in m
   |
 2 | run it like hold { with links.bar.mass = 3 m; }
   |                                          ^^^
-  = help: write it in kg, g or t
+  = help: write it in kg, g, t or mg
 """),
     ("with links.bar.mass = 3 kg; with swing.links.bar.mass = 2 kg;", """\
 error[D232]: this sets `links.bar.mass`, which is set already

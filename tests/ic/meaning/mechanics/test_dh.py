@@ -267,7 +267,7 @@ error[D061]: `a` of the dh of joint `j0` is in m, and this is in rad
   |
 3 |     joint j0 revolute { parent = base; child = l0; dh = classic(a = 1 rad); }
   |                                                                     ^^^^^
-  = help: write it in m, km, cm, mm or um
+  = help: write it in m, km, cm, mm, um, inch or ft
 """),
     ("dh = classic(1 m, 2 rad, 0 m, 0 rad);", """\
 error[D180]: `classic` takes its numbers by name

@@ -174,7 +174,7 @@ error[D061]: `yaw` of the base is in rad, and this is in m
   |
 8 |     base = prescribed { yaw = 10 cm; }
   |                               ^^^^^
-  = help: write it in rad, deg, mrad, arcmin, arcsec or cycle
+  = help: write it in rad, deg, mrad, arcmin, arcsec, cycle or rev
 
 1 error
 """),
