@@ -53,6 +53,7 @@ class Parameter:
     share        of a number: part of a whole, which is seldom above 1; a bare number above that is warned of
     ticks        of a frequency: how often something is done, which turns no angle: 1/s is as plain there as Hz
     as_many_as   of a list: the list that it has a number for each of; it may be empty where that is its default
+    if_negative  of a number above 0: what a negative one stands for, where its magnitude may be written in its place
     """
 
     name: str
@@ -79,6 +80,7 @@ class Parameter:
     share: bool = False
     ticks: bool = False
     as_many_as: str = ""
+    if_negative: str = ""
     only: Only | None = None
 
 

@@ -320,7 +320,15 @@ class Complaints:
         self._found = {each: None for each in self._found if (each.code, each.at and each.at.place) != (code, at)}
 
     def lack(
-        self, of: Place, name: str, code: str, message: str, at: Label | Place, *, also: Iterable[Label], help: str
+        self,
+        of: Place,
+        name: str,
+        code: str,
+        message: str,
+        at: Label | Place,
+        *,
+        also: Iterable[Label],
+        help: Iterable[str] | str,
     ) -> None:
         """Report an error about the definition at `of`, which has no entry of this name, and note that."""
         self.known_missing.add((of, name))

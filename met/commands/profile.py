@@ -34,6 +34,7 @@ class Profile:
                 sample it do not carry that, or the run ends before. Asked with numbers. None: nothing is known of it
     limits      those that it has, such as a table's ends: how much of a run is spent at each is kept of every case
     shortest    (p) -> the least, s, that its parameter `over` may be, for all of it to find room; None: any
+    of_a_rate   what help says of it under a `rate` command, where it is easily taken for another course
     from_file   the lists `times` and `values` are columns of a CSV file: a deck writes `file` and `column` for them
     """
 
@@ -45,6 +46,7 @@ class Profile:
     content: Callable[[Any, float], Content] | None = None
     limits: tuple[Limit, ...] = ()
     shortest: Callable[[Any], Real] | None = None
+    of_a_rate: str = ""
     from_file: bool = False
 
     def jump(self, p: Any) -> Jump:

@@ -51,6 +51,8 @@ def content(p: Any, duration: float) -> Content:
 PROFILE = Profile(
     name="trapezoid",
     doc=__doc__,
+    of_a_rate="the joint goes on at the rate `to`: to move and stop it write `rate(pulse(to = ..., slope = ..., "
+    "over = ...))`, or `position(trapezoid(...))`",
     parameters=(
         Parameter(name="start", unit="command", default=0.0, doc="value before the move"),
         Parameter(name="to", unit="command", doc="value after the move"),

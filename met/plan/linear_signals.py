@@ -37,3 +37,19 @@ def _of_servo(use: ServoUse) -> list[InputSignal]:
     return asked + [
         InputSignal(f"{use.joint}.servo.{each.name}", use.joint, use.divisor, True) for each in parts.outputs
     ]
+
+
+def no_computer(structure: Structure, name: str = "") -> tuple[str, ...]:
+    """The help where a run has no computer whose loop could be opened, or the joint of this signal has none: what to do
+    if the law is continuous. Empty where there is one."""
+    ticks = any(each.is_output for each in input_signals(structure))
+    laws = {use.joint for use in structure.servos if use.continuous}
+    joint = name.partition(".")[0]
+    if joint in laws or (laws and not ticks):
+        rate = f"{structure.schedule.base_hz / structure.schedule.dynamics:.6g} Hz"
+        return (
+            "a law that is `continuous` is a part of the arm, and has no loop to open",
+            f"a fast computer is nearly the same: write `rate = {rate};`, that of the dynamics, in "
+            f"{f'the servo of `{joint}`' if joint in laws else 'a servo'}",
+        )
+    return () if ticks else ("no servo here has a computer that ticks",)

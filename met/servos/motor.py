@@ -12,6 +12,7 @@ RATIO = Parameter(
     name="ratio",
     unit="rad/joint",
     above=0.0,
+    if_negative="the joint moves the same, and the motor's rate, torque and voltage have the other sign",
     source=TABLE_1,
     doc="gear ratio N: angle of the motor divided by that of the joint",
 )

@@ -262,15 +262,16 @@ def _of_joints(
     for wanted in guide.of_joint:
         general = body.get(wanted.name)
         parts = [part for part in components(general, len(joints)) if part is not None]
-        if general is not None and len(joints) > 1 and len(parts) == len(joints):
-            each = "  ".join(
-                f"{joint}.{wanted.name} = {spell(part)};" for joint, part in zip(joints, parts, strict=True)
-            )
+        if general is not None and joints and len(parts) > 1:
+            fits = len(parts) == len(joints)
+            values = [spell(part) for part in parts] if fits else ["..."] * len(joints)
+            each = "  ".join(f"{joint}.{wanted.name} = {value};" for joint, value in zip(joints, values, strict=True))
+            follow = f"{', '.join(f'`{joint}`' for joint in joints)} alone follow{'s' * (len(joints) == 1)} it"
             scope.complaints.error(
                 "D071",
                 f"`{wanted.name}` of {owner.label} is one number for each joint, and this is a list",
                 value_place(general),
-                help=f"write `{each}`",
+                help=f"write `{each}`" if fits else [f"write `{each}`", follow],
             )
             scope.checks.fail(owner.join(wanted.name))
             continue

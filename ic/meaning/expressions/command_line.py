@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from ic.grammar.syntax import Expression, Setting
+from ic.meaning.expressions.lists import no_single_number
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value
 from ic.text.lexer import COMMAND_LINE
-from met.diagnostic import Place, Problem, error
+from met.diagnostic import Place
 from met.frozen import frozen
 from met.plan import Origin
 
@@ -46,7 +47,5 @@ def evaluate_setting(entry: Setting, path: str, names: Names) -> CommandLineValu
     """The number that an entry sets. Raises Problem where it is not a number."""
     found = names.evaluate(entry.value)
     if not isinstance(found, Value):
-        raise Problem(
-            error("D071", f"`{path}` is one number, and this is a list", found.place, help="leave the brackets out")
-        )
+        raise no_single_number(f"`{path}`", found)
     return CommandLineValue(path, found, entry.value, entry.overrides)

@@ -12,6 +12,7 @@ from dataclasses import replace
 from ic.grammar.places import spanned
 from ic.grammar.syntax import Binary, Indexed, Name
 from ic.meaning.expressions.quantity import Value, ValueList
+from ic.text.lexer import COMMAND_LINE
 from met import units
 from met.diagnostic import Label, Place, Problem, error
 from met.trace import Scalar
@@ -20,6 +21,15 @@ from met.units import PURE
 COMPONENTS = ("x", "y", "z")
 
 Arithmetic = Callable[[Binary, Value, Value], Value]
+
+
+def no_single_number(what: str, found: ValueList) -> Problem:
+    """The error where a list stands in the place of one number. what: it is given, in words"""
+    count = len(found.items)
+    help = "leave the brackets out" if count == 1 else f"write one number: these are {count}"
+    if count > 1 and found.place.file == COMMAND_LINE:
+        help = f"`--set` takes one number, and these are {count}; `--vary`, in its place, runs each of them"
+    return Problem(error("D071", f"{what} is one number, and this is a list", found.place, help=help))
 
 
 def list_arithmetic(

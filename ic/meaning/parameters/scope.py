@@ -25,13 +25,14 @@ from ic.meaning.expressions.command_line import (
     written_origin,
 )
 from ic.meaning.expressions.conditions import Checks, VariedPath
+from ic.meaning.expressions.lists import no_single_number
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, ValueList
 from ic.meaning.expressions.remedies import components
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import XYZ, Owner, Settled
-from ic.meaning.parameters.value_checks import ValueChecks
+from ic.meaning.parameters.value_checks import ValueChecks, how_to_write
 from ic.text.complaints import Complaints
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.parameter import Parameter
@@ -406,8 +407,7 @@ class Scope:
         """The value of the item's expression. Raises Problem, D071 where it is a list."""
         found = self.evaluate(item, expression)
         if isinstance(found, ValueList):
-            message = f"`{wanted.name}` of {owner.label} is one number, and this is a list"
-            raise Problem(error("D071", message, found.place, help="leave the brackets out"))
+            raise no_single_number(f"`{wanted.name}` of {owner.label}", found)
         return found
 
     def _missing(self, owner: Owner, wanted: Parameter) -> None:
@@ -418,10 +418,6 @@ class Scope:
         lacks = removed or owner.place
         if any(self.complaints.is_known_to_lack(place, wanted.name) for place in (lacks, *bases)):
             return  # already reported: in another use, or in a base, or another word was taken for it
-        unit = owner.unit(wanted)[0]
-        shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
-        shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {unit}"
-        doc = f" ({wanted.doc})" if wanted.doc != wanted.name else ""
         also = [Label(owner.place, f"{owner.label} stands here")] if removed is not None else []
         at = Label(removed, "removed here") if removed is not None else owner.place
         self.complaints.lack(
@@ -431,7 +427,7 @@ class Scope:
             f"{owner.label} has no `{wanted.name}`",
             at,
             also=also,
-            help=f"write `{wanted.name} = {shown}{'' if owner.call else ';'}`" + doc,
+            help=how_to_write(owner, wanted),
         )
 
     def _settle(

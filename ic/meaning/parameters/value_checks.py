@@ -17,13 +17,29 @@ from ic.meaning.expressions.quantity import Value, ValueList
 from ic.meaning.expressions.remedies import unit_remedy
 from ic.meaning.parameters.owner import Owner
 from ic.text.complaints import Complaints
-from met import units
+from met import models, units
 from met.diagnostic import Help, Place, Problem, TextChange, error, write, write_either
 from met.parameter import Parameter
 from met.plan import JointKind
 from met.trace import Real, Scalar
 from met.unit_parser import parse_unit
+from met.unit_parser import written
 from met.units import PURE
+
+
+def how_to_write(owner: Owner, wanted: Parameter) -> list[str]:
+    """The help where a parameter is missing."""
+    unit = owner.unit(wanted)[0]
+    shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
+    shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {unit}"
+    doc = f" ({wanted.doc})" if wanted.doc != wanted.name else ""
+    return [f"write `{wanted.name} = {shown}{'' if owner.call else ';'}`{doc}", *of_a_rate(owner)]
+
+
+def of_a_rate(owner: Owner) -> list[str]:
+    """What help says of a course under a `rate` command that may be taken for another."""
+    course = models.find_own("command").get(owner.label.strip("`")) if owner.call and owner.command == "rate" else None
+    return [course.of_a_rate] if course is not None and course.of_a_rate else []
 
 
 @dataclass
@@ -174,6 +190,10 @@ class ValueChecks:
         if wanted.whole:
             limits, remedy = f"whole and {limits}", remedy.replace("a number", "a whole number")
         limits += unit if bounds else ""
+        helps: tuple[str, ...] = (remedy + (f" ({wanted.doc})" if wanted.doc else ""),)
+        if wanted.if_negative and isinstance(value, float) and value < 0.0:
+            new = written(-value, text)
+            helps = (write(new, f"write its magnitude, `{new}`: {wanted.if_negative}", where="value"),)
         self.checks.require(
             (value,),
             test,
@@ -182,7 +202,7 @@ class ValueChecks:
             place=place,
             path=path,
             needs=needs,
-            help=remedy + (f" ({wanted.doc})" if wanted.doc else ""),
+            help=helps,
             also=self.names.label_of_cell(value, place),
         )
 
@@ -204,7 +224,7 @@ class ValueChecks:
             f"of a `{owner.command}` command it is in {text}; with `{kind}({course}(...))` it would be in "
             f"{found}, like all of that course"
             for kind in fits
-        ]
+        ] + of_a_rate(owner) * bool(fits)
 
     def _remark_cycles(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> None:
         """Report a unit that may mean cycles in place of radians, or the reverse."""

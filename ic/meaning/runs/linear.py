@@ -22,7 +22,7 @@ from met.parameter import Parameter
 from met.plan import Joint, Structure
 from met.plan.channel import recordable
 from met.plan.judged import MetricUse
-from met.plan.linear_signals import InputSignal, input_signals
+from met.plan.linear_signals import InputSignal, input_signals, no_computer
 from met.plan.linear_uses import FIGURES, LinearUse
 from met.trace import Scalar
 
@@ -30,8 +30,6 @@ ONE_INSTANT = NotSweepable("is one for the whole sweep", "write a `linear` block
 
 EQUILIBRIUM = "equilibrium"
 """The word for an arm at rest, in place of an instant."""
-
-NO_PLACE = "no servo here has a computer that ticks: a law that is continuous is a part of the arm"
 
 LISTS = {"inputs": "inputs", "outputs": "outputs", "open": "opened"}
 """Keys of a block that are lists of signals, and the fields that hold them."""
@@ -158,9 +156,8 @@ def _is_known(scope: Scope, name: Name, key: str, structure: Structure, known: M
     if name.text in places:
         return True
     what = "place to open a loop" if key == "open" else "input"
-    helps = [*did_you_mean(name.text, places), known_words("there are", places)]
-    if not places:
-        helps = [NO_PLACE]
+    helps = [*no_computer(structure, name.text)] or [*did_you_mean(name.text, places)]
+    helps += [known_words("there are", places)] * bool(places)
     scope.complaints.error("D375", f"there is no {what} `{name.text}`", name.place, help=helps)
     return False
 
@@ -170,16 +167,16 @@ def resolve_linear_metrics(
 ) -> tuple[MetricUse, ...]:
     """The metrics of a run that are figures of linear answers."""
     figures = [item for item in block.of_kind("metric") if is_figure_metric(item)]
-    places = [each.path for each in input_signals(structure) if each.is_output] if figures else []
-    found = [_metric(scope, item, block, places, answers) for item in figures]
+    found = [_metric(scope, item, block, structure, answers) for item in figures]
     scope.complaints.note_lost_names(*(item.name for item, use in zip(figures, found, strict=True) if use is None))
     return tuple(use for use in found if use is not None)
 
 
 def _metric(
-    scope: Scope, item: Item, block: MergedBlock, places: Sequence[str], answers: Sequence[LinearUse]
+    scope: Scope, item: Item, block: MergedBlock, structure: Structure, answers: Sequence[LinearUse]
 ) -> MetricUse | None:
-    """The metric of a figure. places: where a loop of the run can be opened."""
+    """The metric of a figure."""
+    places = [each.path for each in input_signals(structure) if each.is_output]
     figure = FIGURES[word_of(item.value) or ""]
     body = item.body or MergedBlock()
     if item.value is None or refuse_values(scope, item.value, ["of"]):
@@ -201,7 +198,7 @@ def _metric(
         return None  # it failed (already reported)
     if figure.of_loops and not use.opened:
         message = f"`linear {use.name}` opens no loop, so it has no `{figure.name}`"
-        helps = [f"write `open = {places[0]};` in it"] if places else [NO_PLACE]
+        helps = [f"write `open = {places[0]};` in it"] if places else [*no_computer(structure)]
         helps += [known_words("places to open a loop", places)] if len(places) > 1 else []
         scope.complaints.error("D376", message, _place(item, of), help=helps)
         return None

@@ -20,9 +20,9 @@ from met.analysis.linear.standing import moves, refusal, settled, standing, weak
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.messages.alike import nearest
-from met.plan import Experiment, Recorded
+from met.plan import Experiment, Recorded, Structure
 from met.plan.channel import recordable
-from met.plan.linear_signals import InputSignal, input_signals
+from met.plan.linear_signals import InputSignal, input_signals, no_computer
 
 MOST_TICKS = 5000
 """Ticks of the base rate in a period, at most: each takes some 10 ms."""
@@ -196,7 +196,8 @@ class LinearQuestion:
             raise _outside(experiment, self.at)
         every = input_signals(experiment.structure)
         solved = [each.path for each in every if not each.is_output] if self.stands else []
-        named = _named(every, tuple(dict.fromkeys((*self.inputs, *self.opened, *solved))), self.opened)
+        asked = tuple(dict.fromkeys((*self.inputs, *self.opened, *solved)))
+        named = _named(experiment.structure, every, asked, self.opened)
         program = PeriodProgram(experiment, named, _records(experiment, self.outputs))
         if program.ticks > MOST_TICKS:
             raise _too_long(program)
@@ -427,26 +428,26 @@ def _records(experiment: Experiment, outputs: Sequence[str]) -> tuple[Recorded, 
     return tuple(each for name in outputs for each in known[name])
 
 
-def _named(every: Sequence[InputSignal], asked: Sequence[str], opened: Sequence[str]) -> tuple[InputSignal, ...]:
+def _named(
+    structure: Structure, every: Sequence[InputSignal], asked: Sequence[str], opened: Sequence[str]
+) -> tuple[InputSignal, ...]:
     known = {each.path: each for each in every}
     laws = {path: each for path, each in known.items() if each.is_output}
     for path in asked:
         if path in opened and path not in laws:
-            raise _unknown("place to open a loop", path, laws)
+            raise _unknown("place to open a loop", path, laws, no_computer(structure, path))
         if path not in known:
-            raise _unknown("input", path, known)
+            raise _unknown("input", path, known, no_computer(structure, path))
     return tuple(known[path] for path in asked)
 
 
-def _unknown(what: str, name: str, known: Mapping[str, object]) -> Problem:
-    near = nearest(name, known)
-    helps = [f"did you mean `{near}`?"] if near else []
+def _unknown(what: str, name: str, known: Mapping[str, object], why: Sequence[str] = ()) -> Problem:
+    near = nearest(name, known) if not why else None
+    helps = [*why, *([f"did you mean `{near}`?"] if near else [])]
     if known and len(known) <= 12:
         helps.append("there are " + ", ".join(f"`{each}`" for each in known))
     elif what == "output":
         helps.append("an output is any name that `record` takes")
-    elif not known:
-        helps.append("no servo here has a computer that ticks: a law that is continuous is a part of the arm")
     return Problem(error("D373", f"there is no {what} `{name}`", help=tuple(helps)))
 
 

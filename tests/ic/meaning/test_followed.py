@@ -112,6 +112,45 @@ def test_a_course_in_the_units_of_another_kind_of_command_is_not_mended_to_a_fas
     )
 
 
+def test_a_trapezoid_of_rate_is_told_of_the_courses_that_come_to_rest(tmp_path: Path) -> None:
+    servo = SERVO.replace("rate(0.1 rad/s)", "rate(trapezoid(to = 0.1 rad/s, max_rate = 0.1 rad/s))")
+    found = check(tmp_path, ARM, servo, RUN).diagnostics
+    assert sorted(each.code for each in found) == ["D061", "D075"]
+    for each in found:
+        assert each.help[-1] == (
+            "the joint goes on at the rate `to`: to move and stop it write `rate(pulse(to = ..., slope = ..., over = "
+            "...))`, or `position(trapezoid(...))`"
+        )
+    pulse = "rate(pulse(to = 0.1 rad/s, slope = 1 rad/s^2, over = 0.5 s))"
+    assert check(tmp_path, ARM, SERVO.replace("rate(0.1 rad/s)", pulse), RUN).diagnostics == ()
+
+
+def test_a_negative_gear_ratio_is_mended_by_its_magnitude(tmp_path: Path) -> None:
+    servo = SERVO.replace("ratio = 100;", "ratio = -62.6111;")
+    (found,) = check(tmp_path, ARM, servo, RUN).diagnostics
+    assert found.code == "D077"
+    assert found.help == (
+        "write its magnitude, `62.6111`: the joint moves the same, and the motor's rate, torque and voltage have the "
+        "other sign",
+    )
+    assert check(tmp_path, ARM, servo.replace("-62.6111", "62.6111"), RUN).diagnostics == ()
+
+
+def test_a_list_for_more_joints_than_follow_a_guide_names_those_that_do(tmp_path: Path) -> None:
+    guided = GUIDED.replace("elbow = free;", "elbow = free { command = position(0 deg); }")
+    (found,) = check(tmp_path, FREE, guided, ARM).diagnostics
+    assert found.help == ("write `hinge.to = ...;`", "`hinge` alone follows it")
+    assert check(tmp_path, FREE, guided.replace("to = [50, -76] deg;", "hinge.to = 50 deg;"), ARM).diagnostics == ()
+
+
+def test_several_numbers_for_set_are_told_of_vary(tmp_path: Path) -> None:
+    (found,) = check(tmp_path, ARM, SERVO, RUN, set=("drive.kp=[0.1, 0.2] V*s/rad",)).diagnostics
+    assert found.help == ("`--set` takes one number, and these are 2; `--vary`, in its place, runs each of them",)
+    varied = check(tmp_path, ARM, SERVO, RUN, vary=("drive.kp=[0.1, 0.2] V*s/rad",))
+    assert varied.plan is not None
+    assert [each.cases.count for each in varied.plan.experiments] == [2]
+
+
 def test_a_word_of_a_macro_of_the_command_line_is_told_of_that(tmp_path: Path) -> None:
     text = "let long = SIZE;\n"
     (found,) = check(tmp_path, text, ARM, SERVO, RUN, defines=("SIZE=tall",)).diagnostics

@@ -151,7 +151,7 @@ error[D071]: `torque` of the scale of joint `hinge`'s bed is one number, and thi
   |
 1 | run it like hold { substitute hinge { scale { torque = [1, 2]; } } }
   |                                                        ^^^^^^
-  = help: leave the brackets out
+  = help: write one number: these are 2
 """,
     "scaled { torque = 25; }": """\
 error[D141]: `substitute hinge` has no `scaled`

@@ -142,4 +142,8 @@ def test_a_law_that_is_continuous_is_part_of_the_arm(tmp_path: Path) -> None:
         linear(made, opened=["hinge.servo.voltage"])
     (told,) = refused.value.diagnostics
     assert told.message == "there is no place to open a loop `hinge.servo.voltage`"
-    assert told.help == ("no servo here has a computer that ticks: a law that is continuous is a part of the arm",)
+    assert told.help == (
+        "a law that is `continuous` is a part of the arm, and has no loop to open",
+        "a fast computer is nearly the same: write `rate = 1000 Hz;`, that of the dynamics, in the servo of `hinge`",
+    )
+    assert linear(swing(tmp_path, MORE="rate = 1000 Hz;"), opened=["hinge.servo.voltage"]).loops
