@@ -287,8 +287,8 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
     KIND is servo, sensor, command, environment, guide, metric, integrator, bed or law; MODEL is the name of one model.
     Other words are the blocks of a deck, as in `met doc run` or `met doc joint`; `channels`, the signals that can be
     recorded; `dh`, Denavit-Hartenberg numbers; `shapes` of links; `units`; `functions`; `designs` and `distributions`
-    of samples; the code of a message, as in `met doc D060`; an entry of a block, such as `allow`; and a word of the
-    glossary, such as `shard`. `met doc language --format json` prints all of it for programs.
+    of samples; the code of a message, as in `met doc D060`; any word of a deck, such as `like`, `allow` or `kp`; and a
+    word of the glossary, such as `shard`. `met doc language --format json` prints all of it for programs.
     """
     from ic.language import BLOCKS
     from ic.printing import models as print_models
@@ -326,13 +326,12 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
         else:
             _print_text(text())
         return
+    from ic.printing.words import print_word
+
     try:
         found = print_models.selected_models(words)
     except Problem:
-        from ic.printing.glossary import meaning
-        from ic.printing.language import print_entries
-
-        lines = list(meaning(words[0])) or list(print_entries(words[0])) if len(words) == 1 else []
+        lines = list(print_word(words[0])) if len(words) == 1 else []
         if not lines:
             raise
         if form == "json":
@@ -351,6 +350,9 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
             if position:
                 click.echo()
             _print_text(print_models.print_model(kind, model))
+        others = list(print_word(words[0])) if len(words) == 1 else []
+        if others:
+            _print_text(["", f"Also `{words[0]}`", *(f"  {line}" for line in others)])
 
 
 @click.command()

@@ -45,14 +45,9 @@ def print_block(block: BlockDeclaration) -> Iterator[str]:
         yield from columns(varying)
 
 
-def print_entries(word: str) -> Iterator[str]:
-    """The entries of blocks that begin with this word, such as `allow`, for a terminal; empty where there are none."""
-    for block in BLOCKS.values():
-        for each in block.entries:
-            if each.name.split()[0] == word:
-                yield f"{each.written}  in {_an(block.name)}"
-                about = [(each.doc,), (f"default: {default(each)}",)]
-                yield from described(about, width=terminal_width(), indent="    ")
+def in_block(block: BlockDeclaration) -> str:
+    """Where the entries of a block stand, in words."""
+    return {"deck": "a deck", "anywhere": "any block"}.get(block.name) or _an(block.name)
 
 
 def block_json(block: BlockDeclaration) -> list[dict[str, Any]]:

@@ -7,12 +7,22 @@ from pathlib import Path
 
 import pytest
 
+from ic.grammar.declared_units import UNIT
+from ic.grammar.parse import LETS
+from ic.grammar.uses import USE
+from ic.language import BLOCKS, HEADS, TOP_LEVEL
+from ic.language.bodies import JOINT_KINDS
 from ic.meaning.definitions.row_tables import CSV
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
 from ic.meaning.mechanics.shapes import SHAPES
-from ic.printing import codes
-from ic.printing.glossary import meaning
+from ic.printing import codes, textmate
+from ic.printing.glossary import entries, meaning
+from ic.printing.models import KINDS, selected_models
+from ic.printing.subjects import SUBJECTS
+from ic.printing.textmate import PARTS, STATEMENTS
+from ic.printing.words import print_word
 from ic.sweeps.designs import DESIGNS, DISTRIBUTIONS
+from ic.text.preprocess import DIRECTIVES
 from met import cli, models, units
 
 
@@ -218,3 +228,28 @@ def test_every_word_of_the_glossary_is_found() -> None:
     words = [word for row in rows if row != "word" for word in row.split(", ")]
     assert len(words) > 50
     assert not [word for word in words if not list(meaning(word.replace("**", "").removeprefix("the ")))]
+
+
+@pytest.mark.slow
+def test_met_doc_knows_every_word_of_the_language_and_of_the_glossary() -> None:
+    grammar = ("like", "of", "from", "in", "by", "and", "or", "not", "as", "because", "default", "defined", "cases",
+               "confidence", *LETS, UNIT, USE, "for")  # fmt: skip
+    keys = [each.name.split()[0] for block in (*BLOCKS.values(), TOP_LEVEL) for each in block.entries]
+    declared = [
+        each.name for kind in KINDS for model in models.available(kind).values() for each in models.written(model)
+    ]
+    others = (*STATEMENTS, *PARTS, *textmate.WORDS, *HEADS, *DIRECTIVES, *JOINT_KINDS, *FUNCTIONS, *CONSTANTS, *DESIGNS)
+    words = {*grammar, *keys, *declared, *others, *DISTRIBUTIONS, *units.ALL_UNITS, *entries()} - {*SUBJECTS, *KINDS}
+    unknown = [word for word in sorted(words) if not list(print_word(word)) and word not in SUBJECTS]
+    names = {model.name for _, model in selected_models(())}
+    assert [word for word in unknown if word not in names] == []
+
+
+def test_met_doc_shows_every_meaning_of_a_word(capsys: pytest.CaptureFixture[str]) -> None:
+    out = printed(capsys, "tau_max")
+    assert [line for line in out.splitlines() if not line.startswith(" ")] == [
+        "tau_max = 87 N*m;  in a joint",
+        "tau_max = ... N*m  in servo rigid_gearbox, compliant_gearbox",
+        "tau_max = ... N*m  in bed emulated, torque_drive, rate_drive",
+    ]
+    assert "step: from one instant of the dynamics to the next" in printed(capsys, "step")

@@ -1,0 +1,119 @@
+"""The meanings of one word for `met doc`: of the language, of entries, of parameters of models, of the glossary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+
+from ic.language import ANYWHERE, BLOCKS, TOP_LEVEL
+from ic.language.bodies import JOINT_KINDS
+from ic.meaning.mechanics import dh, shapes
+from ic.printing.glossary import meaning
+from ic.printing.language import default, in_block
+from ic.printing.models import KINDS
+from ic.printing.subjects import channels, in_si, unit_table
+from ic.printing.sweeps import SUBJECTS
+from ic.printing.wrapping import described, terminal_width
+from met import models
+
+Row = tuple[str, str, str]
+"""What a deck writes, where, and what it means."""
+
+_CONDITIONAL = ("what follows, up to the next `#elif`, `#else` or `#endif`, is read only where {}", "a line of its own")
+
+SYNTAX: Mapping[str, tuple[str, str, str]] = MappingProxyType({
+    "like": ("KIND NAME like BASE { ... }", "a definition, or an entry of `servos`",
+             "all entries of BASE, with what differs in the block; a later entry replaces an inherited one"),
+    "of": ("sweep NAME of RUN { ... }", "a sweep, search or tuning", "the run whose cases are made"),
+    "from": ('arm NAME from urdf("FILE") { ... }', "an arm", "the arm of a robot's file; the block holds what differs"),
+    "default": ("default run NAME { ... }", "a run, sweep, search or tuning",
+                "the one that `met run DECK` runs where several are defined"),
+    "remove": ("remove NAME;", "a block `like` another", "takes an inherited entry out"),
+    "macro": ("vary macro NAME = [A, B];", "a sweep", "varies a macro of `#define`: each choice is a deck of its own"),
+    "when": ("exclude when CONDITION;", "a sweep", "leaves the cases out for which the condition holds"),
+    "in": ("for i in 1 .. 6 by 1 { ... }", "a loop", "the numbers or names of a loop; also `in 99 % of cases`, of a "
+           "requirement"),
+    "by": ("0.1 .. 1 by 0.1 kg", "a range", "the step from one value to the next; both ends belong to it"),
+    "and": ("A and B", "a condition", "holds where both hold"),
+    "or": ("A or B", "a condition", "holds where one of them holds, or both"),
+    "not": ("not A", "a condition", "holds where A does not"),
+    "as": ("use <FILE> as ROOF;", "a deck", "the name in front of the definitions of the used deck: `ROOF.NAME`"),
+    "because": ('allow CODE because "REASON";', "a run, sweep, search or tuning", "the reason, which must be written"),
+    "cases": ("require METRIC < LIMIT in 99 % of cases;", "a requirement", "how many cases of a sweep must meet it"),
+    "confidence": ("require METRIC < LIMIT in 99 % of cases with 90 % confidence;", "a requirement",
+                   "how sure that is to be, for a sweep with random values"),
+    "free": ("base = free;", "a run", "the arm's base moves as its mass and the forces on it have it"),
+    "prescribed": ("base = prescribed { ... }", "a run", "the arm's base moves as its courses say"),
+    "links": ("links.NAME.mass", "a path", "a number of a link; also a channel, as in `links.NAME.position`"),
+    "payloads": ("payloads.NAME.mass", "a path", "a number of a payload; also a channel"),
+    "guides": ("guides.NAME.PARAMETER", "a path", "a number of a guide"),
+    "sensors": ("sensors.NAME", "a path", "a sensor on a link: its reading, or a number of it"),
+    "metrics": ("metrics.NAME.PARAMETER", "a path", "a number of a metric"),
+    **{kind: (f"joint NAME {kind} {{ ... }}", "an arm", f"a joint that {moves}") for kind, moves in zip(
+        JOINT_KINDS, ("turns about its axis", "slides along its axis", "does not move"), strict=True)},
+    "include": ('#include "FILE"', _CONDITIONAL[1], "reads a file of the deck's folder here; `<FILE>` is one of MET's"),
+    "define": ("#define NAME VALUE", _CONDITIONAL[1], "a macro: its name stands for its text; `-D NAME=VALUE` as well"),
+    "undef": ("#undef NAME", _CONDITIONAL[1], "forgets a macro"),
+    "if": ("#if CONDITION", _CONDITIONAL[1], _CONDITIONAL[0].format("a condition of macros and whole numbers holds")),
+    "ifdef": ("#ifdef NAME", _CONDITIONAL[1], _CONDITIONAL[0].format("there is a macro NAME; a `let` is none")),
+    "ifndef": ("#ifndef NAME", _CONDITIONAL[1], _CONDITIONAL[0].format("there is no macro NAME; a `let` is none")),
+    "elif": ("#elif CONDITION", _CONDITIONAL[1], "as `#if`, where nothing before it was read"),
+    "elifdef": ("#elifdef NAME", _CONDITIONAL[1], "as `#ifdef`, where nothing before it was read"),
+    "elifndef": ("#elifndef NAME", _CONDITIONAL[1], "as `#ifndef`, where nothing before it was read"),
+    "else": ("#else", _CONDITIONAL[1], "what follows is read where nothing before it was"),
+    "endif": ("#endif", _CONDITIONAL[1], "ends the text of an `#if`"),
+    "defined": ("#if defined(NAME)", "a condition of `#if`", "whether there is a macro NAME"),
+    "pragma": ("#pragma once", _CONDITIONAL[1], "lets a file be read only once"),
+    "error": ("#error TEXT", _CONDITIONAL[1], "refuses the deck, with this text"),
+    "warning": ("#warning TEXT", _CONDITIONAL[1], "warns with this text"),
+})  # fmt: skip
+"""Words that the grammar and the preprocessor know, besides those of blocks and models."""
+
+
+def print_word(word: str) -> Iterator[str]:
+    """Every meaning of a word, for a terminal; empty where there is none. The glossary's comes first."""
+    yield from meaning(word)
+    for written, where, doc in dict.fromkeys(_rows(word)):
+        yield f"{written}  in {where}" if where else written
+        yield from described([(line,) for line in doc.split("\n")], width=terminal_width(), indent="    ")
+
+
+def _rows(word: str) -> Iterator[Row]:
+    if word in SYNTAX:
+        yield SYNTAX[word]
+    for block in (*BLOCKS.values(), TOP_LEVEL, ANYWHERE):
+        for each in block.entries:
+            if each.name.split()[0] == word:
+                yield each.written, in_block(block), f"{each.doc}\ndefault: {default(each)}"
+            elif each.parameter is not None and word in each.parameter.words:
+                yield f"{each.name} = {word};", in_block(block), each.doc
+    yield from _of_models(word)
+    for subject, page in SUBJECTS.items():
+        for name, written, doc in page.rows():
+            if name == word:
+                yield written, f"a value: `met doc {subject}`", doc
+    for name, shape in shapes.SHAPES.items():
+        if word == name or any(each.name == word for each in shape.parameters):
+            yield f"shape = {name}(...)", "a link or payload", "`met doc shapes` shows it"
+    for number in dh.NUMBERS:
+        if number.name == word:
+            yield f"dh = classic({word} = ...)", "a joint", number.doc
+    for unit in unit_table():
+        if unit["name"] == word:
+            yield word, "a quantity, behind its number", f"{unit['word']}, {in_si(unit)}"
+    for channel in channels():
+        if channel["path"].rpartition(".")[2] == word:
+            yield channel["path"], "a `record`, metric or signal", f"{channel['meaning']}, {channel['unit']}"
+
+
+def _of_models(word: str) -> Iterator[Row]:
+    """The parameters of this name, and those that may be this word, each with the models that declare it alike."""
+    found: dict[tuple[str, str, str], list[str]] = {}
+    for kind in KINDS:
+        for name, model in models.available(kind).items():
+            for each in models.written(model):
+                if each.name == word or word in each.words:
+                    value = word if each.name != word else "..." if each.unit == "1" else f"... {each.unit}"
+                    found.setdefault((kind, f"{each.name} = {value}", each.doc), []).append(name)
+    for (kind, written, doc), names in found.items():
+        yield written, f"{kind} {', '.join(names)}", doc
