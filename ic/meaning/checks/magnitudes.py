@@ -17,6 +17,7 @@ from ic.meaning.parameters.scope import Scope
 from met.diagnostic import Place
 from met.frozen import frozen
 from met.plan import BASE, Structure
+from met.plan.defaults import INERTIA
 from met.trace import Real, Scalar
 
 
@@ -103,6 +104,18 @@ GYRATION, LEAST_GYRATION = 10.0, 10.0
 """Radius of gyration relative to the length of an arm or a shape, and in m: above both no link of the arm has one, and
 above the former no body of that shape."""
 
+SMALLEST_GYRATION = 1e-5
+"""Smallest radius of gyration of a body of a milligram or more, m: a ball of lead that has it weighs 5e-11 kg, but
+decks have masses that are nearly points."""
+
+IN_OTHER_UNITS = (
+    ("mm and g", 1e-3, 1e-3),
+    ("mm and kg", 1.0, 1e-3),
+    ("cm and g", 1e-3, 1e-2),
+    ("cm and kg", 1.0, 1e-2),
+)
+"""Units of all numbers of a body, with the factors of its mass and of its sizes if it was in them."""
+
 OTHER_UNITS = (1e3, 1e6, 1e9)
 """Factors by which a number is wrong after a wrong prefix."""
 
@@ -185,7 +198,7 @@ def _beyond(kind: Magnitude, values: np.ndarray) -> np.ndarray:
 
 @frozen
 class WeighedBody:
-    """A link or a payload with its known properties: mass, largest moments and sizes of its shape.
+    """A link or a payload with its known properties: mass, inertia (xx, yy, zz, xy, xz, yz) and sizes of its shape.
 
     name    in words;  head: of its paths
     place   of its shape, or of its inertia
@@ -196,8 +209,13 @@ class WeighedBody:
     head: str
     place: Place
     mass: Settled
-    moments: tuple[Settled, ...]
+    inertia: tuple[Settled, ...]
     sizes: Mapping[str, Settled]
+
+    @property
+    def moments(self) -> tuple[Settled, ...]:
+        """The moments about the three axes."""
+        return self.inertia[:3]
 
     @property
     def is_rod(self) -> bool:
@@ -240,7 +258,7 @@ def _bodies(scope: Scope, structure: Structure) -> Iterator[WeighedBody]:
         head = f"{group}.{name}"
         sizes = shapes.get(head, {})
         mass = scope.parameters.get(f"{head}.mass")
-        moments = [scope.parameters.get(f"{head}.inertia.{axis}{axis}") for axis in XYZ]
+        moments = [scope.parameters.get(f"{head}.inertia.{part}") for part in INERTIA]
         written = [*sizes.values(), *moments]
         place = next((each.origin.place for each in written if each is not None and each.origin.place), None)
         if mass is not None and place is not None and None not in moments:
@@ -289,48 +307,119 @@ def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[Weigh
     vectors = [scope.parameters.get(f"{path}.{axis}") for path in paths for axis in XYZ]
     if None in vectors:
         return
-    settled = [each for body in bodies for each in (body.mass, *body.moments, *body.sizes.values())]
-    ends = np.cumsum([4 + len(body.sizes) for body in bodies]).tolist()
+    settled = [each for body in bodies for each in (body.mass, *body.inertia, *body.sizes.values())]
+    ends = np.cumsum([7 + len(body.sizes) for body in bodies]).tolist()
 
     def warn(rows: np.ndarray) -> None:
         with np.errstate(over="ignore"):  # an arm of 1e200 m overflows to infinity, which is reported
             arm = np.sqrt((rows[:, ends[-1] :].reshape(len(rows), -1, 3) ** 2).sum(axis=2)).sum(axis=1)
-        found = []
+        found: dict[Remark, list[tuple[float, WeighedBody, OddBody, str]]] = {}
         for body, first, last in zip(bodies, [0, *ends], ends, strict=False):
-            mass, largest, sizes = rows[:, first], rows[:, first + 1 : first + 4].max(axis=1), rows[:, first + 4 : last]
-            with np.errstate(over="ignore"):  # a body of 1e-320 kg likewise
+            mass, inertia, sizes = rows[:, first], rows[:, first + 1 : first + 7], rows[:, first + 7 : last]
+            largest = inertia[:, :3].max(axis=1)
+            with np.errstate(over="ignore", invalid="ignore"):  # a body of 1e-320 kg likewise
                 radius = np.sqrt(np.maximum(largest, 0.0) / np.where(mass > 0.0, mass, np.inf))
                 length = np.sqrt((sizes * sizes).sum(axis=1)) if body.sizes else arm
+                density = _ellipsoid_density(mass, inertia)
             least = GYRATION * length if body.sizes else np.maximum(GYRATION * length, LEAST_GYRATION)
-            bad = (length > 0.0) & (radius > least)
-            if bad.any():
-                row = int(np.where(bad, radius / np.where(bad, least, 1.0), 0.0).argmax())
-                where = _where(scope, body, row, float(mass[row]))
-                found.append((body, float(radius[row]), float(length[row]), float(largest[row]), where))
-        if not found or scope.complaints.error_count:
+            large = (length > 0.0) & (radius > least)
+            thin = (length > 0.0) & (radius > LEAST_GYRATION) & (density > 0.0) & (density < THIN) & ~large
+            thin &= not body.sizes
+            tiny = (radius > 0.0) & (radius < SMALLEST_GYRATION) & (mass >= MASSES.low)
+            kinds: list[tuple[Remark, np.ndarray, np.ndarray]] = [
+                (_too_large, large, radius / np.where(large, least, 1.0)),
+                (_too_thin, thin, 1.0 / np.where(thin, density, 1.0)),
+                (_too_small, tiny, 1.0 / np.where(tiny, radius, 1.0)),
+            ]
+            for remark, bad, excess in kinds:
+                if bad.any():
+                    row = int(np.where(bad, excess, 0.0).argmax())
+                    numbers = (float(each[row]) for each in (radius, length, largest, mass, density))
+                    odd = OddBody(body.sizes, *numbers)
+                    where = _where(scope, body, row, odd.mass)
+                    found.setdefault(remark, []).append((float(excess[row]), body, odd, where))
+        if scope.complaints.error_count:
             return
-        body, radius, length, largest, where = max(found, key=lambda each: each[1] / each[2])
-        helps = [
-            f"it would be of {radius / math.sqrt(times):.4g} m, were it in {unit}: "
-            f"`{largest:.6g} {unit}` is {largest / times:.4g} kg*m^2"
-            for times, unit in OTHER_INERTIAS
-            if radius / math.sqrt(times) <= 2.0 * length
-        ]
-        beside = f"its shape is {length:.4g} m large" if body.sizes else f"its arm is {length:.4g} m long"
-        scope.complaints.remark(
-            "D298",
-            f"{body.name} has the inertia of a body of {radius:.4g} m (its radius of gyration){where}"
-            f"{_others(len(found))}, and {beside}",
-            next((each.origin.place for each in body.moments if each.origin.place), body.place),
-            help=[*helps[:1], "look at the units of its mass and of its inertia", MEANT.format("D298")],
-        )
+        for remark, those in found.items():
+            _, body, odd, where = max(those, key=lambda each: each[0])
+            beside, helps = remark(odd)
+            scope.complaints.remark(
+                "D298",
+                f"{body.name} has the inertia of a body of {odd.radius:.4g} m (its radius of gyration){where}"
+                f"{_others(len(those))}, and {beside}",
+                next((each.origin.place for each in body.moments if each.origin.place), body.place),
+                help=[*helps[:1], "look at the units of its mass and of its inertia", MEANT.format("D298")],
+            )
 
     _together(scope, [*settled, *(each for each in vectors if each is not None)], warn, bodies)
 
 
+@frozen
+class OddBody:
+    """The numbers of a body with an odd inertia: radius of gyration, length of its arm or shape, largest moment, mass,
+    density as a solid ellipsoid; SI. sizes: of its shape, empty where it has none"""
+
+    sizes: Mapping[str, Settled]
+    radius: float
+    length: float
+    largest: float
+    mass: float
+    density: float
+
+
+Remark = Callable[[OddBody], tuple[str, list[str]]]
+"""What an odd body is compared with, and remedies."""
+
+
+def _too_large(odd: OddBody) -> tuple[str, list[str]]:
+    """Of a body with too large an inertia."""
+    helps = [
+        f"it would be of {odd.radius / math.sqrt(times):.4g} m, were it in {unit}: "
+        f"`{odd.largest:.6g} {unit}` is {odd.largest / times:.4g} kg*m^2"
+        for times, unit in OTHER_INERTIAS
+        if odd.radius / math.sqrt(times) <= 2.0 * odd.length
+    ]
+    return f"its {'shape' if odd.sizes else 'arm'} is {odd.length:.4g} m {'large' if odd.sizes else 'long'}", helps
+
+
+def _too_thin(odd: OddBody) -> tuple[str, list[str]]:
+    """Of a body that is too large for its mass, on an arm that is as large."""
+    unit, known, least, most = SOLIDS[0]
+    helps = [
+        f"it would be of {odd.radius * across:.4g} m, {odd.mass * lighter:.4g} kg and {denser:.4g} {unit}, were all "
+        f"its numbers in {units}"
+        for units, lighter, across in IN_OTHER_UNITS
+        if least < (denser := odd.density * lighter / across**3) < most
+    ]
+    return f"would be of {odd.density:.4g} {unit}; {known}", helps
+
+
+def _too_small(odd: OddBody) -> tuple[str, list[str]]:
+    """Of a body with next to no inertia."""
+    helps = [
+        f"it would be of {odd.radius * math.sqrt(times):.4g} m, were it {odd.largest * times:.4g} kg*m^2: was it "
+        f"converted from {unit} twice?"
+        for times, unit in OTHER_INERTIAS
+        if 0.05 * odd.length <= odd.radius * math.sqrt(times) <= 2.0 * odd.length
+    ]
+    return f"weighs {odd.mass:.4g} kg; a point mass has `inertia = [0, 0, 0] kg*m^2`", helps
+
+
+def _ellipsoid_density(mass: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """The density of the solid ellipsoids of these masses and moments xx, yy, zz, xy, xz, yz, kg/m^3; infinite for flat
+    ones, and for moments of no body."""
+    xx, yy, zz, xy, xz, yz = inertia.T
+    half = (xx + yy + zz) / 2.0
+    x, y, z = half - xx, half - yy, half - zz  # second moments of mass: a diagonal element is m a^2/5
+    volume = x * (y * z - yz * yz) - xy * (xy * z + yz * xz) - xz * (xy * yz + y * xz)
+    least = np.sqrt(np.maximum(volume, 0.0)) * (4.0 / 3.0 * math.pi)
+    with np.errstate(divide="ignore"):
+        return np.where((mass > 0.0) & (least > 0.0), mass * (mass / 5.0) ** 1.5 / least, np.inf)
+
+
 def _where(scope: Scope, body: WeighedBody, row: int, mass: float) -> str:
     """A remark on the case in which a body is so, with its mass; empty where it is so in all cases."""
-    numbers = [each.value for each in (body.mass, *body.moments, *body.sizes.values())]
+    numbers = [each.value for each in (body.mass, *body.inertia, *body.sizes.values())]
     case = scope.checks.where(row, numbers)
     return f"{case} ({mass:.4g} kg)" if case else ""
 

@@ -53,6 +53,28 @@ def test_an_inertia_in_square_millimetres_is_told_with_the_unit(tmp_path: Path) 
     assert "  = help: it would be of 0.1732 m, were it in kg*mm^2: `30000 kg*mm^2` is 0.03 kg*m^2\n" in said
 
 
+@pytest.mark.parametrize(
+    ("body", "said", "cure"),
+    [
+        ("mass = 2500 kg; com = [150, 0, 0] m; inertia = [3e6, 5e6, 5e6] kg*m^2;",
+         "44.72 m (its radius of gyration), and would be of 0.002378 kg/m^3; solids have 1 to 22,600",
+         "it would be of 0.04472 m, 2.5 kg and 2378 kg/m^3, were all its numbers in mm and g"),
+        ("mass = 2.5 kg; com = [0.15, 0, 0] m; inertia = [3e-12, 5e-12, 5e-12] kg*m^2;",
+         "1.414e-06 m (its radius of gyration), and weighs 2.5 kg; a point mass has `inertia = [0, 0, 0] kg*m^2`",
+         "it would be of 0.04472 m, were it 0.005 kg*m^2: was it converted from g*mm^2 twice?"),
+    ],
+)  # fmt: skip
+def test_an_inertia_in_other_units_on_an_arm_in_these_and_one_converted_twice_are_told(
+    tmp_path: Path, body: str, said: str, cure: str
+) -> None:
+    [found] = check(tmp_path, arm(body), SERVO, RUN).diagnostics
+    assert found.code == "D298" and found.message == f"link `bar` has the inertia of a body of {said}"
+    assert found.help == (cure, "look at the units of its mass and of its inertia", MEANT)
+
+
+MEANT = 'if it is meant so, `allow D298 because "...";`'
+
+
 def test_a_body_of_next_to_no_mass_is_endlessly_large_and_no_defect(tmp_path: Path) -> None:
     body = "mass = 1 kg; com = [0.3, 0, 0] m; inertia = [0.2, 0.2, 0.2] kg*m^2;"
     found = check(
@@ -149,6 +171,7 @@ def test_a_torque_constant_in_milli_is_told(tmp_path: Path) -> None:
         "mass = 1 kg; com = [0.1, 0, 0] mm; inertia = [1, 1, 1] kg*m^2;",  # a rotor that is nearly balanced
         "mass = 1 kg; com = [0.5, 0, 0] m; inertia = [1e-9, 1e-9, 1e-9] kg*m^2;",  # nearly a point
         "mass = 20 kg; shape = box(size = [10, 3, 0.1] m);",  # a panel of solar cells
+        "mass = 300 kg; com = [20, 0, 0] m; inertia = [40020, 40020, 80000, -39980, 0, 0] kg*m^2;",  # a mast, 40 m long
         "mass = 400 t; com = [10, 0, 0] m; inertia = [1e8, 2e8, 2e8] kg*m^2;",  # a station
     ],
 )
