@@ -38,6 +38,7 @@ Unsaved = Mapping[str, str]
 
 NOTHING_UNSAVED: Unsaved = MappingProxyType({})
 
+_XML = re.compile(r"\s*<[?!A-Za-z]")
 _NOT_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
 
@@ -279,7 +280,22 @@ def decode(data: bytes, name: str, kind: str) -> tuple[str, Diagnostic | None]:
             place = _place_of_byte(data, reason.start, name)
             message = f"`{name}` is not UTF-8: byte 0x{data[reason.start]:02x}"
             complaint = error("D002", message, place, help="save the file as UTF-8")
+    if complaint is None and kind == "deck" and _XML.match(text):
+        complaint = _xml(text, name)
     return text.replace("\r\n", "\n").replace("\r", "\n"), complaint
+
+
+def _xml(text: str, name: str) -> Diagnostic:
+    before = text[: text.index("<")]
+    at = Place(name, before.count("\n") + 1, len(before) - before.rfind("\n"))
+    file = posixpath.basename(name)
+    helps = [
+        f"`met import {name} -o robot.ic` makes a deck of a robot's URDF file",
+        f'a deck can take such a file as it is: `arm NAME from urdf("{file}") {{ ... }}`',
+    ]
+    if "<robot" not in text:
+        helps = ["a deck is text in a language of its own; of robots in XML, MET reads URDF files (`met import`)"]
+    return error("D002", f"`{name}` is XML, not a deck", at, help=helps)
 
 
 def _place_of_byte(data: bytes, at: int, name: str) -> Place:

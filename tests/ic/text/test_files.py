@@ -258,6 +258,36 @@ error[D001]: `empty.ic` is a directory, not a deck
     )
 
 
+def test_a_robots_file_and_other_xml_are_no_decks_and_the_message_names_what_reads_them(desk: Desk) -> None:
+    others: dict[str, str | bytes] = {
+        "arms/two.urdf": "\n  <robot name='two'/>",
+        "two.sdf": "<?xml version='1.0'?>\n<sdf/>",
+    }
+    assert (
+        desk.told('#include "arms/two.urdf"\n#include "two.sdf"\n', (), others)
+        == """\
+error[D002]: `arms/two.urdf` is XML, not a deck
+ --> arms/two.urdf:2:3
+  |
+2 |   <robot name='two'/>
+  |   ^
+  = help: `met import arms/two.urdf -o robot.ic` makes a deck of a robot's URDF file
+  = help: a deck can take such a file as it is: `arm NAME from urdf("two.urdf") { ... }`
+  = note: included from a.ic:1
+
+error[D002]: `two.sdf` is XML, not a deck
+ --> two.sdf:1:1
+  |
+1 | <?xml version='1.0'?>
+  | ^
+  = help: a deck is text in a language of its own; of robots in XML, MET reads URDF files (`met import`)
+  = note: included from a.ic:2
+
+2 errors
+"""
+    )
+
+
 def test_a_pipe_and_a_device_are_not_read(desk: Desk) -> None:
     os.mkfifo(desk.directory / "pipe.ic")
     assert (
