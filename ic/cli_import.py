@@ -19,7 +19,8 @@ from met.messages.visible import say
 @click.option(
     "--mimic",
     type=click.Choice(["free", "fixed"]),
-    help="Joints that follow other joints in the file: make them `free` to move, or `fixed` at 0.",
+    help="Joints that follow other joints in the file: make them `free` to move, or `fixed` where "
+    "those put them at the start.",
 )
 @loudness_options
 def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet: bool, verbose: bool) -> None:

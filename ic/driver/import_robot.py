@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
-from typing import Literal
 
 from ic.grammar.syntax import Deck, Group, Word
 from ic.meaning.definitions.resolve import Definitions
@@ -14,16 +13,14 @@ from ic.read import in_order
 from ic.robots.deck import arm_name, print_deck
 from ic.robots.entries import ArmEntries, arm_entries
 from ic.robots.files import KIND, load
-from ic.robots.robot import Joint, Robot
+from ic.robots.following import Treatment, without_mimics
 from ic.text.complaints import Complaints
 from ic.text.files import Files, FoundFile
 from ic.text.limits import MOST_URDF_BYTES
 from met.diagnostic import Diagnostic, Problem
 
-Mimic = Literal["free", "fixed"]
 
-
-def import_robot(path: str, mimic: Mimic | None = None) -> str:
+def import_robot(path: str, mimic: Treatment | None = None) -> str:
     """The text of the deck. mimic: treatment of joints that follow others. Raises Problem, with the file's text."""
     files = Files()
     try:
@@ -31,7 +28,7 @@ def import_robot(path: str, mimic: Mimic | None = None) -> str:
         made = load(found.name, files.text(found, kind=KIND, most=MOST_URDF_BYTES))
         if mimic is not None:
             made = arm_entries(without_mimics(made.robot, mimic))
-        _check(made)
+        made = _checked(made)
     except Problem as problem:
         sources = tuple(files.read_so_far.values())
         raise Problem(in_order(problem.diagnostics, sources), {each.name: each.text for each in sources}) from None
@@ -43,16 +40,17 @@ def import_robot(path: str, mimic: Mimic | None = None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def without_mimics(robot: Robot, mimic: Mimic) -> Robot:
-    """The robot with the joints that follow others freed, or fixed where they are at 0; `print_deck` names them."""
-
-    def changed(joint: Joint) -> Joint:
-        if joint.mimic is None:
-            return joint
-        free = replace(joint, mimic=None, followed=joint.mimic)
-        return free if mimic == "free" else replace(free, type=replace(joint.type, text="fixed"), axis=None)
-
-    return replace(robot, joints=tuple(changed(joint) for joint in robot.joints))
+def _checked(made: ArmEntries) -> ArmEntries:
+    """The entries, without the base if only this is of no body: it does not count while the base is fixed. Raises
+    Problem where they do not make an arm."""
+    try:
+        _check(made)
+    except Problem:
+        if made.base is None:
+            raise
+        made = replace(made, base=None)
+        _check(made)
+    return made
 
 
 def _check(made: ArmEntries) -> None:
@@ -60,7 +58,9 @@ def _check(made: ArmEntries) -> None:
     place = made.robot.root.name.place
     words = (Word("arm", place), Word(arm_name(made), place))
     complaints = Complaints()
-    definitions = Definitions(Deck(made.robot.file, (Group(words, None, None, made.entries, place),), ()), complaints)
+    entries = (*([made.base.entry] if made.base is not None else []), *made.entries)
+    definitions = Definitions(Deck(made.robot.file, (Group(words, None, None, entries, place),), ()), complaints)
+    definitions.robot_files.take(made)
     for definition in definitions.of_kind("arm").values():
         check_arm(Scope(definitions, complaints), definition)
     if complaints.errors:
@@ -69,7 +69,9 @@ def _check(made: ArmEntries) -> None:
 
 def _mended(found: tuple[Diagnostic, ...]) -> list[Diagnostic]:
     """The errors with the remedies of `met import` in place of those for a deck."""
-    follow = "`--mimic free` lets such joints move by themselves, `--mimic fixed` holds them at 0"
+    follow = (
+        "`--mimic free` lets such joints move by themselves, `--mimic fixed` holds them where they are at the start"
+    )
     made = [replace(each, help=(follow,)) if each.code == "D213" else each for each in found]
     if made[-1].code != "D213":
         other = 'write a deck with `arm NAME from urdf("FILE") { ... }`: its block can change what the file says'

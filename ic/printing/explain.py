@@ -14,6 +14,7 @@ from ic.meaning.expressions.command_line import ON_COMMAND_LINE
 from ic.printing.codes import is_code
 from ic.printing.columns import columns, number, quantity, vector
 from ic.printing.settings import settings
+from ic.robots.entries import NOTES
 from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import Diagnostic, Label, Place, Problem, error, nearest
@@ -251,7 +252,7 @@ def _one(
         unit = "" if coordinate.unit == "1" else f" {coordinate.unit}"
         yield f"  varied by {coordinate.path}: {_series_of(coordinate)}{unit}"
     note = _note(origin)
-    said = note if note == ON_COMMAND_LINE else SAID[origin.kind] + (f": {note}" if note else "")
+    said = note if note in (ON_COMMAND_LINE, *NOTES) else SAID[origin.kind] + (f": {note}" if note else "")
     if origin.place is None and origin.kind == "deck":
         said = IN_PLAN
     if origin.place is None:

@@ -12,15 +12,14 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Setting
 from ic.robots.attributes import shown
-from ic.robots.entries import LIMITS, ArmEntries, RobotEntry, limits, spelled
+from ic.robots.entries import LIMITS, ArmEntries, RobotEntry, spelled
+from ic.robots.following import hold_position
 from ic.robots.names import word
-from ic.robots.robot import MOVING, Inertial, Joint
+from ic.robots.robot import MOVING, Inertial, Joint, Mimic
 from ic.text.edition import EDITION_WORD, LATEST
 
 WIDE = 100  # columns of a block on one line
 WIDEST = 120  # with its comment
-FREE = "follows `{}` in the file{}; here it moves by itself"
-HELD = "follows `{}` in the file{}; here it is held at 0"
 
 
 def print_deck(body: ArmEntries, title: str) -> Iterator[str]:
@@ -32,7 +31,7 @@ def print_deck(body: ArmEntries, title: str) -> Iterator[str]:
     yield ""
     yield f"arm {arm} {{"
     changed = {(each.kind, each.name): each.written.text for each in body.names.changed}
-    for part in body.links:
+    for part in (*([body.base] if body.base is not None else []), *body.links):
         yield from _block(part, _link_notes(part, changed))
     yield ""
     for part in body.joints:
@@ -47,12 +46,13 @@ def arm_name(body: ArmEntries) -> str:
 
 
 def _about(body: ArmEntries) -> Iterator[str]:
-    root = body.robot.root
-    weight = " What it weighs rests on the ground." if root.inertial is not None else ""
-    yield f"// `base` is the file's link `{_safe(root.name.text)}`.{weight}"
+    weight = " Its mass counts in a run with `base = free;`." if body.base is not None else ""
+    if body.base is None and body.robot.root.inertial is not None:
+        weight = " Its inertia is left out: no body has it."
+    yield f"// `base` is the file's link `{_safe(body.robot.root.name.text)}`.{weight}"
     if body.robot.dropped:
         kinds = sorted(body.robot.dropped.items(), key=lambda kind: (-len(kind[1]), kind[0]))
-        yield f"// Not in this deck: {', '.join(f'{len(places)} {_safe(tag)}' for tag, places in kinds)}."
+        yield f"// Not in this deck: {', '.join(f'{len(elements)} {_safe(what)}' for what, elements in kinds)}."
 
 
 def _block(part: RobotEntry, notes: list[str]) -> Iterator[str]:
@@ -89,7 +89,7 @@ def _rows(settings: list[tuple[str, str]]) -> list[list[tuple[str, str]]]:
 def _link_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> list[str]:
     notes = _called(part, "link", changed)
     inertial = getattr(part.of, "inertial", None)
-    if isinstance(inertial, Inertial) and inertial.rpy is not None and not inertial.rpy.nothing:
+    if isinstance(inertial, Inertial) and inertial.rpy is not None and inertial.is_turned:
         notes.append(f"inertia turned from axes at rpy {' '.join(map(spelled, inertial.rpy.values))}")
     return notes
 
@@ -101,11 +101,18 @@ def _joint_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> li
     if joint.type.text == "continuous":
         notes.append("continuous")
     if joint.followed is not None:
-        law = f" ({joint.law})" if joint.law else ""
-        notes.append((HELD if joint.type.text == "fixed" else FREE).format(shown(joint.followed.text), law))
+        notes.append(_following(joint, joint.followed))
     if joint.type.text in MOVING:
         notes += [f"{name} {spelled(value)}" for name, value in joint.friction.items() if value]
     return notes
+
+
+def _following(joint: Joint, mimic: Mimic) -> str:
+    """A note on a joint that follows another in the file."""
+    law = {"multiplier": (mimic.multiplier, 1.0), "offset": (mimic.offset, 0.0)}
+    shown_law = ", ".join(f"{name} {spelled(value)}" for name, (value, default) in law.items() if value != default)
+    here = f"here it is held at {spelled(joint.held)}" if joint.type.text == "fixed" else "here it moves by itself"
+    return f"follows `{shown(mimic.joint.text)}` in the file{f' ({shown_law})' if shown_law else ''}; {here}"
 
 
 def _called(part: RobotEntry, kind: str, changed: Mapping[tuple[str, str], str]) -> list[str]:
@@ -126,7 +133,7 @@ def _runs(body: ArmEntries, arm: str) -> Iterator[str]:
         return
     taken = {*joints, *(part.entry.words[1].text for part in body.links)}
     held, slide = _free("held", taken), _free("held_slide", taken)
-    poses = {name: pose(joint) for name, joint in joints.items()}
+    poses = {name: hold_position(joint) for name, joint in joints.items()}
     slides = [name for name, joint in joints.items() if joint.type.text == "prismatic"]
     yield ""
     yield "// Each joint is held, and `tau` is what that takes. Put servos of yours in the place of these."
@@ -172,17 +179,6 @@ def _fall(
         yield f"        {name} = {free(f'{name}_bearing')};"
     yield "    }"
     yield "}"
-
-
-def pose(joint: Joint) -> float:
-    """The position at which a joint is held: 0, or the middle of its range where that excludes 0."""
-    found = limits(joint)
-    lower, upper = found.get("lower", -1.0), found.get("upper", 1.0)
-    if lower <= 0.0 <= upper:
-        return 0.0
-    middle = lower / 2.0 + upper / 2.0  # the sum might overflow
-    short = float(f"{middle:.4g}")
-    return short if lower <= short <= upper else middle
 
 
 def _at(value: float, slides: bool) -> str:

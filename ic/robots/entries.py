@@ -10,12 +10,14 @@ the moments are written in the link's axes. What is zero by itself is left out.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 
 from ic.grammar.syntax import Entry, Expression, Group, List, Name, Number, Setting, Unary, Unit, WithUnit, Word
 from ic.robots.names import DeckNames, deck_names
 from ic.robots.robot import MOVING, Inertial, Joint, Link, Numbers, Robot, Written
 from met.diagnostic import Place
 from met.frozen import frozen
+from met.plan import BASE
 
 AXES = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
 UNITS = {
@@ -30,6 +32,12 @@ UNITS = {
 }
 LIMITS = {"lower": "q_min", "upper": "q_max", "velocity": "qd_max", "effort": "tau_max"}
 """Limits of a URDF file's joint, with their names in a deck."""
+LEFT_OUT = "URDF's default: the file leaves it out here"
+ZERO = "written here as 0, or left out"
+TURNED = "written here, and turned into the link's axes"
+NOTES = (LEFT_OUT, ZERO, TURNED)
+"""Notes on places, each a sentence of its own."""
+
 NOISE = 1e-15  # of sines and cosines of right angles, whose size is 1: cos(pi/2) is 6e-17 in doubles
 
 
@@ -43,12 +51,18 @@ class RobotEntry:
 
 @frozen
 class ArmEntries:
-    """A robot's arm: its entries, links and then joints, in the file's order, with the names in decks."""
+    """A robot's arm: its entries, links and then joints, in the file's order, with the names in decks.
+
+    base   the link `base`, as a base that moves has it; None where the file's root has no inertia
+    notes  on places whose text is not the number that entries have from there: how this came about
+    """
 
     robot: Robot
     names: DeckNames
+    base: RobotEntry | None
     links: tuple[RobotEntry, ...]
     joints: tuple[RobotEntry, ...]
+    notes: Mapping[Place, str]
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -59,7 +73,24 @@ def arm_entries(robot: Robot) -> ArmEntries:
     names = deck_names(robot)
     links = tuple(RobotEntry(link, _link(link, names.links[link.name.text])) for link in robot.carried)
     joints = tuple(RobotEntry(joint, _joint(joint, names)) for joint in robot.joints)
-    return ArmEntries(robot, names, links, joints)
+    base = None if robot.root.inertial is None else RobotEntry(robot.root, _link(robot.root, BASE))
+    return ArmEntries(robot, names, base, links, joints, dict(_notes(robot)))
+
+
+def _notes(robot: Robot) -> Iterator[tuple[Place, str]]:
+    for link in robot.links:
+        found = link.inertial
+        if found is None:
+            yield link.name.place, LEFT_OUT
+        elif found.is_turned:
+            yield found.moments.place, TURNED
+        else:
+            yield found.moments.place, LEFT_OUT if any(found.moments.values[3:]) else ZERO
+    for joint in robot.joints:
+        if joint.axis is None:
+            yield joint.name.place, LEFT_OUT
+        if joint.limits_at is not None:
+            yield joint.limits_at, LEFT_OUT
 
 
 def _link(link: Link, name: str) -> Group:
@@ -78,7 +109,7 @@ def _link(link: Link, name: str) -> Group:
 def moments(inertial: Inertial) -> Numbers:
     """xx, yy, zz in the link's axes, and xy, xz, yz where one of them is not zero."""
     found = inertial.moments
-    if inertial.rpy is not None and not inertial.rpy.nothing:
+    if inertial.rpy is not None and inertial.is_turned:
         found = Numbers(_turned(found.values, inertial.rpy.values), found.place)  # each of them made of all
     return found if any(found.values[3:]) else Numbers(found.values[:3], found.place, found.each[:3])
 
@@ -121,22 +152,27 @@ def _joint(joint: Joint, names: DeckNames) -> Group:
         settings.append(_setting("axis", _axis(axis), axis.place))
     way, effort = ("m", "N") if kind == "prismatic" else ("rad", "N*m")
     units = {"lower": way, "upper": way, "velocity": f"{way}/s", "effort": effort}
-    for name, value in limits(joint).items():
-        place = joint.limits_at or joint.name.place
-        settings.append(_setting(LIMITS[name], _signed(value, units[name], place), place))
+    for name, limit in limits(joint).items():
+        settings.append(_setting(LIMITS[name], _signed(limit.values[0], units[name], limit.place), limit.place))
     if joint.mimic is not None:
-        followed = names.joints.get(joint.mimic.text, joint.mimic.text)
-        settings.append(_setting("mimic", _name(followed, joint.mimic.place), joint.mimic.place))
+        followed = joint.mimic.joint
+        settings.append(_setting("mimic", _name(names.joints[followed.text], followed.place), followed.place))
     return _group("joint", names.joints[joint.name.text], Word(kind, joint.type.place), settings, joint.name.place)
 
 
-def limits(joint: Joint) -> dict[str, float]:
-    """The limits of the joint: none of position where it is continuous; values of zero or less count as none."""
-    if joint.type.text not in MOVING:
+def limits(joint: Joint) -> dict[str, Numbers]:
+    """The limits of the joint: none of position where it is continuous, or where both ends are 0 or left out; else an
+    end that is left out is 0. Infinite ones are none, and so are an effort and a velocity of 0."""
+    if joint.type.text not in MOVING or joint.limits_at is None:
         return {}
-    lower, upper = joint.limits.get("lower", 0.0), joint.limits.get("upper", 0.0)
-    found = {"lower": lower, "upper": upper} if joint.type.text != "continuous" and lower < upper else {}
-    return found | {name: x for name in ("velocity", "effort") if (x := joint.limits.get(name, 0.0)) > 0.0}
+    left_out = Numbers((0.0,), joint.limits_at)
+    found = {name: joint.limits.get(name, left_out) for name in LIMITS}
+    ranges = joint.type.text != "continuous" and not (found["lower"].nothing and found["upper"].nothing)
+    return {
+        name: limit
+        for name, limit in found.items()
+        if math.isfinite(limit.values[0]) and (ranges if name in ("lower", "upper") else not limit.nothing)
+    }
 
 
 def _end(key: str, link: Written, names: DeckNames) -> Setting:

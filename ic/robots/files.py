@@ -9,7 +9,7 @@ from ic.grammar.syntax import Call, Deck, String
 from ic.named_files import NamedFiles
 from ic.text.complaints import known_words
 from ic.text.limits import MOST_URDF_BYTES
-from met.diagnostic import Diagnostic, Problem, did_you_mean, error
+from met.diagnostic import Diagnostic, Place, Problem, did_you_mean, error
 
 if TYPE_CHECKING:
     from ic.robots.entries import ArmEntries
@@ -29,6 +29,18 @@ class RobotFiles(NamedFiles["ArmEntries"]):
     def roots(self) -> set[str]:
         """Names of the links that are called `base` in arms."""
         return {each.robot.root.name.text for each in self.loaded}
+
+    def take(self, made: ArmEntries) -> None:
+        """Let a robot that was read elsewhere count as one of these files."""
+        self._read[made.robot.file] = made
+
+    def hold(self, place: Place) -> bool:
+        """Return True if a place is in one of these files, which a deck can override, but not change."""
+        return place.file in self._read
+
+    def note_at(self, place: Place) -> str:
+        """A note on a place whose text is not the number from there, empty elsewhere."""
+        return next((note for each in self.loaded if (note := each.notes.get(place)) is not None), "")
 
     def arm_entries(self, made_from: Call) -> ArmEntries:
         """The robot of `urdf("FILE")`. Raises Problem."""

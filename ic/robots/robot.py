@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field
 
+from ic.robots.xml import Element
 from met.diagnostic import Place
 from met.frozen import frozen
 
@@ -51,6 +52,10 @@ class Inertial:
     moments: Numbers
     place: Place
 
+    @property
+    def is_turned(self) -> bool:
+        return self.rpy is not None and not self.rpy.nothing
+
 
 @frozen
 class Link:
@@ -59,13 +64,23 @@ class Link:
 
 
 @frozen
+class Mimic:
+    """The joint that another follows, at `multiplier` times its position plus `offset`, m or rad."""
+
+    joint: Written
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@frozen
 class Joint:
     """A joint; axis in its own frame, as written.
 
-    limits    lower, upper, effort, velocity: those that are written and are numbers; `limits_at` their place
+    limits    lower, upper, effort, velocity: those that are written, infinite where none is meant; `limits_at` the
+              place of their element
     friction  damping and friction, not negative; `friction_at` their place, None where both are zero or not written
-    mimic     the joint that it follows; `law` its multiplier and offset as written
-    followed  the same of a joint that follows none any more
+    mimic     the joint that it follows
+    followed  the same of a joint that follows none any more; `held` its position where it is fixed instead
     """
 
     name: Written
@@ -75,25 +90,29 @@ class Joint:
     at: Numbers | None = None
     rpy: Numbers | None = None
     axis: Numbers | None = None
-    limits: Mapping[str, float] = field(default_factory=dict)
+    limits: Mapping[str, Numbers] = field(default_factory=dict)
     limits_at: Place | None = None
     friction: Mapping[str, float] = field(default_factory=dict)
     friction_at: Place | None = None
-    mimic: Written | None = None
-    law: str = ""
-    followed: Written | None = None
+    mimic: Mimic | None = None
+    followed: Mimic | None = None
+    held: float = 0.0
 
 
 @frozen
 class Robot:
-    """A robot. root: the link that no joint carries, which is the arm's base; dropped: names of what was not read"""
+    """A robot.
+
+    root     the link that no joint carries, which is the arm's base
+    dropped  elements that were not read, by tag, or of which an attribute was not, by `NAME of TAG`
+    """
 
     file: str
     name: str
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
     root: Link
-    dropped: Mapping[str, tuple[Place, ...]]
+    dropped: Mapping[str, tuple[Element, ...]]
 
     @property
     def carried(self) -> tuple[Link, ...]:

@@ -8,34 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from ic.robots.attributes import (
-    XACRO,
-    number,
-    number_or_none,
-    numbers,
-    only_child,
-    refuse_unknown,
-    required_child,
-    shown,
-    word,
-)
-from ic.robots.robot import TYPES, Inertial, Joint, Link, Numbers, Robot
+from ic.robots.attributes import XACRO, Found, read_element, shown
+from ic.robots.robot import Inertial, Joint, Link, Mimic, Numbers, Robot
 from ic.robots.xml import Element, parse
 from ic.text.complaints import Complaints, known_words
 from ic.text.limits import MOST_LINKS
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 
-LIMITS = ("lower", "upper", "effort", "velocity")
-FRICTION = ("damping", "friction")
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 MOST_NAMED = 6  # places of a fault in one message
 
-_READ = {
-    "robot": ("link", "joint"),
-    "link": ("inertial",),
-    "inertial": ("origin", "mass", "inertia"),
-    "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
-}
 _FORMATS = {"sdf": "SDF", "mujoco": "MuJoCo's MJCF", "svg": "a drawing", "html": "a web page", "COLLADA": "a mesh"}
 
 
@@ -67,29 +49,30 @@ def read(name: str, text: str) -> Robot:
                 )
             )
     complaints = Complaints()
-    dropped: dict[str, list[Place]] = {}
-    links, joints = [], []
-    _drop(root, dropped)
+    dropped: dict[str, list[Element]] = {}
+    links, joints, own = [], [], None
+    with complaints.gather():
+        own = read_element(root, dropped)
     for element in root.all("link"):
         with complaints.gather():
-            links.append(_link(element, dropped))
+            links.append(_link(read_element(element, dropped)))
     for element in root.all("joint"):
         with complaints.gather():
-            joints.append(_joint(element, dropped))
+            joints.append(_joint(read_element(element, dropped)))
     _check_names(links, "link", complaints)
     _check_names(joints, "joint", complaints)
     if not complaints.errors:
         _check_ends(links, joints, complaints)
-    if complaints.errors:
+        _check_mimics(joints, complaints)
+    if complaints.errors or own is None:
         raise Problem(complaints.errors)
-    robot = root.attributes.get("name", "").strip()
     return Robot(
         name,
-        robot,
+        own.words["name"].text if "name" in own.words else "",
         tuple(links),
         tuple(joints),
         _root(root, links, joints),
-        {tag: tuple(places) for tag, places in dropped.items()},
+        {what: tuple(elements) for what, elements in dropped.items()},
     )
 
 
@@ -101,86 +84,52 @@ def _within(root: Element) -> Iterator[Element]:
         stack.extend(reversed(element.children))
 
 
-def _drop(element: Element, dropped: dict[str, list[Place]]) -> None:
-    """Count the elements inside that are not read."""
-    for child in element.children:
-        if child.tag not in _READ[element.tag]:
-            dropped.setdefault(child.tag, []).append(child.place)
+def _link(found: Found) -> Link:
+    inertial = found.inside.get("inertial")
+    return Link(found.words["name"], None if inertial is None else _inertial(inertial))
 
 
-def _link(element: Element, dropped: dict[str, list[Place]]) -> Link:
-    name = word(element, "name", '<link name="...">')
-    _drop(element, dropped)
-    inertial = only_child(element, "inertial")
-    return Link(name, None if inertial is None else _inertial(inertial, dropped))
-
-
-def _inertial(element: Element, dropped: dict[str, list[Place]]) -> Inertial:
-    _drop(element, dropped)
-    com, rpy = _origin(element)
-    mass = required_child(element, "mass", '<mass value="..."/>')
-    refuse_unknown(mass, ("value",))
-    inertia = required_child(element, "inertia", '<inertia ixx="..." iyy="..." izz="..." ixy="0" ixz="0" iyz="0"/>')
-    refuse_unknown(inertia, MOMENTS)
-    moments = [number(inertia, each) if each in MOMENTS[:3] else numbers(inertia, each, 1) for each in MOMENTS]
+def _inertial(found: Found) -> Inertial:
+    inertia = found.inside["inertia"]
+    moments = [inertia.numbers.get(each) for each in MOMENTS]
     values = tuple(0.0 if moment is None else moment.values[0] for moment in moments)
     each = tuple(inertia.place if moment is None else moment.place for moment in moments)
-    return Inertial(number(mass, "value"), com, rpy, Numbers(values, inertia.place, each), element.place)
+    com, rpy = _origin(found)
+    mass = found.inside["mass"].numbers["value"]
+    return Inertial(mass, com, rpy, Numbers(values, inertia.place, each), found.place)
 
 
-def _origin(element: Element) -> tuple[Numbers | None, Numbers | None]:
+def _origin(found: Found) -> tuple[Numbers | None, Numbers | None]:
     """xyz and rpy of the `<origin>` inside."""
-    origin = only_child(element, "origin")
-    if origin is None:
-        return None, None
-    refuse_unknown(origin, ("xyz", "rpy"))
-    return numbers(origin, "xyz", 3), numbers(origin, "rpy", 3)
+    origin = found.inside.get("origin")
+    return (None, None) if origin is None else (origin.numbers.get("xyz"), origin.numbers.get("rpy"))
 
 
-def _joint(element: Element, dropped: dict[str, list[Place]]) -> Joint:
-    name = word(element, "name", '<joint name="..." type="revolute">')
-    kind = word(element, "type", '<joint name="..." type="revolute">')
-    _drop(element, dropped)
-    at, rpy = _origin(element)
-    parent = word(required_child(element, "parent", '<parent link="..."/>'), "link", '<parent link="..."/>')
-    child = word(required_child(element, "child", '<child link="..."/>'), "link", '<child link="..."/>')
-    axis = only_child(element, "axis")
-    if axis is not None:
-        refuse_unknown(axis, ("xyz",))
-    limit, dynamics, mimic = only_child(element, "limit"), only_child(element, "dynamics"), only_child(element, "mimic")
-    limits = {} if limit is None else {name: number_or_none(limit, name) for name in LIMITS}
-    friction = _friction(dynamics)
-    law = ""
-    if mimic is not None:
-        given = mimic.attributes
-        law = ", ".join(f"{each} {shown(given[each])}" for each in ("multiplier", "offset") if each in given)
+def _joint(found: Found) -> Joint:
+    at, rpy = _origin(found)
+    axis, limit, dynamics = (found.inside.get(tag) for tag in ("axis", "limit", "dynamics"))
+    friction = {} if dynamics is None else {name: each.values[0] for name, each in dynamics.numbers.items()}
     return Joint(
-        name,
-        kind,
-        parent,
-        child,
+        found.words["name"],
+        found.words["type"],
+        found.inside["parent"].words["link"],
+        found.inside["child"].words["link"],
         at,
         rpy,
-        None if axis is None or kind.text not in TYPES[:3] else numbers(axis, "xyz", 3),
-        {name: value for name, value in limits.items() if value is not None},
+        None if axis is None else axis.numbers["xyz"],
+        {} if limit is None else limit.numbers,
         None if limit is None else limit.place,
         friction,
         None if dynamics is None or not any(friction.values()) else dynamics.place,
-        None if mimic is None else word(mimic, "joint", '<mimic joint="..."/>'),
-        law,
+        _mimic(found.inside.get("mimic")),
     )
 
 
-def _friction(dynamics: Element | None) -> dict[str, float]:
-    """Damping and friction. Raises Problem D206 for a negative one."""
-    found = {}
-    for name in FRICTION:
-        given = None if dynamics is None else numbers(dynamics, name, 1)
-        if given is not None:
-            found[name] = given.values[0]
-            if found[name] < 0.0:
-                raise Problem(error("D206", f"`{name}` is below 0", given.place, help="write 0, or a number above it"))
-    return found
+def _mimic(found: Found | None) -> Mimic | None:
+    if found is None:
+        return None
+    given = {name: each.values[0] for name, each in found.numbers.items()}
+    return Mimic(found.words["joint"], given.get("multiplier", 1.0), given.get("offset", 0.0))
 
 
 def _check_names(named: Sequence[Link] | Sequence[Joint], kind: str, complaints: Complaints) -> None:
@@ -212,6 +161,38 @@ def _check_ends(links: Sequence[Link], joints: Sequence[Joint], complaints: Comp
                 )
 
 
+def _check_mimics(joints: Sequence[Joint], complaints: Complaints) -> None:
+    """Check that each joint that follows another follows, in the end, an existing one that moves by itself."""
+    followed = {joint.name.text: joint.mimic for joint in joints}
+    in_circles: set[str] = set()
+    for joint in joints:
+        if joint.mimic is None:
+            continue
+        leader = joint.mimic.joint
+        if leader.text not in followed:
+            complaints.error(
+                "D207",
+                f"no joint `{shown(leader.text)}` in this file",
+                leader.place,
+                also=[Label(joint.name.place, f"joint `{shown(joint.name.text)}`")],
+                help=[*did_you_mean(leader.text, followed), known_words("joints", map(shown, sorted(followed)))],
+            )
+        name = joint.name.text
+        at: Mimic | None = joint.mimic
+        chain = {name: True}
+        while at is not None and at.joint.text not in chain and at.joint.text in followed:
+            chain[at.joint.text] = True
+            at = followed[at.joint.text]
+        if at is not None and at.joint.text == name and not in_circles.intersection(chain):
+            in_circles.update(chain)
+            complaints.error(
+                "D213",
+                f"joint `{shown(name)}` follows itself: {' -> '.join(map(shown, [*chain, name]))}",
+                leader.place,
+                help="remove the `<mimic>` of one of these joints: it then moves by itself",
+            )
+
+
 def _root(element: Element, links: Sequence[Link], joints: Sequence[Joint]) -> Link:
     """The link that no joint carries. Raises Problem D209 where there is none or more than one, or it carries
     nothing."""
@@ -228,7 +209,7 @@ def _root(element: Element, links: Sequence[Link], joints: Sequence[Joint]) -> L
                 "every link of this robot hangs on another: none is its base",
                 joints[0].name.place,
                 also=also,
-                help="one of the joints closes a loop; a closed chain is not in this version",
+                help="one of the joints closes a loop: take it out, and close it by a stiff `bushing` in the run",
             )
         )
     if len(roots) > 1:

@@ -45,9 +45,6 @@ def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
 
 def _left_out(body: ArmEntries) -> Iterator[Label]:
     robot = body.robot
-    root = robot.root.inertial
-    if root is not None and root.mass.values[0] != 0.0:
-        yield Label(root.place, f"the inertia of `{shown(robot.root.name.text)}`: it is `base`, the ground")
     rubbing = [joint for joint in robot.joints if joint.friction_at is not None and joint.type.text in MOVING]
     if rubbing and rubbing[0].friction_at is not None:
         yield Label(
@@ -56,9 +53,9 @@ def _left_out(body: ArmEntries) -> Iterator[Label]:
         )
     if robot.dropped:
         kinds = sorted(robot.dropped.items(), key=lambda kind: (-len(kind[1]), kind[0]))
-        counts = [f"{len(places)} `{shown(tag)}`" for tag, places in kinds[:MOST_NAMED]]
+        counts = [f"{len(elements)} `{shown(what)}`" for what, elements in kinds[:MOST_NAMED]]
         more = f" and {len(kinds) - MOST_NAMED} kinds more" if len(kinds) > MOST_NAMED else ""
-        yield Label(kinds[0][1][0], f"not read: {', '.join(counts)}{more}")
+        yield Label(kinds[0][1][0].place, f"not read: {', '.join(counts)}{more}")
 
 
 def _joints(body: ArmEntries, joints: Sequence[Joint]) -> str:

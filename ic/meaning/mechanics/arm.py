@@ -358,14 +358,23 @@ def _limits(scope: Scope, owner: Owner, body: MergedBlock) -> tuple[str, ...]:
     if len(ends) == 1:
         other = "q_max" if ends == ["q_min"] else "q_min"
         message = f"{owner.label} has `{ends[0]}` and no `{other}`"
+    of_file = bool(ends) and scope.definitions.robot_files.hold(body.items[ends[0]].place)
         scope.complaints.error(
             "D346",
             message,
             body.items[ends[0]].place,
-            help=f"write `{other}` too: a range has two ends",
+            help=[
+                f"write `{other}` too: a range has two ends",
+                *([f"in the arm's block: `{owner.path} {{ {other} = ...; }}`"] if of_file else []),
+            ],
         )
     elif ends and None not in values.values():
-        check_relations(scope, owner, (Q_MIN,), body, values)
+        remedies = ["swap them, or leave both out: a range has two ends"]
+        if of_file:
+            remedies.append(
+                f"in the arm's block: `{owner.path} {{ remove q_min;  remove q_max; }}`, or write both there"
+            )
+        check_relations(scope, owner, (Q_MIN,), body, values, remedies)
     return tuple(values)
 
 

@@ -20,9 +20,17 @@ from met.plan import BASE
 
 
 def check_relations(
-    scope: Scope, owner: Owner, parameters: Iterable[Parameter], body: MergedBlock, values: Mapping[str, Any]
+    scope: Scope,
+    owner: Owner,
+    parameters: Iterable[Parameter],
+    body: MergedBlock,
+    values: Mapping[str, Any],
+    disorder: tuple[str, ...] = (),
 ) -> None:
-    """Report parameters that contradict each other, except names of the arm, which `check_names` checks."""
+    """Report parameters that contradict each other, except names of the arm, which `check_names` checks.
+
+    disorder  the remedies for one that is not less than another, in place of leaving one of them out
+    """
     for wanted in parameters:
         value, place, path = values[wanted.name], _place(owner, body, wanted.name), owner.join(wanted.name)
         if wanted.direction:
@@ -46,7 +54,7 @@ def check_relations(
                 place=place if body.get(wanted.name) is not None else _place(owner, body, other),
                 path=path,
                 needs=(path, owner.join(other)),
-                help=f"swap them, or leave one out ({wanted.doc})",
+                help=disorder or f"swap them, or leave one out ({wanted.doc})",
             )
         if wanted.shape == "list":
             _check_list(scope, owner, wanted, body, values, place)

@@ -588,7 +588,7 @@ class Scope:
     def _origin(self, item: Item, place: Place) -> Origin:
         """The origin of an item's value; for a cell of a table with its line and column in the file."""
         name = self.definitions.in_full(item.value) if isinstance(item.value, Name) else None
-        note = f"from `{name.text}`" if name is not None else ""
+        note = f"from `{name.text}`" if name is not None else self.definitions.robot_files.note_at(place)
         cells = self.names.cells.get(name.text, ()) if name is not None else ()
         at = f" ({cells[0].place})" if len(cells) == 1 else ""
         return written_origin(place, item.overrides, note + at)

@@ -9,6 +9,9 @@ import pytest
 
 import ic
 from ic.driver.import_robot import import_robot
+from ic.robots.entries import rotation
+from ic.robots.following import without_mimics
+from ic.robots.urdf import read
 from met import cli, run
 from met.diagnostic import Problem
 from tests.ic.robots.two import TWO, changed, refused
@@ -150,12 +153,91 @@ error[D213]: joint `finger` follows `roll`, which is not in this version
    |
 23 |     <parent link="hand"/> <child link="tool 1"/> <mimic joint="roll" multiplier="0.1"/>
    |                                                                ^^^^
-   = help: `--mimic free` lets such joints move by themselves, `--mimic fixed` holds them at 0
+   = help: `--mimic free` lets such joints move by themselves, `--mimic fixed` holds them where they are at the start
 
 1 error
 """
     )
     assert not Path("arm.ic").exists()
+
+
+LED = """\
+<robot name="led">
+  <link name="base_link"/> <link name="a">BODY</link> <link name="b">BODY</link> <link name="c">BODY</link>
+  <joint name="one" type="revolute">
+    <parent link="base_link"/> <child link="a"/> <axis xyz="0 0 1"/> <limit lower="0.2" upper="0.6"/>
+  </joint>
+  <joint name="two" type="KIND">
+    ORIGIN <parent link="a"/> <child link="b"/> <axis xyz="AXIS"/>
+    <mimic joint="one" multiplier="-1.5" offset="0.5"/>
+  </joint>
+  <joint name="three" type="revolute">
+    <origin xyz="0.3 0.2 0.1"/> <parent link="b"/> <child link="c"/> <axis xyz="0 1 0"/> <mimic joint="two"/>
+  </joint>
+</robot>
+""".replace("BODY", '<inertial> <mass value="1"/> <inertia ixx="1" iyy="1" izz="1"/> </inertial>')
+
+
+def led(kind: str, origin: str = "", axis: str = "0 0 1") -> str:
+    return LED.replace("KIND", kind).replace("ORIGIN", origin).replace("AXIS", axis)
+
+
+def turn(vector: np.ndarray) -> np.ndarray:
+    """The rotation by a vector, as the power series of its cross product."""
+    x, y, z = vector
+    cross, term, total = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]), np.eye(3), np.eye(3)
+    for n in range(1, 25):
+        term = term @ cross / n
+        total = total + term
+    return total
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 1), (-1, 0, 0), (0, -2, 0), (1, 2, 3)])
+@pytest.mark.parametrize("rpy", [(0, 0, 0), (0.3, -1.1, 2), (0.4, np.pi / 2, 0), (3, -1.4, -3)])
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_a_follower_is_fixed_where_its_leader_puts_it(kind: str, rpy: tuple[float, ...], axis: tuple[int, ...]) -> None:
+    """The leader is held in the middle of its range, at 0.4 rad, so the follower is at -1.5 0.4 + 0.5 = -0.1."""
+    origin = f'<origin xyz="0.1 0.2 0.3" rpy="{" ".join(map(repr, map(float, rpy)))}"/>'
+    robot = read("led.urdf", led(kind, origin, " ".join(map(str, axis))))
+    before, (_, after, _) = robot.joints[1], without_mimics(robot, "fixed").joints
+    assert before.at and before.rpy and after.at and after.rpy and after.type.text == "fixed"
+    along = -0.1 * np.array(axis) / np.linalg.norm(axis)
+    R = np.array(rotation(*before.rpy.values))
+    moved = R @ along if kind == "prismatic" else np.zeros(3)
+    np.testing.assert_allclose(after.at.values, before.at.values + moved, atol=1e-15)
+    R = R if kind == "prismatic" else R @ turn(along)
+    np.testing.assert_allclose(rotation(*after.rpy.values), R, atol=4e-16 * 8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_the_deck_with_followers_held_has_its_links_where_followers_are_that_move(kind: str) -> None:
+    Path("led.urdf").write_text(led(kind, '<origin xyz="0 1 0" rpy="0.3 -1.1 2"/>', "1 2 3"), encoding="utf-8")
+    free, fixed = (import_robot("led.urdf", treatment) for treatment in ("free", "fixed"))  # type: ignore[arg-type]
+    unit = "rad" if kind == "revolute" else "m"
+    assert "follows `one` in the file (multiplier -1.5, offset 0.5); here it is held at -0.1" in fixed
+    assert "follows `two` in the file; here it is held at -0.1" in fixed and "one.q = 0.4 rad;" in fixed
+    free = free.replace("one.q = 0.4 rad;", f"one.q = 0.4 rad;  two.q = -0.1 {unit};  three.q = -0.1 rad;")
+    poses = []
+    for deck in (free, fixed):
+        Path("led.ic").write_text(deck.replace("[q, tau]", "[links.c.position, links.c.orientation]"), encoding="utf-8")
+        [plan] = [ic.compile("led.ic", select=["hold"])]
+        found = run.run(plan.experiments[0])
+        poses.append(np.concatenate([found.signals[f"links.c.{name}"][0, 0] for name in ("position", "orientation")]))
+    np.testing.assert_allclose(poses[0], poses[1], atol=1e-14)
+
+
+def test_a_follower_that_is_fixed_stays_where_it_is() -> None:
+    Path("led.urdf").write_text(led("fixed"), encoding="utf-8")
+    assert "joint two fixed { parent = a;  child = b; }" in import_robot("led.urdf", "fixed")
+
+
+@pytest.mark.parametrize("treatment", [None, "free", "fixed"])
+def test_a_joint_that_follows_none_that_there_is_is_refused_however_it_is_treated(treatment: str | None) -> None:
+    Path("two.urdf").write_text(changed(TWO, ("<axis", '<mimic joint="ghost"/> <axis')), encoding="utf-8")
+    with pytest.raises(Problem) as problem:
+        import_robot("two.urdf", treatment)  # type: ignore[arg-type]
+    assert [each.code for each in problem.value.diagnostics] == ["D207"]
 
 
 def test_a_joint_that_is_let_go_and_moves_nothing_is_refused() -> None:
@@ -186,6 +268,20 @@ error[D087]: the inertia of link `bar` is no body's
 
 
 def test_a_file_that_is_there_is_left_alone_unless_forced(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_root_is_a_base_with_its_mass_unless_no_body_is_so() -> None:
+    root = '<link name="ground"> <inertial> <mass value="7"/> <inertia ixx="1" iyy="1" izz="1"/> </inertial> </link>'
+    Path("two.urdf").write_text(changed(TWO, ('<link name="ground"/>', root)), encoding="utf-8")
+    Path("two.ic").write_text(
+        import_robot("two.urdf").replace("duration", "base = free;  duration", 1), encoding="utf-8"
+    )
+    assert ic.compile("two.ic").experiments[0].parameters["links.base.mass"].value == 7.0
+    odd = root.replace('ixx="1"', 'ixx="3"')
+    Path("two.urdf").write_text(changed(TWO, ('<link name="ground"/>', odd)), encoding="utf-8")
+    text = import_robot("two.urdf")
+    assert "`base` is the file's link `ground`. Its inertia is left out: no body has it." in text
+    assert "link base" not in text
+
+
     Path("arm.ic").write_text("mine", encoding="utf-8")
     assert cli.main(["import", "arm.urdf", "-o", "arm.ic", "--mimic", "fixed"]) == 2
     assert (

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ic.robots.two import DECK, TWO, changed, said
+from tests.ic.robots.two import DECK, OTHER, TWO, changed, said
 
 # ruff: noqa: E501 - messages are as wide as they are
 
@@ -115,7 +115,7 @@ error[D205]: this `<inertia>` has no `ixx`
   |
 7 |       <inertia iyy="0.2" izz="0.2" ixy="0" ixz="0" iyz="0"/>
   |       ^^^^^^^^
-  = help: write `<inertia ixx="..."/>`
+  = help: write `<inertia ixx="..." iyy="..." izz="..." ixy="0" ixz="0" iyz="0"/>`
 """,
 )
 mistake(
@@ -248,6 +248,7 @@ error[D212]: joint `hinge` is floating, and joints are revolute, prismatic or fi
 )
 mistake(
     "a joint that follows another",
+    ("</robot>", OTHER),
     ('<axis xyz="0 0 1"/>', '<mimic joint="other" multiplier="-1"/>'),
     says="""\
 error[D213]: joint `hinge` follows `other`, which is not in this version
@@ -256,7 +257,152 @@ error[D213]: joint `hinge` follows `other`, which is not in this version
 13 |     <mimic joint="other" multiplier="-1"/>
    |                   ^^^^^
    = help: in the arm's block, `hinge { remove mimic; }` lets it move by itself
-   = help: `remove hinge;  joint hinge fixed { ... }` holds it where it is at q = 0
+   = help: `met import --mimic fixed` prints the joint held where it is in the file
+""",
+)
+mistake(
+    "a joint that follows none that there is",
+    ('<axis xyz="0 0 1"/>', '<mimic joint="othre"/>'),
+    ("</robot>", OTHER),
+    says="""\
+error[D207]: no joint `othre` in this file
+  --> two.urdf:13:19
+   |
+13 |     <mimic joint="othre"/>
+   |                   ^^^^^
+  ::: two.urdf:10:16  joint `hinge`
+   = help: did you mean `other`?
+   = help: joints: hinge, other
+""",
+)
+mistake(
+    "joints that follow each other",
+    ('<axis xyz="0 0 1"/>', '<mimic joint="other"/>'),
+    ("</robot>", OTHER.replace("<parent", '<mimic joint="hinge"/> <parent')),
+    says="""\
+error[D213]: joint `hinge` follows itself: hinge -> other -> hinge
+  --> two.urdf:13:19
+   |
+13 |     <mimic joint="other"/>
+   |                   ^^^^^
+   = help: remove the `<mimic>` of one of these joints: it then moves by itself
+""",
+)
+mistake(
+    "a limit with a decimal comma and one in degrees",
+    ("<axis", '<limit lower="-180deg" upper="3,14" effort="5 Nm" velocity="nan"/> <axis'),
+    says="""\
+error[D206]: `-180deg` is not a number
+  --> two.urdf:13:19
+   |
+13 |     <limit lower="-180deg" upper="3,14" effort="5 Nm" velocity="nan"/> <axis xyz="0 0 1"/>
+   |                   ^^^^^^^
+   = help: a number is finite, and written as 12.5 or -1e-3, without a unit; `-inf` stands for no limit
+
+error[D206]: `3,14` is not a number
+  --> two.urdf:13:35
+   |
+13 |     <limit lower="-180deg" upper="3,14" effort="5 Nm" velocity="nan"/> <axis xyz="0 0 1"/>
+   |                                   ^^^^
+   = help: the decimal sign is a point: `3.14`
+
+error[D206]: `Nm` is not a number
+  --> two.urdf:13:49
+   |
+13 |     <limit lower="-180deg" upper="3,14" effort="5 Nm" velocity="nan"/> <axis xyz="0 0 1"/>
+   |                                                 ^^^^
+   = help: a number is finite, and written as 12.5 or -1e-3, without a unit; `inf` stands for no limit
+
+error[D206]: `nan` is not a number
+  --> two.urdf:13:65
+   |
+13 |     <limit lower="-180deg" upper="3,14" effort="5 Nm" velocity="nan"/> <axis xyz="0 0 1"/>
+   |                                                                 ^^^
+   = help: a number is finite, and written as 12.5 or -1e-3, without a unit; `inf` stands for no limit
+""",
+)
+mistake(
+    "a limit that xacro would fill in, and an endless one on the wrong side",
+    ("<axis", '<limit lower="inf" upper="$(arg up)"/> <axis'),
+    says="""\
+error[D206]: `lower` cannot be `inf`
+  --> two.urdf:13:19
+   |
+13 |     <limit lower="inf" upper="$(arg up)"/> <axis xyz="0 0 1"/>
+   |                   ^^^
+   = help: `-inf` stands for no limit
+
+error[D203]: `$(arg up)` is to be filled in
+  --> two.urdf:13:31
+   |
+13 |     <limit lower="inf" upper="$(arg up)"/> <axis xyz="0 0 1"/>
+   |                               ^^^^^^^^^
+   = help: this is xacro, from which a URDF file is made: run `xacro FILE > robot.urdf` and take that
+""",
+)
+mistake(
+    "limits the wrong way round, and below zero",
+    ("<axis", '<limit lower="1" upper="-1" effort="-5" velocity="2"/> <axis'),
+    says="""\
+error[D241]: `q_min` of joint `hinge` must be less than `q_max`
+  --> two.urdf:13:19
+   |
+13 |     <limit lower="1" upper="-1" effort="-5" velocity="2"/> <axis xyz="0 0 1"/>
+   |                   ^ 1 is not less than -1
+   = help: swap them, or leave both out: a range has two ends
+   = help: in the arm's block: `hinge { remove q_min;  remove q_max; }`, or write both there
+
+error[D077]: `tau_max` of joint `hinge` must be above 0 N*m
+  --> two.urdf:13:41
+   |
+13 |     <limit lower="1" upper="-1" effort="-5" velocity="2"/> <axis xyz="0 0 1"/>
+   |                                         ^^ this is -5 N*m
+   = help: write a number above 0 N*m (largest torque of the servo on the joint in either direction)
+""",
+)
+mistake(
+    "a range of one end",
+    ("<axis", '<limit lower="1" upper="inf"/> <axis'),
+    says="""\
+error[D346]: joint `hinge` has `q_min` and no `q_max`
+  --> two.urdf:13:19
+   |
+13 |     <limit lower="1" upper="inf"/> <axis xyz="0 0 1"/>
+   |                   ^
+   = help: write `q_max` too: a range has two ends
+   = help: in the arm's block: `hinge { q_max = ...; }`
+""",
+)
+mistake(
+    "an attribute in capitals, and an element",
+    ("<axis", '<Limits lower="-1"/> <limit Lower="-1"/> <axis'),
+    says="""\
+error[D208]: `<joint>` has no element `<Limits>`
+  --> two.urdf:13:5
+   |
+13 |     <Limits lower="-1"/> <limit Lower="-1"/> <axis xyz="0 0 1"/>
+   |     ^^^^^^^
+   = help: did you mean `limit`?
+
+error[D208]: `<limit>` has no attribute `Lower`
+  --> two.urdf:13:33
+   |
+13 |     <Limits lower="-1"/> <limit Lower="-1"/> <axis xyz="0 0 1"/>
+   |                                 ^^^^^
+   = help: did you mean `lower`?
+   = help: it has `lower`, `upper`, `effort`, `velocity`
+""",
+)
+mistake(
+    "an element in the place of an attribute",
+    ("<axis", "<limit> <lower>-1</lower> </limit> <axis"),
+    says="""\
+error[D208]: `<limit>` has no element `<lower>`
+  --> two.urdf:13:13
+   |
+13 |     <limit> <lower>-1</lower> </limit> <axis xyz="0 0 1"/>
+   |             ^^^^^^
+   = help: `lower` is an attribute: `<limit lower="..." upper="..." effort="..." velocity="..."/>`
 """,
 )
 mistake(

@@ -27,6 +27,12 @@ TWO = """\
   </joint>
 </robot>
 """
+OTHER = """\
+  <link name="tip"/>
+  <joint name="other" type="fixed"> <parent link="bar"/> <child link="tip"/> </joint>
+</robot>"""
+"""Another joint, in the place of the robot's end."""
+
 DECK = """\
 arm two from urdf("two.urdf") { }
 run fall { arm = two;  rates { dynamics = 1 kHz; }  duration = 10 ms;  record = [q]; }
@@ -57,4 +63,4 @@ def without_count(text: str) -> str:
     return text.rpartition("\n\n")[0] + "\n" if text else ""
 
 
-__all__ = ["DECK", "TWO", "changed", "check", "refused", "said"]
+__all__ = ["DECK", "OTHER", "TWO", "changed", "check", "refused", "said"]

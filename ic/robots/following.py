@@ -1,0 +1,101 @@
+"""Joints that follow others in a URDF file, freed or held: a deck has none that follows.
+
+A follower is at `multiplier` times the position of its leader plus `offset`, and the leader is where the deck's first
+run holds it (`hold_position`): at 0, or in the middle of a range that 0 is not in.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Literal
+
+from ic.robots.entries import limits, rotation
+from ic.robots.robot import MOVING, Joint, Numbers, Robot
+
+Treatment = Literal["free", "fixed"]
+PARALLEL = 1e-9  # sine of the angle to a right one below which a pitch leaves roll and yaw alike
+
+
+def without_mimics(robot: Robot, treatment: Treatment) -> Robot:
+    """The robot with its followers freed, or fixed where they are; `print_deck` names them."""
+    known = {joint.name.text: joint for joint in robot.joints}
+
+    def changed(joint: Joint) -> Joint:
+        if joint.mimic is None:
+            return joint
+        free = replace(joint, mimic=None, followed=joint.mimic)
+        return free if treatment == "free" else _fixed(free, position(joint, known))
+
+    return replace(robot, joints=tuple(changed(joint) for joint in robot.joints))
+
+
+def position(joint: Joint, known: dict[str, Joint]) -> float:
+    """Where the joint is at the start: a follower where its leader puts it. known: all joints by name"""
+    chain = [joint]
+    while (mimic := chain[-1].mimic) is not None:
+        chain.append(known[mimic.joint.text])
+    value = hold_position(chain[-1])
+    for follower in reversed(chain[:-1]):
+        assert follower.mimic is not None
+        value = follower.mimic.multiplier * value + follower.mimic.offset
+    return value + 0.0
+
+
+def hold_position(joint: Joint) -> float:
+    """The position at which a deck's first run holds a joint: 0, or the middle of its range where that excludes 0."""
+    if joint.type.text not in MOVING:
+        return 0.0
+    found = {name: limit.values[0] for name, limit in limits(joint).items()}
+    lower, upper = found.get("lower", -math.inf), found.get("upper", math.inf)
+    if lower <= 0.0 <= upper or not lower < upper < math.inf:  # else the arm is refused
+        return 0.0
+    middle = lower / 2.0 + upper / 2.0  # the sum might overflow
+    short = float(f"{middle:.4g}")
+    return short if lower <= short <= upper else middle
+
+
+def _fixed(joint: Joint, at: float) -> Joint:
+    """The joint fixed at a position, its child where it is there."""
+    fixed = replace(joint, type=replace(joint.type, text="fixed"), axis=None)
+    if joint.type.text not in MOVING or at == 0.0:
+        return fixed
+    axis = (1.0, 0.0, 0.0) if joint.axis is None else joint.axis.values
+    length = math.hypot(*axis)
+    if length == 0.0:  # no direction to move in
+        return fixed
+    x, y, z = (each / length for each in axis)
+    place = joint.name.place
+    rpy = (0.0, 0.0, 0.0) if joint.rpy is None else joint.rpy.values
+    if joint.type.text == "prismatic":
+        R = rotation(*rpy)
+        moved = (sum(row[k] * at * (x, y, z)[k] for k in range(3)) for row in R)
+        start = (0.0, 0.0, 0.0) if joint.at is None else joint.at.values
+        there = tuple(a + b for a, b in zip(start, moved, strict=True))
+        return replace(fixed, at=Numbers(there, place if joint.at is None else joint.at.place), held=at)
+    turned = _turned(rpy, (x, y, z), at)
+    return replace(fixed, rpy=Numbers(turned, place if joint.rpy is None else joint.rpy.place), held=at)
+
+
+def _turned(rpy: tuple[float, ...], axis: tuple[float, float, float], angle: float) -> tuple[float, float, float]:
+    """rpy of a frame at `rpy` that is then turned about an axis of its own; exact about x, and of a frame not turned
+    about any of its axes."""
+    along = [k for k in range(3) if axis[k] != 0.0]
+    if along == [0] or (len(along) == 1 and not any(rpy)):
+        roll, pitch, yaw = (rpy[k] + axis[k] * angle for k in range(3))
+        return roll, pitch, yaw
+    x, y, z = axis
+    c, s = math.cos(angle), math.sin(angle)
+    u = 1.0 - c
+    turn = (
+        (c + x * x * u, x * y * u - z * s, x * z * u + y * s),
+        (y * x * u + z * s, c + y * y * u, y * z * u - x * s),
+        (z * x * u - y * s, z * y * u + x * s, c + z * z * u),
+    )
+    before = rotation(rpy[0], rpy[1], rpy[2])
+    R = [[sum(before[i][k] * turn[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
+    across = math.hypot(R[0][0], R[1][0])
+    pitch = math.atan2(-R[2][0], across)
+    if across < PARALLEL:
+        return math.atan2(-R[1][2], R[1][1]), pitch, 0.0
+    return math.atan2(R[2][1], R[2][2]), pitch, math.atan2(R[1][0], R[0][0])
