@@ -14,7 +14,7 @@ from ic.grammar.roofs import split_path
 from ic.grammar.syntax import Binary, Call, Deck, Entry, Expression, Group, Let, Name, Setting, Word
 from ic.language import DEFINITIONS, EXPERIMENTS, HEADS, OF_A_RUN
 from ic.meaning.definitions.csv_files import csv_files
-from ic.meaning.definitions.merge import MergedBlock, defined_twice, merge
+from ic.meaning.definitions.merge import Item, MergedBlock, defined_twice, merge
 from ic.meaning.definitions.row_tables import RowTable, row_table
 from ic.robots.files import RobotFiles
 from ic.text.complaints import Complaints, known_words, where_it_belongs, with_article
@@ -285,6 +285,17 @@ class Definitions:
             for each in self.robot_files.remarks(call):
                 self._complaints.remark(each.code, each.message, each.at, also=each.also, help=each.help)
             return merge(None, body.entries, home=definition.name, base_name=None, complaints=self._complaints)
+        return None
+
+    def base_from_file(self, arm: str) -> Item | None:
+        """The link `base` of the file that an arm, or one that it is like, is made from; None where there is none."""
+        for name in reversed(self.homes(self._by_kind["arm"][arm])):
+            call = self._by_kind["arm"][name].group.made_from
+            base = self.robot_files.arm_entries(call).base if call is not None else None
+            if base is not None:
+                return merge(None, (base.entry,), home=name, base_name=None, complaints=self._complaints).get(
+                    "link base"
+                )
         return None
 
     def homes(self, definition: Definition) -> tuple[str, ...]:

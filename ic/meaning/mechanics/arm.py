@@ -16,7 +16,7 @@ from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.names import FoundNames
 from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.dh import use_dh
-from ic.meaning.mechanics.foreign import refuse_foreign_joint
+from ic.meaning.mechanics.foreign import how_to_close, refuse_foreign_joint
 from ic.meaning.mechanics.matter import use_matter
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.addresses import in_arm
@@ -218,7 +218,7 @@ def _resolved(
             _take_over(scope, known)
             return known.thing
         there = scope if own_scope is None else own_scope()
-        return _link(there, item, homes) if item.kind == "link" else _joint(there, item, homes, ends)
+        return resolve_link(there, item, homes) if item.kind == "link" else _joint(there, item, homes, block, ends)
 
     links = [link for item in block.of_kind("link") if isinstance(link := part(item), Link)]
     made = [part(item) for item in block.of_kind("joint")]
@@ -266,7 +266,8 @@ def _stray(scope: Scope, item: Item, block: MergedBlock) -> None:
 # Links
 
 
-def _link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
+def resolve_link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
+    """A link of an arm, with its numbers entered as parameters; None where it has no block (already reported)."""
     owner = Owner(f"link `{item.name}`", item.place, f"links.{item.name}", homes=homes)
     if item.detail:
         scope.complaints.error(
@@ -290,9 +291,11 @@ def _link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
 # Joints
 
 
-def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str, None]) -> Joint | None:
+def _joint(
+    scope: Scope, item: Item, homes: tuple[str, ...], block: MergedBlock, links: Mapping[str, None]
+) -> Joint | None:
     owner = Owner(f"joint `{item.name}`", item.place, item.name, homes=homes)
-    if refuse_foreign_joint(scope, item):
+    if refuse_foreign_joint(scope, item, homes[-1], block):
         return None
     kind = item.detail[0].text if item.detail else None
     if item.body is None or item.value is not None:
@@ -355,10 +358,10 @@ def _limits(scope: Scope, owner: Owner, body: MergedBlock) -> tuple[str, ...]:
         return ()
     values = {wanted.name: scope.number(owner, wanted, item) for wanted, item in written.items()}
     ends = [name for name in ("q_min", "q_max") if name in values]
+    of_file = bool(ends) and scope.definitions.robot_files.hold(body.items[ends[0]].place)
     if len(ends) == 1:
         other = "q_max" if ends == ["q_min"] else "q_min"
         message = f"{owner.label} has `{ends[0]}` and no `{other}`"
-    of_file = bool(ends) and scope.definitions.robot_files.hold(body.items[ends[0]].place)
         scope.complaints.error(
             "D346",
             message,
@@ -369,11 +372,10 @@ def _limits(scope: Scope, owner: Owner, body: MergedBlock) -> tuple[str, ...]:
             ],
         )
     elif ends and None not in values.values():
-        remedies = ["swap them, or leave both out: a range has two ends"]
+        remedies: tuple[str, ...] = ("swap them, or leave both out: a range has two ends",)
         if of_file:
-            remedies.append(
-                f"in the arm's block: `{owner.path} {{ remove q_min;  remove q_max; }}`, or write both there"
-            )
+            instead = f"`{owner.path} {{ remove q_min;  remove q_max; }}`, or write both there"
+            remedies = (*remedies, f"in the arm's block: {instead}")
         check_relations(scope, owner, (Q_MIN,), body, values, remedies)
     return tuple(values)
 
@@ -494,7 +496,7 @@ def check_tree(scope: Scope, name: str, links: list[Link], joints: list[Joint], 
                 f"link `{joint.child}` has two parents",
                 Label(_place(joint), f"`{joint.parent}`"),
                 also=[Label(_place(first), f"`{first.parent}`, by joint `{first.name}`")],
-                help="a closed chain is not in this version; a branch is a parent with two children",
+                help=["a branch is a parent with two children", *how_to_close(scope, joint, _place(joint))],
             )
             continue
         holder[joint.child] = joint

@@ -17,8 +17,7 @@ from ic.meaning.definitions.merge import Item
 from ic.meaning.expressions.conditions import in_pieces
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
-from met.diagnostic import Place
-from met.plan import Joint, Link, Payload
+from met.plan import BASE, Joint, Link, Payload
 from met.trace import Real
 
 
@@ -39,9 +38,11 @@ def check_body(
     place = owner.place
     if item is not None:
         place = item.place if item.value is None else place_of(item.value)
-        if written_elsewhere(scope, place):
-            entry = "remove inertia;" if weightless else "inertia = [...] kg*m^2;"
-            helps.append(f"in the arm's block: `{name} {{ {entry} }}`")
+        if scope.definitions.robot_files.hold(place):
+            entry = f"{name} {{ {'remove inertia;' if weightless else 'inertia = [...] kg*m^2;'} }}"
+            if name == BASE:  # which the arm does not hold, so that there is nothing to change
+                entry = f"link {BASE} {{ mass = ...;  inertia = [...] kg*m^2; }}"
+            helps.append(f"in the arm's block: `{entry}`")
     scope.checks.require(
         (*inertia, 1.0 if mass is None else mass),
         lambda values: in_pieces(lambda rows: _not_a_body(rows, kind), values),
@@ -59,12 +60,6 @@ def _is_plainly_a_body(inertia: Sequence[Real], mass: Real | None) -> bool:
         return False
     least, middle, most = sorted(float(each) for each in inertia[:3])
     return mass != 0.0 and not any(inertia[3:]) and least >= 0.0 and most <= least + middle
-
-
-def written_elsewhere(scope: Scope, place: Place) -> bool:
-    """Return True if a place is in a file from which an arm is made: a deck can override it, but not change it
-    there."""
-    return any(source.name == place.file for source in scope.definitions.robot_files.sources)
 
 
 def _not_a_body(values: np.ndarray, kind: str) -> tuple[np.ndarray, list[str]]:

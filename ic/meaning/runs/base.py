@@ -12,7 +12,7 @@ from ic.grammar.syntax import Call, Expression
 from ic.language.runs import BASE_KINDS
 from ic.meaning.control.courses import course_named, use_course
 from ic.meaning.definitions.merge import Item, MergedBlock
-from ic.meaning.mechanics.arm import ResolvedArm
+from ic.meaning.mechanics.arm import ResolvedArm, resolve_link
 from ic.meaning.mechanics.bodies import carried_loads
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, refuse_values, word_of
@@ -172,9 +172,14 @@ def remark_ground(
 
 
 def _standing(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:
-    """The arm with its base among the links: without mass, unless the arm gives it some."""
+    """The arm with its base among the links: without mass, unless the arm or the file that it is made from gives it
+    some."""
     if any(link.name == BASE for link in arm.links) or BASE in arm.failed:
         return arm
+    written = scope.definitions.base_from_file(arm.name)
+    if written is not None:
+        link = resolve_link(scope, written, scope.definitions.homes(scope.definitions.of_kind("arm")[arm.name]))
+        return arm if link is None else replace(arm, links=(*arm.links, link))
     owner = Owner(f"link `{BASE}`", item.place, f"links.{BASE}")
     scope.number(owner, Parameter(name="mass", unit="kg", default=0.0, at_least=0.0, doc="mass of the link"), None)
     for name, unit, parts in (("com", "m", tuple("xyz")), ("inertia", "kg*m^2", INERTIA)):

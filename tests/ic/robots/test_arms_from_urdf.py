@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,13 @@ import pytest
 import ic
 from ic.driver.explain import explain
 from ic.driver.import_robot import import_robot
-from ic.robots.entries import moments, rotation
+from ic.robots.entries import LEFT_OUT, TURNED, moments, rotation
 from ic.robots.names import deck_names
 from ic.robots.urdf import read
 from met import cli, run
 from met.plan import Experiment
 from met.plan import file as plan_file
-from tests.ic.robots.two import DECK, TWO, changed, check, said
+from tests.ic.robots.two import DECK, OTHER, TWO, changed, check, said
 from tests.ic.small_decks import messages
 from tests.oracles.random_urdf import random_urdf
 from tests.oracles.urdf_plan import made_from, see
@@ -186,15 +187,100 @@ def check_file(folder: Path, deck: str) -> Path:
 
 
 def test_a_joint_that_follows_another_moves_by_itself_once_its_mimic_is_removed(tmp_path: Path) -> None:
-    robot = changed(TWO, ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><mimic joint="other"/>'))
+    robot = changed(TWO, ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><mimic joint="other"/>'), ("</robot>", OTHER))
     assert (
         made(tmp_path, robot, changed(DECK, ("{ }", "{ hinge { remove mimic; } }"))).structure.moving[0].name == "hinge"
     )
     fixed = "{ remove hinge;  joint hinge fixed { parent = base;  child = bar; }  link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }  joint turn revolute { parent = bar; child = tip; axis = z; } }"
+    fixed = fixed.replace("tip", "end")
     assert [joint.kind for joint in made(tmp_path, robot, changed(DECK, ("{ }", fixed))).structure.joints] == [
+        "fixed",
         "fixed",
         "revolute",
     ]
+
+
+LIMIT_NAMES = ("q_min", "q_max", "qd_max", "tau_max")
+
+
+@pytest.mark.parametrize(
+    ("written", "limits"),
+    [
+        ('lower="-1" upper="2" effort="50" velocity="3"', (-1.0, 2.0, 3.0, 50.0)),
+        ('lower=" -1e0&#10;" upper="+2." effort=".5e2" velocity="3"', (-1.0, 2.0, 3.0, 50.0)),
+        ('lower="-1"', (-1.0, 0.0, None, None)),  # URDF takes an end that is left out as 0
+        ('lower="0" upper="0" effort="0" velocity="0"', (None, None, None, None)),
+        ('lower="-inf" upper="+INF" effort="Infinity" velocity="inf"', (None, None, None, None)),
+        ('lower="-1.79769e+308" upper="1.7976931348623157e+308"', (None, None, None, None)),
+        ('lower="-inf" upper="inf" effort="50"', (None, None, None, 50.0)),
+    ],
+)
+def test_limits_are_what_is_written_and_an_infinite_one_is_none(
+    written: str, limits: tuple[float | None, ...], tmp_path: Path
+) -> None:
+    known = made(tmp_path, changed(TWO, ("<axis", f"<limit {written}/> <axis"))).parameters
+    found = [known.get(f"hinge.{name}") for name in LIMIT_NAMES]
+    assert tuple(None if each is None else each.value for each in found) == limits
+
+
+def test_an_arms_block_corrects_limits_that_are_none(tmp_path: Path) -> None:
+    robot = changed(TWO, ("<axis", '<limit lower="1" upper="-1" effort="-5"/> <axis'))
+    block = "{ hinge { remove q_min;  remove q_max;  tau_max = 5 N*m; } }"
+    assert "hinge.q_min" not in made(tmp_path, robot, changed(DECK, ("{ }", block))).parameters
+    robot = changed(TWO, ("<axis", '<limit lower="1" upper="inf"/> <axis'))
+    found = made(tmp_path, robot, changed(DECK, ("{ }", "{ hinge { q_max = 3 rad; } }")))
+    assert [found.parameters[f"hinge.{end}"].value for end in ("q_min", "q_max")] == [1.0, 3.0]
+
+
+def test_other_attributes_are_counted_with_what_is_not_read(tmp_path: Path) -> None:
+    robot = changed(TWO, ("<axis", '<limit gear_velocity="1" effort="5"/> <axis'), ('"hinge" ', '"hinge" kept="yes" '))
+    assert "not read: 1 `gear_velocity of limit`, 1 `kept of joint`\n" in said(tmp_path, robot)
+
+
+WEIGHTY = changed(
+    TWO,
+    ('<link name="ground"/>', '<link name="ground"> <inertial> <mass value="7"/> <inertia ixx="1" iyy="1" izz="1"/> </inertial> </link>'),
+)  # fmt: skip
+FREE_RUN = DECK.replace("{ arm = two;", "{ arm = two;  base = free;")
+
+
+def test_the_inertia_of_the_root_is_that_of_a_base_that_moves_and_of_no_other(tmp_path: Path) -> None:
+    known = made(tmp_path, WEIGHTY, FREE_RUN).parameters
+    assert [known[f"links.base.{name}"].value for name in ("mass", "inertia.xx", "inertia.xy")] == [7.0, 1.0, 0.0]
+    assert values(made(tmp_path, WEIGHTY)) == values(made(tmp_path))
+    own = changed(FREE_RUN, ("{ }", "{ link base { mass = 3 kg;  shape = sphere(radius = 0.3 m); } }"))
+    assert made(tmp_path, WEIGHTY, own).parameters["links.base.mass"].value == 3.0
+    like = changed(FREE_RUN, ("arm = two", "arm = other")) + "arm other like two { }\n"
+    assert made(tmp_path, WEIGHTY, like).parameters["links.base.mass"].value == 7.0
+
+
+def test_a_root_of_no_body_is_told_where_its_base_moves_and_replaced_as_the_message_says(tmp_path: Path) -> None:
+    robot = changed(WEIGHTY, ('ixx="1"', 'ixx="9"'))
+    assert made(tmp_path, robot) is not None
+    told = said(tmp_path, robot, FREE_RUN)
+    assert "D087" in told and "`link base { mass = ...;  inertia = [...] kg*m^2; }`" in told
+    own = changed(FREE_RUN, ("{ }", "{ link base { mass = 7 kg;  inertia = [1, 1, 1] kg*m^2; } }"))
+    assert made(tmp_path, robot, own) is not None
+
+
+@pytest.mark.parametrize("root", [TWO, WEIGHTY])
+def test_a_robot_that_floats_does_so_by_a_free_base_as_the_message_says(root: str, tmp_path: Path) -> None:
+    arm = OTHER.replace('"fixed"', '"revolute"').replace(
+        '<link name="tip"/>', '<link name="tip"> <inertial> <mass value="1"/> <inertia ixx="1" iyy="1" izz="1"/> </inertial> </link>'
+    )  # fmt: skip
+    robot = changed(root, ("revolute", "floating"), ("<axis", '<origin xyz="0 0 1"/> <axis'), ("</robot>", arm))
+    (help,) = re.findall(r"in the arm's block, `(.*)`, and in the run `base = free;`", said(tmp_path, robot))
+    found = made(tmp_path, robot, changed(FREE_RUN, ("{ }", f"{{ {help} }}")))
+    assert found.parameters["hinge.at.z"].value == 1.0 and found.parameters["links.base.mass"].value == 0.0
+    assert [joint.name for joint in found.structure.moving] == ["other"]
+
+
+def test_a_floating_joint_that_does_not_carry_all_is_no_free_base(tmp_path: Path) -> None:
+    beside = changed(TWO, ("revolute", "floating"), ("</robot>", OTHER.replace('"bar"', '"ground"')))
+    assert (
+        "three prismatic and three revolute joints do the same, except where the middle one of these is at 90 deg"
+        in (said(tmp_path, beside))
+    )
 
 
 @pytest.mark.parametrize("kind", ["floating", "planar", "spherical"])
@@ -203,6 +289,61 @@ def test_a_joint_that_met_has_not_may_be_put_in_another_way(kind: str, tmp_path:
     other = "{ remove hinge;  joint hinge prismatic { parent = base;  child = bar;  axis = z; } }"
     assert "D212" in said(tmp_path, robot)
     assert made(tmp_path, robot, changed(DECK, ("{ }", other))).structure.moving[0].kind == "prismatic"
+
+
+BARS = "".join(
+    f"""\
+  <link name="{name}"> <inertial>
+    <origin xyz="{com}"/> <mass value="1"/> <inertia ixx="0.003" iyy="0.003" izz="0.003"/>
+  </inertial> </link>
+"""
+    for name, com in (("crank", "0 0 0.1"), ("coupler", "0.15 0 0"), ("rocker", "0 0 0.1"))
+)
+JOINTS = "".join(
+    f"""\
+  <joint name="{name}" type="{kind}">
+    <origin xyz="{at}"/> <parent link="{parent}"/> <child link="{child}"/> <axis xyz="0 1 0"/>
+  </joint>
+"""
+    for name, kind, at, parent, child in (
+        ("a", "revolute", "0 0 0", "ground", "crank"),
+        ("b", "revolute", "0 0 0.2", "crank", "coupler"),
+        ("end", "fixed", "0.3 0 0", "coupler", "tip"),
+        ("d", "revolute", "0.3 0 0", "ground", "rocker"),
+        ("c", "revolute", "0 0 0.2", "rocker", "tip"),
+    )
+)
+FOUR_BAR = f'<robot name="four_bar">\n  <link name="ground"/> <link name="tip"/>\n{BARS}{JOINTS}</robot>\n'
+SWING = """\
+arm two from urdf("two.urdf") { BLOCK }
+run fall {
+    arm         = two;
+    environment { gravity = [0, 0, -9.81] m/s^2;  BUSHING }
+    initial     { a.q = 2.6 rad;  b.q = -2.6 rad;  d.q = 2.6 rad; }
+    rates       { dynamics = 10 kHz;  record = 100 Hz; }
+    duration    = 0.5 s;
+    record      = [q, links.tip.position];
+}
+"""
+
+
+@pytest.mark.slow
+def test_a_chain_is_closed_as_the_message_says_and_swings_as_one_body(tmp_path: Path) -> None:
+    """A parallelogram has one degree of freedom: J q'' = m g l sin q."""
+    told = said(tmp_path, FOUR_BAR, SWING.replace("BLOCK", "").replace("BUSHING", ""))
+    (remove,) = re.findall(r"in the arm's block, `(.*)`", told)
+    (bushing,) = re.findall(r"then, in the run's `environment`: `(.*)`", told)
+    found = run.run(made(tmp_path, FOUR_BAR, SWING.replace("BLOCK", remove).replace("BUSHING", bushing)))
+    q, tip = found.signals["q"][0], found.signals["links.tip.position"][0]
+    meeting = np.stack([0.3 + 0.2 * np.sin(q[:, 2]), 0 * q[:, 2], 0.2 * np.cos(q[:, 2])], axis=1)
+    assert np.abs(tip - meeting).max() < 1e-4  # some 10 N, over 1e5 N/m
+    angle, rate, step = 2.6, 0.0, 1e-4
+    inertia, weight = 2 * (0.003 + 0.1**2) + 0.2**2, 9.81 * (0.1 + 0.1 + 0.2)
+    for _ in range(5000):  # by the midpoint rule
+        half = rate + 0.5 * step * weight / inertia * np.sin(angle)
+        middle = angle + 0.5 * step * rate
+        angle, rate = angle + step * half, rate + step * weight / inertia * np.sin(middle)
+    np.testing.assert_allclose(q[-1], [angle, -angle, angle], atol=1e-3)
 
 
 # What is kept and told
@@ -224,6 +365,26 @@ def test_explain_shows_the_files_line(tmp_path: Path) -> None:
     assert (Path(found.place.file).name, found.place.line, found.place.column) == ("two.urdf", 6, 20)
     (over,) = explain(check_file(tmp_path, changed(DECK, ("{ }", "{ bar { mass = 3 kg; } }"))), "links.bar.mass")
     assert [(Path(each.file).name, each.line) for each in over.overrode] == [("two.urdf", 6)]
+
+
+def test_explain_says_of_what_is_not_written_that_it_is_not(tmp_path: Path) -> None:
+    turned = changed(TWO, ('rpy="0 0 0"', 'rpy="0 0 1"'), ('<axis xyz="0 0 1"/>', '<limit lower="-1"/>'))
+    turned = turned.replace("</robot>", OTHER)
+    deck = check_file(tmp_path, DECK)
+    deck.with_name("two.urdf").write_text(turned, encoding="utf-8")
+    notes = {}
+    for path in ("hinge.q_min", "hinge.q_max", "hinge.axis.x", "links.bar.inertia.xx", "links.tip.mass"):
+        (found,) = explain(deck, path)
+        notes[path] = found.note
+    assert notes == {
+        "hinge.q_min": "",
+        "hinge.q_max": LEFT_OUT,
+        "hinge.axis.x": LEFT_OUT,
+        "links.bar.inertia.xx": TURNED,
+        "links.tip.mass": LEFT_OUT,
+    }
+    (product,) = explain(check_file(tmp_path, DECK), "links.bar.inertia.xy")
+    assert product.note == "written here as 0, or left out"
 
 
 def test_explain_prints_what_a_deck_overrides_of_the_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -285,7 +446,6 @@ warning[D210]: not all that `two.urdf` says is in this arm
   |
 2 | arm two from urdf("two.urdf") { }
   |                   ^^^^^^^^^^
- ::: two.urdf:4:5  the inertia of `m`: it is `base`, the ground
  ::: two.urdf:14:5  damping and friction of 1 joint (base_joint): a servo has these, such as `passive`
  ::: two.urdf:5:5  not read: 2 `visual`, 1 `collision`, 1 `material`, 1 `transmission`
   = help: `met import` makes a deck of such a file, with friction beside each joint

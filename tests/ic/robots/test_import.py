@@ -262,12 +262,12 @@ error[D087]: the inertia of link `bar` is no body's
   |       ^^^^^^^^ principal moments 0.1, 0.2 and 0.9 kg*m^2; no body has one above the sum of the others
   = help: inertia is about the centre of mass, in link axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2
   = help: products have the sign of -sum(m x y)
+  = help: in the arm's block: `bar { inertia = [...] kg*m^2; }`
   = help: write a deck with `arm NAME from urdf("FILE") { ... }`: its block can change what the file says
 """
     )
 
 
-def test_a_file_that_is_there_is_left_alone_unless_forced(capsys: pytest.CaptureFixture[str]) -> None:
 def test_the_root_is_a_base_with_its_mass_unless_no_body_is_so() -> None:
     root = '<link name="ground"> <inertial> <mass value="7"/> <inertia ixx="1" iyy="1" izz="1"/> </inertial> </link>'
     Path("two.urdf").write_text(changed(TWO, ('<link name="ground"/>', root)), encoding="utf-8")
@@ -282,6 +282,7 @@ def test_the_root_is_a_base_with_its_mass_unless_no_body_is_so() -> None:
     assert "link base" not in text
 
 
+def test_a_file_that_is_there_is_left_alone_unless_forced(capsys: pytest.CaptureFixture[str]) -> None:
     Path("arm.ic").write_text("mine", encoding="utf-8")
     assert cli.main(["import", "arm.urdf", "-o", "arm.ic", "--mimic", "fixed"]) == 2
     assert (

@@ -229,7 +229,7 @@ error[D212]: joint `hinge` is planar, and joints are revolute, prismatic or fixe
    |
 10 |   <joint name="hinge" type="planar">
    |                             ^^^^^^
-   = help: two prismatic joints and a revolute one do the same, with links of `mass = 0 kg` between them
+   = help: two prismatic joints and a revolute one do the same; put links of `mass = 0 kg` between them
    = help: in the arm's block, `remove hinge;` makes room for them
 """,
 )
@@ -242,14 +242,13 @@ error[D212]: joint `hinge` is floating, and joints are revolute, prismatic or fi
    |
 10 |   <joint name="hinge" type="floating">
    |                             ^^^^^^^^
-   = help: three prismatic and three revolute joints do the same, with links of `mass = 0 kg` between them
-   = help: in the arm's block, `remove hinge;` makes room for them
+   = help: in the arm's block, `remove hinge;  joint hinge fixed { parent = base;  child = bar; }`, and in the run `base = free;`: base and `bar` then float as one
 """,
 )
 mistake(
     "a joint that follows another",
-    ("</robot>", OTHER),
     ('<axis xyz="0 0 1"/>', '<mimic joint="other" multiplier="-1"/>'),
+    ("</robot>", OTHER),
     says="""\
 error[D213]: joint `hinge` follows `other`, which is not in this version
   --> two.urdf:13:19
@@ -478,7 +477,9 @@ error[D098]: link `bar` has two parents
 11 |   <joint name="hinge" type="revolute">
    |                ^^^^^ `base`
   ::: two.urdf:10:16  `base`, by joint `first`
-   = help: a closed chain is not in this version; a branch is a parent with two children
+   = help: a branch is a parent with two children
+   = help: a stiff `bushing` closes a chain: in the arm's block, `remove hinge;`
+   = help: then, in the run's `environment`: `hinge = bushing { link = bar;  stiffness = [100000, 100000, 100000] N/m;  damping = [100, 100, 100] N*s/m;  turning = [1000, 1000, 0] N*m/rad;  turning_damping = [1, 1, 0] N*m*s/rad; }`
 """,
 )
 mistake(
@@ -491,7 +492,7 @@ error[D209]: every link of this robot hangs on another: none is its base
 10 |   <joint name="back" type="fixed"> <parent link="bar"/> <child link="ground"/> </joint>
    |                ^^^^
   ::: two.urdf:11:16  joint `hinge`
-   = help: one of the joints closes a loop; a closed chain is not in this version
+   = help: one of the joints closes a loop: take it out, and close it by a stiff `bushing` in the run
 """,
 )
 mistake(

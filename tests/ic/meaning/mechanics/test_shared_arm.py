@@ -70,7 +70,7 @@ def test_all_is_as_if_each_run_resolved_its_arm(monkeypatch: pytest.MonkeyPatch,
 
 def test_a_sweep_resolves_again_what_it_varies_and_what_is_made_of_that(monkeypatch: pytest.MonkeyPatch) -> None:
     resolved: list[str] = []
-    for name in ("_link", "_joint"):
+    for name in ("resolve_link", "_joint"):
         own = getattr(arm, name)
 
         def counted(scope, item, *rest, own=own):  # type: ignore[no-untyped-def]
