@@ -1,19 +1,22 @@
 """The servo loop that causes an instability, and the change of it that would help, for loops closed over the arm.
 
 A loop is to blame for modes that grow with its gain and do not grow without it. Modes that fall or drift without the
-loop are not counted.
+loop are not counted. Of many loops, only those that matter most to the fastest such modes are tried: a spectrum for
+each loop would take longer than the run.
 """
 
 from __future__ import annotations
 
+import heapq
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
+from operator import itemgetter
 
 import numpy as np
 
-from met.analysis.loops import Gains, growths
+from met.analysis.loops import WHOLE, Gains, parts_in, rates_of, spectrum, uncoupled
 from met.analysis.step_map import Linearizer, SampledLoops
 from met.frozen import frozen
 
@@ -29,6 +32,16 @@ STRIDE = 0.8
 WORSE = 1.5
 """Factor over the growth without a loop above which the loop is to blame although the arm grows without it too."""
 
+TRIED, TRIED_OF_MANY = 8, 3
+"""Largest number of loops that are tried, and of modes that they are chosen by, of an arm and of one above
+`met.analysis.loops.WHOLE`."""
+
+COARSE = 0.5, 1.05
+"""As `STRIDE`, and the factor to which a share is found, for an arm above `met.analysis.loops.WHOLE`."""
+
+LARGEST_FITTED = 1200
+"""States and memory of an arm above which no stable share of a gain is searched for."""
+
 BY_TICKS = 2.0
 """Factor over the growth of the arm with laws that have no ticks, above which the ticks are to blame."""
 
@@ -38,7 +51,8 @@ class Unstable:
     """Loops that are unstable at one pose of one case.
 
     joints  whose loops: of one the gain alone is to blame; of several those of all of them together
-    gain    share of the gains up to which it is stable, as far as all else stays, or above 1, from which on; None: none
+    gain    share of the gains up to which it is stable, as far as all else stays, or above 1, from which on; None:
+            none; not a number: none was searched for
     every   s in which a disturbance grows by e
     ticks   whether it would not be so if the laws had no ticks and no delays of them
     sensed  whether it would not be so if the laws saw what is so, without their sensors
@@ -83,7 +97,7 @@ def needs(each: Unstable) -> tuple[float, float]:
 
 def _change(share: float | None) -> float:
     """A measure of how little a gain has to change: the larger, the smaller the change."""
-    return 0.0 if share is None else min(share, 1.0 / share)
+    return 0.0 if share is None or math.isnan(share) else min(share, 1.0 / share)
 
 
 @frozen
@@ -119,6 +133,16 @@ class Lane:
     lane: int
     limit: float
     ticks: bool
+    _spectra: dict[tuple[object, ...], np.ndarray] = field(default_factory=dict, compare=False)
+
+    @cached_property
+    def _parts(self) -> tuple[SampledLoops, ...]:
+        return uncoupled(self.loops, 0)
+
+    @cached_property
+    def size(self) -> int:
+        """States and memory of the largest part that is coupled."""
+        return max(each.states + len(each.held) for each in self._parts)
 
     def growing(
         self,
@@ -130,8 +154,43 @@ class Lane:
     ) -> _Growing:
         """Modes that grow, with these shares of gains; above: this share of the limit."""
         ticks = self.ticks if ticks is None else ticks
-        (rates,) = growths(self.loops, np.array([self.lane]), gains, ticks=ticks, direct=direct)
+        rates = np.concatenate([rate for _, _, rate in self._modes(gains or {}, ticks, direct)])
         return _Growing(tuple(sorted(rates[rates > above * self.limit].tolist(), reverse=True)))
+
+    def _modes(
+        self, gains: Gains, ticks: bool, direct: bool = False
+    ) -> Iterator[tuple[SampledLoops, np.ndarray, np.ndarray]]:
+        """Each part with its eigenvalues and their growth rates, which are kept: most gains leave most parts as they
+        were."""
+        for number, part in enumerate(self._parts):
+            key = number, ticks, direct, tuple(gains.get(law.joint, 1.0) for law in part.laws)
+            if key not in self._spectra:
+                (self._spectra[key],) = spectrum(part, np.array([self.lane]), gains, ticks=ticks, direct=direct)
+            yield part, self._spectra[key], rates_of(part, self._spectra[key], ticks=ticks)
+
+    def telling(self, gains: Gains | None = None) -> tuple[str, ...]:
+        """The joints whose loops are tried: all of a small arm, else those that matter most to the fastest modes that
+        grow, and to modes of laws without ticks beside others that tick."""
+        joints = [law.joint for law in self.loops.laws]
+        most = TRIED if self.size <= WHOLE else TRIED_OF_MANY
+        if len(joints) <= most:
+            return tuple(joints)
+        found: dict[str, float] = {}
+        mixed = self.ticks and any(law.continuous for law in self.loops.laws)
+        for ticks in (True, False) if mixed else (self.ticks,):
+            modes = [
+                (rate, complex(value), part)
+                for part, values, rates in self._modes(gains or {}, ticks)
+                for value, rate in zip(values.tolist(), rates.tolist(), strict=True)
+                if self.limit < rate < math.inf and value.imag >= 0.0
+            ]
+            for _, value, part in heapq.nlargest(most, modes, key=itemgetter(0)):
+                shares = parts_in(part, self.lane, gains, value, ticks=ticks)
+                whole = sum(shares.values()) or 1.0
+                for joint, share in shares.items():
+                    found[joint] = max(found.get(joint, 0.0), share / whole)
+        chosen = heapq.nlargest(most, found, key=lambda joint: round(found[joint], 6))
+        return tuple(joint for joint in joints if joint in chosen)
 
     def without(self, own: _Growing, joints: Sequence[str], gains: Gains | None = None) -> _Growing | None:
         """The growth without the loops of these joints, where it is less than with them; None where it is not."""
@@ -141,7 +200,7 @@ class Lane:
     def concerned(self) -> frozenset[str]:
         """The joints whose loops are each to blame without the others."""
         own = self.growing()
-        return frozenset(law.joint for law in self.loops.laws if self.without(own, (law.joint,)) is not None)
+        return frozenset(joint for joint in self.telling() if self.without(own, (joint,)) is not None)
 
     def blamed(self) -> list[Unstable]:
         """The loops that make the lane grow; none where they do not.
@@ -157,7 +216,7 @@ class Lane:
         told: list[Unstable] = []
         while len(gains) < len(together):
             now = self.growing(gains)
-            groups: list[tuple[str, ...]] = [(joint,) for joint in together if joint not in gains]
+            groups: list[tuple[str, ...]] = [(joint,) for joint in self.telling(gains) if joint not in gains]
             at_fault = {which: base for which in groups if (base := self.without(now, which, gains)) is not None}
             if not at_fault and not told and len(together) > 1:
                 base = self.without(now, together)
@@ -167,6 +226,8 @@ class Lane:
             fits = {which: self._gain(now, base, which, gains) for which, base in at_fault.items()}
             which = max(fits, key=lambda which: _change(fits[which]))
             told.append(self._unstable(own, which, fits[which], now.beyond(at_fault[which])))
+            if self.size > WHOLE:
+                break  # the next check tells the next
             gains |= dict.fromkeys(which, fits[which] or 0.0)
         return told or self._too_weak(own)
 
@@ -177,7 +238,12 @@ class Lane:
         def count(share: float) -> float:
             return self.growing({**gains, **dict.fromkeys(joints, share)}).count
 
-        return fitting(count, min(without.count, own.count - 1))
+        return self._fitting(count, min(without.count, own.count - 1))
+
+    def _fitting(self, count: Callable[[float], float], aim: float) -> float | None:
+        if self.size > LARGEST_FITTED:
+            return math.nan
+        return fitting(count, aim, *(COARSE if self.size > WHOLE else ()))
 
     def _unstable(self, own: _Growing, joints: tuple[str, ...], gain: float | None, rate: float) -> Unstable:
         """The loops to blame, and whether their ticks or their sensors cause it."""
@@ -190,13 +256,15 @@ class Lane:
 
     def _too_weak(self, own: _Growing) -> list[Unstable]:
         """The position loops that do not hold a load which falls without them, and would hold it with more gain."""
-        told = []
+        told, tried = [], self.telling()
         for law in self.loops.laws:
+            if law.joint not in tried or self.size > LARGEST_FITTED:
+                continue
 
             def count(share: float, joint: str = law.joint) -> float:
                 return self.growing({joint: share}).count
 
-            gain = fitting(count, own.count - 1) if law.command == "position" else None
+            gain = self._fitting(count, own.count - 1) if law.command == "position" else None
             if gain is not None and gain > 1.0:
                 every = 1.0 / max(own.rates)
                 told.append(
@@ -236,7 +304,7 @@ class Opened:
 
     def _remedied(self, lane: Lane, found: Unstable) -> Unstable:
         """The findings with the parameters that help, each tried alone."""
-        if len(found.joints) > 1:
+        if len(found.joints) > 1 or lane.size > WHOLE:
             return found
         (joint,), own = found.joints, lane.growing()
         aim = min(own.count - 1, lane.growing({joint: 0.0}).count)
@@ -244,7 +312,8 @@ class Opened:
         for each in self._opened.gains(joint):
 
             def count(share: float, name: str = each.name) -> float:
-                return replace(lane, loops=self._with({joint: {name: share}})).growing().count
+                scaled = Lane(self._with({joint: {name: share}}), lane.lane, lane.limit, lane.ticks)
+                return scaled.growing().count
 
             share = fitting(count, aim)
             if share is not None:
@@ -252,17 +321,17 @@ class Opened:
         return replace(found, parameters=several)
 
 
-def fitting(count: Callable[[float], float], aim: float) -> float | None:
-    """The largest share below 1 at which at most `count` modes grow, to a thousandth; else the smallest above 1; None
-    where there is none."""
-    for stride in (STRIDE, 1.0 / STRIDE):
-        bad, good = 1.0, stride
+def fitting(count: Callable[[float], float], aim: float, stride: float = STRIDE, exact: float = 1.001) -> float | None:
+    """The largest share below 1 at which at most `count` modes grow, to the factor `exact`; else the smallest above 1;
+    None where there is none."""
+    for each in (stride, 1.0 / stride):
+        bad, good = 1.0, each
         while count(good) > aim:
-            bad, good = good, good * stride
+            bad, good = good, good * each
             if not SMALLEST <= good <= LARGEST:
                 break
         else:
-            while max(bad, good) > 1.001 * min(bad, good):
+            while max(bad, good) > exact * min(bad, good):
                 middle = math.sqrt(bad * good)
                 bad, good = (middle, good) if count(middle) > aim else (bad, middle)
             return good

@@ -183,21 +183,71 @@ def growths(
     parts = uncoupled(found)
     if len(parts) > 1:
         return np.concatenate([growths(each, lanes, gains, ticks=ticks, direct=direct) for each in parts], axis=1)
+    return rates_of(found, spectrum(found, lanes, gains, ticks=ticks, direct=direct), ticks=ticks)
+
+
+def spectrum(
+    found: SampledLoops, lanes: np.ndarray, gains: Gains | None = None, *, ticks: bool, direct: bool = False
+) -> np.ndarray:
+    """Eigenvalues of the frame, or, without ticks, of the arm with all laws continuous, 1/s: [lane, mode]; infinite
+    where one is not finite."""
     if ticks:
         with np.errstate(all="ignore"):  # an overflow gives no finite number
-            sizes = np.abs(_eigenvalues(frame(found, lanes, gains, direct=direct)))
-            return np.asarray(np.log(sizes) / seconds(found))
+            return _eigenvalues(frame(found, lanes, gains, direct=direct))
     try:
-        return _eigenvalues(_over(found, lanes, gains, direct, found.laws)[0]).real
+        return _eigenvalues(_over(found, lanes, gains, direct, found.laws)[0])
     except np.linalg.LinAlgError:
-        return np.full((len(lanes), 1), math.inf)
+        return np.full((len(lanes), 1), math.inf, dtype=complex)
 
 
-def uncoupled(found: SampledLoops) -> tuple[SampledLoops, ...]:
-    """Parts of a large arm that do not act on each other in any lane, such as chains on a fixed base, each with its own
-    laws; else the whole. A frame of a part is no longer than the whole's."""
+def rates_of(found: SampledLoops, eigenvalues: np.ndarray, *, ticks: bool) -> np.ndarray:
+    """Rates at which modes of these eigenvalues grow, or decay, 1/s."""
+    if not ticks:
+        return eigenvalues.real
+    with np.errstate(all="ignore"):
+        return np.asarray(np.log(np.abs(eigenvalues)) / seconds(found))
+
+
+def parts_in(
+    found: SampledLoops, lane: int, gains: Gains | None, eigenvalue: complex, *, ticks: bool
+) -> dict[str, float]:
+    """How much the gain of each law matters to a mode: the derivative of its eigenvalue, as a size, by joint; of laws
+    that tick where the eigenvalue is that of a frame, else of all. One factorisation, where all eigenvectors would cost
+    as much as many spectra."""
+    from scipy.linalg import lu_factor, lu_solve
+
+    if ticks:
+        matrix = frame(found, lane, gains)
+        continuous = [law for law in found.laws if law.continuous]
+        cells = _over(found, lane, gains, False, continuous)[2].tolist()
+    else:
+        matrix, _, kept = _over(found, lane, gains, False, found.laws)
+    size = len(matrix)
+    nearly = eigenvalue + 1e-7 * max(1.0, abs(eigenvalue))
+    factors = lu_factor(matrix - nearly * np.eye(size), check_finite=False)
+    right = left = np.cos(np.arange(size) ** 2)  # any vector that is square to no mode
+    for _ in range(3):
+        right, left = lu_solve(factors, right), lu_solve(factors, left, trans=1)
+        right, left = right / np.linalg.norm(right), left / np.linalg.norm(left)
+    shares = {}
+    for law in found.laws:
+        at = [found.states + found.held.index(name) for name in law.memory[: law.outputs]]
+        if not ticks:
+            rows = _rows(law, lane, gains, False)[: law.outputs]
+            acts = left[: found.states] @ found.slope[lane][:, at]
+            shares[law.joint] = float(np.abs(acts @ (rows[:, kept] @ right)))
+        elif not law.continuous:
+            own = [cells.index(cell) for cell in at]
+            shares[law.joint] = float(np.abs(left[own] @ right[own]))
+    return shares
+
+
+def uncoupled(found: SampledLoops, largest: int | None = None) -> tuple[SampledLoops, ...]:
+    """Parts of an arm that do not act on each other in any lane, such as chains on a fixed base, each with its own
+    laws; the whole where it has no more than `largest` states and memory, else `WHOLE`. A frame of a part is no longer
+    than the whole's."""
     n, p, count = found.states, found.positions, found.states + len(found.held)
-    if count <= WHOLE:
+    if count <= (WHOLE if largest is None else largest):
         return (found,)
     places = {name: at for at, name in enumerate(found.held, n)}
     acts = np.zeros((count, count), dtype=bool)

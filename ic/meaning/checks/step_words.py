@@ -85,6 +85,8 @@ def _fitting(experiment: Experiment, loop: Unstable) -> str:
     if loop.parameters:
         several = [_bound(experiment, loop.case, f"{joint}.servo.{name}", x) for name, x in loop.parameters.items()]
         return f"stable with {' or '.join(several)}, {'each alone' if several[1:] else 'all else as it is'}"
+    if share is not None and math.isnan(share):
+        return "how much of the gain is stable was not searched for: the arm is too large"
     if share is None:
         return "no share of the gain is stable"
     gains = [

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from met import run as engine
+from met.analysis import blame
 from met.analysis import loops as servo_loops
 from met.analysis.blame import Unstable, closed
-from met.analysis.loops import fastest, frame, growing, growths, uncoupled
+from met.analysis.loops import fastest, frame, growing, growths, parts_in, spectrum, uncoupled
 from met.analysis.step_map import Linearizer
 from met.plan import Experiment
 from tests.ic.small_decks import changed, check, experiment
@@ -252,3 +253,64 @@ def test_a_chain_is_one_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(servo_loops, "WHOLE", 1)
     assert sampled is not None
     assert len(uncoupled(sampled)) == 1
+
+
+@pytest.mark.parametrize(("ticks", "dynamics"), [(True, "50 Hz"), (True, "200 Hz"), (False, "50 Hz")])
+def test_the_part_of_a_loop_in_a_mode_is_the_derivative_by_its_gain(tmp_path: Path, ticks: bool, dynamics: str) -> None:
+    made = changed(arms(3, 3), ("dynamics = 10 kHz", f"dynamics = {dynamics}"), ("ki = 0 V/rad", "ki = 3 V/rad"))
+    sampled = Linearizer(experiment(tmp_path, made), [0]).sampled()
+    assert sampled is not None
+    lanes = np.array([0])
+    (values,) = spectrum(sampled, lanes, ticks=ticks)
+    value = values[np.argmax(np.abs(values - ticks))]
+    parts, slopes = parts_in(sampled, 0, None, complex(value), ticks=ticks), []
+    for joint in parts:
+        sides = [spectrum(sampled, lanes, {joint: 1.0 + d}, ticks=ticks)[0] for d in (-1e-4, 1e-4)]
+        less, more = (side[np.argmin(np.abs(side - value))] for side in sides)
+        slopes.append(abs(more - less))
+    assert np.allclose(np.array(list(parts.values())) / max(parts.values()), np.array(slopes) / max(slopes), atol=1e-3)
+
+
+def many(joints: int, eager: int) -> str:
+    """A chain of one servo, but for one joint's, whose gain is too large."""
+    text = changed(
+        arms(joints, joints),
+        ("kp = 2.0 V", "kp = 0.05 V"),
+        ("dynamics = 10 kHz", "dynamics = 200 Hz"),
+        (f"hinge_{eager} = drive;", f"hinge_{eager} = eager;"),
+    )
+    return changed(text, ("run hold", "servo eager like drive { kp = 12 V*s/rad; }\nrun hold"))
+
+
+def test_of_many_loops_those_are_tried_that_matter_most(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The finding is that of all loops tried, from a number of spectra that does not depend on how many there are."""
+    made = experiment(tmp_path, many(3, 1))
+    counts: list[int] = []
+
+    def counted(*given: object, **more: object) -> np.ndarray:
+        counts[-1] += 1
+        return spectrum(*given, **more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(blame, "spectrum", counted)
+    counts.append(0)
+    (all_tried,) = loops(made)
+    monkeypatch.setattr(blame, "TRIED", 1)
+    counts.append(0)
+    (found,) = loops(made)
+    assert found == all_tried and found.joints == ("hinge_1",) and counts[1] < counts[0]
+
+
+def test_the_gain_that_fits_a_large_arm_is_found_coarsely_or_not_at_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = experiment(tmp_path, many(3, 1))
+    (exact,) = loops(made)
+    monkeypatch.setattr(blame, "WHOLE", 1)
+    (coarse,) = loops(made)
+    assert exact.gain is not None and coarse.gain is not None
+    assert exact.gain / 1.06 < coarse.gain < 1.001 * exact.gain and coarse.joints == exact.joints == ("hinge_1",)
+    monkeypatch.setattr(blame, "LARGEST_FITTED", 1)
+    (unfitted,) = loops(made)
+    assert unfitted.gain is not None and math.isnan(unfitted.gain) and unfitted.joints == exact.joints
+    (warning,) = check(tmp_path, many(3, 1), select="all").diagnostics
+    assert warning.help[0] == "how much of the gain is stable was not searched for: the arm is too large"
