@@ -22,8 +22,7 @@ from met.diagnostic import Help, Place, Problem, TextChange, error, write, write
 from met.parameter import Parameter
 from met.plan import JointKind
 from met.trace import Real, Scalar
-from met.unit_parser import parse_unit
-from met.unit_parser import written
+from met.unit_parser import parse_unit, written
 from met.units import PURE
 
 

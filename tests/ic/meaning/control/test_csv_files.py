@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ic.meaning.control.wraps import wrapped_rows
 from ic.meaning.definitions.csv_files import read_csv
 from met.diagnostic import Problem
 from met.host.files import memory
-from ic.meaning.control.wraps import wrapped_rows
 from tests.ic.meaning.control.trajectories import MOVES, servo, shown
 from tests.ic.small_decks import ARM, RUN, changed, check, messages
 
