@@ -84,7 +84,8 @@ def run(
     plan          a deck's path; what `ic.compile` gives; or a plan file (`met plan DECK -o p.json`)
     set, vary     of a deck: values in place of its own, and what a sweep of the run varies, as `ic.compile` has them
     output        the archive; None: in the current folder, called as `met run` calls it: the deck's name, and those of
-                  the runs and sweeps that were asked for (`two_link.gains.h5`). FILE.mcap, FILE.csv or FILE.parquet:
+                  the runs and sweeps that were asked for, if the deck does not choose them itself
+                  (`two_link.gains.h5`). FILE.mcap, FILE.csv or FILE.parquet:
                   FILE.h5, and an export of it: a table of a sweep has its metrics, or the histories that are asked for
     experiments   names of runs and sweeps; None: all of the plan's, of a deck as `met run` takes it
     cases         rows of the case table, `"#7"`, or the beginnings of case_ids; None: all

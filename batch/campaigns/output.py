@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from batch.archive.sink import FileBusy, Sink, temporary_of
+from batch.campaigns.choosing import experiments_named
 from batch.campaigns.folder import Folder, beside
 from batch.formats import format_of
 from ic.printing.columns import size as size_text
@@ -30,14 +31,17 @@ def default_output(
     selected: Sequence[tuple[Experiment, CaseValues]] = (),
     whole: int | None = None,
 ) -> Path:
-    """The default name: `two_link.h5`; `two_link.gains.h5` where runs are named; `two_link.gains.case7.h5` for some of
-    the cases.
+    """The default name: `two_link.h5` for the run that the deck itself chooses, whether it is named or not;
+    `two_link.gains.h5` for other runs and sweeps; `two_link.gains.case7.h5` for some of the cases.
 
     They are named here, or were when the plan was made (`two_link.all.h5` where all were asked for).
     So a case that is run again does not take its sweep's place. A deck of the standard library is called `<name>`.
     whole: how many cases there are of all that was asked for; None: of what is selected.
     """
-    asked = plan.selected if any(map(varies, plan.settings)) else experiments or plan.selected
+    asked = plan.selected
+    if experiments and not any(map(varies, plan.settings)):
+        chosen = experiments_named(plan, experiments)
+        asked = experiments if len(chosen) < len(plan.experiments) else plan.selected
     names = [Path(plan.deck.strip("<>")).stem, *asked]
     count = sum(len(rows) for _, rows in selected)
     if count < (sum(experiment.cases.count for experiment, _ in selected) if whole is None else whole):

@@ -74,7 +74,7 @@ def measured(value: Any, si: str) -> float:
     "-o",
     "--output",
     metavar="FILE",
-    help="The archive to write [DECK.h5, or DECK.NAME.h5, in this folder]; "
+    help="The archive to write [in this folder: DECK.h5 for what DECK runs without a NAME, else DECK.NAME.h5]; "
     f"FILE{endings(' or ')}: FILE.h5, and an export of it.",
 )
 @click.option(

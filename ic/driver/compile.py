@@ -146,6 +146,8 @@ def compile_deck(
             source.effects.complete &= bool(groups)
             experiments += (made for made, _ in groups)
             scopes += (scope for _, scope in groups)
+        if not varied and len(asked) == 1 and asked[0] is _own_choice(definitions):
+            selected = ()  # as where no name is given
         source.effects.report(complaints, [definition.name for definition in asked])
         blocks = [definitions.block(definition) for definition in definitions.of_kind("run").values()]
         loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
@@ -205,6 +207,18 @@ def _with_settings(deck: Deck, settings: Sequence[str], complaints: Complaints) 
     return deck, ()
 
 
+def _own_choice(definitions: Definitions, kinds: Collection[str] = EXPERIMENTS) -> Definition | None:
+    """The run or sweep that a deck itself chooses: its only one, or the one marked `default`; None where it has
+    several."""
+    known = [definition for kind in kinds for definition in definitions.of_kind(kind).values()]
+    own = [definition for definition in known if definitions.writes(definition)]
+    default = definitions.default() if not own or any(each.default for each in own) else None
+    if default is not None and default.kind in kinds:
+        return default
+    known = own or known
+    return known[0] if len(known) == 1 else None
+
+
 def asked_definitions(
     definitions: Definitions,
     complaints: Complaints,
@@ -233,12 +247,9 @@ def asked_definitions(
                     help=definitions.stays_away(name) or [*did_you_mean(name, known), known_words("it has", known)],
                 )
         return [known[name] for name in names if name in known]
-    own = {name: definition for name, definition in known.items() if definitions.writes(definition)}
-    default = definitions.default() if not own or any(d.default for d in own.values()) else None
-    default = default if default is None or default.kind in kinds else None
-    known = own or known
-    if len(known) == 1 or default is not None:
-        return [default] if default is not None else list(known.values())
+    if (chosen := _own_choice(definitions, kinds)) is not None:
+        return [chosen]
+    known = {name: definition for name, definition in known.items() if definitions.writes(definition)} or known
     if complaints.errors and not known:
         return []
     if not known:

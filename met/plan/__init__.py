@@ -557,9 +557,9 @@ class Source:
 class Plan:
     """A resolved deck. `deck` names the root file; `sources` holds every file that was read.
 
-    selected: how the runs and sweeps were asked for, by name or `all`; none where the deck's own choice was taken. It
-    gives an archive its name. settings: values set from outside of the deck, `PATH=VALUE`, as if the deck contained
-    them.
+    selected: how the runs and sweeps were asked for, by name or `all`; none where they are what the deck itself
+    chooses. It gives an archive its name. settings: values set from outside of the deck, `PATH=VALUE`, as if the deck
+    contained them.
     """
 
     deck: str

@@ -260,7 +260,7 @@ class TestHowItEnds:
         def output(select: Any, **options: Any) -> str:
             return campaign.prepare(ic.compile("two_link.ic", select=select), **options).output.name
 
-        assert output(None) == "two_link.h5"
+        assert output(None) == output("nominal") == output("nominal", experiments=["nominal"]) == "two_link.h5"
         assert output(["gains"]) == output("gains") == "two_link.gains.h5"
         assert output("all") == "two_link.all.h5"
         assert output("all", experiments=["gains"]) == "two_link.gains.h5"
@@ -282,7 +282,8 @@ class TestHowItEnds:
 
     def test_a_case_that_is_run_again_does_not_take_its_sweeps_place(self, here: Path) -> None:
         def output(*cases: str | int) -> str:
-            return campaign.prepare(plans.plan(plans.gains(9)), experiments=["gains"], cases=cases).output.name
+            made = plans.plan(plans.nominal(), plans.gains(9))
+            return campaign.prepare(made, experiments=["gains"], cases=cases).output.name
 
         assert output("#7") == "two_link.gains.case7.h5"
         assert output("#7", 2) == "two_link.gains.case2-7.h5"

@@ -69,5 +69,5 @@ def test_vscode_shows_and_mends_mistakes_completes_renames_and_runs(tmp_path: Pa
         run = "Array.from(document.querySelectorAll('.codelens-decoration a')).find(e => e.innerText === 'run')"
         code.page.click(*code.until(f"{PLACE_OF}({run})"))
         code.until_text(LENSES, "met by 1 of 1")
-        assert (tmp_path / "arm.nominal.h5").is_file()
+        assert (tmp_path / "arm.h5").is_file()
         assert code.page.run("document.querySelectorAll('.terminal-wrapper').length"), "what it printed stays"
