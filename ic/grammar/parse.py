@@ -192,8 +192,7 @@ class _Parser(Uses):
         self.entries(body)
         self.end_items(outer)
         closing = self.leave()
-        before = self.tokens[self.at - 2]
-        on_lines = [self.line_of(each) for each in (opening, before, closing)]
+        on_lines = [self.line_of(each) for each in (opening, self.tokens[self.at - 2], closing)]
         if not self.open and on_lines[0] != on_lines[1] == on_lines[2] and not closing.expansions:
             self.closed_within_line = closing
         if self.misindented is None and not (opening.expansions or closing.expansions):

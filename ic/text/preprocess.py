@@ -187,10 +187,10 @@ class _Preprocessor(Macros):
     def warn_of_names(self) -> None:
         """Warn about names in conditions that are not macros, and macros on the command line that nothing uses."""
         named: dict[str, tuple[int, str, Token]] = {}
-        for n, (word, name) in enumerate(pairwise(self.output)):
-            if name.kind == NAME and word.text in NAMING:
-                named.setdefault(name.text, (n, word.text, name))
-        lets = [name for name, (_, word, _) in named.items() if word in ("let", "param")]
+        for n, (word, token) in enumerate(pairwise(self.output)):
+            if token.kind == NAME and word.text in NAMING:
+                named.setdefault(token.text, (n, word.text, token))
+        lets = [name for name, (_, kind, _) in named.items() if kind in ("let", "param")]
         for name, place in self._zeros.items():
             message = f"`{name}` is no macro, so it counts as 0 in this condition"
             if name in named:

@@ -102,8 +102,8 @@ def _columns(
             )
         )
     if angle is not None:
-        cells = partial(table.cell, angle)
-        warn_of_wraps(scope, f"column `{angle.name}`", *columns.values(), lambda n: cells(n).place)
+        cell, (times, angles) = partial(table.cell, angle), columns.values()
+        warn_of_wraps(scope, f"column `{angle.name}`", times, angles, lambda n: cell(n).place)
     scope.keep_setting(owner.join(FILE.name), table.file, item=file)
     scope.keep_setting(owner.join(COLUMN.name), wanted, item=body.get(COLUMN.name), note=f"the {kind}'s name")
     return columns

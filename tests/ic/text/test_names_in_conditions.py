@@ -1,0 +1,51 @@
+"""Conditions that ask for the macro of a name which the deck defines otherwise."""
+
+from __future__ import annotations
+
+import pytest
+
+from ic.language import DEFINITIONS
+from ic.text.preprocess import NAMING
+from tests.ic.decktext import Desk
+
+
+def test_to_ask_for_the_macro_of_a_definition_written_before_gets_a_warning(desk: Desk):
+    assert (
+        desk.told("let heavy = 1;\n#ifdef heavy\n#endif\n")
+        == """\
+warning[D036]: `heavy` is no macro, so it counts as not defined in this condition
+ --> a.ic:2:8
+  |
+2 | #ifdef heavy
+  |        ^^^^^
+ ::: a.ic:1:5  this `let` is a value; a condition sees macros alone
+  = help: define a macro for it, `#define NAME ...`, and ask that
+
+1 warning
+"""
+    )
+
+
+@pytest.mark.parametrize("condition", [
+    "#ifdef x", "#ifndef x", "#if defined(x)", "#if !defined x", "#if 0\n#elifdef x", "#if 0\n#elifndef x",
+    "#if 0\n#elif defined(x)", "#define ASK defined(x)\n#if ASK",
+])  # fmt: skip
+@pytest.mark.parametrize("before", [
+    "let x = 1;", "param x = 1 m;", "run x { }", "#define LET(name) let name = 1;\nLET(x)", '#include "b.ic"',
+])  # fmt: skip
+def test_each_way_to_ask_and_each_definition_before_it_gets_this_warning_once(desk: Desk, condition: str, before: str):
+    desk.write("let x = 1;\n", "b.ic")
+    made = desk.tokens(f"{before}\n{condition}\n#endif\n#ifdef x\n#endif\n")
+    assert [d.code for d in made.diagnostics] == ["D036"]
+
+
+@pytest.mark.parametrize("text", [
+    "#ifndef x\nlet x = 1;\n#endif", "#ifdef x\n#endif\nlet x = 1;", '#if !defined(x)\n#include "b.ic"\n#endif',
+])  # fmt: skip
+def test_to_ask_before_the_definition_is_written_gets_no_warning(desk: Desk, text: str):
+    desk.write("let x = 1;\n", "b.ic")
+    assert desk.told(text + "\n") == ""
+
+
+def test_the_words_of_definitions_that_a_condition_knows_are_those_of_the_language():
+    assert {*DEFINITIONS, "let", "param", "link", "joint"} == set(NAMING)
