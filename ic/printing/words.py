@@ -115,5 +115,5 @@ def _of_models(word: str) -> Iterator[Row]:
                 if each.name == word or word in each.words:
                     value = word if each.name != word else "..." if each.unit == "1" else f"... {each.unit}"
                     found.setdefault((kind, f"{each.name} = {value}", each.doc), []).append(name)
-    for (kind, written, doc), names in found.items():
-        yield written, f"{kind} {', '.join(names)}", doc
+    for (of_kind, written, doc), names in found.items():
+        yield written, f"{of_kind} {', '.join(names)}", doc
