@@ -27,6 +27,7 @@ from met.frozen import frozen
 from met.plan import SEED, Experiment, Formula
 from met.plan import file as plan_file
 from met.plan.keys import case_seeds
+from met.plant import bed_values
 from met.run import prepare
 
 
@@ -65,7 +66,7 @@ def run(request: CaseRequest) -> loop.LoopEnd:
     of = pace_of(experiment)
     stop_requested = process.listening()
     joints = substituted(prepare(experiment, wire=True))
-    _check_start(experiment, joints, request.row)
+    check(experiment, request.row, request.lock_step)
     beds: list[BedDriver] = []
     abouts: list[About] = []
     try:
@@ -79,7 +80,6 @@ def run(request: CaseRequest) -> loop.LoopEnd:
         _check_ticks(abouts, of, lock_step)
         prepared = prepare(experiment, wire=True, late=of.late(lock_step), lanes=LANES)
         driven = CaseKernel(prepared, request.row, of.repeats)
-        _check_delay(driven, of, lock_step)
         if not lock_step:
             process.precedence()
         driven(0, [0.0] * len(beds), [[0.0, 0.0] for _ in beds])  # code and memory are there when time begins to count
@@ -167,13 +167,16 @@ def _check_ticks(abouts: Sequence[About], of: Pace, lock_step: bool) -> None:
             raise Problem(error("E405", message, help=helps))
 
 
-def _check_delay(driven: CaseKernel, of: Pace, lock_step: bool) -> None:
-    """Raise Problem E415 where the law takes its commands for earlier than they are."""
-    least = of.late(lock_step)
-    for joint in driven.joints:
-        if driven.delay(joint) < least:
-            message = f"joint `{joint}`: its law takes the bed's delay for none, and over a wire it is a tick"
-            raise Problem(error("E415", message, help="`bed = emulated(delay = 1, ...)` in the deck says so"))
+def check(experiment: Experiment, row: int, lock_step: bool) -> None:
+    """Raise Problem where a case cannot be driven, whatever its beds are: E415 where the law takes its commands for
+    earlier than they are, E416 where a joint begins with a rate. Nothing is opened or written for that."""
+    least = pace_of(experiment).late(lock_step)
+    for use in experiment.structure.substitutions:
+        if bed_values(experiment, use.joint, row)["delay"] < least:
+            message = f"joint `{use.joint}`: its law takes the bed's delay for none, and over a wire it is a tick"
+            helps = f"`bed = {use.bed}(delay = 1, ...)` in the deck says so"
+            raise Problem(error("E415", message, use.place, help=helps))
+    _check_start(experiment, [use.joint for use in experiment.structure.substitutions], row)
 
 
 def _check_start(experiment: Experiment, joints: Sequence[str], row: int) -> None:
@@ -181,10 +184,12 @@ def _check_start(experiment: Experiment, joints: Sequence[str], row: int) -> Non
     inputs = {coordinate.path: float(coordinate.values[row]) for coordinate in experiment.cases.coordinates}
     outputs = experiment.formulas.replay(inputs)
     for joint in joints:
-        value = experiment.parameters[f"initial.{joint}.qd"].value
+        parameter = experiment.parameters[f"initial.{joint}.qd"]
+        value = parameter.value
         if (outputs[value.output] if isinstance(value, Formula) else value) != 0.0:
             message = f"joint `{joint}` begins with a rate, and a bed's shaft begins at rest"
-            raise Problem(error("E416", message, help=f"`initial {{ {joint}.qd = 0 rad/s; }}` in the run"))
+            helps = f"`initial {{ {joint}.qd = 0 rad/s; }}` in the run"
+            raise Problem(error("E416", message, parameter.origin.place, help=helps))
 
 
 def _driven(request: CaseRequest) -> dict[str, Any]:

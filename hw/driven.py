@@ -12,7 +12,7 @@ import numpy as np
 
 from met.backends.backend import Block
 from met.plan import Experiment
-from met.plant import bed_values, servo_period
+from met.plant import servo_period
 from met.run import Prepared, inputs
 
 LANES = 4
@@ -61,10 +61,6 @@ class CaseKernel:
         self.block.step(max(0, at - self.divisor + 1), at)
         for b, (voltage, current) in enumerate(self._outputs):
             commands[b][0], commands[b][1] = float(voltage[0]), float(current[0])
-
-    def delay(self, joint: str) -> float:
-        """The bed's delay as the law takes it to be, in the servo's ticks."""
-        return bed_values(self.prepared.experiment, joint, self.row)["delay"]
 
     def again(self, rates: Iterable[Sequence[float]]) -> tuple[np.ndarray, np.ndarray, int]:
         """Run from rates that were read before, at the servos' ticks from 0 on.

@@ -18,7 +18,7 @@ from batch.queries.summary import summarise
 from batch.terminal.margin import in_words
 from batch.terminal.running import first_picture
 from batch.terminal.verdict import announcement, result_lines, worst_cases, writing
-from hw.case import pace_of
+from hw.case import check, pace_of
 from hw.drivers import check_model, in_lock_step, kind_of, ports_in_words
 from met.analysis.margin import margins, remedy
 from met.diagnostic import Problem, error
@@ -79,6 +79,9 @@ def campaign_of(
     [stepped] = steps
     late = max(pace_of(each).late(stepped) for each in experiments)
     found = prepare(plan, output=output, experiments=names, cases=cases, histories="all", wires=Wires(late))
+    for part in found.parts:
+        for row in part.rows:
+            check(part.experiment, int(row), stepped)
     return found, by_joint, stepped
 
 

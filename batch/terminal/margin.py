@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from hw.pace import pace
 from ic.printing.columns import columns, count
 from met.analysis.margin import HEAVIEST, Margin, remedy
 from met.plan import Experiment
@@ -40,6 +41,10 @@ def margin_lines(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> I
     for one in tightest:
         if not one.stable:
             yield f"  {one.joint}: {remedy(one)} may help"
+    for each in joints:
+        if early := next((one for one in each if one.delay < pace(one.rate_hz).late(False)), None):
+            own = f"`bed = {early.bed}(delay = 1, ...)`, which has another margin"
+            yield f"  {early.joint}: `met bed run` refuses this delay on a line, where commands act a tick later: {own}"
     for each in joints:
         bad = [one for one in each if not one.stable]
         if bad and len(found) > 1:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -143,6 +144,21 @@ def test_where_the_arm_is_too_light_the_table_says_from_where_it_would_not_be() 
     rows = as_data(experiment, found)["margins"]
     assert [row["stable"] for row in rows] == [False, True]
     assert rows[1]["lower"] == found[1][0].lower and rows[1]["margin"] == found[1][0].lighter
+
+
+def test_a_delay_that_no_line_has_is_said() -> None:
+    """`met bed run` refuses it there; a servo below 500 Hz is spoken to more often, and has none."""
+    experiment = _stiff(0.08, [1.0])[0]
+    one = _one()
+    said = [
+        [line for line in margin_lines(experiment, [[replace(one, **changed)]]) if "refuses" in line]
+        for changed in ({}, {"delay": 0.0}, {"delay": 0.0, "rate_hz": 100.0})
+    ]
+    assert said[0] == said[2] == []
+    assert said[1] == [
+        "  hip: `met bed run` refuses this delay on a line, where commands act a tick later: "
+        "`bed = emulated(delay = 1, ...)`, which has another margin"
+    ]
 
 
 @pytest.mark.parametrize(

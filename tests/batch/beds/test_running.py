@@ -16,10 +16,11 @@ import pytest
 import batch
 import ic
 from batch.beds.executor import OnBeds
-from batch.beds.running import check_margins
+from batch.beds.running import campaign_of, check_margins
 from batch.campaigns.campaign import prepare
 from hw import records
 from met import cli
+from met.diagnostic import Problem
 
 DECK = """\
 #include <two_link.ic>
@@ -110,14 +111,16 @@ def test_a_transcript_is_replayed_to_the_same_bits(bed: Callable[..., tuple[int,
             ("moving", "--port", "emulated"),
             """\
 error[E416]: joint `shoulder` begins with a rate, and a bed's shaft begins at rest
- = help: `initial { shoulder.qd = 0 rad/s; }` in the run
+  --> deck.ic:17:49
+   = help: `initial { shoulder.qd = 0 rad/s; }` in the run
 """,
         ),
         (
             ("wired", "--port", "firmware"),
             """\
 error[E415]: joint `shoulder`: its law takes the bed's delay for none, and over a wire it is a tick
- = help: `bed = emulated(delay = 1, ...)` in the deck says so
+ --> deck.ic:9:5
+  = help: `bed = emulated(delay = 1, ...)` in the deck says so
 """,
         ),
         (
@@ -174,7 +177,7 @@ it would not be stable
 """,
         ),
         (
-            ("wired", "--port", "/dev/nobody"),
+            ("slow", "--port", "/dev/nobody"),
             """\
 error[E400]: /dev/nobody cannot be opened: no such file or directory
 """,
@@ -184,10 +187,30 @@ error[E400]: /dev/nobody cannot be opened: no such file or directory
 def test_what_is_wrong(
     bed: Callable[..., tuple[int, str, str]], here: Path, words: tuple[str, ...], message: str
 ) -> None:
-    status, _, complaint = bed(*words, "-o", "x.h5")
+    status, said, complaint = bed(*words, "-o", "x.h5")
     assert status == cli.BAD_INPUT
     assert message in complaint
     assert not (here / "x.h5").exists()
+    assert "writing" not in said or "E400" in message  # which only the line can tell
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "written", "remedy"),
+    [
+        ("wired", "E415", "emulated(faults = typical)", "emulated(faults = typical, delay = 1)"),
+        ("moving", "E416", "shoulder.qd = 0.01 rad/s;", "shoulder.qd = 0 rad/s;"),
+    ],
+)
+def test_a_case_that_no_bed_can_drive_is_refused_before_anything_is_written_and_driven_once_mended(
+    here: Path, name: str, code: str, written: str, remedy: str
+) -> None:
+    port, stepped = ("firmware", False) if code == "E415" else ("emulated", True)
+    deck = here / "deck.ic"
+    with pytest.raises(Problem) as caught:
+        campaign_of(ic.compile(deck, select=[name]), [name], [port], lock_step=stepped)
+    assert caught.value.diagnostics[0].code == code
+    deck.write_text(DECK.replace(written, remedy))
+    campaign_of(ic.compile(deck, select=[name]), [name], [port], lock_step=stepped)
 
 
 @pytest.mark.slow
