@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import io
 import os
 import re
@@ -44,6 +45,10 @@ LOST = (
 class SerialLine:
     """A serial line, open as soon as it is made. Making it raises Problem E400, its methods raise E401.
 
+    A device is open for this process alone: the system lets no other open it then (TIOCEXCL), but one of the
+    superuser's, or one that had it open before; and none of those that lock it (flock). What is behind a socket:// or
+    rfc2217:// its server gives to whom it likes.
+
     to, lost  what is at its other end, and what to do where it was lost, in words
     """
 
@@ -63,6 +68,13 @@ class SerialLine:
         with contextlib.suppress(AttributeError, NotImplementedError, ValueError, OSError):
             self._port.set_low_latency_mode(True)
         self.warnings = latency(url) if local else ()
+        self._exclude(termios.TIOCEXCL)
+
+    def _exclude(self, request: int) -> None:
+        """Let others open the device no more, TIOCEXCL, or again, TIOCNXCL."""
+        with contextlib.suppress(OSError):  # as of a socket
+            if self._file is not None:
+                fcntl.ioctl(self._file, request)
 
     @property
     def file(self) -> int | None:
@@ -99,6 +111,7 @@ class SerialLine:
     def close(self) -> None:
         # pyserial does not close a socket whose other end has gone
         connection = getattr(self._port, "_socket", None)
+        self._exclude(termios.TIOCNXCL)
         with contextlib.suppress(OSError):
             self._port.close()
         if connection is not None:

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
+import termios
+import time
 import tty
 
 from met.diagnostic import Problem, error
+
+FREE = 1.0
+"""Time without a byte after which another host may open a line, s: one that was killed has it open for itself alone."""
 
 
 class Terminal:
@@ -27,11 +33,18 @@ class Terminal:
         with contextlib.suppress(FileNotFoundError):
             os.unlink(path)
         os.symlink(os.ttyname(self._near), path)
+        self._heard = time.monotonic()
 
     def read(self) -> bytes:
         """Read pending input."""
+        now = time.monotonic()
         with contextlib.suppress(BlockingIOError):
-            return os.read(self.file, 4096)
+            data = os.read(self.file, 4096)
+            self._heard = now
+            return data
+        if now > self._heard + FREE:
+            self._heard = now
+            fcntl.ioctl(self._near, termios.TIOCNXCL)
         return b""
 
     def write(self, data: bytes) -> None:

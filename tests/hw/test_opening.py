@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import socket
+import struct
 import subprocess
 import sys
 from collections.abc import Callable
@@ -20,6 +22,9 @@ from tests.hw.device import Device
 from tests.hw.relay import VirtualLine
 
 pytestmark = pytest.mark.alone
+
+TIOCGEXCL = 0x80045440
+"""The system's request for whether a line is open for one process alone (Linux)."""
 
 
 def bed_of(device: Device, **more: Any) -> LineBed:
@@ -54,6 +59,23 @@ def test_a_line_that_another_joint_s_bed_is_on(on_pty: Callable[..., str]) -> No
             f"error[E400]: {name} cannot be opened: this run has it open already\n"
             " = help: each bed is on a line of its own: give each joint another port"
         )
+
+
+def test_a_line_is_open_for_one_process_alone_until_it_is_closed() -> None:
+    """The system then lets no other open it, but one of the superuser's: the flag alone is looked at here."""
+
+    def exclusive() -> bool:
+        return bool(struct.unpack("i", fcntl.ioctl(own, TIOCGEXCL, bytes(4)))[0])
+
+    host, own = os.openpty()
+    try:
+        line = serial_port.SerialLine(os.ttyname(own), 921600)
+        assert exclusive()
+        line.close()
+        assert not exclusive()
+    finally:
+        os.close(host)
+        os.close(own)
 
 
 @pytest.mark.parametrize("text", [None, "", "anything"])
