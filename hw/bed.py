@@ -53,6 +53,7 @@ class Fault(enum.IntFlag):
     DRIVE = 1 << 16
     SUPPLY = 1 << 17
     DISAGREEMENT = 1 << 18
+    OTHER_MASTER = 1 << 19
 
 
 class Capability(enum.IntFlag):
@@ -175,12 +176,14 @@ class BedDriver(ABC):
     has_line  False where answers come at once, from this process, so that there is no line to measure
     warnings  what may make exchanges late, known once it is connected
     remarks   rows for whoever asks what the bed is, a word and a line each, known once it is connected
+    unseen    what another master may do to it without being noticed, in words; "" where there can be none
     """
 
     patience: float = 0.01
     has_line: bool = True
     warnings: tuple[Diagnostic, ...] = ()
     remarks: tuple[tuple[str, str], ...] = ()
+    unseen: str = ""
 
     @abstractmethod
     def connect(self) -> About:

@@ -54,6 +54,10 @@ _FAULTS = {
         "the two drives do not agree about the shaft",
         "look whether the coupling slips, and whether one of them counts the other way round: `reversed`",
     ),
+    Fault.OTHER_MASTER: (
+        "another program or computer commands it",
+        "find and end it: another run, a maker's tool on another port of a drive, a controller on the bus",
+    ),
     Fault.INTERLOCK: ("its interlock stopped it", "`met bed probe` says by which of its inputs"),
 }
 

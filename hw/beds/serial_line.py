@@ -31,6 +31,7 @@ class SerialBed(WireBed):
     def __init__(
         self, url: str, *, period: float, baud: int = BAUD, transcript: Callable[[bytes], object] | None = None
     ) -> None:
+        self.unseen = "commands whose answers do not come over this line"
         super().__init__(url, period, secrets.randbelow(messages.NUMBERS))
         self.baud = baud
         header = {"line": url, "baud": baud, "period": period, "first": self._number}

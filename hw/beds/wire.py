@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 from hw import refusals
@@ -36,6 +37,12 @@ _STOP = (0.02,) * 10 + (0.05, 0.1, 0.2, 0.4)
 _SIMULATED = 0.01
 """Longest time for a tick of a simulated plant, s: an emulator of a small controller takes about a millisecond."""
 
+_OURS = 4096
+"""Last numbers of questions whose answers may still come."""
+
+_FOREIGN = 2
+"""Answers to questions that this host has not asked, after which another asks them."""
+
 _NONSENSE = 1024
 """Bytes of other things after which the answer counts as missing, so that a line that babbles holds nobody up."""
 
@@ -62,6 +69,8 @@ class WireBed(BedDriver):
         self._has_interlock = False
         self._step = 0
         """Ticks that a bed in lock-step advances by at an exchange; 0 for one with a time of its own."""
+        self._asked = self._foreign = 0
+        """Questions since it was greeted, `_OURS` at most, and answers to another's since it was armed."""
         self._angle: tuple[int, int] | None = None
         """The encoder's last count as it came, and without the jumps where it wraps around."""
 
@@ -72,6 +81,7 @@ class WireBed(BedDriver):
     def connect(self) -> About:
         self.close()
         self._line, self._decoder, self._angle = self.open(), Decoder(), None
+        self._asked = 0
         try:
             self._about = self._greet()
         except BaseException:
@@ -115,7 +125,7 @@ class WireBed(BedDriver):
         about = self._there()
         # so that a bed whose answer was lost is asked again before its deadman has it; or says that it has
         waits = _WAITS if self._step else (*(about.deadman / 3,) * 3, _WAITS[-1])
-        self.confirmed = False
+        self.confirmed, self._foreign = False, 0
         message = messages.ArmMessage(about.session)
         first = self._answer(message, SampleAnswer, waits[0])
         sample = self._sample(first or self._ask(message, SampleAnswer, waits[1:]))
@@ -132,7 +142,13 @@ class WireBed(BedDriver):
             messages.StepMessage(volts, amperes, self._step) if self._step else messages.DriveMessage(volts, amperes)
         )
         found = self._answer(command, SampleAnswer, self.patience)
-        return None if found is None else self._sample(found)
+        if found is None:
+            return None
+        sample = self._sample(found)
+        if self._foreign < _FOREIGN:
+            return sample
+        self.stop()
+        return replace(sample, state=BedState.STOPPED, faults=sample.faults | Fault.OTHER_MASTER)
 
     def _counts(self, what: str, value: float, scale: float, most: int, unit: str) -> int:
         counts = greeting.commanded(value, scale, most)
@@ -191,6 +207,11 @@ class WireBed(BedDriver):
         for _ in range(2):  # a transcript that cannot be written is in the way once
             try:
                 found = self._ask_again(messages.StopMessage(), SampleAnswer, _STOP)
+                if found is not None and found.status & messages.STATE == BedState.ARMED:
+                    # another's number is ahead of this host's, whose frames are old then: a greeting disarms, whatever
+                    # its number
+                    self._ask_again(messages.HelloMessage(), HelloAnswer, _STOP)
+                    found = self._ask_again(messages.StopMessage(), SampleAnswer, _STOP)
                 self.confirmed = found is not None and found.status & messages.STATE != BedState.ARMED
                 break
             except Problem:
@@ -228,6 +249,7 @@ class WireBed(BedDriver):
         line = self._line
         assert line is not None
         self._number = number = (self._number + 1) % messages.NUMBERS
+        self._asked = min(self._asked + 1, _OURS)
         line.send(messages.frame_of(message, number))
         until, nonsense = line.now() + wait, 0
         while nonsense < _NONSENSE:
@@ -238,6 +260,7 @@ class WireBed(BedDriver):
             for payload in self._decoder.feed(data):
                 found = messages.bed_answer(payload, len(self._sensors) + self._has_interlock)
                 if found is None or found[0] != number:
+                    self._foreign += found is not None and (number - found[0]) % messages.NUMBERS >= self._asked
                     continue
                 if isinstance(found[1], kind):
                     return found[1]

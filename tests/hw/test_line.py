@@ -515,3 +515,31 @@ def test_a_socket_that_is_not_there(tmp_path: Path) -> None:
         f"error[E400]: unix://{tmp_path}/line cannot be opened: no such file or directory\n"
         " = help: is there someone who made that socket, and listens?"
     )
+
+
+# Another master
+
+
+def drives_beside(number: int, seconds: float) -> tuple[LineBed, list[BedState]]:
+    """A bed whose answers to another master come too: the state after each exchange. number: of the other's first"""
+    line = VirtualLine(Device(), None)
+    bed = LineBed(lambda: line)
+    bed.connect()
+    bed.arm()
+    found = []
+    for n in range(round(seconds / 1e-3)):
+        if n % 10 == 5:
+            line._put("up", model.frame(struct.pack("<BHiiB", 5, (number + n) % (1 << 16), 40, 0, 1)), line.time)
+        sample = bed.exchange(0.0, 0.0)
+        assert sample is not None
+        found.append(sample.state)
+        if sample.state != BedState.ARMED:
+            assert sample.faults == Fault.OTHER_MASTER
+            break
+    return bed, found
+
+
+def test_an_answer_to_a_question_that_this_host_has_not_asked_is_to_another_master() -> None:
+    bed, states = drives_beside(30_000, 0.1)
+    assert states[-1] == BedState.STOPPED and 12 <= len(states) <= 20
+    assert bed.confirmed
