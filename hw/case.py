@@ -125,7 +125,7 @@ def _rest(beds: Sequence[BedDriver], time: float, stop_requested: Callable[[], b
 def _greeted(bed: BedDriver, joint: str, experiment: Experiment, request: CaseRequest) -> About:
     """Greet a bed, and return its description. A simulated one begins anew, with the case's noise."""
     about, row = bed.connect(), request.row
-    process.say(bed=joint, about=process.about_as_json(about))
+    process.say(bed=joint, about=process.about_as_json(about), unseen=process.unseen(bed))
     process.warnings(bed)
     if not request.clear:
         latch.check(bed, about, request.ports[joint])

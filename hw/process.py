@@ -72,6 +72,11 @@ def warnings(bed: BedDriver) -> None:
         say(said=said, help=list(warning.help))
 
 
+def unseen(bed: BedDriver) -> str:
+    """A line about what another master may do to a bed without being noticed; "" where there can be none."""
+    return f"another master is noticed and stops the bed; not noticed are {bed.unseen}" if bed.unseen else ""
+
+
 def precedence() -> None:
     """Take precedence over other processes, and report what was not allowed."""
     for refused in realtime.take_precedence():

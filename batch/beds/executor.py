@@ -211,7 +211,8 @@ class OnBeds:
         try:
             for line in talk("hw.case", asked, self._say, until="began", idle=self._tell):
                 if "about" in line:
-                    self._greeted(line["bed"], f"bed `{line['about']['name']}`, firmware {line['about']['firmware']}")
+                    bed = f"bed `{line['about']['name']}`, firmware {line['about']['firmware']}"
+                    self._greeted(line["bed"], bed, line.get("unseen", ""))
                 ended = line.get("ended", ended)
         except Problem as problem:
             code = problem.diagnostics[0].code
@@ -229,11 +230,13 @@ class OnBeds:
                 with contextlib.suppress(OSError), new_file(ended_file) as file:
                     file.write(json.dumps(ended).encode())
 
-    def _greeted(self, joint: str, bed: str) -> None:
-        """Print which bed a joint is on, where it differs from the case before."""
+    def _greeted(self, joint: str, bed: str, unseen: str) -> None:
+        """Print which bed a joint is on, and what is not noticed there, where it differs from the case before."""
         if self._greeted_beds.get(joint) != bed:
             self._greeted_beds[joint] = bed
             self._say(f"{joint}: {bed}")
+            if unseen:
+                self._say(f"{joint}: {unseen}")
 
 
 def _recorded(path: Path) -> bool:

@@ -41,6 +41,9 @@ from met.substitution.bed import DRIVES, DriveCommand
 LONGEST_SHARE = 0.8
 """Largest share of a period that the frames of an exchange may take on the bus."""
 
+ASKED_SHARE = 0.9
+"""Largest share of a period up to which drives are asked what another master would have changed."""
+
 STALE = 0.05
 """Longest time since a drive has said its state, s; an answer that is more than that behind does not count."""
 
@@ -163,7 +166,11 @@ class CanBed(BedDriver):
         return about
 
     def _check_share(self) -> None:
-        """Raise Problem E405 where the frames of an exchange do not fit into a period."""
+        """Raise Problem E405 where the frames of an exchange do not fit into a period, and see whether it has room for
+        questions."""
+        check = 0.0 if self._bench.bus["interface"] == SERIAL else 2.0 * on_bus(CanFrame(0, bytes(8)))
+        self._asks = self._on_bus() + check <= ASKED_SHARE * self.period
+        self.unseen = "; ".join(dict.fromkeys((each if self._asks else CanDrive).unseen for each in self._drives))
         share = self._on_bus() / self.period
         if share > LONGEST_SHARE:
             message = (
@@ -283,6 +290,7 @@ class CanBed(BedDriver):
         if self._state == BedState.ARMED:
             self._hold(volts, amperes, now)
             drive, load = self._drives
+            frames += [*load.checks(), *drive.checks()] if self._asks else []
             frames += load.told(self._kt_load * amperes * scales.current)
             frames += drive.told(self._told(volts * scales.voltage))
         answered = self._answers(frames, now)
@@ -316,15 +324,17 @@ class CanBed(BedDriver):
             raise self._refused("clear")
         if self._state == BedState.STOPPED and not forget(self._talk):
             raise self._refused("clear")
+        self._talk.forget_other_master()
         self._state, self._faults, self._why = BedState.DISARMED, Fault(0), ""
         return self._sample()
 
     def account(self) -> tuple[str, ...]:
+        why = (f"it stopped itself: {self._why}",) if self._why else ()
         said = [drive.power is not None for drive in self._drives]
         if not any(said):
-            return ("neither drive says its power: what went back to the supply is not known",)
+            return (*why, "neither drive says its power: what went back to the supply is not known")
         whose = "the drives" if all(said) else f"the {self._drives[said.index(True)].entry.role}, which alone says it,"
-        return (f"{whose} gave {self.returned:.3g} J back to the supply",)
+        return (*why, f"{whose} gave {self.returned:.3g} J back to the supply")
 
     def rest(self, time: float) -> BedSample:
         self._there()
@@ -454,10 +464,14 @@ class CanBed(BedDriver):
             self._filtered = side.rate, 0.0
 
     def _watch(self) -> None:
-        """Stop where a drive has stopped, the supply's voltage is too high, or the shaft is too fast."""
+        """Stop where a drive has stopped or another master commands it, the supply's voltage is too high, or the shaft
+        is too fast."""
+        if other := self._talk.other_master:
+            self._stopped(Fault.OTHER_MASTER, other)
+            return
         for drive in self._drives:
             if not drive.sound:
-                words = f"{drive.words}: {drive.errors or 'it drives no more'}"
+                words = f"{drive.words}: {drive.errors or 'it drives no more, and tells no error'}"
                 self._stopped(Fault.DEADMAN if drive.starved else Fault.DRIVE, words)
                 return
             if drive.supply is not None and drive.supply > self._supply_max:
@@ -511,7 +525,9 @@ class CanBed(BedDriver):
         self._why = self._why or why
 
     def _latch_failures(self) -> None:
-        """Latch that a drive has failed while the bed was disarmed, where nothing is latched yet."""
+        """Latch that a drive has failed or another master commands it, where the bed is disarmed."""
+        if self._state == BedState.DISARMED and (other := self._talk.other_master):
+            self._latch(Fault.OTHER_MASTER, other)
         for each in self._drives:
             if each.state == DriveState.FAILED and self._state == BedState.DISARMED:
                 self._latch(Fault.DEADMAN if each.starved else Fault.DRIVE, f"{each.words}: {each.errors}")

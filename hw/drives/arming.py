@@ -55,6 +55,7 @@ def prove_watchdogs(talk: Talk, deadman: float) -> tuple[float | None, ...]:
             helps = (
                 "it is not armed; look whether its watchdog is switched on",
                 "nothing else stops it without a host",
+                "another program or computer that commands it feeds its watchdog, too",
             )
             raise Problem(error("E406", message, help=helps))
         if not drive.starved:

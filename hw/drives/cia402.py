@@ -16,6 +16,7 @@ import struct
 from collections.abc import Sequence
 
 from hw.drives.bench_file import DriveEntry
+from hw.drives.checks import SELDOM, Checks
 from hw.drives.drive import CanDrive, DriveFacts, DriveReading, DriveState, Talk
 from hw.drives.frames import CanFrame
 
@@ -32,6 +33,12 @@ NMT, SYNC, EMERGENCY, TPDO1, RPDO1, TPDO2, SDO_ANSWER, SDO_ASK, HEARTBEAT = (
 )
 """Identifiers, to which a node's number is added except for the first two."""
 
+RPDOS = range(RPDO1, RPDO1 + 4 * 0x100, 0x100)
+"""Identifiers of what a node is told by PDOs, to which its number is added."""
+
+DOWNLOADS = (0, 1)
+"""Highest three bits of an SDO that writes: its segments, and its beginning."""
+
 HOST = 127
 """The host's number, under which its heartbeat goes."""
 
@@ -45,12 +52,18 @@ ten, signed."""
 DEVICE, PRODUCT, CONSUMED, ABORT = (0x1000, 0), (0x1018, 2), (0x1016, 1), (0x6007, 0)
 REVISION, MODES, MODE, RATED, MOST, SPEED = (0x1018, 3), (0x6502, 0), (0x6060, 0), (0x6076, 0), (0x6072, 0), (0x6080, 0)
 STEPS, TURNS, VELOCITY_UNIT = (0x608F, 1), (0x608F, 2), (0x60A9, 0)
+TARGET_TORQUE, TARGET_RATE, LARGEST = ((0x6071, 0), "<h"), ((0x60FF, 0), "<i"), (MOST, "<H")
+"""Objects that say what a drive was told, and its largest torque, with what they hold."""
+
+CHECK_EVERY, DOUBTED_EVERY = 16, 4
+"""Exchanges of which one asks a drive what it was told, and where that was another's once."""
+
 CONTROL, STATUS = (0x6040, 0), (0x6041, 0)
 OFFSETS = ((0x60B1, 0), "<i"), ((0x60B2, 0), "<h")
 """Objects, by index and subindex; the offsets, of velocity and torque, with what they hold."""
 
-NO_OBJECT = 0x06020000
-"""Code of an SDO for an object that a drive does not have."""
+NO_OBJECT = (0x06020000, 0x06010001)
+"""Codes of an SDO for an object that a drive does not have, or that cannot be read."""
 
 CONTROL_HZ = 1000.0
 """Rate at which two such drives answer on a bus of 1 Mbit/s."""
@@ -60,6 +73,11 @@ MOST_TOLD, MOST_RATE = (1 << 15) - 1, (1 << 31) - 1
 
 OFF, SHUT_DOWN, SWITCH_ON, ENABLE, RESET = 0x00, 0x06, 0x07, 0x0F, 0x80
 _TURN = 2.0 * math.pi
+
+
+def _upload(which: tuple[int, int]) -> bytes:
+    """The SDO that asks for an object."""
+    return struct.pack("<BHB", 0x40, *which).ljust(8, b"\0")
 
 
 def _words(which: tuple[int, int]) -> str:
@@ -73,6 +91,7 @@ class Cia402Drive(CanDrive):
     dialect = "cia402"
     answers_commands = True
     takes_rates = True
+    unseen = f"on another port of a drive, such as USB, {SELDOM}"
 
     def __init__(self, entry: DriveEntry) -> None:
         super().__init__(entry)
@@ -80,6 +99,9 @@ class Cia402Drive(CanDrive):
         self._control, self._wanted, self._error = OFF, False, 0
         self._rated = self._step = self._rate_unit = 1.0
         self._mode = TORQUE_MODE
+        self._checks, self._turn = Checks(apart=1.0), 0
+        self._objects: dict[str, tuple[tuple[int, int], str]] = {}
+        """Objects that are asked for in a run, with what they hold, by their names."""
 
     def greet(self, talk: Talk) -> DriveFacts:
         self._wanted, self._control = False, OFF
@@ -119,6 +141,7 @@ class Cia402Drive(CanDrive):
         self.reading = None
         if not talk.ask(self.asked(), lambda: self.reading is not None and self.state != DriveState.DRIVING):
             raise talk.silent(self, "SYNC")
+        self._prepare_checks(talk)
         product, revision = int(self._read(talk, PRODUCT, "<I")), int(self._read(talk, REVISION, "<I"))
         return DriveFacts(
             f"revision 0x{revision:X}",
@@ -133,6 +156,17 @@ class Cia402Drive(CanDrive):
             rate_told_count=self._rate_unit if self.rates else 0.0,
             angle_range=self._step * 2.0**32,
         )
+
+    def _prepare_checks(self, talk: Talk) -> None:
+        """Find which objects it can be asked for in a run: what it is told, and what nobody then changes."""
+        told, other = (TARGET_RATE, TARGET_TORQUE) if self.rates else (TARGET_TORQUE, TARGET_RATE)
+        self._objects = {
+            _words(which): (which, layout)
+            for which, layout in (told, other, LARGEST)
+            if self._sdo(talk, _upload(which), _words(which), may_lack=True)
+        }
+        kept = {name: self._read(talk, *each) for name, each in self._objects.items() if each is not told}
+        self._checks.begin([_words(told[0])] if _words(told[0]) in self._objects else (), kept)
 
     def renew(self, talk: Talk) -> None:
         self._most(talk)
@@ -172,8 +206,7 @@ class Cia402Drive(CanDrive):
         """Set to 0 the offsets that a drive adds to commanded rate and torque, if it has any: they may be saved. Raises
         Problem E404 where it keeps one."""
         for which, layout in OFFSETS:
-            request = struct.pack("<BHB", 0x40, *which)
-            if self._sdo(talk, request, _words(which), may_lack=True) and self._read(talk, which, layout) != 0.0:
+            if self._sdo(talk, _upload(which), _words(which), may_lack=True) and self._read(talk, which, layout) != 0.0:
                 self._set(talk, which, layout, 0)
 
     def _sdo(self, talk: Talk, data: bytes, what: str, *, may_lack: bool = False) -> bytes:
@@ -190,7 +223,7 @@ class Cia402Drive(CanDrive):
         assert self._answer is not None
         if self._answer[0] == 0x80:
             code = struct.unpack_from("<I", self._answer, 4)[0]
-            if may_lack and code == NO_OBJECT:
+            if may_lack and code in NO_OBJECT:
                 return b""
             raise self.wrong(f"it refuses {what}, 0x{code:08X}", "its documentation says whether it has that object")
         return self._answer
@@ -198,9 +231,8 @@ class Cia402Drive(CanDrive):
     def _read(self, talk: Talk, which: tuple[int, int], layout: str) -> float:
         """An object, read twice: a limit is not taken from one frame."""
         what = _words(which)
-        request = struct.pack("<BHB", 0x40, *which)
         size = struct.calcsize(layout)
-        first, second = (self._sdo(talk, request, what) for _ in range(2))
+        first, second = (self._sdo(talk, _upload(which), what) for _ in range(2))
         if first != second or first[0] & 0xE3 != 0x43 or 4 - (first[0] >> 2 & 3) < size:
             raise self.wrong(f"{what} is not what it is in a drive", "two nodes of one number on the bus?")
         return float(struct.unpack_from(layout, first, 4)[0])
@@ -235,6 +267,7 @@ class Cia402Drive(CanDrive):
         if self.state == DriveState.DRIVING:
             counts = self.own(value) / (self._rate_unit if self.rates else 1e-3 * self._rated)
             told = math.trunc(counts + math.copysign(1e-6, counts))  # rounding must not lose a step
+        self._checks.tell(told)
         frames = (self._pdo(self._control if self._wanted else OFF, told),)
         return frames if self.entry.role == "load" else (*frames, CanFrame(HEARTBEAT + HOST, b"\x05"), *self.asked())
 
@@ -243,6 +276,24 @@ class Cia402Drive(CanDrive):
 
     def is_asked_by(self, frame: CanFrame) -> bool:
         return frame.id == SYNC
+
+    def checks(self) -> Sequence[CanFrame]:
+        """An SDO that asks for what it was told, before it is told anew; those to the two drives take turns."""
+        self._turn += 1
+        every = DOUBTED_EVERY if self._checks.doubtful else CHECK_EVERY
+        turn = self._turn + every // 2 * (self.entry.role == "load")
+        if self.state != DriveState.DRIVING or turn % every or not (what := self._checks.next()):
+            return ()
+        return (CanFrame(SDO_ASK + self.node, _upload(self._objects[what][0])),)
+
+    def is_command(self, frame: CanFrame) -> bool:
+        if frame.extended or frame.fd or frame.remote:
+            return False
+        if frame.id == NMT:
+            return frame.data[1:2] in (b"\0", bytes([self.node]))
+        if frame.id == SDO_ASK + self.node:
+            return frame.data[:1] != b"" and frame.data[0] >> 5 in DOWNLOADS
+        return frame.id in (SYNC, HEARTBEAT + HOST, *(each + self.node for each in RPDOS))
 
     def idle(self) -> Sequence[CanFrame]:
         self._wanted = False
@@ -264,6 +315,7 @@ class Cia402Drive(CanDrive):
         which, data = frame.id & 0x780, frame.data
         if which == SDO_ANSWER and len(data) == 8:
             self._answer = data
+            self._check(data, frame.time)
         elif which == TPDO1 and len(data) == 3:
             status, mode = struct.unpack("<Hb", data)
             self._status(status, mode, frame.time)
@@ -278,6 +330,17 @@ class Cia402Drive(CanDrive):
         else:
             return False
         return True
+
+    def _check(self, data: bytes, time: float) -> None:
+        """Take the answer to what it was told, where it was asked."""
+        if not self._checks.asked:
+            return
+        which, layout = self._objects[self._checks.asked]
+        upload = data[0] & 0xE3 == 0x43 and 4 - (data[0] >> 2 & 3) >= struct.calcsize(layout)
+        if not upload or data[1:4] != struct.pack("<HB", *which):
+            return
+        if what := self._checks.answered(struct.unpack_from(layout, data, 4)[0], time):
+            self.disturbed = f"{self.words} was commanded by another: {what}"
 
     def _status(self, status: int, mode: int, time: float) -> None:
         self.stated, drove = time, self.state == DriveState.DRIVING

@@ -30,6 +30,8 @@ WHOLE = (TIMEOUT, MODE, VERSION, SUB_VERSION)
 """Registers that hold whole numbers; the others hold floats."""
 
 MIT_MODE = 1
+MODES = range(4)
+"""Modes under which it is told something, MIT's first: 256 times the mode is added to its number."""
 TIMEOUT_UNIT = 50e-6
 """s of a count of the watchdog's register. That it is so each arming proves."""
 
@@ -149,6 +151,14 @@ class DamiaoDrive(CanDrive):
     def is_asked_by(self, frame: CanFrame) -> bool:
         refresh = frame.id == REGISTERS and frame.data[:3] == struct.pack("<HB", self.node, REFRESH)
         return refresh or frame.id == self.node
+
+    def is_command(self, frame: CanFrame) -> bool:
+        data = frame.data
+        if frame.extended or frame.fd or frame.remote or frame.id == self._answers_as:
+            return False
+        if frame.id == REGISTERS:
+            return data[:2] == struct.pack("<H", self.node) and data[2:3] not in (b"", bytes([READ]), bytes([REFRESH]))
+        return frame.id & 0xFF == self.node and frame.id >> 8 in MODES and len(data) in (4, 8)
 
     def idle(self) -> Sequence[CanFrame]:
         """Send no torque while the drive still takes it, so that none is left when it is enabled."""

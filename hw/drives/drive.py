@@ -10,6 +10,8 @@ shaft. It disarms itself where it hears nothing for the time of its watchdog.
     drive.told(value)        frames of a command
     drive.asked()            frames that ask for its angle, rate and state
     drive.take(frame)        what it answers, or says by itself
+    drive.is_command(frame)  whether a frame that came commands it: then there is another master
+    drive.checks()           frames that ask what another master would have changed
 """
 
 from __future__ import annotations
@@ -44,6 +46,11 @@ ASKS = 5
 LATE = 256
 """Largest number of frames that are taken after the end of a wait: those that have come meanwhile, and no more, since a
 busy bus always has another."""
+
+
+SENT, ECHOED = 256, 0.05
+"""Frames of the host that are remembered, so that they are not taken for another's where they come back; for how long,
+s."""
 
 
 class DriveState(enum.Enum):
@@ -110,11 +117,14 @@ class CanDrive(ABC):
     rates     True where it is told rates: set before it is greeted, where its dialect `takes_rates`
     owed      times at which it was asked what is not answered yet, s of the line's clock
     steps     rad and rad/s of the steps in which its answers tell angle and rate, once it is greeted; 0: floats
+    disturbed  how its answers show that another master has commanded it, in words; "" where they do not
     """
 
     dialect: str
     answers_commands = False
     """True where its answer to a command has its angle, rate and state, so that it need not be asked."""
+    unseen = "commands on another port of a drive, such as USB"
+    """What another master may do to it without being noticed, in words."""
     takes_rates = False
     """True where it can be commanded rates, and closes the rate loop itself."""
 
@@ -129,6 +139,7 @@ class CanDrive(ABC):
         self.power: float | None = None
         self.owed = deque[float](maxlen=256)
         self.steps = 0.0, 0.0
+        self.disturbed = ""
         self._said: dict[Hashable, float] = {}
         """Time of each pair of angle and rate, as in answers, when it was last sent, s."""
         self._turned = -math.inf
@@ -179,6 +190,15 @@ class CanDrive(ABC):
     @abstractmethod
     def answers(self) -> Sequence[CanFrame]:
         """Frames as long as those with which it answers an exchange, to reckon how long they take on the bus."""
+
+    def is_command(self, frame: CanFrame) -> bool:
+        """True for a frame that only a master sends to this drive, and that changes what it does. One that only asks is
+        none: who listens may ask."""
+        return False
+
+    def checks(self) -> Sequence[CanFrame]:
+        """Frames that ask whether another master has commanded it, to be sent before a command, where it can tell."""
+        return ()
 
     def owes(self, now: float) -> bool:
         """True where an answer to an earlier question may still come at a time of the line's clock, s."""
@@ -243,11 +263,28 @@ class Talk:
         self.line, self.drives = line, drives
         self.strange: dict[int, int] = {}
         """Frames that no drive has taken, by identifier, for the message about a drive that does not answer."""
+        self._sent: dict[tuple[Hashable, ...], float] = {}
+        """Times at which frames were sent last, s."""
+        self._heard = ""
+
+    @property
+    def other_master(self) -> str:
+        """What was noticed of another master, in words; "" where nothing was."""
+        return self._heard or next((each.disturbed for each in self.drives if each.disturbed), "")
+
+    def forget_other_master(self) -> None:
+        self._heard = ""
+        for drive in self.drives:
+            drive.disturbed = ""
 
     def send(self, frames: Iterable[CanFrame]) -> None:
         for frame in frames:
             self.line.send(frame)
-            now = self.line.now()
+            now, content = self.line.now(), _content(frame)
+            self._sent.pop(content, None)
+            self._sent[content] = now
+            if len(self._sent) > SENT:
+                del self._sent[next(iter(self._sent))]
             for drive in self.drives:
                 if drive.is_asked_by(frame):
                     drive.owed.append(now)
@@ -260,9 +297,19 @@ class Talk:
             late += self.line.now() > until
             if frame is None or late > LATE:
                 return done()
-            if not any(self._taken(drive, frame) for drive in self.drives) and len(self.strange) < 64:
-                self.strange[frame.id] = self.strange.get(frame.id, 0) + 1
+            if not any(self._taken(drive, frame) for drive in self.drives):
+                self._overhear(frame)
         return True
+
+    def _overhear(self, frame: CanFrame) -> None:
+        """Take a frame that is no drive's. One that commands a drive is another master's, unless this host has sent the
+        same: some interfaces hand what they send to their sender too."""
+        told = next((drive for drive in self.drives if drive.is_command(frame)), None)
+        own = self.line.now() - self._sent.get(_content(frame), -math.inf) <= ECHOED
+        if told is not None and not self._heard and not own:
+            self._heard = f"{told.words} was sent a command by another, 0x{frame.id:X} {frame.data.hex(' ')}".rstrip()
+        if len(self.strange) < 64:
+            self.strange[frame.id] = self.strange.get(frame.id, 0) + 1
 
     def _taken(self, drive: CanDrive, frame: CanFrame) -> bool:
         """Give a frame to a drive. Returns whether it was its; an answer is to the oldest question that it owes."""
@@ -303,3 +350,8 @@ class Talk:
             nodes = sorted({each >> 5 for each in self.strange if each & 0x1F == 1})
             return [f"0x{(nodes[0] << 5) + 1:X} looks like the heartbeat of an ODrive, node {nodes[0]}"]
         return []
+
+
+def _content(frame: CanFrame) -> tuple[Hashable, ...]:
+    """All of a frame that goes over the bus."""
+    return frame.id, frame.data, frame.extended, frame.remote

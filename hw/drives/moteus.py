@@ -77,6 +77,24 @@ def asked_for(kind: int, first: int, count: int = 1) -> bytes:
     return bytes([READ | kind << 2 | count]) + number(first)
 
 
+def writes(data: bytes) -> bool:
+    """True for the data of a frame that does more than to ask for registers."""
+    at = 0
+    try:
+        while at < len(data):
+            head, at = data[at], at + 1
+            if head == NOTHING:
+                continue
+            if head & 0xF0 != READ:
+                return True
+            if not head & 3:
+                _, at = _number(data, at)
+            _, at = _number(data, at)
+    except IndexError:
+        return False
+    return False
+
+
 def padded(data: bytes) -> bytes:
     """The data of a frame, filled up to a length that there is."""
     return data.ljust(next(size for size in SIZES if size >= len(data)), bytes([NOTHING]))
@@ -172,6 +190,9 @@ class MoteusDrive(CanDrive):
 
     def is_asked_by(self, frame: CanFrame) -> bool:
         return frame.id == ASKS_ANSWER | self.node and _STATE in frame.data
+
+    def is_command(self, frame: CanFrame) -> bool:
+        return frame.extended and frame.id & 0x7F == self.node and not frame.id >> 16 and writes(frame.data)
 
     def idle(self) -> Sequence[CanFrame]:
         """The drive under test brakes, the load lets go. What has failed is off, and stopping it would forget why."""

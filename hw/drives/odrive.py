@@ -35,6 +35,12 @@ VERSION, HEARTBEAT_ID, ESTOP, READ_OR_WRITE, ANSWERED, SET_STATE = 0x00, 0x01, 0
 ESTIMATES, MODES, RATE, TORQUE, SUPPLY, CLEAR = 0x09, 0x0B, 0x0D, 0x0E, 0x17, 0x18
 """Commands, the lower five bits of an identifier."""
 
+SAYS = (VERSION, HEARTBEAT_ID, 0x03, ANSWERED, ESTIMATES, 0x0A, 0x14, 0x15, SUPPLY, 0x1C, 0x1D)
+"""Commands under which a drive says something; under all others it is told something."""
+
+CHECK_EVERY, DOUBTED_EVERY = 8, 2
+"""Exchanges of which one asks a drive what another master would have changed, and where that was seen once."""
+
 HEARTBEAT_MS, SUPPLY_MS = 5, 20
 """Periods at which a drive is set to tell its state, and its supply's voltage and current, ms."""
 
@@ -70,7 +76,7 @@ class OdriveDrive(OdriveAxis):
         self._numbers: dict[str, tuple[int, str]] = {}
         """Properties' numbers and formats, by path."""
         self._answered: dict[int, bytes] = {}
-        self._beats = 0
+        self._beats = self._turn = 0
 
     def greet(self, talk: Talk) -> DriveFacts:
         self._version, self._beats = None, 0
@@ -159,6 +165,7 @@ class OdriveDrive(OdriveAxis):
         )
 
     def told(self, value: float) -> Sequence[CanFrame]:
+        self._checks.tell(self.own(value) / TURN if self.rates else self.own(value))
         if self.rates:  # with no torque besides that of its loop
             return (self._frame(RATE, struct.pack("<ff", self.own(value) / TURN, 0.0)),)
         return (self._frame(TORQUE, struct.pack("<f", self.own(value))),)
@@ -168,6 +175,22 @@ class OdriveDrive(OdriveAxis):
 
     def is_asked_by(self, frame: CanFrame) -> bool:
         return frame.remote and frame.id == self.node << 5 | ESTIMATES
+
+    def is_command(self, frame: CanFrame) -> bool:
+        if frame.extended or frame.fd or frame.remote or frame.id >> 5 != self.node:
+            return False
+        command = frame.id & 0x1F
+        return command not in SAYS and (command != READ_OR_WRITE or frame.data[:1] == b"\1")
+
+    def checks(self) -> Sequence[CanFrame]:
+        """A question for a property, at the end of the time for which the command before was in force; those to the two
+        drives take turns."""
+        self._turn += 1
+        every = DOUBTED_EVERY if self._checks.doubtful else CHECK_EVERY
+        if (self._turn + every // 2 * (self.entry.role == "load")) % every:
+            return ()
+        number, _ = self._numbers[self._checks.next()]
+        return (self._frame(READ_OR_WRITE, struct.pack("<BHB", 0, number, 0)),)
 
     def idle(self) -> Sequence[CanFrame]:
         return (*self.told(0.0), self._frame(SET_STATE, struct.pack("<I", IDLE)))
@@ -186,7 +209,11 @@ class OdriveDrive(OdriveAxis):
             return False
         command, data = frame.id & 0x1F, frame.data
         if command == ANSWERED and 4 <= len(data) <= 8:
-            self._answered[struct.unpack_from("<xH", data)[0]] = data[4:]
+            number = struct.unpack_from("<xH", data)[0]
+            self._answered[number] = data[4:]
+            at, layout = self._numbers.get(self._checks.asked, (-1, ""))
+            if number == at and len(data) >= 4 + struct.calcsize(layout):
+                self._check(float(struct.unpack_from(layout, data, 4)[0]), frame.time)
             return True
         if len(data) != 8:
             return False

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from hw.drives.bench_file import ASCII, DriveEntry
+from hw.drives.checks import SELDOM
 from hw.drives.drive import ASKS, GREETED, DriveFacts, DriveReading, DriveState, Talk
 from hw.drives.frames import CanFrame
 from hw.drives.odrive_axis import (
@@ -40,8 +41,9 @@ HARDWARE_NUMBERS = ("hw_version_major", "hw_version_minor", "hw_version_variant"
 QUIET = 0.02
 """Time to wait for late answers before a question of a greeting is repeated, s."""
 
-SUPPLY_EVERY = 4
-"""Exchanges of which one asks for the supply in the place of the state."""
+SUPPLY_EVERY = 8
+"""Exchanges of which one asks for the supply; of the others every other asks for what another master would have
+changed, and the rest for the state."""
 
 DIGITS = 1e-6
 """Turns, and turns/s, of the last decimal of an angle and a rate, as firmware 0.5 writes them."""
@@ -53,6 +55,7 @@ class OdriveAsciiDrive(OdriveAxis):
     """The host's side of an ODrive's axis on a serial line."""
 
     dialect = ASCII
+    unseen = SELDOM
     answers_commands = True  # each command goes with the questions of an exchange
 
     def __init__(self, entry: DriveEntry) -> None:
@@ -139,9 +142,9 @@ class OdriveAsciiDrive(OdriveAxis):
         return CanFrame(self.node, text.encode())
 
     def _command(self, value: float) -> CanFrame:
-        if self.rates:
-            return self._text(f"v 0 {self.own(value) / TURN:.7f} 0")
-        return self._text(f"c 0 {self.own(value):.7f}")
+        own = self.own(value) / TURN if self.rates else self.own(value)
+        self._checks.tell(own)
+        return self._text(f"v 0 {own:.7f} 0" if self.rates else f"c 0 {own:.7f}")
 
     def armed(self) -> Sequence[CanFrame]:
         return (
@@ -157,10 +160,14 @@ class OdriveAsciiDrive(OdriveAxis):
     def told(self, value: float) -> Sequence[CanFrame]:
         self._turn += 1
         asks: tuple[str, ...] = (STATE,)
+        if self._turn % 2 == 0 and self._checks.doubtful:  # while the command before is still in force
+            return (self._text(f"r {self._checks.next()}"), self._command(value), self._text("f 0"))
         if self.state == DriveState.DRIVING and self._state is not None:  # it has stopped, and does not say why itself
             asks = (ACTIVE, REASON)
         elif self._turn % SUPPLY_EVERY == 0:
             asks = (CURRENT if self._turn % (2 * SUPPLY_EVERY) else VOLTAGE,)
+        elif self._turn % 2 == 0:
+            asks = (self._checks.next(),)
         return (self._command(value), self._text("f 0"), *(self._text(f"r {path}") for path in asks))
 
     def asked(self) -> Sequence[CanFrame]:
@@ -199,6 +206,8 @@ class OdriveAsciiDrive(OdriveAxis):
             self._judge(path, value, frame.time)
         elif path in (VOLTAGE, CURRENT) and math.isfinite(value):
             self._supplied(path, value)
+        elif path == self._checks.asked:
+            self._check(value, frame.time)
         return True
 
     def _judge(self, path: str, value: float, time: float) -> None:

@@ -12,6 +12,7 @@ import math
 from abc import abstractmethod
 
 from hw.drives.bench_file import DriveEntry
+from hw.drives.checks import SELDOM, Checks
 from hw.drives.drive import ASKS, CanDrive, DriveFacts, DriveState, Talk
 
 IDLE, CLOSED_LOOP = 1, 8
@@ -58,8 +59,9 @@ RATE_MAX, SUPPLY_MAX = "axis0.controller.config.vel_limit", "config.dc_bus_overv
 TORQUE_MOST, TORQUE_LEAST = "axis0.config.torque_soft_max", "axis0.config.torque_soft_min"
 RATE_GAIN, RATE_INTEGRAL = "axis0.controller.config.vel_gain", "axis0.controller.config.vel_integrator_gain"
 CONTROL_MODE, INPUT_MODE = "axis0.controller.config.control_mode", "axis0.controller.config.input_mode"
+INPUT_TORQUE, INPUT_RATE = "axis0.controller.input_torque", "axis0.controller.input_vel"
 LIMITS = (WATCHDOG_TIMEOUT, WATCHDOG_ENABLED, TORQUE_CONSTANT, CURRENT_MAX, RATE_MAX, SUPPLY_MAX)
-NEEDED = (*LIMITS, CONTROL_MODE, INPUT_MODE, TORQUE_MOST, TORQUE_LEAST)
+NEEDED = (*LIMITS, CONTROL_MODE, INPUT_MODE, TORQUE_MOST, TORQUE_LEAST, INPUT_TORQUE, INPUT_RATE)
 NEEDED_FOR_RATES = (RATE_GAIN, RATE_INTEGRAL)
 """Properties needed with rate commands: the loop's gains, N m s/turn and N m/turn."""
 
@@ -68,11 +70,13 @@ class OdriveAxis(CanDrive):
     """The host's side of an ODrive's axis, without its transport."""
 
     takes_rates = True
+    unseen = f"on another port of a drive, such as USB, {SELDOM}"
 
     def __init__(self, entry: DriveEntry) -> None:
         super().__init__(entry)
         self._written: dict[str, float] = {}
         """Properties that were set, with their values, by path."""
+        self._checks = Checks()
 
     @property
     def _mode(self) -> int:
@@ -82,6 +86,11 @@ class OdriveAxis(CanDrive):
     def renew(self, talk: Talk) -> None:
         for path, value in self._written.items():
             self._write(talk, path, value)
+
+    def _check(self, value: float, time: float) -> None:
+        """Take what it says that it was told, at a time of the line's clock, s."""
+        if what := self._checks.answered(value, time):
+            self.disturbed = f"{self.words} was commanded by another: {what}"
 
     @abstractmethod
     def _read(self, talk: Talk, path: str) -> float:
@@ -122,6 +131,7 @@ class OdriveAxis(CanDrive):
             (INPUT_MODE, PASSTHROUGH),
             (TORQUE_MOST, bears),
             (TORQUE_LEAST, -bears),
+            (INPUT_TORQUE if self.rates else INPUT_RATE, 0.0),  # what it is not told
         ):
             self._write(talk, path, value)
         kt, current = self._read(talk, TORQUE_CONSTANT), self._read(talk, CURRENT_MAX)
@@ -135,6 +145,9 @@ class OdriveAxis(CanDrive):
         if not all(math.isfinite(each) and each > 0.0 for each in (kt, current, rate, supply, watchdog)):
             raise self.wrong("a limit of its is no number above zero", f"{', '.join(LIMITS)}: set them")
         loop = self._rate_loop(talk) if self.rates else None
+        told = (INPUT_RATE, INPUT_TORQUE) if self.rates else (INPUT_TORQUE,)
+        kept = dict.fromkeys((*NEEDED, *NEEDED_FOR_RATES * self.rates))
+        self._checks.begin(told, {path: self._read(talk, path) for path in kept if path not in told})
         most = kt * current
         return DriveFacts(firmware, hardware, watchdog, most, rate, CONTROL_HZ, supply_max=supply, rate_loop=loop)
 

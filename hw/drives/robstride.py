@@ -243,6 +243,10 @@ class RobstrideDrive(CanDrive):
     def is_asked_by(self, frame: CanFrame) -> bool:
         return frame.extended and frame.id & 0xFF == self.node and frame.id >> 24 in (TELL, ENABLE, STOP, WRITE)
 
+    def is_command(self, frame: CanFrame) -> bool:
+        told = frame.extended and not frame.fd and not frame.remote and frame.id & 0xFF == self.node
+        return told and frame.id >> 24 not in (IDENTITY, FEEDBACK, READ, FAULT)
+
     def idle(self) -> Sequence[CanFrame]:
         """Send no torque while the drive still takes it, so that none is left when it is enabled."""
         self._wanted = self._ran = False

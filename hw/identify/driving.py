@@ -105,6 +105,8 @@ def run(request: MovesRequest) -> MovesResult:
     with opened(port, experiment, request.joint, request.row, of.period) as bed:
         about = bed.connect()
         process.warnings(bed)
+        if said := process.unseen(bed):
+            process.say(said=said)
         latch.check(bed, about, request.port)
         if about.drive != "voltage":
             message = f"bed `{about.name}` takes a {about.drive}, and the moves that identify a motor are voltages"

@@ -31,6 +31,8 @@ _OBJECTS = (
     ("status", 0x6041, 0, 6, 0x40),
     ("mode", 0x6060, 0, 2, 0),
     ("mode shown", 0x6061, 0, 2, 0),
+    ("target torque", 0x6071, 0, 3, 0),
+    ("target velocity", 0x60FF, 0, 4, 0),
     ("most torque", 0x6072, 0, 6, 3000),
     ("rated torque", 0x6076, 0, 7, 200),
     ("most speed", 0x6080, 0, 7, 6000),
@@ -138,9 +140,12 @@ class PlayedCia402(PlayedDrive):
         elif frame.id == 0x700 + (self.value(0x1016, 1) >> 16) and self.value(0x1016, 1):
             self.heard = now
         elif self._operational and frame.id == self.value(0x1400, 1):
-            layout = "<Hi" if self.value(0x1600, 2) == 0x60FF0020 else "<Hh"
+            rates = self.value(0x1600, 2) == 0x60FF0020
+            layout = "<Hi" if rates else "<Hh"
             if len(data) >= struct.calcsize(layout):
-                self._obey(*struct.unpack_from(layout, data))
+                control, told = struct.unpack_from(layout, data)
+                self.set_value(0x60FF if rates else 0x6071, 0, told)
+                self._obey(control, told)
         elif self._operational and frame.id == 0x080 and not data:
             return self._answers()
         return ()

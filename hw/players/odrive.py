@@ -31,6 +31,8 @@ PROPERTIES = (
     ("axis0.controller.config.vel_integrator_gain", "float"),
     (MODE := "axis0.controller.config.control_mode", "uint8"),
     ("axis0.controller.config.input_mode", "uint8"),
+    (INPUT_TORQUE := "axis0.controller.input_torque", "float"),
+    (INPUT_RATE := "axis0.controller.input_vel", "float"),
 )
 FIRST = 201
 FORMATS = {"float": "<f", "bool": "<?", "uint32": "<I", "uint8": "<B"}
@@ -74,7 +76,7 @@ class PlayedOdrive(PlayedDrive):
         self.version: tuple[int, ...] | None = (2, 4, 4, 58, 0, 6, 10, 0)
         turn = 2.0 * math.pi
         drive = (supply, supply_max, False, 0.1, kt, current_max, rate_max / turn, 100, 10, 0)
-        values = (*drive, math.inf, -math.inf, turn * rate_gain, turn * rate_integral, 3, 1)
+        values = (*drive, math.inf, -math.inf, turn * rate_gain, turn * rate_integral, 3, 1, 0.0, 0.0)
         self.values = dict(zip((path for path, _ in PROPERTIES), values, strict=True))
         self.refuses: set[str] = set()
         """Properties that cannot be set."""
@@ -122,14 +124,25 @@ class PlayedOdrive(PlayedDrive):
             self.values[MODE] = struct.unpack_from("<I", data)[0]
         elif command == 0x0D and len(data) >= 8:
             told = struct.unpack_from("<f", data)[0]
-            most = self.values["axis0.controller.config.vel_limit"]
-            self.rate_told = 2.0 * math.pi * min(max(told, -most), most) if math.isfinite(told) else 0.0
-        elif command == 0x0E and len(data) >= 4 and self.mode == 1:
-            told = struct.unpack_from("<f", data)[0]
-            self.torque = self._limited(told) if math.isfinite(told) else 0.0
+            self._told_rate(told)
+            self._told_torque(struct.unpack_from("<f", data, 4)[0])
+        elif command == 0x0E and len(data) >= 4:
+            self._told_torque(struct.unpack_from("<f", data)[0])
         elif command == 0x18:
             self.errors = 0
         return ()
+
+    def _told_rate(self, told: float) -> None:
+        """Take a rate, turns/s."""
+        most = self.values["axis0.controller.config.vel_limit"]
+        self.values[INPUT_RATE] = told
+        self.rate_told = 2.0 * math.pi * min(max(told, -most), most) if math.isfinite(told) else 0.0
+
+    def _told_torque(self, told: float) -> None:
+        """Take a torque, N m, which is in force in the mode of torques."""
+        self.values[INPUT_TORQUE] = told
+        if self.mode == 1:
+            self.torque = self._limited(told) if math.isfinite(told) else 0.0
 
     def _limited(self, torque: float) -> float:
         """A torque within the limits of its current and of its torque, N m."""

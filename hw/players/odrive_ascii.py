@@ -86,14 +86,13 @@ class PlayedOdriveAscii(PlayedOdrive):
         match words:
             case ["c", "0", torque]:
                 self.fed = now
-                value = _float(torque)
-                if self.mode == 1:
-                    self.torque = self._limited(value) if math.isfinite(value) else 0.0
+                self._told_torque(_float(torque))
                 return None
-            case ["v", "0", rate, *_]:
+            case ["v", "0", rate, *more]:
                 self.fed = now
-                most, value = self.values["axis0.controller.config.vel_limit"], _float(rate)
-                self.rate_told = 2.0 * math.pi * min(max(value, -most), most) if math.isfinite(value) else 0.0
+                self._told_rate(_float(rate))
+                if more:
+                    self._told_torque(_float(more[0]))
                 return None
             case ["u", "0"]:
                 self.fed = now
