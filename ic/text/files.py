@@ -20,7 +20,7 @@ from ic.text.limits import MOST_BYTES
 from ic.text.source import SourceFile
 from met.diagnostic import Diagnostic, Help, Place, Problem, error, write
 from met.frozen import frozen
-from met.host.files import open_regular
+from met.host.files import open_regular, real_path
 
 LIBRARY = Path(__file__).parents[1] / "decks"
 MOST_LISTED = 2_000  # names that a "did you mean" compares with
@@ -78,7 +78,7 @@ class FoundFile:
 
     @property
     def identity(self) -> str:
-        return os.path.realpath(self.path)
+        return real_path(self.path)
 
 
 def file_at(path: str) -> FoundFile:
@@ -87,7 +87,7 @@ def file_at(path: str) -> FoundFile:
     `a/../b.ic` is `b.ic`, unless `a` is a link to elsewhere.
     """
     name = os.path.normpath(path)
-    if ".." in path.split(os.sep) and os.path.realpath(name) != os.path.realpath(path):
+    if ".." in path.split(os.sep) and real_path(name) != real_path(path):
         name = path
     return FoundFile(path, os.path.join(os.curdir, name) if name.startswith("<") else name)
 

@@ -14,7 +14,7 @@ import math
 import os
 import stat
 from collections.abc import Iterator
-from io import BufferedReader, BufferedWriter
+from io import BufferedReader, BufferedWriter, FileIO
 from typing import Any
 
 MOST_JSON_BYTES = 64 << 20
@@ -31,6 +31,30 @@ KINDS = {
 }
 
 
+class _Raw(FileIO):
+    """A file that does not wait, read without `None`s: where it has nothing to give yet, as files of the kernel may,
+    reading raises OSError."""
+
+    def readinto(self, buffer: Any) -> int:
+        return self._given(super().readinto(buffer))
+
+    def readall(self) -> bytes:
+        return self._given(super().readall())
+
+    def _given(self, found: Any) -> Any:
+        if found is None:
+            raise BlockingIOError(errno.EAGAIN, "it has nothing to give, and no end")
+        return found
+
+
+def real_path(path: str) -> str:
+    """The path without links; as it is where no file can have such a name."""
+    try:
+        return os.path.realpath(path)
+    except (OSError, ValueError):
+        return path
+
+
 def open_regular(path: str | os.PathLike[str]) -> BufferedReader:
     """A regular file, open for reading. Raises OSError, at once, where it is none."""
     name = os.fspath(path)
@@ -41,7 +65,7 @@ def open_regular(path: str | os.PathLike[str]) -> BufferedReader:
     file = os.open(name, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
     try:
         _check_regular(os.fstat(file), name)
-        return open(file, "rb")
+        return BufferedReader(_Raw(file, "rb"))
     except BaseException:
         os.close(file)
         raise

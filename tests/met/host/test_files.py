@@ -48,6 +48,25 @@ def test_a_socket_a_device_and_a_folder_are_no_files(tmp_path: Path) -> None:
         files.open_regular(tmp_path)
 
 
+@pytest.mark.parametrize("most", [None, 100])
+def test_a_file_that_has_neither_data_nor_an_end_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most: int | None
+) -> None:
+    """As /proc/kmsg, which says that it is a regular file: here a pipe, taken for one."""
+    os.mkfifo(tmp_path / "pipe")
+    end = os.open(tmp_path / "pipe", os.O_RDWR)
+    monkeypatch.setattr(files, "_check_regular", lambda *_: None)
+    with pytest.raises(OSError, match="it has nothing to give, and no end"):
+        files.read_regular(tmp_path / "pipe", most)
+    os.close(end)
+
+
+def test_a_name_that_no_file_can_have_is_its_own_real_path(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to("other")
+    names = ["/a\0b", "/\ud800", "/" + "a" * 5000, str(tmp_path / "link")]
+    assert [files.real_path(name) for name in names] == [*names[:3], str(tmp_path / "other")]
+
+
 def test_a_name_with_a_null_character_is_refused_as_a_file_is() -> None:
     with pytest.raises(OSError, match="its name holds a null character"):
         files.open_regular("a\0b")
