@@ -23,6 +23,7 @@ from ic.editor.positions import file_named, path_of
 from ic.editor.structure import KnownStructures
 from ic.editor.used import used_files
 from met.frozen import frozen
+from met.host.files import real_path
 
 if TYPE_CHECKING:
     from ic.driver.by_definition import Known
@@ -49,7 +50,7 @@ class OpenText:
     @property
     def identity(self) -> str:
         """The file's real path, or the address of a text without a file."""
-        return self.uri if self.path is None else os.path.realpath(self.path)
+        return self.uri if self.path is None else real_path(self.path)
 
 
 @frozen
@@ -157,7 +158,7 @@ class DeckChecks:
     def request(self, deck: OpenText) -> CheckRequest:
         """The request for a check of a deck, with all texts as they are now."""
         folder, name = os.path.split(deck.path) if deck.path is not None else (os.getcwd(), "")
-        exists = os.path.isdir(folder)
+        exists = os.path.isdir(folder) and os.access(folder, os.X_OK)
         return CheckRequest(
             folder if exists else os.getcwd(),
             name if exists else deck.path or "",
@@ -174,21 +175,32 @@ class DeckChecks:
         await self._resting.wait()
 
     async def work(self) -> None:
-        """Check changed decks, for ever."""
+        """Check changed decks, for ever: no document ends this."""
         while True:
             await self._wake.wait()
             self._wake.clear()
-            while (uri := self._next()) is not None:
-                pause = self._due - time.monotonic()
-                if pause > 0:
-                    await asyncio.sleep(pause)
-                    continue
-                try:
-                    await self._check(uri)
-                except Exception:  # a defect must not end the server
-                    self._failed.add(uri)
-                    self._log(f"this is a defect of MET; please report it:\n{traceback.format_exc()}")
+            try:
+                await self._check_all()
+            except Exception:  # a defect in the choice of what to check: until the next change nothing is checked
+                self._report_defect()
             self._resting.set()
+
+    async def _check_all(self) -> None:
+        """Check decks until none has changed."""
+        while (uri := self._next()) is not None:
+            pause = self._due - time.monotonic()
+            if pause > 0:
+                await asyncio.sleep(pause)
+                continue
+            try:
+                await self._check(uri)
+            except Exception:  # a defect must not end the checks of other decks
+                self._stale.pop(uri, None)
+                self._failed.add(uri)
+                self._report_defect()
+
+    def _report_defect(self) -> None:
+        self._log(f"this is a defect of MET; please report it:\n{traceback.format_exc()}")
 
     def _changed(self, identities: Iterable[str]) -> None:
         found = set(identities)
@@ -290,7 +302,7 @@ class DeckChecks:
     def _keep(self, deck: OpenText, request: CheckRequest, texts: dict[str, OpenText], answer: CheckReply) -> None:
         """Keep a reply as the known state of the deck, and report it."""
         paths = (file_named(name, request.folder) for name in answer.sources)
-        files = frozenset(os.path.realpath(path) for path in paths if path is not None)
+        files = frozenset(real_path(path) for path in paths if path is not None)
         used = frozenset(name for text in answer.sources.values() for name in used_files(text))
         name = request.name if request.text is None else next(iter(answer.sources), "")
         checked = CheckedDeck(deck, request.folder, name, texts, files, used, answer)

@@ -15,6 +15,9 @@ from ic.text.limits import DEPTH
 Position = Callable[[int], types.Position]
 """A function that gives the position of an offset of a text."""
 
+Fold = tuple[int, int, types.FoldingRangeKind | None]
+"""First and last line of a stretch, counted from 0, and its kind; one whose last line is not below folds nothing."""
+
 _KINDS: Mapping[str, types.SymbolKind] = MappingProxyType({
     "arm": types.SymbolKind.Class, "servo": types.SymbolKind.Class, "link": types.SymbolKind.Struct,
     "joint": types.SymbolKind.Field, "run": types.SymbolKind.Function, "sweep": types.SymbolKind.Array,
@@ -58,19 +61,18 @@ def _symbols(entries: Iterable[TextEntry], position: Position, levels: int = DEP
 def folds(text: DeckText) -> list[types.FoldingRange]:
     """The stretches of lines that fold: blocks, comments of several lines, conditionals, runs of includes."""
     line = text.source.line
-    found = [
-        types.FoldingRange(line(entry.opened.offset) - 1, line(max(entry.closed - 1, 0)) - (2 if entry.complete else 1))
+    found: list[Fold] = [
+        (line(entry.opened.offset) - 1, line(max(entry.closed - 1, 0)) - (2 if entry.complete else 1), None)
         for entry in text.all_entries()
         if entry.opened is not None
     ]
     found += _folded_comments(text.comments, line)
     found += _folded_conditionals(text, line)
-    return sorted(
-        (each for each in found if each.end_line > each.start_line), key=lambda each: (each.start_line, each.end_line)
-    )
+    several = sorted((each for each in found if each[1] > each[0]), key=lambda each: each[:2])
+    return [types.FoldingRange(first, last, kind=kind) for first, last, kind in several]
 
 
-def _folded_comments(comments: list[Token], line: Callable[[int], int]) -> Iterator[types.FoldingRange]:
+def _folded_comments(comments: list[Token], line: Callable[[int], int]) -> Iterator[Fold]:
     """A fold for each run of comments on lines one after the other."""
     runs: list[tuple[int, int]] = []
     for token in comments:
@@ -80,16 +82,16 @@ def _folded_comments(comments: list[Token], line: Callable[[int], int]) -> Itera
         else:
             runs.append((first, last))
     for first, last in runs:
-        yield types.FoldingRange(first, last, kind=types.FoldingRangeKind.Comment)
+        yield first, last, types.FoldingRangeKind.Comment
 
 
-def _folded_conditionals(text: DeckText, line: Callable[[int], int]) -> Iterator[types.FoldingRange]:
+def _folded_conditionals(text: DeckText, line: Callable[[int], int]) -> Iterator[Fold]:
     opened: list[int] = []
     for directive in text.directives:
         at = line(directive.tokens[0].offset) - 1
         if directive.name.startswith("if"):
             opened.append(at)
         elif directive.name.startswith(("el", "end")) and opened:
-            yield types.FoldingRange(opened.pop(), at - 1, kind=types.FoldingRangeKind.Region)
+            yield opened.pop(), at - 1, types.FoldingRangeKind.Region
             if directive.name != "endif":
                 opened.append(at)

@@ -14,14 +14,23 @@ from met.diagnostic import Place
 
 
 def path_of(uri: str) -> str | None:
-    """The file at an address; None where there is none, as for a text that was never saved."""
-    parts = urlsplit(uri)
-    return os.path.normpath(unquote(parts.path)) if parts.scheme == "file" and parts.path else None
+    """The file at an address; None where there is none, as for a text that was never saved, or where no file can have
+    such a name."""
+    try:
+        parts = urlsplit(uri)
+        if parts.scheme != "file" or not parts.path:
+            return None
+        path = os.path.normpath(unquote(parts.path))
+        os.path.realpath(path)
+        os.fsencode(path).decode()
+    except (ValueError, OSError):
+        return None
+    return path
 
 
 def uri_of(path: str) -> str:
     """The address of a file, as editors commonly write it."""
-    return "file://" + quote(path)
+    return "file://" + quote(path, errors="replace")
 
 
 def file_named(name: str, folder: str) -> str | None:

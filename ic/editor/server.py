@@ -24,7 +24,9 @@ from ic.editor.rename_process import CannotRename, nameable, rename
 from ic.editor.semantic import LEGEND, semantic_tokens
 from ic.editor.structure import DeckText
 from ic.editor.told import in_editor
+from ic.text.files import DECK_IN_MEMORY
 from met.diagnostic import Problem
+from met.host.files import real_path
 from met.version import VERSION
 
 PYGLS_LOG = "pygls.protocol.json_rpc"
@@ -120,7 +122,7 @@ class DeckServer(LanguageServer):
         path = file_named(name, deck.folder)
         if path is None:
             return None
-        real = os.path.realpath(path)
+        real = real_path(path)
         return next((each.uri for each in self.checks.texts.values() if each.identity == real), uri_of(path))
 
     def _as_checked(self, deck: CheckedDeck, uri: str) -> bool:
@@ -142,7 +144,7 @@ class DeckServer(LanguageServer):
             return []
         before = "\n".join(lines_of(opened.text))
         try:
-            after = lay_out_text(opened.path or uri, before)
+            after = lay_out_text(opened.path or DECK_IN_MEMORY, before)
         except Problem as problem:
             self._warn(f"not laid out: {problem.diagnostics[0].message}")
             return []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import signal
@@ -12,6 +13,9 @@ from typing import Any
 
 import pytest
 
+from ic.editor.checker_process import CheckerProcess
+from ic.editor.checks import DeckChecks, OpenText
+from ic.editor.positions import path_of
 from met.host import interpreter
 from met.messages.programs import JSON_VERSION
 from tests.ic.editor.client import Editor, uri
@@ -165,6 +169,66 @@ def test_a_text_that_was_never_saved_is_checked(tmp_path: Path, editor: Editor) 
     assert messages(editor.diagnostics["untitled:Untitled-1"]) == [BARE]
     editor.tell("textDocument/didClose", {"textDocument": {"uri": "untitled:Untitled-1"}})
     editor.settle()
+
+
+STRANGE = ["file:///a%00b/x.ic", "file:///", "file:", "", "file:///proc/self", "http://[", "\0", "\ud800",
+           "file:///\ud800.ic", "file:///\udcff", "file:///" + "a" * 5000, "file:///<a>", "untitled:\0"]  # fmt: skip
+
+
+def test_an_address_of_no_file_has_no_path() -> None:
+    assert [path_of(each) for each in ("file:///%00", "file:///\ud800", "http://[", "", "untitled:\0")] == [None] * 5
+    assert path_of("file:///a%20b/../c.ic") == "/c.ic"
+
+
+@pytest.mark.parametrize("address", ["file:///%00", *(pytest.param(each, marks=pytest.mark.slow) for each in STRANGE)])
+def test_a_text_at_any_address_is_checked_and_ends_no_checks(tmp_path: Path, editor: Editor, address: str) -> None:
+    document = {"uri": address, "languageId": "met", "version": 1, "text": "run b {}"}
+    editor.tell("textDocument/didOpen", {"textDocument": document})
+    editor.settle()
+    assert editor.logged == []
+    about = {"textDocument": {"uri": address}, "position": {"line": 0, "character": 3}}
+    for method in ("hover", "definition", "foldingRange", "documentSymbol", "codeLens", "semanticTokens/full"):
+        editor.ask(f"textDocument/{method}", about)
+    editor.ask("textDocument/formatting", {**about, "options": {"tabSize": 4, "insertSpaces": True}})
+    editor.tell("textDocument/didClose", {"textDocument": {"uri": address}})
+    deck = tmp_path / "arm.ic"
+    editor.open(deck, "run b {")
+    assert [each["code"] for each in editor.of(deck)] == ["D022"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["a\0b.ic", "\ud800.ic", "..", "/dev/zero", "/proc/kmsg", "a" * 5000])
+@pytest.mark.parametrize("written", ['#include "{}"\n', 'use "{}" as b;\n'])
+def test_a_file_that_cannot_be_is_a_mistake_of_the_deck(
+    tmp_path: Path, editor: Editor, name: str, written: str
+) -> None:
+    deck = tmp_path / "arm.ic"
+    editor.open(deck, written.format(name))
+    assert editor.of(deck) and editor.logged == []
+    editor.about("textDocument/definition", deck, 0, 6)
+
+
+def test_a_defect_in_the_choice_of_what_to_check_does_not_end_the_checks(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+
+    async def changes() -> None:
+        checks = DeckChecks(CheckerProcess(), lambda _: None, told.append, lambda: None)
+        worker, fails = asyncio.create_task(checks.work()), [ValueError("on purpose"), None, None]
+
+        def next_or_fail() -> None:
+            if (fault := fails.pop(0)) is not None:
+                raise fault
+
+        monkeypatch.setattr(checks, "_next", next_or_fail)
+        for _ in range(2):
+            checks.open(OpenText("untitled:1", "", 1))
+            await asyncio.sleep(0)
+            await checks.rest()
+        assert not worker.done() and fails == [None]
+        worker.cancel()
+
+    asyncio.run(changes())
+    assert len(told) == 1 and "ValueError: on purpose" in told[0]
 
 
 def test_what_is_outdated_is_never_told(tmp_path: Path, editor: Editor) -> None:

@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from ic.editor.outline import folds
+from ic.editor.structure import DeckText
 from ic.formatting.formatter import formatted
 from tests.ic.editor.client import Editor, uri
 
@@ -159,3 +161,22 @@ def test_blocks_comments_and_conditionals_fold(
     editor.open(deck, text)
     found = editor.ask("textDocument/foldingRange", {"textDocument": {"uri": uri(deck)}})
     assert [(each["startLine"], each["endLine"]) for each in found] == folded
+
+
+BLOCKS = "// a\n#if 1\nrun b {\n    duration = 5 s;\n}\n#else\narm a { link l { }\n}\n#endif\n/* x\n */ // y\n"
+
+
+@pytest.mark.parametrize(
+    "text", ["run b {}", "run b { }\n", "{", "}", "run b {", "/*", "#if 1", "#else", "#endif", "\r\r"]
+)
+def test_what_stands_on_one_line_does_not_fold(text: str) -> None:
+    assert folds(DeckText("deck", text)) == []
+
+
+def test_what_folds_goes_down_whatever_is_missing() -> None:
+    whole = [(each.start_line, each.end_line) for each in folds(DeckText("deck", BLOCKS))]
+    assert whole == [(1, 4), (2, 3), (5, 7), (9, 10)]
+    for first in range(len(BLOCKS)):
+        for text in (BLOCKS[:first], BLOCKS[first:], BLOCKS[:first] + BLOCKS[first + 1 :].replace("\n", "")):
+            for each in folds(DeckText("deck", text)):
+                assert 0 <= each.start_line < each.end_line <= text.count("\n")
