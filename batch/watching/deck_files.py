@@ -6,6 +6,7 @@ So a file has changed when its bytes have, which are compared only where its siz
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import re
@@ -15,6 +16,7 @@ from pathlib import Path
 
 from ic.text.files import LIBRARY
 from ic.text.lexer import COMMAND_LINE
+from ic.text.limits import MOST_CSV_BYTES
 from met.host.files import read_regular
 
 PAUSE = 0.02
@@ -95,12 +97,13 @@ class DeckFiles:
 
     def _look(self, path: Path) -> bool:
         """Note a file's present state. True where its bytes have changed."""
-        self._stamps[path] = _stamp(path)
+        self._stamps[path] = stamp = _stamp(path)
+        text: bytes | None = None
         try:
-            text = read_regular(path)
-        except OSError:
-            text = None
-        digest = b"" if text is None else hashlib.sha256(text).digest()
+            text = read_regular(path, MOST_CSV_BYTES)
+            digest = hashlib.sha256(text).digest()
+        except OSError as reason:
+            digest = repr(stamp).encode() if reason.errno == errno.EFBIG else b""  # no file of a deck is as large
         named = () if text is None or LIBRARY in path.parents else dict.fromkeys(NAMED.findall(text))
         self._named[path] = [os.fsdecode(each) for each in [*named][:MOST_NAMED]]
         before = self._digests.get(path)

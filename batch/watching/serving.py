@@ -23,6 +23,7 @@ from typing import Any
 from urllib.parse import parse_qs
 
 from batch.watching.board import Board
+from batch.watching.door import Door
 from batch.watching.frame import FRAME_POLICY, frame, page_of_runs
 from met.diagnostic import Problem, error
 
@@ -30,11 +31,14 @@ HOST = "127.0.0.1"
 TOKEN_BYTES = 24
 
 MOST_OPEN = 64
-"""Largest number of open connections: a browser has two for all its pages. Further ones are refused for a while, so
-that memory stays bounded."""
+"""Largest number of open connections that have shown the token: a browser has two for all its pages. Further ones are
+refused for a while, so that memory stays bounded."""
 
 FULL = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 1\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
-"""The answer to a client when all connections are taken."""
+"""The answer to a client with the token when all connections are taken."""
+
+LOOK_SECONDS = 0.25
+"""Seconds after which those who wait outside are looked at again, and the end of the server is noticed."""
 
 IDLE_SECONDS = 10.0
 """Seconds for a whole request, and for a whole answer, after which the connection is closed."""
@@ -66,6 +70,8 @@ class PageServer(ThreadingHTTPServer):
     def __init__(self, board: Board, port: int = 0) -> None:
         self.board, self.token = board, secrets.token_urlsafe(TOKEN_BYTES)
         self._open = threading.Semaphore(MOST_OPEN)
+        self._begun: dict[Any, bytes] = {}
+        self._ended, self._serving = threading.Event(), threading.Thread(target=self._serve, daemon=True)
         try:
             super().__init__((HOST, port), _Request)
         except OSError as reason:
@@ -81,22 +87,42 @@ class PageServer(ThreadingHTTPServer):
 
     def begin(self) -> None:
         """Serve, in a thread of its own."""
-        threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.5}, daemon=True).start()
+        self._serving.start()
 
     def end(self) -> None:
         """Stop serving, and release everybody who waits."""
         self.board.end()
-        self.shutdown()
+        self._ended.set()
+        if self._serving.is_alive():
+            self._serving.join()
         self.server_close()
 
-    def process_request(self, request: Any, client_address: Any) -> None:
+    def _serve(self) -> None:
+        door = Door(self.socket, self.token, self._admit)
+        door.open()
+        while not self._ended.is_set():
+            door.attend(LOOK_SECONDS)
+        door.close()
+
+    def _admit(self, request: socket, client_address: Any, begun: bytes) -> None:
+        """Answer one who has shown the token, in a thread of its own. begun: what was read of the request"""
         if self._open.acquire(blocking=False):
-            super().process_request(request, client_address)
+            self._begun[request] = begun
+            try:
+                self.process_request(request, client_address)
+            except RuntimeError:  # no thread can be had
+                self._open.release()
+                self.begun(request)
+                self.shutdown_request(request)
         else:
             with suppress(OSError):  # nothing waits here: a short answer goes at once or not at all
-                request.setblocking(False)
                 request.send(FULL)
+                request.recv(1 << 16)
             self.shutdown_request(request)
+
+    def begun(self, request: socket) -> bytes:
+        """What was read of a request, before its connection was let in."""
+        return self._begun.pop(request, b"")
 
     def process_request_thread(self, request: socket | Any, client_address: Any) -> None:
         try:
@@ -116,15 +142,21 @@ class PageServer(ThreadingHTTPServer):
 
 
 class _InTime(io.RawIOBase):
-    """The input of a connection, all of which must come within a time; afterwards reading raises TimeoutError."""
+    """The input of a connection, all of which must come within a time; afterwards reading raises TimeoutError. begun:
+    its first bytes, which were read before"""
 
-    def __init__(self, connection: socket, seconds: float) -> None:
+    def __init__(self, connection: socket, seconds: float, begun: bytes) -> None:
         self._connection, self._seconds, self._end = connection, seconds, time.monotonic() + seconds
+        self._begun = begun
 
     def readable(self) -> bool:
         return True
 
     def readinto(self, buffer: Any) -> int:
+        if self._begun:
+            count = min(len(buffer), len(self._begun))
+            buffer[:count], self._begun = self._begun[:count], self._begun[count:]
+            return count
         left = self._end - time.monotonic()
         if left <= 0.0:
             raise TimeoutError
@@ -144,7 +176,7 @@ class _Request(BaseHTTPRequestHandler):
 
     def setup(self) -> None:
         super().setup()
-        self.rfile = io.BufferedReader(_InTime(self.connection, self.timeout))
+        self.rfile = io.BufferedReader(_InTime(self.connection, self.timeout, self.server.begun(self.request)))
 
     def do_GET(self) -> None:
         what, number = self._asked()

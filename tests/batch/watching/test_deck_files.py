@@ -115,3 +115,28 @@ def test_a_file_that_is_looked_for_in_another_folder_is_noticed_there(
         assert files.changed(around=True) and not files.changed(around=True), name
     Path("elsewhere/f.ic").write_text("let b = 1;\n")
     assert not files.changed(around=True)
+
+
+@pytest.mark.parametrize("kind", ["sparse", "pipe", "device", "folder"])
+def test_a_deck_in_whose_place_something_else_is_put_is_watched_on(files: DeckFiles, kind: str) -> None:
+    """A file of 3 GiB is not read, only looked at; what is no file is not read at all."""
+    os.unlink("part.ic")
+    if kind == "sparse":
+        with open("part.ic", "wb") as large:
+            large.truncate(3 << 30)
+    elif kind == "pipe":
+        os.mkfifo("part.ic")
+    elif kind == "device":
+        os.symlink("/dev/zero", "part.ic")
+    else:
+        os.mkdir("part.ic")
+    assert files.changed() and not files.changed()
+    if kind == "sparse":
+        os.truncate("part.ic", (3 << 30) + 1)
+        assert files.changed() and not files.changed()
+    if kind == "folder":
+        os.rmdir("part.ic")
+    else:
+        os.unlink("part.ic")
+    Path("part.ic").write_text("let a = 2;\n")
+    assert files.changed() and not files.changed()

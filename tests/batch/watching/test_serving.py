@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from batch.watching import serving
+from batch.watching import door, serving
 from batch.watching.board import KEPT, Board
 from batch.watching.serving import PageServer
 from met.diagnostic import Problem
@@ -157,22 +157,39 @@ def test_it_listens_on_this_machines_own_address_alone(server: PageServer) -> No
         socket.create_connection(("127.0.0.2", server.server_port), 5).close()
 
 
-def test_who_opens_many_connections_is_told_to_come_again_and_the_page_goes_on(
-    server: PageServer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(serving._Request, "timeout", 3.0)
-    many = [socket.create_connection(("127.0.0.1", server.server_port)) for _ in range(serving.MOST_OPEN + 8)]
-    many[-1].settimeout(20)
-    with many[-1].makefile("rb") as answer:
-        assert answer.read() == serving.FULL
-    many[0].settimeout(20)
-    assert many[0].recv(1) == b""  # it says nothing, and is given up
-    end = time.monotonic() + 20
-    while get(server, "page/1").status != 200:
-        assert time.monotonic() < end
-        time.sleep(0.05)
+def test_who_has_not_shown_the_token_takes_no_place(server: PageServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Strangers who say nothing, or begin a request, wait outside: some are turned away, and all are soon."""
+    many = [socket.create_connection(("127.0.0.1", server.server_port), 20) for _ in range(door.MOST_OUTSIDE + 8)]
+    for n, said in enumerate((b"GET /", b"POST", f"GET /{server.token}".encode())):
+        many[-1 - n].sendall(said)
+    assert [get(server, "page/1").status for _ in range(20)] == [200] * 20
+    assert [each.recv(1) for each in many[:8]] == [b""] * 8  # the first to come are the first to go
+    monkeypatch.setattr(door, "OUTSIDE_SECONDS", 0.0)
+    assert [each.recv(1) for each in many[8:]] == [b""] * door.MOST_OUTSIDE
     for each in many:
         each.close()
+
+
+def test_who_has_the_token_and_takes_all_places_is_told_to_come_again(
+    server: PageServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serving._Request, "timeout", 2.0)
+    many = [socket.create_connection(("127.0.0.1", server.server_port), 20) for _ in range(serving.MOST_OPEN + 1)]
+    for each in many:
+        each.sendall(f"GET /{server.token}/page/1 HTTP/1.1\r\n".encode())  # and then nothing
+    with many[-1].makefile("rb") as answer:
+        assert answer.read() == serving.FULL
+    assert many[0].recv(1) == b""  # it says nothing more, and is given up
+    for each in many:
+        each.close()
+
+
+def test_a_request_that_comes_byte_by_byte_is_let_in(server: PageServer) -> None:
+    with socket.create_connection(("127.0.0.1", server.server_port), 20) as slow:
+        slow.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for byte in f"GET /{server.token}/page/1 HTTP/1.1\r\nHost: 127.0.0.1:{server.server_port}\r\n\r\n".encode():
+            slow.sendall(bytes([byte]))
+        assert slow.recv(100).split()[1] == b"200"
 
 
 @pytest.mark.parametrize("posted", [False, True])
@@ -180,6 +197,7 @@ def test_who_sends_a_byte_now_and_then_is_given_up(
     server: PageServer, monkeypatch: pytest.MonkeyPatch, posted: bool
 ) -> None:
     monkeypatch.setattr(serving._Request, "timeout", 1.0)
+    monkeypatch.setattr(door, "OUTSIDE_SECONDS", 1.0)
     began = time.monotonic()
     with socket.create_connection(("127.0.0.1", server.server_port), 0.1) as slow:
         if posted:
@@ -195,7 +213,7 @@ def test_who_sends_a_byte_now_and_then_is_given_up(
                 assert time.monotonic() - began < 20
             except OSError:
                 break
-    assert time.monotonic() - began >= 0.9
+    assert not posted or time.monotonic() - began >= 0.9
     assert get(server, "page/1").status == 200
 
 
