@@ -15,6 +15,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import click
@@ -33,35 +34,21 @@ YES, NO, BAD_INPUT = 0, 1, 2
 INTERRUPTED, PIPE_CLOSED = 130, 141  # 128 + the signal, as a shell counts
 DEFECT = 70  # EX_SOFTWARE of sysexits.h
 
-# The order of commands in `met --help`: the order of work. A command that is not named here comes after them.
-ORDER = (
-    "new",
-    "import",
-    "fmt",
-    "check",
-    "explain",
-    "plan",
-    "cases",
-    "run",
-    "submit",
-    "status",
-    "show",
-    "plot",
-    "report",
-    "view",
-    "best",
-    "diff",
-    "sensitivity",
-    "export",
-    "compile",
-    "profile",
-    "margin",
-    "linear",
-    "bed",
-    "lsp",
-    "doc",
-    "dump",
-)
+GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType({
+    "Write a deck": ("new", "import", "fmt", "check", "explain", "plan", "cases"),
+    "Run it": ("run", "submit", "status"),
+    "Look at what came out": ("show", "plot", "report", "view"),
+    "Decide": ("best", "diff", "sensitivity", "linear"),
+    "Pass it on": ("export", "compile"),
+    "Motors on a bed": ("margin", "bed"),
+    "Help, and MET itself": ("doc", "lsp", "profile", "dump"),
+})  # fmt: skip
+"""The commands in `met --help` by what they are for, in the order of work."""
+
+OTHERS = "Others"
+"""The heading of commands that `GROUPS` does not name, as other packages offer them."""
+
+ORDER = tuple(name for names in GROUPS.values() for name in names)
 
 Face = TypeVar("Face", bound=Callable[..., Any])
 
@@ -101,17 +88,20 @@ class CommandTable(click.Group):
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        lines = []
+        lines = dict[str, str]()
         for name in self.table():
             try:
                 command = self.get_command(ctx, name)
             except Problem as problem:
-                lines.append((name, problem.diagnostics[0].message))
+                lines[name] = problem.diagnostics[0].message
                 continue
             if command is not None and not command.hidden:
-                lines.append((name, command.get_short_help_str(100)))
-        with formatter.section("Commands, in the order of work"):
-            formatter.write_dl(lines)
+                lines[name] = command.get_short_help_str(100)
+        width = max(map(len, lines), default=0)
+        for heading, names in {**GROUPS, OTHERS: tuple(name for name in lines if name not in ORDER)}.items():
+            if rows := [(name.ljust(width), lines[name]) for name in names if name in lines]:
+                with formatter.section(heading):
+                    formatter.write_dl(rows)
 
     def _meant(self, name: str) -> str:
         if name.endswith(".ic"):

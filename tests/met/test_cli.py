@@ -62,10 +62,12 @@ def met(*words: str, **more: object) -> subprocess.CompletedProcess[str]:
     )  # type: ignore[call-overload, no-any-return]
 
 
-def test_help_lists_the_commands_in_the_order_of_work(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_lists_the_commands_in_groups_and_in_the_order_of_work(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--help"]) == 0
-    lines = capsys.readouterr().out.split("order of work:")[1].splitlines()
-    listed = [line.split()[0] for line in lines if line.startswith("  ")]
+    lines = capsys.readouterr().out.partition("this message and exit.\n")[2].splitlines()
+    headings = [line.removesuffix(":") for line in lines if line.endswith(":") and not line.startswith(" ")]
+    assert [each for each in headings if each != cli.OTHERS] == list(cli.GROUPS)
+    listed = [line.split()[0] for line in lines if line.startswith("  ") and line[2] not in " S"]
     assert [word for word in listed if word in cli.ORDER] == [word for word in cli.ORDER if word in listed]
     own = {point.name for point in cli.met.table().values() if point.package == "met_arm"}
     assert own <= {*cli.ORDER, "bench"} and listed.index("best") < listed.index("diff")
