@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from ic.meaning.control.wraps import wrapped_rows
 from ic.meaning.definitions.csv_files import read_csv
 from met.diagnostic import Problem
 from met.host.files import memory
