@@ -41,7 +41,7 @@ def default_output(
     asked = plan.selected
     if experiments and not any(map(varies, plan.settings)):
         chosen = experiments_named(plan, experiments)
-        asked = experiments if len(chosen) < len(plan.experiments) else plan.selected
+        asked = tuple(experiments) if len(chosen) < len(plan.experiments) else plan.selected
     names = [Path(plan.deck.strip("<>")).stem, *asked]
     count = sum(len(rows) for _, rows in selected)
     if count < (sum(experiment.cases.count for experiment, _ in selected) if whole is None else whole):

@@ -16,6 +16,7 @@ import pytest
 import batch
 from batch.campaigns import performing, shard, tasks
 from met import cli
+from met.host.streams import OutputLost
 from met.plan import file as plan_file
 from tests.batch import plans, whole
 from tests.batch.begun import CASES, OF_TASK, begin, flip, go_on, plan, refused
@@ -175,7 +176,9 @@ def test_a_disk_that_is_full_when_it_goes_on_keeps_what_there_is(
     assert whole.shards(archive) == kept
 
 
-def interrupted_in(archive: Path, number: int, monkeypatch: pytest.MonkeyPatch) -> str:
+def interrupted_in(
+    archive: Path, number: int, monkeypatch: pytest.MonkeyPatch, interrupt: type[KeyboardInterrupt] = KeyboardInterrupt
+) -> str:
     """Run the plan, with an interrupt while its task of this number is computed, from 1; what is said of it."""
     computed, count = tasks.compute, 0
 
@@ -183,17 +186,20 @@ def interrupted_in(archive: Path, number: int, monkeypatch: pytest.MonkeyPatch) 
         nonlocal count
         count += 1
         if count == number:
-            raise KeyboardInterrupt
+            raise interrupt
         return computed(*arguments, **options)
 
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt) as caught:
+    with monkeypatch.context() as patch, pytest.raises(interrupt) as caught:
         patch.setattr(tasks, "compute", compute)
         batch.run(plan(), output=archive, threads=1)
     return str(caught.value)
 
 
-def test_as_many_are_said_to_be_kept_as_are(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    said = interrupted_in(archive, 4, monkeypatch)
+@pytest.mark.parametrize("interrupt", [KeyboardInterrupt, OutputLost])
+def test_as_many_are_said_to_be_kept_as_are(
+    interrupt: type[KeyboardInterrupt], archive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = interrupted_in(archive, 4, monkeypatch, interrupt)
     folder = whole.folder_of(archive).path
     assert whole.done(archive, CASES) == 24
     assert said == f"24 of {CASES} cases are kept in {folder}; the same command goes on"
