@@ -63,7 +63,7 @@ def resolve_base(scope: Scope, item: Item | None, arm: ResolvedArm) -> tuple[Bas
             if kind == "free":
                 help = f"its state at the start stands in `initial`: {', '.join(INITIAL_OF_BASE)}"
             scope.complaints.error("D250", f"a {kind} base takes no block", item.upon or item.place, help=help)
-        return (Base("free", (), item.place), _standing(scope, item, arm)) if kind == "free" else (None, arm)
+        return (Base("free", (), item.place), _free(scope, item, arm)) if kind == "free" else (None, arm)
     courses = () if refuse_values(scope, item.value, COMPONENTS) else _courses(scope, item, body)
     return Base("prescribed", courses, item.place), _standing(scope, item, arm)
 
@@ -171,15 +171,21 @@ def remark_ground(
     )
 
 
+def _free(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:
+    """The arm with its base among the links: that of the arm, else of the file that it is made from, else without
+    mass."""
+    known = any(link.name == BASE for link in arm.links) or BASE in arm.failed
+    written = None if known else scope.definitions.base_from_file(arm.name)
+    if written is None:
+        return _standing(scope, item, arm)
+    link = resolve_link(scope, written, scope.definitions.homes(scope.definitions.of_kind("arm")[arm.name]))
+    return arm if link is None else replace(arm, links=(*arm.links, link))
+
+
 def _standing(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:
-    """The arm with its base among the links: without mass, unless the arm or the file that it is made from gives it
-    some."""
+    """The arm with its base among the links: without mass, unless the arm gives it some."""
     if any(link.name == BASE for link in arm.links) or BASE in arm.failed:
         return arm
-    written = scope.definitions.base_from_file(arm.name)
-    if written is not None:
-        link = resolve_link(scope, written, scope.definitions.homes(scope.definitions.of_kind("arm")[arm.name]))
-        return arm if link is None else replace(arm, links=(*arm.links, link))
     owner = Owner(f"link `{BASE}`", item.place, f"links.{BASE}")
     scope.number(owner, Parameter(name="mass", unit="kg", default=0.0, at_least=0.0, doc="mass of the link"), None)
     for name, unit, parts in (("com", "m", tuple("xyz")), ("inertia", "kg*m^2", INERTIA)):

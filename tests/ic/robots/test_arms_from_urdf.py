@@ -244,10 +244,12 @@ WEIGHTY = changed(
 FREE_RUN = DECK.replace("{ arm = two;", "{ arm = two;  base = free;")
 
 
-def test_the_inertia_of_the_root_is_that_of_a_base_that_moves_and_of_no_other(tmp_path: Path) -> None:
+def test_the_inertia_of_the_root_is_that_of_a_free_base_and_of_no_other(tmp_path: Path) -> None:
     known = made(tmp_path, WEIGHTY, FREE_RUN).parameters
     assert [known[f"links.base.{name}"].value for name in ("mass", "inertia.xx", "inertia.xy")] == [7.0, 1.0, 0.0]
     assert values(made(tmp_path, WEIGHTY)) == values(made(tmp_path))
+    swept = FREE_RUN + "sweep s of fall { vary links.base.mass = [5, 6] kg; }\n"
+    assert made(tmp_path, WEIGHTY, swept).parameters["links.base.inertia.xx"].value == 1.0
     own = changed(FREE_RUN, ("{ }", "{ link base { mass = 3 kg;  shape = sphere(radius = 0.3 m); } }"))
     assert made(tmp_path, WEIGHTY, own).parameters["links.base.mass"].value == 3.0
     like = changed(FREE_RUN, ("arm = two", "arm = other")) + "arm other like two { }\n"
