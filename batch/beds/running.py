@@ -80,8 +80,8 @@ def campaign_of(
     late = max(pace_of(each).late(stepped) for each in experiments)
     found = prepare(plan, output=output, experiments=names, cases=cases, histories="all", wires=Wires(late))
     for part in found.parts:
-        for row in part.rows:
-            check(part.experiment, int(row), stepped)
+        for row in part.rows.tolist():
+            check(part.experiment, row, stepped)
     return found, by_joint, stepped
 
 
