@@ -12,7 +12,7 @@ from hw.drives import DIALECTS
 from tests.batch.beds import played_paper as paper
 
 WORST = {
-    "odrive": (1.0e-3, 1.5e-4),
+    "odrive": (1.0e-3, 2.0e-4),
     "moteus": (1.0e-3, 1.5e-4),
     "cia402": (1.4e-3, 1.1e-3),
     "damiao": (1.8e-3, 1.5e-3),
@@ -20,7 +20,7 @@ WORST = {
     "odrive_ascii": (1.0e-3, 1.5e-4),
 }
 """rms of the shoulder's rate off the run in software, and off the serial bed's, as shares of the rate asked, which were
-measured as 0.08, 0.08, 0.12, 0.15, 0.08, 0.08 % and 0.01, 0.01, 0.08, 0.13, 0.01, 0.01 % at most: the rest is for
+measured as 0.08, 0.08, 0.12, 0.15, 0.08, 0.08 % and 0.015, 0.01, 0.08, 0.13, 0.01, 0.01 % at most: the rest is for
 other compilers. The first is 0.077 % of the serial bed, whose tachometer's filter makes it; the second grows with the
 dialect's steps of torque and rate."""
 
