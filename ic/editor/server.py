@@ -61,6 +61,7 @@ class DeckServer(LanguageServer):
         self.fixes: dict[str, list[QuickFix]] = {}
         self._published: dict[str, types.PublishDiagnosticsParams] = {}
         self._worker: asyncio.Task[None] | None = None
+        self._last_text: DeckText | None = None
 
     def begin(self, parameters: types.InitializeParams) -> None:
         """Take the editor's options, and start to check."""
@@ -155,9 +156,17 @@ class DeckServer(LanguageServer):
         return [types.TextEdit(types.Range(types.Position(0, 0), end), after)]
 
     def text(self, uri: str) -> DeckText:
-        """A text that is open, with its structure."""
+        """A text that is open, with its structure; that of the last one is kept, since editors ask several things."""
         opened = self.checks.texts.get(uri)
-        return DeckText(uri, "\n".join(lines_of(opened.text if opened is not None else "")))
+        text = "\n".join(lines_of(opened.text if opened is not None else ""))
+        if self._last_text is None or (self._last_text.source.name, self._last_text.source.text) != (uri, text):
+            self._last_text = DeckText(uri, text)
+        return self._last_text
+
+    def forget_text(self, uri: str) -> None:
+        """Release the structure of a text that an editor has closed."""
+        if self._last_text is not None and self._last_text.source.name == uri:
+            self._last_text = None
 
     def position_in(self, text: DeckText) -> Callable[[int], types.Position]:
         """A function from offsets of a text to the editor's positions."""
@@ -253,6 +262,7 @@ def make(
     @server.feature(types.TEXT_DOCUMENT_DID_CLOSE)
     def did_close(parameters: types.DidCloseTextDocumentParams) -> None:
         server.checks.shut(parameters.text_document.uri)
+        server.forget_text(parameters.text_document.uri)
 
     @server.feature(
         types.TEXT_DOCUMENT_CODE_ACTION, types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix])

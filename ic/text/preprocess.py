@@ -282,6 +282,8 @@ class _Preprocessor(Macros):
             if joined and not (ifs and not ifs[-1].active):
                 self._warn_of_joined_comments(line)
             first = next((token for token in line if token.kind != SPACE), line[-1])
+            if first.kind == SPACE:  # pcpp takes longer over an empty line than its lexer
+                continue
             if first.text != "#":
                 if ifs and not ifs[-1].active:
                     continue
