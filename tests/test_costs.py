@@ -61,11 +61,13 @@ def test_tests_for_a_release_have_no_limit() -> None:
     assert costs.excesses({("release", "tests/test_it.py::test_hours"): 7200.0}, LEDGER) == []
 
 
-def test_each_function_of_the_ledger_exists_and_has_a_reason() -> None:
+def test_each_function_and_fixture_of_the_ledger_exists_and_has_a_reason() -> None:
     for name, (seconds, why) in costs.read_ledger().dear.items():
-        file, _, function = name.partition("::")
-        tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
-        assert function in {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}, name
+        where, _, function = name.partition("::")
+        file = ROOT / where if where.endswith(".py") else ROOT / where / "conftest.py"
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        functions = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+        assert function.removeprefix("fixture ") in functions, name
         assert seconds > 0 and why, name
 
 

@@ -16,7 +16,6 @@ from pathlib import Path
 
 from ic.text.files import LIBRARY
 from ic.text.lexer import COMMAND_LINE
-from ic.text.limits import MOST_CSV_BYTES
 from met.host.files import read_regular
 
 PAUSE = 0.02
@@ -27,6 +26,9 @@ SETTLED, LONGEST = 0.02, 0.5
 
 NAMED, MOST_NAMED = re.compile(rb"""["<]([^"<>\x00-\x1f]{1,200})/[^"<>/\r\n]{1,200}[">]"""), 100
 """A file in another folder, as decks name one, included or read; and the largest number of them in a file."""
+
+MOST_COMPARED = 16 << 20
+"""Bytes of a file that are compared: a larger one has changed when its size, time or inode has."""
 
 Stamp = tuple[int, int, int] | None
 """Time, size and inode of a file; None where there is none."""
@@ -100,7 +102,7 @@ class DeckFiles:
         self._stamps[path] = stamp = _stamp(path)
         text: bytes | None = None
         try:
-            text = read_regular(path, MOST_CSV_BYTES)
+            text = read_regular(path, MOST_COMPARED)
             digest = hashlib.sha256(text).digest()
         except OSError as reason:
             digest = repr(stamp).encode() if reason.errno == errno.EFBIG else b""  # no file of a deck is as large

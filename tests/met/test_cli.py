@@ -350,7 +350,7 @@ def test_warnings_of_libraries_are_left_out_and_those_of_models_said(
         warnings.simplefilter("always")
         assert cli.main([]) == 0
         assert capsys.readouterr().err == "met: warning: this motor has no source\n"
-        with pytest.warns(RuntimeWarning, match="invalid value encountered in cast"):
+        with pytest.warns(RuntimeWarning, match="invalid value encountered in cast"), pytest.warns(UserWarning):
             cli.main(["-v"])
 
 

@@ -316,7 +316,6 @@ class TestValues:
             arm.run({"gearbox.kpp": 0.1})
         assert str(caught.value) == "\n".join(
             [
-                "",
                 "error[D128]: no parameter `gearbox.kpp` in this run",
                 " --> (given):2:6",
                 "  |",

@@ -85,6 +85,7 @@ def test_a_name_is_changed_in_all_files_and_the_plan_but_for_the_name_is_what_it
         assert same_but_for(old, new, encode(Plan, plan), encode(Plan, after))
 
 
+@pytest.mark.slow
 def test_a_unit_of_the_deck_is_changed_wherever_it_stands(editor: Editor, deck: Path) -> None:
     deck.write_text("deck 2;\n" + DECK.replace("let slow = 3 deg/s", "unit turn = 360 deg;\nlet slow = 0.01 turn/s"))
     editor.change(deck, deck.read_text())
@@ -135,6 +136,7 @@ def test_a_name_of_a_loop_is_refused(tmp_path: Path, editor: Editor) -> None:
     assert len(rename(editor, path, "span =", "pitch")[uri(path)]) == 3
 
 
+@pytest.mark.slow
 def test_a_file_outside_of_the_open_folders_is_not_changed(tmp_path: Path, editor: Editor) -> None:
     (tmp_path / "lengths.ic").write_text(LENGTHS)
     inside = tmp_path / "inside"
@@ -147,6 +149,7 @@ def test_a_file_outside_of_the_open_folders_is_not_changed(tmp_path: Path, edito
     assert reason.startswith("`reach` stands in ") and reason.endswith("outside of the folders that are open")
 
 
+@pytest.mark.slow
 def test_a_deck_with_a_mistake_is_mended_first(editor: Editor, deck: Path) -> None:
     text = DECK + "run broken like nominal { duration = 5; }\n"
     deck.write_text(text)

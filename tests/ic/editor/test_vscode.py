@@ -91,6 +91,7 @@ def test_colours_and_messages_are_those_of_the_folder_without_a_client() -> None
         assert described["contributes"][kind] == other["contributes"][kind]
 
 
+@pytest.mark.node
 @pytest.mark.skipif(shutil.which("node") is None, reason="the client is JavaScript: node runs it")
 def test_the_client_shows_what_the_server_says(tmp_path: Path) -> None:
     deck, met = tmp_path / "arm.ic", tmp_path / "met"
