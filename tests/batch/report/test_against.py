@@ -167,8 +167,8 @@ class TestThePage:
             said = re.sub(r"^(a|b)  |^  require |\bnan\b|:$", "", line).strip()
             for piece in re.split(r"\s{2,}|: |; |,? now\b", said):
                 assert squeezed(piece.replace("`", "")) in source, line  # the page sets these as a program's text
-        word, _, rest = last.partition(";" if ";" in last else ":" if ":" in last else ",")
-        assert squeezed(word) in source and squeezed(rest) in source
+        word, rest = re.split("[,;:]", last, maxsplit=1)
+        assert squeezed(word) in source and squeezed(rest.replace("`", "")) in source
 
     @pytest.mark.slow
     def test_says_all_that_met_diff_says(self, planted: tuple[Path, Path]) -> None:
@@ -254,7 +254,7 @@ class TestThePage:
         [only] = found.sections[0].changes
         assert only.heading == "nominal: 1 case in both, identical"
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_has_commands_that_run_both_again(self, here: Path) -> None:
         batch.run(archives.compiled(here, "ways", "brief"), output="a.h5")
         deck = archives.DECK.replace("duration = 4 s", "duration = 5 s")
