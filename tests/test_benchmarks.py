@@ -237,6 +237,7 @@ def test_the_run_that_is_timed_has_few_events_and_the_other_many() -> None:
     assert few < stepping.FEW < many
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("state", "unlike"), [("same", 0), ("few", differences.FEW), ("all", 28)])
 def test_the_pairs_that_are_compared_differ_by_what_was_planted(state: str, unlike: int) -> None:
     import batch

@@ -79,7 +79,7 @@ REST = {**ALL, "MET_TEST_REST": "1"}
 EVERY_TEST = ["test_right", "test_wrong", "test_skipped", "test_right_with_a_mess_behind_it", "test_slow"]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_passed_wholly_is_left_out_until_a_file_changes(checkout: Path) -> None:
     assert names(checkout, {}, "-m", "not slow") == EVERY_TEST[:-1]
     assert names(checkout, REST) == EVERY_TEST[1:]

@@ -295,7 +295,7 @@ def _any_users_python() -> str:
 # Those that make environments
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_first_start_makes_the_environment_and_the_next_only_starts(checkout: Path) -> None:
     shorten(checkout, "requirements.lock", TO_CHECK)
     first = start(checkout, "--version")
@@ -323,7 +323,7 @@ def test_the_first_start_makes_the_environment_and_the_next_only_starts(checkout
         moved.rename(checkout)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_of_two_starts_at_once_one_makes_the_environment_and_both_start(checkout: Path) -> None:
     shorten(checkout, "requirements.lock", TO_START)
     surroundings = {**os.environ, "HOME": str(checkout), "MET_PYTHON": ""}
@@ -339,7 +339,7 @@ def test_of_two_starts_at_once_one_makes_the_environment_and_both_start(checkout
     assert sum("installing the" in err for _, err in told) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_start_that_was_killed_half_way_is_made_good_by_the_next(checkout: Path) -> None:
     shorten(checkout, "requirements.lock", TO_START)
     surroundings = {**os.environ, "HOME": str(checkout), "MET_PYTHON": ""}
@@ -356,7 +356,7 @@ def test_a_start_that_was_killed_half_way_is_made_good_by_the_next(checkout: Pat
     assert done.stderr.splitlines()[0] == "met: making the environment in .venv anew: it was left half made"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_without_a_network_it_is_refused_in_one_line(checkout: Path) -> None:
     nowhere = {"PIP_INDEX_URL": "http://127.0.0.1:9/simple", "PIP_FIND_LINKS": "", "PIP_EXTRA_INDEX_URL": ""}
     done = start(checkout, **nowhere)
@@ -370,7 +370,7 @@ def test_without_a_network_it_is_refused_in_one_line(checkout: Path) -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_scripts_test_adds_what_it_needs_and_ends_with_the_summary_of_pytest(checkout: Path) -> None:
     for lock, names in zip(LOCKS, (TO_START, TO_TEST, TO_TEST | {"mpmath"}), strict=True):
         shorten(checkout, lock, names)

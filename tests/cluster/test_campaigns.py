@@ -66,6 +66,7 @@ def under_way(folder: Path, job: int) -> bool:
 KEPT = ("--histories", "every:10000", "--histories", "worst:3:volts")
 
 
+@pytest.mark.release
 def test_an_array_of_which_a_job_is_cancelled_midway_goes_on_when_it_is_submitted_again(
     slurm: Slurm, tmp_path: Path, campaign: tuple[Path, bytes]
 ) -> None:
@@ -93,6 +94,7 @@ def test_an_array_of_which_a_job_is_cancelled_midway_goes_on_when_it_is_submitte
     assert "is whole" in met(slurm, "status", "a.h5", cwd=tmp_path)
 
 
+@pytest.mark.release
 def test_what_is_left_of_an_array_is_run_here_by_met_run(
     slurm: Slurm, tmp_path: Path, campaign: tuple[Path, bytes]
 ) -> None:

@@ -77,7 +77,7 @@ def test_with_shorter_steps_it_is_met_as_the_page_says(rate: str, tmp_path: Path
     assert rate not in ("200 kHz", "400 kHz") or (short["q"] < 1e-7 and short["spring"] < 1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("change", "signal", "least"), [
     ({"more": "arm = without_inertia;"}, "spring", 5.0),
     ({"fifth": "rate_s = 0.01 rad/s;"}, "q", 5.0),

@@ -13,7 +13,7 @@ from tests.docs.test_pages import codes_in_use
 PAGE = Page("bed.md")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_its_other_steps_can_be_done(tmp_path: Path) -> None:
     PAGE.put(tmp_path)
     jitter, identify = re.findall(r"^    met (bed .*)$", PAGE.text, re.MULTILINE)[:2]

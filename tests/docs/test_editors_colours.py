@@ -43,6 +43,7 @@ def scopes(text: str) -> dict[str, str]:
     return {piece: found[-1].removesuffix(".met") for _, piece, found in coloured(text)}
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("deck", DECKS, ids=lambda path: path.name)
 def test_every_piece_of_a_standard_deck_has_a_scope_and_numbers_and_comments_have_theirs(deck: Path) -> None:
     text = deck.read_text(encoding="utf-8")

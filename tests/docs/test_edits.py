@@ -102,7 +102,7 @@ def helps() -> Iterator[tuple[str, str, bool]]:
     yield from ((code, text, there) for (code, text), there in told.items())
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_as_many_helps_have_edits_as_are_known_to() -> None:
     assert sum(there for _, _, there in helps()) >= WITH_EDITS
 

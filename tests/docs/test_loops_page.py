@@ -98,7 +98,7 @@ def test_a_random_deck_of_loops_is_the_same_deck_without(tmp_path: Path, seed: i
     assert one.requirements and [each.text for each in one.requirements] == [each.text for each in other.requirements]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_five_hundred_joints_of_ten_lines_are_those_of_macros(tmp_path: Path) -> None:
     assert DECKS["chain.ic"].count("\n") <= 10
     of_loop = experiment(tmp_path, "chain.ic", DECKS["chain.ic"])

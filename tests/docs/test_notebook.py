@@ -132,7 +132,7 @@ def nobodys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         yield
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.usefixtures("two_cores", "nobodys")
 def test_it_runs_and_says_what_is_stored(stored: Any, tmp_path: Path) -> None:
     import matplotlib.font_manager  # noqa: F401 - the first import on a machine makes a cache of fonts, and says so

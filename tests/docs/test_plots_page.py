@@ -14,7 +14,7 @@ from tests.batch.plotting import figures
 from tests.batch.plotting.figures import PAGE
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_commands_draw_what_they_name(tmp_path: Path) -> None:
     drawn = figures.run(tmp_path)
     assert {Path(name).suffix for name in drawn} == set(output.METADATA)

@@ -91,7 +91,7 @@ def off_on_beds(folder: Path, beds: dict[str, str]) -> list[str]:
     return [f"{100.0 * np.sqrt(np.mean((each - rates[0]) ** 2)) / SLOW:#.2g}" for each in rates[1:]]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("row", DRIVES, ids=[row[0] for row in DRIVES])
 def test_a_drive_told_a_torque_is_off_by_what_the_page_says(row: tuple[str, str, str], tmp_path: Path) -> None:
     beds = {"emulated(delay = 1)": row[0], "torque_drive(delay = 1)": row[0]}
@@ -112,7 +112,7 @@ def test_so_is_one_that_is_slow_or_gives_too_much_or_has_faults(tmp_path: Path) 
 SOFT = "velocity_tracking(drift = 1e-3 N^2*m^2/s)"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_drive_told_a_rate_is_off_by_what_the_page_says(tmp_path: Path) -> None:
     """Against the run in software at 4 kHz of the loop that the drive has."""
     gains = {
@@ -213,7 +213,7 @@ def test_the_errors_of_the_page_are_those_of_its_deck(law: str, tmp_path: Path) 
     assert columns(law)[0] == off(tmp_path, law)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("law", LAWS)
 def test_so_are_those_at_the_papers_rates_and_with_faults(law: str, tmp_path: Path) -> None:
     slow, faulty = off(tmp_path, law, servos=100, dynamics=25), off(tmp_path, law, "emulated(faults = typical)")
@@ -223,7 +223,7 @@ def test_so_are_those_at_the_papers_rates_and_with_faults(law: str, tmp_path: Pa
 FAULTS = re.findall(r"^\| `(\w+)` = (\S+) (\S+) \| ([^|]*/[^|]*) \| ([^|]*/[^|]*) \|", PAGE, re.MULTILINE)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("fault", FAULTS, ids=[row[0] for row in FAULTS])
 def test_so_are_those_of_each_fault_alone(fault: tuple[str, ...], tmp_path: Path) -> None:
     name, size, unit, fast, slow = fault

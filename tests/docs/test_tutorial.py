@@ -11,7 +11,7 @@ from tests.docs import tutorial
 from tests.docs.pages import DOCS
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_each_command_prints_what_is_shown(tmp_path: Path) -> None:
     for command, shown, printed in tutorial.follow(tmp_path):
         lines = iter(printed.split("\n"))

@@ -193,7 +193,7 @@ def test_a_line_with_faults(kind: str, lock_step: bool, tmp_path: Path) -> None:
     judged(kind, lock_step, 2000, tmp_path, "model")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("of", DEVICES)
 @pytest.mark.parametrize("lock_step", [True, False], ids=["lock-step", "free"])
 @pytest.mark.parametrize("kind", KINDS)

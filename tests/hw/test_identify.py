@@ -222,6 +222,7 @@ def test_a_shaft_that_does_not_come_to_rest_is_found_out() -> None:
     assert guide.stuck and not guide.began
 
 
+@pytest.mark.release
 def test_a_bed_with_a_time_of_its_own_holds_what_it_is_told_until_the_next(tmp_path: Path) -> None:
     truth = hidden(3)
     what, its, _ = moved(experiment(tmp_path, truth, "none"), 3, OwnTime)
@@ -229,6 +230,7 @@ def test_a_bed_with_a_time_of_its_own_holds_what_it_is_told_until_the_next(tmp_p
     assert outside(found, truth) == [] and float((found.residual**2).mean() ** 0.5) < 1e-3
 
 
+@pytest.mark.release
 def test_drive_current_that_is_measured_gives_the_load_motors_constant_too(tmp_path: Path) -> None:
     truth = hidden(4)
     what, its, _ = moved(experiment(tmp_path, truth, "typical"), 4, Measuring)

@@ -14,7 +14,7 @@ SEEDS = (1, 6, 10, 14)
 """Of `tests.ic.fuzz.planted`, with decks that told of half of their mistakes or less."""
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_dozen_mistakes_planted_in_a_standard_deck_are_all_told(tmp_path: Path, seed: int) -> None:
     rng = random.Random(seed)

@@ -404,7 +404,7 @@ def test_where_mets_name_is_another_modules_already_that_is_named(
 SLOW_TO_IMPORT = {"llvmlite", "h5py", "h5netcdf", "xarray", "pandas", "dask", "matplotlib", "scipy", "pint"}
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("words", ["check two_link.ic", "plan two_link.ic", "--version", "--help", "doc"])
 def test_what_costs_a_tenth_of_a_second_is_not_imported(words: str) -> None:
     """Each of these packages takes 0.1 to 2 s to import, and none of these commands needs it."""

@@ -78,7 +78,7 @@ def test_it_runs_from_a_small_deck_and_its_bits_depend_on_the_case_alone(
     assert np.abs(kernel - rows).max() < 1e-10 * np.abs(rows).max()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("servo", [name for name, model in models.find_own("servo").items() if model.commands])
 @pytest.mark.parametrize("course", models.find_own("command"))
 def test_every_servo_takes_every_course_of_every_command_that_it_knows(servo: str, course: str, tmp_path: Path) -> None:

@@ -34,6 +34,7 @@ def pint_registry():
     return pint.UnitRegistry()
 
 
+@pytest.mark.release
 @pytest.mark.oracle
 @pytest.mark.parametrize("name", [n for n in ALL_UNITS if n not in ("rpm", "cycle", "rev", "Hz", "kHz", "MHz")])
 def test_every_unit_has_the_size_and_dimension_that_pint_gives_it(name, pint_registry):

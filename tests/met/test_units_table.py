@@ -59,6 +59,7 @@ def in_pint(registry: pint.UnitRegistry, written: str) -> pint.Quantity:
     return (registry.Quantity(1.0) * registry.parse_expression(named)).to_base_units()
 
 
+@pytest.mark.release
 @pytest.mark.oracle
 @pytest.mark.parametrize("written", WRITTEN)
 def test_a_written_unit_has_pints_size_and_dimension(written: str, registry: pint.UnitRegistry) -> None:

@@ -94,7 +94,7 @@ def test_velocity_products_are_those_of_lagrange():
     assert off(result, without, "qd") > 50 * off(result, exact, "qd")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_friction_keeps_order_two_through_sixty_stops_and_releases():
     """A sine that reverses both joints every second. Measured 4.5e-6 of range at 1 kHz, falling by 4.0 each time."""
     exact = reference(np.arange(1601) / 100.0, command=sine(SLOW, 0.5), servo_hz=100.0)
@@ -145,7 +145,7 @@ def test_both_joints_settle_at_the_commanded_rate_at_the_papers_rates(joint):
     assert np.sqrt(np.mean(difference[time <= 5.0] ** 2)) < 0.0012
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_figures_can_be_drawn(tmp_path):
     written = draw(tmp_path)
     assert [path.name for path in written] == [f"paper_figure_{number}.png" for number in (5, 6, 7, 8)]

@@ -91,6 +91,7 @@ CRANE = """
 HEAVIER = "zip { links.carriage.mass = [50, 150, 750, 3000] kg;  links.boom.mass = [20, 40, 200, 800] kg; }"
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("joints", [("slide",), ("slide", "swing")])
 @pytest.mark.parametrize("law", ["velocity_tracking", pytest.param("torque_balance_observer", marks=slow)])
 def test_a_prismatic_joint_follows_its_own_motor(joints: tuple[str, ...], law: str) -> None:

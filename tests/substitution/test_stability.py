@@ -63,7 +63,7 @@ def swept(law: str, rate: int, swept: str, heaviness: Sequence[float], duration:
     return text, grows(own, bench, round(duration * rate / 8.0))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("rate", "duration", "delays", "cuts"),
     [
@@ -107,7 +107,7 @@ def test_measured_acceleration_grows_from_where_the_margin_and_an_independent_mo
         known.below(0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("rate", [100, 200, 1000])
 def test_half_a_percent_to_each_side_of_a_limit_runs_die_away_and_grow(rate: int) -> None:
     """Nine limits a rate: three delays, three filters. The shaft's second difference is the loop's swing; one that
@@ -132,7 +132,7 @@ def test_half_a_percent_to_each_side_of_a_limit_runs_die_away_and_grow(rate: int
     assert (above[:, 3] > 0.9 * above[:, 1]).all() and (above[:, 3] > 0.1).all(), above
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("law", ["velocity_tracking", "torque_balance", "torque_balance_observer"])
 @pytest.mark.parametrize(
     ("rate", "delays", "cuts"),

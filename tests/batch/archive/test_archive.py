@@ -419,7 +419,7 @@ OWN_NAMES = (
 )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", OWN_NAMES)
 def test_a_swept_coordinate_may_be_called_as_anything_of_our_own(here: Path, name: str) -> None:
     experiment = renamed(plans.gains(3), "gearbox.kp", name)
@@ -541,7 +541,7 @@ def test_a_flipped_bit_in_a_history_is_noticed(here: Path) -> None:
     assert caught.value.diagnostics[0].code == "E302"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_flipped_bits_anywhere_are_a_problem_or_an_archive(here: Path) -> None:
     """In a process of its own, which has two minutes: HDF5 may not come back from some damage, nor may it be ours."""
     import os

@@ -48,6 +48,7 @@ def in_node(scene: ArmScene, values: dict[str, float], instants: list[list[float
     return np.array(json.loads(done.stdout), dtype=float)
 
 
+@pytest.mark.release
 @pytest.mark.node
 @pytest.mark.parametrize("free", [False, True])
 def test_bodies_of_random_trees_are_where_rodrigues_formula_puts_them(tmp_path: Path, free: bool) -> None:

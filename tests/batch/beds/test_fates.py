@@ -62,6 +62,7 @@ bed `model` at {port}: cleared: torque did not change the measured rate
     assert (status, complaint) == (cli.YES, "") and "the case reached its end" in said
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     "begun",
     [
@@ -130,11 +131,13 @@ def sweep(met_bed: Met, port: str, *words: str) -> tuple[int, str, str]:
     return met_bed("run", "deck.ic", "tuning", "--port", port, "--lock-step", "-o", "a.h5", "--no-picture", *words)
 
 
+@pytest.mark.release
 def test_a_sweep_names_a_bed_once(met_bed: Met, on_pty: Callable[..., str]) -> None:
     _, said, _ = sweep(met_bed, on_pty(Device(limits=LIMITS)))
     assert said.count("bed `model`") == 1 and "of 3 cases" in said
 
 
+@pytest.mark.release
 def test_a_sweep_ends_where_a_bed_stopped_itself_and_goes_on_once_it_is_cleared(
     met_bed: Met, on_pty: Callable[..., str]
 ) -> None:
@@ -167,6 +170,7 @@ def test_what_was_measured_is_not_written_over(met_bed: Met) -> None:
     assert len(batch.open("a.h5").case_id) == 3
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 def test_a_transcript_of_another_run_is_refused_and_then_the_right_one_is_replayed(met_bed: Met) -> None:
     Path("deck.ic").write_text(SWEEP)

@@ -75,6 +75,7 @@ def test_what_is_no_file_in_the_place_of_the_records_is_left_there(
     assert os.lstat("shoulder.identified.records").st_mode == before
 
 
+@pytest.mark.release
 def test_the_deck_that_is_written_holds_the_truth_and_can_be_included(
     identify: Callable[..., tuple[int, str, str]], capsys: pytest.CaptureFixture[str], here: Path
 ) -> None:

@@ -41,7 +41,7 @@ def test_a_shaft_that_played_drives_turn_goes_as_newton_says(tmp_path: Path) -> 
     assert gained > slower > shaft.rate > 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("kind", ["volts", "torques"])
 def test_figures_7_and_8_with_played_drives(dialect: str, kind: str) -> None:
@@ -51,7 +51,7 @@ def test_figures_7_and_8_with_played_drives(dialect: str, kind: str) -> None:
     assert 1e-6 < beside[0] < most[1] and beside[1] < 2e-4
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("dialect", [name for name, each in DIALECTS.items() if each.takes_rates])
 @pytest.mark.parametrize("gains", [(1.0, 1.0), (1.2, 1.0), (1.0, 1.3)])
 def test_figures_7_and_8_with_drives_that_close_the_rate_loop(dialect: str, gains: tuple[float, float]) -> None:

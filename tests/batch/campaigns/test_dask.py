@@ -301,7 +301,7 @@ class TestInThisProcess:
             assert set(worker.plugins) == before and not whole.workers(os.getpid())
         assert '"workers": "Dask, 1 worker with 2 threads"' in Path("a.h5.run.json").read_text()
 
-    @pytest.mark.slow
+    @pytest.mark.release
     @pytest.mark.usefixtures("poisoned")
     def test_a_case_that_kills_or_hangs_takes_down_a_child_and_no_worker(self, here: Path) -> None:
         with cluster(here) as started:

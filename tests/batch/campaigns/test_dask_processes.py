@@ -145,6 +145,7 @@ def test_where_the_scheduler_is_lost_what_is_done_is_kept(
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("name", ["INT", "TERM", "KILL"])
 def test_whatever_ends_the_driver_ends_its_cluster(archive: Path, name: str) -> None:
     own_session = f"import os\nos.setsid()\n{whole.MET}"

@@ -132,6 +132,7 @@ def told(words: list[str], choose: Callable[..., Any] | None = None) -> tuple[in
 
 @pytest.mark.slow
 class TestTenThousandCases:
+    @pytest.mark.release
     def test_all_others_are_done_with_the_same_bits(self, ran: tuple[Path, int, str], undisturbed: Path) -> None:
         assert differ(undisturbed, ran[0], POISONED) == []
 
@@ -325,6 +326,7 @@ class TestWorkers:
         (failure,) = archive.summaries[0].failures
         assert (failure.status, failure.cause) == ("lost", "its worker was killed by SIGTERM, 3 times")
 
+    @pytest.mark.release
     def test_all_cases_kill_their_worker(self, here: Path) -> None:
         poison = {f"row_{row}": "SIGKILL" for row in range(4)}
         archive = batch.run(plans.plan(plans.gains(4)), output="a.h5", executor=Poisoned(**poison))

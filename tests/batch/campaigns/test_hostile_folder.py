@@ -156,7 +156,7 @@ def test_modules_of_mets_names_on_pythonpath_are_not_taken_for_it(
     assert (folder / "a.h5").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_picture_takes_nothing_of_the_folder(
     met: Callable[..., subprocess.CompletedProcess[str]], folder: Path
 ) -> None:
@@ -176,7 +176,7 @@ def test_jobs_of_a_queue_run_nothing_of_the_folder(
     assert (folder / "a.h5").exists(), (folder / "log").read_text()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("words", [("run", "-o", "a.h5", "--no-picture"), ("probe",)], ids=" ".join)
 def test_beds_run_nothing_of_the_folder(
     met: Callable[..., subprocess.CompletedProcess[str]], words: tuple[str, ...]

@@ -88,6 +88,7 @@ def test_a_driver_that_is_killed_goes_on_with_what_is_missing(
     assert whole.beside_it(archive) == ["a.h5", "a.h5.run.json"]
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way[0])
 def test_a_driver_that_is_killed_again_and_again_comes_to_the_same_end(
     archive: Path, undisturbed: bytes, way: tuple[str, str]

@@ -68,7 +68,7 @@ def small_tasks(patch: pytest.MonkeyPatch, cases: int) -> None:
 # However it is run
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("threads", [1, 2])
 def test_threads(here: Path, plan: Plan, undisturbed: bytes, threads: int) -> None:
     assert batch.run(plan, output="a.h5", threads=threads).path.read_bytes() == undisturbed
@@ -81,7 +81,7 @@ def test_processes(here: Path, plan: Plan, undisturbed: bytes, processes: int, m
     assert batch.run(plan, output="a.h5", processes=processes).path.read_bytes() == undisturbed
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("cases", [1, 7, 33])
 def test_tasks_of_any_size(
     here: Path, plan: Plan, undisturbed: bytes, cases: int, monkeypatch: pytest.MonkeyPatch
@@ -119,7 +119,7 @@ def test_blocks_that_are_merged_decide_nothing_but_where_text_lies(
     assert found[0] == found[1] == found[2]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("sizes", [(7, 4), (1, 40)])
 def test_interrupted_and_gone_on_with_tasks_of_another_size(
     here: Path, plan: Plan, undisturbed: bytes, sizes: tuple[int, int], monkeypatch: pytest.MonkeyPatch
@@ -153,7 +153,7 @@ def test_a_deck_and_its_plan_file(
     assert "error" not in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_whole_processes(place: Path, tmp_path: Path, undisturbed: bytes) -> None:
     for number, words in enumerate((["--threads", "2"], ["--processes", "2"], ["--processes", "1", "--threads", "2"])):
         output = tmp_path / f"{number}.h5"
@@ -162,7 +162,7 @@ def test_whole_processes(place: Path, tmp_path: Path, undisturbed: bytes) -> Non
         assert output.read_bytes() == undisturbed
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("histories", "single"),
     [(("every:3",), True), (("worst:3:volts", "#3"), False), (("failed", "every:11"), False), (("none",), False)],
@@ -262,7 +262,7 @@ def extended(run: str, entries: str) -> Path:
     return batch.run(ic.compile("d.ic", select=["it"]), output=f"{len(list(Path('.').iterdir()))}.h5").path
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("what", EXTENSIONS)
 def test_more_cases_change_no_old_one(here: Path, what: str) -> None:
     run, before, after = EXTENSIONS[what]

@@ -256,7 +256,7 @@ def test_what_was_interrupted_goes_on_to_the_same_bytes(
     assert batch.run(plan, output="a.h5").path.read_bytes() == undisturbed, "it is whole, and nothing is run"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("way", [("--threads", "2"), ("--processes", "2")], ids=lambda way: way[0])
 def test_what_is_killed_at_ten_generations_goes_on_to_the_same_bytes(
     here: Path, place: Path, undisturbed: bytes, way: tuple[str, str]

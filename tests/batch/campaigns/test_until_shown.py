@@ -302,7 +302,7 @@ sweep several = plain + built + ways;
 """
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_sweeps_beside_it_and_structures_of_it_give_the_same_bytes_with_histories_of_some(here: Path) -> None:
     path = deck(here, gains=[0.02, 0.036])
     path.write_text(path.read_text(encoding="utf-8") + SEVERAL, encoding="utf-8")

@@ -352,7 +352,7 @@ with mock.patch.multiple(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("signal_name", "status", "last"), [("INT", 130, "interrupted"), ("TERM", 143, "terminated")])
 def test_a_signal_ends_a_real_run_and_leaves_nothing(tmp_path: Path, signal_name: str, status: int, last: str) -> None:
     """Through the command line: kernels run outside Python, and must let it go."""

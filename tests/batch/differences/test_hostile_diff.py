@@ -444,7 +444,7 @@ def expected(a: Sequence[float], b: Sequence[float], allowed: Sequence[float], r
     return verdict, used
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", range(12))
 def test_verdicts_are_those_of_an_oracle_with_xarray(two: Callable[..., tuple[Path, Path]], seed: int) -> None:
     rng = np.random.default_rng(seed)

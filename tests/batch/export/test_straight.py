@@ -164,7 +164,7 @@ def test_none_failed_so_there_is_nothing_to_export(here: Path, capsys: pytest.Ca
     assert "error[E323]: no histories of `few` are in the archive" in told.err and "x.mcap is missing" in told.out
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_killed_while_exporting_no_file_has_the_final_name(here: Path) -> None:
     """A long run's export, killed at several instants: the archive is whole, the export whole or not there."""
     import signal

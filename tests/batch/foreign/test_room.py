@@ -93,7 +93,7 @@ def test_a_small_file_that_would_fill_the_memory_is_refused(
     )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     "how",
     [

@@ -110,7 +110,7 @@ def test_a_name_longer_than_the_terminal_is_wide_is_shown(
     assert f"\n{long}\n    {about}\n" in answer.text
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("value", [1.7e308, -1.7e308, 5e-324, float("inf"), float("nan")])
 def test_any_number_may_be_in_a_signal(value: float, archive: Path, tmp_path: Path) -> None:
     with changed(archive, tmp_path) as (copy, file):
@@ -133,7 +133,7 @@ def test_times_beyond_those_of_an_mcap_file_are_told(single: Path, tmp_path: Pat
     )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", range(8))
 def test_an_archive_with_something_else_in_it_is_read_or_told(
     seed: int, archive: Path, single: Path, tmp_path: Path
@@ -141,7 +141,7 @@ def test_an_archive_with_something_else_in_it_is_read_or_told(
     assert tried((archive, single)[seed % 2], tmp_path, seed, most=3) == []
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_so_are_many_of_them(archive: Path, single: Path, tmp_path: Path) -> None:
     for seed in range(100, 130):
         assert tried((archive, single)[seed % 2], tmp_path, seed, most=4) == []

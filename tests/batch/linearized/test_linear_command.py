@@ -148,7 +148,7 @@ def test_of_a_joint_that_sticks_nothing_comes_back(folder: Path) -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("weak", "limits"),
     [

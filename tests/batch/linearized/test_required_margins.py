@@ -157,7 +157,7 @@ def test_a_block_that_no_run_can_answer_is_refused_before_anything_is_written(tm
     assert not list(tmp_path.glob("b.h5*"))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_command_asks_what_the_deck_asks(folder: Path) -> None:
     """By name, and by itself where there is one block and no question."""
     said = met(folder, "linear", "deck.ic", "hold", "--of", "loop", status=0)

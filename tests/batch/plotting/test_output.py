@@ -20,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("engine")
 BEGINS = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("ending", BEGINS)
 def test_the_ending_says_the_format_and_the_same_archive_gives_the_same_bytes(here: Path, ending: str) -> None:
     with archive(3) as file:
@@ -160,7 +160,7 @@ def test_paper_has_its_size_its_letters_and_no_title(here: Path, figures: list[A
     assert figures[1].get_suptitle() == "3 cases"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("width", ["8.5cm", "17.5cm"])
 @pytest.mark.parametrize(
     ("cases", "histories", "over"),

@@ -100,6 +100,7 @@ def changed(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.mean(np.abs(one - other).max(axis=-1) > 0.02))
 
 
+@pytest.mark.release
 @pytest.mark.browser
 @pytest.mark.parametrize("dark", [False, True])
 @pytest.mark.parametrize("width", [1280, 400])
@@ -249,6 +250,7 @@ def test_without_webgl_and_on_paper_it_is_svg(flat: Chromium, pages: Path, tmp_p
     page.close()
 
 
+@pytest.mark.release
 @pytest.mark.browser
 def test_a_run_that_does_not_record_q_says_what_to_record(webgl: Chromium, pages: Path) -> None:
     page = opened(webgl, pages / "blind.view.html")

@@ -255,6 +255,7 @@ MOVED = [
 ]  # fmt: skip
 
 
+@pytest.mark.release
 @pytest.mark.node
 @pytest.mark.parametrize(("group", "moved"), [("it", MOVED), ("ways.rk4", MOVED[:2])])
 def test_the_second_module_has_the_bits_of_met_run_vary_of_its_numbers(

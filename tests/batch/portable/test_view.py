@@ -251,6 +251,7 @@ sweep tuned of held { vary gearbox.kp = [0.005, 0.02] V*s/rad; }
 """
 
 
+@pytest.mark.release
 @pytest.mark.browser
 def test_a_margin_is_shown_as_the_archive_has_it_and_is_not_known_elsewhere(chromium: Chromium, tmp_path: Path) -> None:
     (tmp_path / "deck.ic").write_text(MARGINS, encoding="utf-8")
@@ -401,6 +402,7 @@ def test_texts_of_an_archive_are_texts_whatever_they_hold(chromium: Chromium, se
     page.close()
 
 
+@pytest.mark.release
 @pytest.mark.browser
 @pytest.mark.parametrize("dark", [False, True])
 def test_nothing_is_wider_than_a_phone(chromium: Chromium, sent: Path, dark: bool) -> None:

@@ -61,7 +61,7 @@ def told(now: Path, before: Path) -> str:
     return re.sub(r"\s+", " ", html.unescape(re.sub(r"<[^>]+>", " ", text)))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("kind", OTHERS)
 def test_what_has_no_counterpart_is_told(kind: str, tmp_path: Path) -> None:
     (old, new), words = OTHERS[kind]

@@ -105,6 +105,7 @@ def opened(chromium: Chromium, path: Path, **options: Any) -> Page:
     return page
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("width", [1280, 390, 320])
 @pytest.mark.parametrize("dark", [False, True])
 def test_nothing_is_clipped(chromium: Chromium, compared: Path, width: int, dark: bool) -> None:

@@ -43,7 +43,7 @@ def test_a_second_driver_is_refused(archive: Path, undisturbed: bytes) -> None:
     assert archive.read_bytes() == undisturbed
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_second_process_is_refused(archive: Path, tmp_path: Path) -> None:
     of = plans.plan(whole.long(2_000))
     cases = of.experiments[0].cases.count

@@ -45,7 +45,7 @@ class TestLikeAnArchive:
         xarray.testing.assert_identical(data, kept)
         assert dict(data.met.grid("settle").sizes) == {"gearbox.kp": 3, "load": 2}
 
-    @pytest.mark.slow
+    @pytest.mark.release
     @pytest.mark.parametrize("deck", ["panda.ic", "free_flyer.ic", "stanford_arm.ic", "ets_vii.ic", "station_arm.ic"])
     def test_any_parameters_of_any_deck_give_what_an_archive_holds(self, deck: str, tmp_path: Path) -> None:
         sim = batch.Simulation(deck, set={"duration": "0.4 s"})

@@ -36,7 +36,7 @@ def test_no_wrong_answer_is_taken(tmp_path: Path, dialect: str, kind: str) -> No
     assert tally.wrong == 0, tally
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("kind", FAULTS)
 def test_no_wrong_answer_of_two_thousand_is_taken(tmp_path: Path, dialect: str, kind: str) -> None:

@@ -296,7 +296,7 @@ def test_no_wrong_answer_is_taken_of_lines_that_are_spoilt(tmp_path: Path, kind:
     assert tally.wrong == 0, tally
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("kind", TEXT_FAULTS)
 def test_no_wrong_answer_is_taken_of_two_thousand_exchanges(tmp_path: Path, kind: str) -> None:
     tally, spoiler = through(tmp_path, kind, 2000)

@@ -270,6 +270,7 @@ def test_a_bed_of_a_short_name_tells_name_and_firmware(name: str) -> None:
     assert (found.name, bytes(8) == found.firmware) == (name.encode().ljust(16, b"\0"), False)
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 def test_the_longest_unused_are_removed(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(building, "LIMIT", 100_000)

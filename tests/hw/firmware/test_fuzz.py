@@ -63,6 +63,7 @@ def clang() -> str:
     return "clang"
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("capabilities", "lock"),
     [(SENSORS, None), (SENSORS | LOCK_STEP, None), (SENSORS, LOCK)],

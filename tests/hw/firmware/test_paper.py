@@ -124,6 +124,7 @@ def test_behind_a_terminal_too() -> None:
         assert driven(experiment, lambda voltage, current: line.step(voltage, current).rate, 1000) == here
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 @pytest.mark.parametrize(
     ("law", "command"),

@@ -134,7 +134,7 @@ def begin(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[s
     models.available.cache_clear()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("kind", MODELS)
 def test_a_model_does_what_every_model_must(
     kind: models.Kind, begin: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -170,7 +170,7 @@ def test_its_file_passes_the_projects_own_linter(kind: str, folder: Path) -> Non
     assert done.returncode == 0, done.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_pip_installs_what_is_written_and_met_finds_it(folder: Path) -> None:
     for kind in MODELS:
         cli.main(["new", kind, f"my_{kind}", "-q"])

@@ -158,7 +158,7 @@ def test_after_any_edits_what_was_brought_along_makes_no_difference() -> None:
     compare(ARM + RUN, 1, 40)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", sorted(path.name for path in LIBRARY.glob("*.ic")))
 def test_after_any_edits_of_a_shipped_deck_what_was_brought_along_makes_no_difference(name: str) -> None:
     compare((LIBRARY / name).read_text(), 7, 30)

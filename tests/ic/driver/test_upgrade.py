@@ -205,7 +205,7 @@ def test_standard_input_and_plans_are_not_upgraded(capsys: pytest.CaptureFixture
     assert fmt(capsys, "--upgrade", "p.json")[2].startswith("error[E342]")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", sorted(path.relative_to(LIBRARY).as_posix() for path in LIBRARY.rglob("*.ic")))
 def test_standard_decks_can_be_upgraded(name: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = (LIBRARY / name).read_text()

@@ -293,7 +293,7 @@ def test_a_crash_in_a_check_is_told_in_the_log_and_the_server_lives_on(
         assert editor.of(deck) == []
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_met_lsp_without_pygls_says_how_to_install_it(tmp_path: Path) -> None:
     hidden = "u.find_spec = lambda name, *more: None if name == 'pygls' else find(name, *more)\n"
     hidden = f"import importlib.util as u\nfind = u.find_spec\n{hidden}"

@@ -82,7 +82,7 @@ def structures() -> int:
     return sum(type(each) is DeckText for each in gc.get_objects())
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_memory_does_not_grow_with_the_number_of_edits(tmp_path: Path) -> None:
     uri = (tmp_path / "arm.ic").as_uri()
 

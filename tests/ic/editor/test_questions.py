@@ -84,7 +84,7 @@ def test_a_servo_has_the_parameters_of_its_model_through_what_it_is_like(editor:
     assert [name for name in found if name in declared] == list(dict.fromkeys(declared))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("written", "first"),
     [
@@ -319,7 +319,7 @@ def test_all_uses_of_a_name_are_found_in_all_files(editor: Editor, deck: Path) -
     assert places(found) == [(uri(deck), *at(ARM, mark)) for mark in ("gearbox;", "gearbox; }", "gearbox.kp")]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_is_known_outlives_a_text_that_cannot_be_compiled(editor: Editor, deck: Path) -> None:
     editor.change(deck, ARM + "run broken like nominal { record = [q")
     assert editor.of(deck) != []

@@ -167,7 +167,7 @@ def test_a_name_with_other_uses_in_a_table_is_refused(editor: Editor, deck: Path
     assert "`gearbox` would not be found everywhere" in refused(editor, deck, "gearbox like", "motor")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_an_editor_is_told_of_the_name_before_it_asks_for_a_new_one(editor: Editor, deck: Path) -> None:
     line, column = at(DECK, "slow)")
     found = editor.about("textDocument/prepareRename", deck, line, column + 1)

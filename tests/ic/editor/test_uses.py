@@ -116,7 +116,7 @@ def test_behind_several_roofs_their_definitions_may_stand_and_before_them_none(e
     assert {"hinge", "wrist"} <= set(words(editor, nested, NESTED + "run other like hold { servos { |"))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("mark", "further", "new", "count"), [
     ("cell.left.reach", 10, "span", {"deck.ic": 1, "cell.ic": 1, "part.ic": 4}),
     ("cell.left.reach", 5, "other", {"deck.ic": 2, "cell.ic": 7}),

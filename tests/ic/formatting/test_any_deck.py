@@ -96,7 +96,7 @@ def test_a_mutilated_deck_is_laid_out_or_told_where_it_is_broken(tmp_path: Path)
     assert any(outcomes) and not all(outcomes)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("first", range(1000, 2000, 500))
 def test_a_thousand_ruffled_decks_keep_their_tokens(tmp_path: Path, first: int) -> None:
     for seed in range(first, first + 500):
@@ -111,7 +111,7 @@ def test_a_deck_whose_indentation_is_lost_gets_it_back(name: str, text: str) -> 
     assert laid_out(rows(Text(name, flat))) == text
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("text", [
     "a = [" + "1,\n" * 5_000 + "1];\n",
     "\n".join("a" * (i % 7 + 1) + "  = " * 20 + ";" for i in range(200)),

@@ -33,7 +33,7 @@ SEED, DECKS = 20261128, 100
 """Which decks are tried here, each time the same, and how many; `python -m tests.ic.fuzz` tries others."""
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_decks_that_nobody_would_write_show_no_fault() -> None:
     found = fuzz(SEED, 1200.0, decks=DECKS)
     assert not found.faults, told(found, SEED)
@@ -58,7 +58,7 @@ def test_a_model_that_acts_on_the_world_of_an_empty_arm_is_no_fault(tmp_path: Pa
     assert "D159" in [diagnostic.code for diagnostic in ic.check(deck).diagnostics]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_deck_of_the_series_is_the_same_each_time() -> None:
     assert mutations.changed_bytes(_rng(), ARM.encode()) == mutations.changed_bytes(_rng(), ARM.encode())
     for change in mutations.GENTLE:
@@ -177,6 +177,6 @@ def test_some_random_sweeps_show_no_fault(tmp_path: Path) -> None:
     assert sum(compiled for _, _, compiled in told) > 5
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_hundred_random_sweeps_show_no_fault(tmp_path: Path) -> None:
     assert sweeps.main(f"{SEED}", 100, tmp_path) == 0

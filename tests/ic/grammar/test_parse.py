@@ -555,7 +555,7 @@ def test_no_bytes_raise_anything_but_a_problem(desk: Desk, data: bytes):
     _survives(desk, data)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", range(300))
 def test_no_mutilated_deck_raises_anything_but_a_problem(desk: Desk, seed: int):
     rng = random.Random(seed)

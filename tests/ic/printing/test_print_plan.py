@@ -249,7 +249,7 @@ def test_plan_as_json_is_the_plan_file(capsys: pytest.CaptureFixture[str]) -> No
     assert plan_file.loads(out).experiments[0].name == "free"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_an_arm_of_a_thousand_joints_is_drawn(deck: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Deeper than Python's stack."""
     links = "".join(f"link l{i} {{ mass = 1 kg; shape = sphere(radius = 1 m); }}\n" for i in range(1200))

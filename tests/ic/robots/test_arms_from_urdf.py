@@ -63,7 +63,7 @@ def test_random_robots_move_as_pinocchio_reads_them(tmp_path: Path) -> None:
         worst.below(CLOSE)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_imported_deck_has_the_plan_of_the_file_bit_for_bit(tmp_path: Path) -> None:
     path, deck = tmp_path / "random.urdf", tmp_path / "imported.ic"
     for seed in SEEDS:

@@ -77,7 +77,7 @@ def rows() -> Iterator[str]:
             yield f"| `{shown(path)}` | {moving} | {'no' if why else 'yes'} | {why} |"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_every_published_robot_that_is_taken_moves_as_pinocchio_reads_it(tmp_path: Path) -> None:
     poses, torques, accelerations = Worst("poses"), Worst("tau against rnea"), Worst("qdd against aba")
     taken = 0

@@ -179,7 +179,7 @@ def test_random_macros_expand_as_gcc_expands_them(desk: Desk, seed: int, circles
     assert compare_random_programs(desk, seed, 6, circles) >= 1
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("circles", [True, False])
 def test_hundreds_of_random_macros_expand_as_gcc_expands_them(desk: Desk, circles: bool) -> None:
     """gcc takes 20 times as long to start as a program takes to expand; 2,000 of this seed were the same too."""
@@ -200,7 +200,7 @@ OWN_LIMITS = {"D013", "D018", "D019", "D020"}
 """Tokens that are not C's, and texts that outgrow our limits: gcc has none, and such a text may fill its memory."""
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "least"), [("program", 270), ("optional_program", 150)])
 def test_hundreds_of_calls_that_are_put_off_expand_as_gcc_expands_them(desk: Desk, kind: str, least: int) -> None:
     rng, compared = random.Random(20_261_122), 0

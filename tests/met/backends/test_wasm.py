@@ -90,6 +90,7 @@ def counted(run: WholeRun, machine: bool | None, *, quick: bool = False) -> tupl
     return sum(a.size for a, _ in pairs), sum(differing(a, b) for a, b in pairs)
 
 
+@pytest.mark.release
 @pytest.mark.node
 @MACHINE
 @pytest.mark.parametrize(("kind", "name"), EVERY)
@@ -119,6 +120,7 @@ def test_arms_of_2_7_and_30_joints_that_reverse_have_the_native_bits(
     assert wrong == 0 and count > 1_000
 
 
+@pytest.mark.release
 @pytest.mark.node
 @MACHINE
 def test_a_module_that_is_sooner_made_has_the_same_bits(machine: bool | None) -> None:
@@ -148,6 +150,7 @@ def wide(columns: int) -> Recording:
     return record(Program(1.0, (), (RecordPhase(Phase("row", row), 1),), (end,), ("x",), columns, ("y",)))
 
 
+@pytest.mark.release
 @pytest.mark.node
 def test_rows_that_do_not_fit_on_the_stack_get_memory_once() -> None:
     recording = wide(20_000)

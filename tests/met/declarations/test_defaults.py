@@ -56,6 +56,7 @@ def test_what_a_deck_leaves_out_has_its_default(kind: models.Kind, name: str, tm
                 assert found_at(deck, use, parameter)[0] == of.value, parameter.name
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "name"), WITH_PARAMETERS)
 def test_writing_the_defaults_changes_neither_plan_nor_bits(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for n, (use, new) in enumerate(first_uses(kind, name)):
@@ -88,6 +89,7 @@ def test_writing_the_defaults_changes_neither_plan_nor_bits(kind: models.Kind, n
             assert a.metrics["m"].tobytes() == b.metrics["m"].tobytes()
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "name"), WITH_PARAMETERS)
 def test_what_must_be_written_is_missed_by_its_name(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for use, new in first_uses(kind, name):
@@ -105,6 +107,7 @@ def test_what_must_be_written_is_missed_by_its_name(kind: models.Kind, name: str
             assert parameter.doc in missed.help[0] or parameter.shape == "text", "and what it is is said"
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "name"), WITH_PARAMETERS)
 def test_what_must_be_written_and_is_misspelt_is_told_once(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for use, new in first_uses(kind, name):
@@ -120,6 +123,7 @@ def test_what_must_be_written_and_is_misspelt_is_told_once(kind: models.Kind, na
             assert found.help[0] == f"did you mean `{key}`?"
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "name"), WITH_PARAMETERS)
 def test_what_must_be_written_may_come_from_a_sweep_or_the_command_line(
     kind: models.Kind, name: str, tmp_path: Path

@@ -66,6 +66,7 @@ def refused(
     assert line[at.place.column - 1 :][: at.place.length] == written, (line, written)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "name"), EVERY)
 def test_a_number_at_its_bound_is_taken_as_it_is(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for use, parameter in ranged(kind, name):
@@ -78,6 +79,7 @@ def test_a_number_at_its_bound_is_taken_as_it_is(kind: models.Kind, name: str, t
                 assert (value[-1] if isinstance(value, tuple) else value) == inside, parameter.name
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "name"), EVERY)
 def test_a_number_just_outside_is_refused_where_the_deck_writes_it(
     kind: models.Kind, name: str, tmp_path: Path
@@ -90,6 +92,7 @@ def test_a_number_just_outside_is_refused_where_the_deck_writes_it(
             refused(tmp_path, use, parameter, deck, repr(outside) if isinstance(value, tuple) else text, words)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "name"), EVERY)
 def test_so_it_is_in_a_case_of_a_sweep(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for use, parameter in ranged(kind, name):
@@ -102,6 +105,7 @@ def test_so_it_is_in_a_case_of_a_sweep(kind: models.Kind, name: str, tmp_path: P
             refused(tmp_path, use, parameter, deck, path, words, ends="; case #1 breaks it", select="cases")
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "name"), EVERY)
 def test_so_it_is_on_the_command_line(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for use, parameter in ranged(kind, name):
@@ -113,6 +117,7 @@ def test_so_it_is_on_the_command_line(kind: models.Kind, name: str, tmp_path: Pa
             refused(tmp_path, use, parameter, use.put(tmp_path).deck(), text, words, settings=settings)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "name"), EVERY)
 @pytest.mark.parametrize("expression", ["{}*way/way", "{}/way"], ids=["nan", "inf"])
 def test_what_comes_out_as_no_number_or_infinite_is_refused(
@@ -140,6 +145,7 @@ def changed(deck: Experiment, path: str, value: object) -> Experiment:
     return replace(deck, parameters={**deck.parameters, path: replace(deck.parameters[path], value=value)})
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "name"), EVERY)
 def test_so_it_is_in_a_plan_by_hand(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for use, parameter in ranged(kind, name):

@@ -25,6 +25,7 @@ def one_sine(monkeypatch: pytest.MonkeyPatch) -> None:
     both_ways.use_sines_of_ones_own(monkeypatch)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "name"), EVERY)
 def test_a_models_functions_give_the_same_recorded_as_with_floats(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for use in uses(kind, name):

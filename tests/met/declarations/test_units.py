@@ -93,6 +93,7 @@ def refused(folder: Path, use: Use, texts: Mapping[str, str], code: str) -> dict
     return by_name
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("joint", JOINTS)
 @pytest.mark.parametrize(("kind", "name"), WITH_NUMBERS)
 def test_a_number_in_another_unit_is_the_same_number_in_si(
@@ -113,6 +114,7 @@ def test_a_number_in_another_unit_is_the_same_number_in_si(
                 assert got == pytest.approx(list(several(value)), rel=1e-15, abs=0), (each, unit, texts[each])
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("joint", JOINTS)
 @pytest.mark.parametrize(("kind", "name"), WITH_NUMBERS)
 def test_a_bare_number_is_refused_where_there_is_a_dimension(
@@ -126,6 +128,7 @@ def test_a_bare_number_is_refused_where_there_is_a_dimension(
             assert named is not None and parse_unit(named[1]) == parse_unit(use.unit(parameter)), said[each]
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("joint", JOINTS)
 @pytest.mark.parametrize(("kind", "name"), WITH_NUMBERS)
 def test_a_number_of_another_dimension_is_refused(kind: models.Kind, name: str, joint: str, tmp_path: Path) -> None:
@@ -137,6 +140,7 @@ def test_a_number_of_another_dimension_is_refused(kind: models.Kind, name: str, 
             assert named is not None and parse_unit(named[1] or "1") == parse_unit(use.unit(parameter) or "1")
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("joint", "other"), [("hinge", "slide"), ("slide", "hinge")])
 @pytest.mark.parametrize(("kind", "name"), WITH_NUMBERS)
 def test_the_unit_of_the_other_kind_of_joint_is_refused(

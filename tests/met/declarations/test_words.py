@@ -84,7 +84,7 @@ def test_a_word_does_not_vary_as_a_number_does(kind: models.Kind, name: str, tmp
         assert f"`{path}`" in refused.message and "word" in refused.message + " ".join(refused.help), messages(compiled)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "name"), WITH_WORDS)
 def test_what_is_not_there_under_a_word_is_refused_with_the_words_under_which_it_is(
     kind: models.Kind, name: str, tmp_path: Path

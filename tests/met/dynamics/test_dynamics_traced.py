@@ -102,7 +102,7 @@ def test_a_recorded_state_gives_the_plain_results(seed: int) -> None:
     close(record.replayed(recorded), everything(tree, arm, arm.mode), seed, CLOSE)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_mode_decided_when_the_program_runs_gives_the_same_as_one_decided_before(seed: int) -> None:
     arm = random_tree(seed)
@@ -115,7 +115,7 @@ def test_a_mode_decided_when_the_program_runs_gives_the_same_as_one_decided_befo
         close(record.replayed(recorded), everything(tree, arm, mode), seed, CLOSE)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", SEEDS)
 def test_an_arm_whose_every_number_is_a_cases_gives_the_same_motion(seed: int) -> None:
     arm = random_tree(seed)

@@ -18,7 +18,7 @@ from tests.oracles.worst import Worst
 CLOSE = 1e-9
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_inertia_and_torque_felt_agree_with_linear_algebra_in_every_mode() -> None:
     # J as a share of itself, b as a share of the torques that it is the difference of.
     held, yielding = Worst("J_eff against M, acceleration mode"), Worst("J_eff against M, torque mode")

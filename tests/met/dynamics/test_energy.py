@@ -145,7 +145,7 @@ def test_a_run_without_losses_keeps_energy_to_the_integrators_order(integrator: 
     assert min(found) > integrator.order - 0.2, found
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda integrator: integrator.name)
 def test_an_arm_that_floats_keeps_momentum_to_the_integrators_order(integrator: Integrator) -> None:
     found = []

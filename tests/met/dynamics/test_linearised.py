@@ -169,7 +169,7 @@ def by_wrenches(arm: RandomArm, of: LinearisedDynamics) -> np.ndarray:
     return np.array(rows).reshape(-1, 2 * arm.n).T
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("joints", range(1, 8))
 def test_any_modes_and_wrenches_move_as_the_recorded_recursion_does(joints: int) -> None:
     worst = Worst("qdd and tau_load by all that is given, share of the largest entry")

@@ -206,7 +206,7 @@ def test_on_plates_in_general_position_what_few_cells_leave_out_is_little_of_the
     assert (left_out(40).max(axis=0) < (0.05, 0.006, 0.0045)).all()  # twice what was found
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_few_cells_leave_out_of_a_thousand_plates_is_what_the_page_says() -> None:
     page = " ".join((Path(__file__).parents[3] / "docs" / "environments.md").read_text(encoding="utf-8").split())
     (said,) = re.findall(

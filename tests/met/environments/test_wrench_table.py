@@ -155,7 +155,7 @@ PULSES = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", ["modified_euler", "midpoint", "semi_implicit_euler", "rk4"])
 @pytest.mark.parametrize("name", PULSES)
 def test_the_impulse_of_rows_within_steps_is_kept(tmp_path: Path, name: str, integrator: str) -> None:

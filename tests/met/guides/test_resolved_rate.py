@@ -40,6 +40,7 @@ def law(
     return units * least_squares(scaled, shown, task), error, scaled
 
 
+@pytest.mark.release
 @pytest.mark.oracle
 @pytest.mark.parametrize(
     ("guides", "rows"),

@@ -255,7 +255,7 @@ def leaves(part: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
             yield from leaves(inner, (*path, key))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_whatever_is_put_anywhere_is_a_problem_or_a_plan_that_makes_a_program() -> None:
     """Every value of a plan in turn is replaced by values of every type."""
     from met.program import build

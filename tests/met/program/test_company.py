@@ -106,7 +106,7 @@ def test_friction_that_begins_within_a_step_opposes_motion_either_way(tmp_path: 
     assert (np.diff(forward) <= 0.0).all() and forward[0] == 1.0 and forward[-1] == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.usefixtures("brake")
 @pytest.mark.parametrize("integrator", ["modified_euler", "semi_implicit_euler", "rk4"])
 def test_company_changes_nothing_where_joints_stick_and_levels_come_and_go(tmp_path: Path, integrator: str) -> None:

@@ -104,6 +104,7 @@ def that_goes_round(joints: int, count: int) -> list[Chain]:
     return found
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("joints", "count"), [(3, 3), (5, 3), (8, 3)])
 def test_joints_that_went_round_in_a_circle_find_the_one_true_answer(joints: int, count: int, tmp_path: Path) -> None:
     for made in that_goes_round(joints, count):

@@ -207,6 +207,7 @@ def test_joints_that_are_told_their_acceleration(tmp_path: Path) -> None:
     assert run.signals["mode"][0, [0, -1]].tolist() == [[1.0, 0.0, 0.0], [1.0, 0.0, 1.0]]
 
 
+@pytest.mark.release
 @pytest.mark.oracle
 @pytest.mark.parametrize("seed", range(8))
 def test_random_decks(tmp_path: Path, seed: int) -> None:
@@ -215,7 +216,7 @@ def test_random_decks(tmp_path: Path, seed: int) -> None:
     compare(experiment(tmp_path, recording(text, *names)), names)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", range(8, 12))
 def test_kernel_and_plain_floats_agree(tmp_path: Path, seed: int) -> None:
     text = random_deck(seed)

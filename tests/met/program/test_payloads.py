@@ -55,7 +55,7 @@ def assert_kept(now: np.ndarray, was: np.ndarray) -> None:
     np.testing.assert_allclose(now, was, rtol=0, atol=2e-15 * np.max(np.abs(was)))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", models.find_own("integrator"))
 def test_a_run_with_a_grapple_and_a_release_keeps_the_integrators_order(tmp_path: Path, integrator: str) -> None:
     def last(run: Run) -> np.ndarray:

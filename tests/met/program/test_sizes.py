@@ -57,7 +57,7 @@ def test_arms_of_one_joint_and_of_a_hundred_run_from_decks(
         assert float(data["top"].item()) == run.metrics["top"][0]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_hundred_joints_that_stick_run_from_a_deck(tmp_path: Path) -> None:
     (tmp_path / "deck.ic").write_text(friction_deck(100, 9, duration="0.2 s"))
     run = engine.run(ic.compile(str(tmp_path / "deck.ic"), select=["many"]).experiments[0])

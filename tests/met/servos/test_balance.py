@@ -23,7 +23,7 @@ def values(use: Use, made: Experiment) -> SimpleNamespace:
     return SimpleNamespace(**{p.name: made.parameters[f"{use.head}.{p.name}"].value for p in use.in_plan()})
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("qd", [0.0, 0.07, -0.07])
 @pytest.mark.parametrize("torque", [0.0, 31.0, -31.0])
 @pytest.mark.parametrize("name", BALANCED)

@@ -95,7 +95,7 @@ def assert_same_run(found: Experiment, case: int = 0, ticks: int | None = None) 
     assert different(inside[0], np.array(rows)) == 0
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("faults", ["none", "typical"])
 @pytest.mark.parametrize(("dynamics", "servos"), [(25, 100), (1000, 1000)])
 def test_at_the_wire_it_makes_the_run_of_the_bed_inside_to_the_bit(
@@ -200,6 +200,7 @@ def test_the_text_is_the_same_each_time_and_another_cases_is_another(tmp_path: P
     assert text != plant_c(found, "shoulder", case=15, period=0.002)
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 @pytest.mark.parametrize("level", ["-O0", "-Os", "-O3"])
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ run wired like nominal {{
 """
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("dynamics", [500, 250])
 @pytest.mark.parametrize(("late", "delay"), [(0, 0), (0, 1), (1, 1), (1, 2)])
 def test_a_bed_outside_the_kernel_makes_the_same_run_as_the_emulated_one_inside(

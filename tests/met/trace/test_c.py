@@ -205,7 +205,7 @@ def test_elementary_functions_and_noise_have_the_kernels_bits(tmp_path: Path, wo
     same(table(elementary), three(2000, 2), tmp_path, words)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("make", [operations, elementary])
 @pytest.mark.parametrize("words", [*ALL, *ARM], ids=" ".join)
 def test_every_compiler_and_level_gives_the_same_bits(

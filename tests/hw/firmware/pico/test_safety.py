@@ -108,6 +108,7 @@ CASES: list[tuple[str, dict[str, Any], InterlockReason, float]] = [
 ]
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("change", "reason", "most"), [case[1:] for case in CASES], ids=[case[0] for case in CASES])
 def test_what_goes_wrong_stops_the_bench_in_time_and_is_told(
     bed: PicoBed, change: dict[str, Any], reason: InterlockReason, most: float, capsys: pytest.CaptureFixture[str]

@@ -64,7 +64,7 @@ arm crane {
     assert keys.structure_key(tabled.structure) == keys.structure_key(plain.structure)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_cell_with_its_unit_is_rounded_as_the_deck_rounds_it(folder: Path) -> None:
     pick = random.Random(24)
     units = ["kg", "g", "mg", "t"]

@@ -140,6 +140,7 @@ def test_the_tables_are_large_enough_to_mean_something() -> None:
     assert len(TAKEN) + len(REFUSED) >= 250
 
 
+@pytest.mark.release
 @pytest.mark.oracle
 @pytest.mark.parametrize(("place", "written"), TAKEN)
 def test_a_quantity_of_the_wanted_dimension_is_taken_at_pints_size(

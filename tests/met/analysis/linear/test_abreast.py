@@ -78,7 +78,7 @@ def test_of_shipped_decks_about_scattered_states(deck: str, name: str, count: in
     assert agree(program, flows) > 0
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("kind", "name"), [each for each in EVERY if each[0] != "metric"])
 def test_of_every_model_at_rest_and_on_its_way(kind: models.Kind, name: str, tmp_path: Path) -> None:
     """Cases of a sweep as the run has them, and some of their rates made 0, on kinks and where friction holds."""
