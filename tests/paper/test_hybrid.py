@@ -91,6 +91,7 @@ def test_joint_two_oscillates_with_joint_one_once_a_turn_of_the_shaft(rates):
     assert straight_one[turn] < 0.05 * power_one[turn] and straight_two[turn] < 0.05 * power_two[turn]
 
 
+@pytest.mark.slow
 def test_joint_two_oscillates_as_much_as_its_servo_lets_joint_one_push_it():
     """At 1 kHz, from the acceleration that the arm is told to the elbow's rate: closed form, friction sliding.
 

@@ -31,6 +31,7 @@ def test_a_heavy_arm_breaks_away_and_turns_back_as_on_its_own_motor(law: str, co
     worst.below(0.5)
 
 
+@pytest.mark.slow
 def test_the_bed_breaks_away_when_the_joint_would() -> None:
     """Within 2 ms. Until then the shaft stands still, exactly: friction holds what the drive pulls."""
     own, bench = ran_both("velocity_tracking", "slow", 5.0)
@@ -40,6 +41,7 @@ def test_the_bed_breaks_away_when_the_joint_would() -> None:
     assert not bench[: times[1]].any()
 
 
+@pytest.mark.slow
 def test_the_shaft_passes_through_rest_with_the_joint() -> None:
     """Within 20 ms: where the rest band of the law, 0.5 rad/s of the shaft, is entered or left at 38 rad/s^2 / 51."""
     own, bench = (RATIO * rate for rate in ran_both("velocity_tracking", LONG, 12.0))

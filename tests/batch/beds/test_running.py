@@ -194,6 +194,7 @@ def test_what_is_wrong(
     assert "writing" not in said or "E400" in message  # which only the line can tell
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "code", "written", "remedy"),
     [

@@ -136,6 +136,7 @@ def test_its_outcome_is_that_of_all_rows(here: Path, name: str) -> None:
                 assert b.most_case == group.values("case")[np.where(np.isfinite(values), values, -np.inf).argmax()]
 
 
+@pytest.mark.slow
 def test_verified_cases_are_those_of_all_rows(here: Path) -> None:
     with ArchiveFile("many.rows.h5") as rows, ArchiveFile("many.summary.h5") as summary:
         one, other = rows.groups[0].verified, summary.groups[0].verified
@@ -144,6 +145,7 @@ def test_verified_cases_are_those_of_all_rows(here: Path) -> None:
     np.testing.assert_array_equal(one.half, other.half)
 
 
+@pytest.mark.slow
 def test_cases_fail_in_these(here: Path) -> None:
     """Else nothing is shown of causes."""
     archives("wild")

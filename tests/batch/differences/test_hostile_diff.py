@@ -99,6 +99,7 @@ def signal(found: Diff, name: str) -> SignalDiff:
 # Verdicts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("last_digits", [False, True])
 def test_the_verdict_names_cases_that_no_tolerance_could_match(
     two: Callable[..., tuple[Path, Path]], last_digits: bool
@@ -124,6 +125,7 @@ def test_the_verdict_names_how_cases_end_and_that_values_differ(two: Callable[..
     )
 
 
+@pytest.mark.slow
 def test_instants_are_compared_to_the_bit(two: Callable[..., tuple[Path, Path]]) -> None:
     def change(file: Any) -> None:
         file["time"][3] *= 1.0 + 1e-13
