@@ -21,7 +21,7 @@ from batch.archive.summarised import CaseSummary
 from batch.queries import requirements
 from batch.queries.requirements import GroupRequirement
 from batch.queries.search_answers import SearchAnswer
-from batch.queries.signals import deck_unit
+from batch.queries.signals import deck_unit, pretty_unit
 from batch.queries.streamed import summed_up
 from met.frozen import frozen
 from met.statistics import confidence as fixed
@@ -200,7 +200,9 @@ def _why_without_confidence(group: ArchiveGroup, coordinates: Sequence[Stored]) 
 
 
 def _shown(variable: Stored, value: float) -> str:
-    return written(value, str(variable.attributes.get("deck_unit", variable.unit)))
+    """A value in the unit of the deck, in the fewest digits that give it again, with the unit typeset."""
+    number, _, unit = written(value, str(variable.attributes.get("deck_unit", variable.unit))).partition(" ")
+    return f"{number} {pretty_unit(unit)}".rstrip()
 
 
 def _judged(each: GroupRequirement, values: np.ndarray, outcomes: np.ndarray, why: str, early: bool) -> dict[str, Any]:
