@@ -2,7 +2,6 @@
 
 import errno
 import os
-import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +17,7 @@ from batch.executors.threads import Threads
 from met.diagnostic import Problem
 from met.plan import file as plan_file
 from tests.batch import plans
-from tests.batch.refusals import refused
+from tests.batch.refusals import fail_for_folders, refused
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -117,18 +116,6 @@ class TestRefusedBeforeAnythingRuns:
             "`rates.record`, take less\n"
             "\n1 error\n"
         )
-
-
-def fail_for_folders(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
-    """Let the system refuse to flush folders, as CIFS, VirtualBox and some file systems of FUSE do."""
-    flush = os.fsync
-
-    def refuse(file: int) -> None:
-        if stat.S_ISDIR(os.fstat(file).st_mode):
-            raise OSError(number, os.strerror(number))
-        flush(file)
-
-    monkeypatch.setattr(os, "fsync", refuse)
 
 
 class TestNaming:

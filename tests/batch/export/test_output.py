@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -19,6 +18,7 @@ from batch.export.output import whole
 from met.diagnostic import Problem
 from tests.batch import plans
 from tests.batch.export.decks import Mcap, said
+from tests.batch.refusals import fail_for_folders
 
 FORMATS = ("mcap", "csv", "parquet")
 
@@ -111,14 +111,7 @@ def test_a_full_disk_is_said_and_leaves_nothing(archive: Path, form: str, monkey
 @pytest.mark.parametrize("number", [errno.EINVAL, errno.EIO])
 def test_an_export_that_has_its_name_is_whole(number: int, here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Some file systems cannot flush a folder; on a disk that fails in it, the file is there nevertheless."""
-    flush = os.fsync
-
-    def refuse(file: int) -> None:
-        if stat.S_ISDIR(os.fstat(file).st_mode):
-            raise OSError(number, os.strerror(number))
-        flush(file)
-
-    monkeypatch.setattr(os, "fsync", refuse)
+    fail_for_folders(monkeypatch, number)
     refused = []
     try:
         with whole(Path("a.csv")) as sink:
