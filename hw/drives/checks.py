@@ -30,7 +30,7 @@ SELDOM = "a few commands that last less than a period, and those that arm what i
 """What another master may do to a drive that is asked what it was told, without being noticed."""
 
 
-class Checks:
+class SetpointChecks:
     """What a drive is asked, and what it should answer.
 
     apart     the largest difference of two values that are the same, besides `SAME`

@@ -16,7 +16,7 @@ import struct
 from collections.abc import Sequence
 
 from hw.drives.bench_file import DriveEntry
-from hw.drives.checks import SELDOM, Checks
+from hw.drives.checks import SELDOM, SetpointChecks
 from hw.drives.drive import CanDrive, DriveFacts, DriveReading, DriveState, Talk
 from hw.drives.frames import CanFrame
 
@@ -99,7 +99,7 @@ class Cia402Drive(CanDrive):
         self._control, self._wanted, self._error = OFF, False, 0
         self._rated = self._step = self._rate_unit = 1.0
         self._mode = TORQUE_MODE
-        self._checks, self._turn = Checks(apart=1.0), 0
+        self._checks, self._turn = SetpointChecks(apart=1.0), 0
         self._objects: dict[str, tuple[tuple[int, int], str]] = {}
         """Objects that are asked for in a run, with what they hold, by their names."""
 

@@ -12,7 +12,7 @@ import math
 from abc import abstractmethod
 
 from hw.drives.bench_file import DriveEntry
-from hw.drives.checks import SELDOM, Checks
+from hw.drives.checks import SELDOM, SetpointChecks
 from hw.drives.drive import ASKS, CanDrive, DriveFacts, DriveState, Talk
 
 IDLE, CLOSED_LOOP = 1, 8
@@ -76,7 +76,7 @@ class OdriveAxis(CanDrive):
         super().__init__(entry)
         self._written: dict[str, float] = {}
         """Properties that were set, with their values, by path."""
-        self._checks = Checks()
+        self._checks = SetpointChecks()
 
     @property
     def _mode(self) -> int:

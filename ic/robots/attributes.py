@@ -45,7 +45,7 @@ class Attribute:
 
 @frozen
 class ElementKind:
-    """What an element holds.
+    """An element of a URDF file as it may be written.
 
     usage       how it is written, for messages
     inside      the elements inside that are read, each at most once, except those of `robot`

@@ -372,7 +372,7 @@ Remark = Callable[[OddBody], tuple[str, list[str]]]
 
 
 def _too_large(odd: OddBody) -> tuple[str, list[str]]:
-    """Of a body with too large an inertia."""
+    """The size that a body with too large an inertia is compared with, and the units that would explain it."""
     helps = [
         f"it would be of {odd.radius / math.sqrt(times):.4g} m, were it in {unit}: "
         f"`{odd.largest:.6g} {unit}` is {odd.largest / times:.4g} kg*m^2"
@@ -383,7 +383,7 @@ def _too_large(odd: OddBody) -> tuple[str, list[str]]:
 
 
 def _too_thin(odd: OddBody) -> tuple[str, list[str]]:
-    """Of a body that is too large for its mass, on an arm that is as large."""
+    """The density of a body too large for its mass, on an arm that is as large, and the units that would explain it."""
     unit, known, least, most = SOLIDS[0]
     helps = [
         f"it would be of {odd.radius * across:.4g} m, {odd.mass * lighter:.4g} kg and {denser:.4g} {unit}, were all "
@@ -395,7 +395,7 @@ def _too_thin(odd: OddBody) -> tuple[str, list[str]]:
 
 
 def _too_small(odd: OddBody) -> tuple[str, list[str]]:
-    """Of a body with next to no inertia."""
+    """The size that a body with next to no inertia is compared with, and the units that would explain it."""
     helps = [
         f"it would be of {odd.radius * math.sqrt(times):.4g} m, were it {odd.largest * times:.4g} kg*m^2: was it "
         f"converted from {unit} twice?"

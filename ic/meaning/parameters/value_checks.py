@@ -36,7 +36,7 @@ def how_to_write(owner: Owner, wanted: Parameter) -> list[str]:
 
 
 def of_a_rate(owner: Owner) -> list[str]:
-    """What help says of a course under a `rate` command that may be taken for another."""
+    """The remedies for a course under a `rate` command that may be taken for another."""
     course = models.find_own("command").get(owner.label.strip("`")) if owner.call and owner.command == "rate" else None
     return [course.of_a_rate] if course is not None and course.of_a_rate else []
 

@@ -10,7 +10,7 @@ import pytest
 from hw.bed import BedState, Fault
 from hw.drives import DIALECTS
 from hw.drives.bench_file import two_drives
-from hw.drives.checks import AGAIN, DOUBTS, TOLD, Checks
+from hw.drives.checks import AGAIN, DOUBTS, TOLD, SetpointChecks
 from hw.drives.frames import CanFrame
 from met.substitution.bed import DriveCommand
 from tests.hw.conftest import refusal
@@ -136,7 +136,7 @@ def test_no_honest_run_is_stopped(tmp_path: Path, dialect: str, told: DriveComma
 
 
 def test_a_command_of_the_last_ones_and_a_setting_as_it_was_are_right() -> None:
-    checks = Checks()
+    checks = SetpointChecks()
     checks.begin(("torque",), {"mode": 1.0})
     for n in range(2 * TOLD):
         checks.tell(0.01 * n)
@@ -146,7 +146,7 @@ def test_a_command_of_the_last_ones_and_a_setting_as_it_was_are_right() -> None:
 
 
 def test_what_is_neither_is_another_s_once_it_is_seen_again_in_time() -> None:
-    checks = Checks()
+    checks = SetpointChecks()
     checks.begin(("torque",), {"mode": 1.0})
     checks.tell(0.1)
     assert [checks.next() for _ in range(9)].count("mode") == 3
@@ -162,7 +162,7 @@ def test_what_is_neither_is_another_s_once_it_is_seen_again_in_time() -> None:
 
 
 def test_the_command_that_goes_with_another_is_0() -> None:
-    checks = Checks()
+    checks = SetpointChecks()
     checks.begin(("rate", "torque"))
     checks.tell(5.0)
     answers = {"rate": 5.0, "torque": 0.0}
