@@ -3,6 +3,7 @@ same bytes whoever ran it, and any of its cases is computed again."""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 from pathlib import Path
@@ -60,16 +61,17 @@ SWEEPS = (
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the deck, and what `archives` makes."""
+    """A folder with the deck and the archives of `many`; and those that `archives` makes later."""
     folder = tmp_path_factory.mktemp("summaries")
     (folder / "d.ic").write_text(DECK, encoding="utf-8")
+    with contextlib.chdir(folder):
+        archives("many")
     return folder
 
 
 @pytest.fixture
 def here(place: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(place)
-    archives("many")
     return place
 
 
@@ -245,6 +247,7 @@ def test_a_case_without_a_row_is_told_with_the_command_that_runs_it(here: Path) 
     assert "runs it again" not in met("show", "many.rows.h5", "--case", "#600").text
 
 
+@pytest.mark.slow
 def test_met_show_says_that_it_is_a_summary(here: Path) -> None:
     archives("wild")
     said = met("show", "wild.summary.h5", "--no-plots").text
