@@ -88,7 +88,7 @@ def plant(path: Path, *, few: bool) -> None:
 
     with h5py.File(path, "r+") as file:
         for dataset in file.values():
-            if isinstance(dataset, h5py.Dataset) and dataset.attrs.get("role") in ("metric", "signal"):
+            if isinstance(dataset, h5py.Dataset) and dataset.attrs.get("role") in (b"metric", b"signal"):
                 count = len(dataset)
                 at = np.linspace(0, count - 1, FEW).astype(int) if few else range(0, count, BLOCK)
                 for first in at:

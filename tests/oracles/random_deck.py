@@ -188,7 +188,7 @@ def random_deck(seed: int, *, friction: bool = True) -> str:
 
 def in_edition_2(text: str, seed: int) -> str:
     """A deck of edition 1 in edition 2, with the same parameters: some of its values have names of units, and some are
-    in units that it declares."""
+    in units that it declares; at least one of each, the first two values that are written so."""
     pick = random.Random(seed)
     behind = {"min", *re.findall(r"[*/(]\s*([A-Za-z]+)", text)}  # units that could be values where they stand
     names = [name for name in units.ALL_UNITS if name.isalpha() and name not in behind]
@@ -197,10 +197,11 @@ def in_edition_2(text: str, seed: int) -> str:
 
     def changed(found: re.Match[str]) -> str:
         number, unit = found["number"], found["unit"]
-        if pick.random() < 0.3 and names:
+        named, declared = pick.random() < 0.3, pick.random() < 0.4
+        if not head or (len(head) > 1 and named and names):
             head.append(f"let {names.pop()} = {number} ({unit});")
             return f"= {head[-1].split()[1]};"
-        if pick.random() < 0.4:
+        if len(head) == 1 or declared:
             head.append(f"unit own_{len(head)} = 1 {unit};")
             return f"= {number} own_{len(head) - 1};"
         return found[0]
