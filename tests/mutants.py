@@ -2,19 +2,20 @@
 
 A mutant is the module with one small change (a comparison turned, a sign, a constant, a condition, a statement left
 out). A seeded sample of them is tried on a copy of the tree, never on the tree itself. Each is given the tests that
-execute the changed line, the cheapest first, until one fails. What survives is printed: a line that can be wrong
-without a test that says so.
+execute the changed line, those of `scripts/test` before those that CI adds and those before the rest, the cheapest
+first, until one fails. What survives is printed, and what only tests outside `scripts/test` notice.
 
     MODULE            a file, such as met/statistics/confidence.py
     --count N         mutants of each module [20]
     --seed N          of the sample [1]
     --tests WORDS     which tests, as pytest's `-m` [those of `scripts/test`]
     --paths PATH ...  in which folders [tests]
-    --cap SECONDS     processor time of tests for each mutant, after which it counts as survived [60]
-    -o FILE           write each mutant as a line of JSON: file, line, change, and the test that killed it, or null
+    --cap SECONDS     processor time of tests of a tier for each mutant, after which the next tier's are tried [60]
+    -o FILE           write each mutant as a line of JSON: file, line, change, the test that noticed it, or null, and
+                      that test's tier (default, ci or release)
 
-First all tests are run once on the unchanged tree, to see which lines they execute and what they cost. Lines that only
-another process executes are not seen, and a line without a test is printed as that.
+First all tests are run once on the unchanged tree, to see which lines they execute and what they cost; those that fail
+there are left out. Lines that only another process executes are not seen, and a line without a test is printed as that.
 """
 
 from __future__ import annotations
@@ -38,6 +39,8 @@ from types import FrameType
 from typing import Any
 
 import pytest
+
+from tests.costs import tier_of
 
 ROOT = Path(__file__).parents[1]
 DEFAULT = "not (slow or release or alone or oracle or compiler or firmware or cluster or browser or node)"
@@ -139,6 +142,8 @@ class Traced:
         self._files = {str(ROOT_OF_RUN / file): file for file in files}
         self._lines: dict[str, set[str]] = defaultdict(set)
         self._costs: dict[str, float] = defaultdict(float)
+        self._tiers: dict[str, str] = {}
+        self._failing: set[str] = set()
         self._out = out
         self._hit: set[str] = set()
 
@@ -157,6 +162,7 @@ class Traced:
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
         function = item.nodeid.partition("[")[0]
         self._hit = self._lines[function]
+        self._tiers[function] = tier_of(mark.name for mark in item.iter_markers())
         before = os.times()
         sys.settrace(self._called)
         try:
@@ -166,9 +172,14 @@ class Traced:
             after = os.times()
             self._costs[function] += sum(after[:4]) - sum(before[:4])
 
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed:
+            self._failing.add(report.nodeid.partition("[")[0])
+
     def pytest_sessionfinish(self) -> None:
-        lines = {function: sorted(hit) for function, hit in self._lines.items() if hit}
-        self._out.write_text(json.dumps({"lines": lines, "costs": self._costs}))
+        sound = {function: hit for function, hit in self._lines.items() if function not in self._failing}
+        lines = {function: sorted(hit) for function, hit in sound.items() if hit}
+        self._out.write_text(json.dumps({"lines": lines, "costs": self._costs, "tiers": self._tiers}))
 
 
 ROOT_OF_RUN = Path(os.environ.get("MET_MUTANTS_ROOT", ROOT))
@@ -194,55 +205,76 @@ def _pytest(tree: Path, words: list[str], surroundings: dict[str, str], cap: flo
     return subprocess.run(command, cwd=tree, env=environment, stdout=quiet, stderr=quiet, preexec_fn=limited).returncode
 
 
-def trace(tree: Path, files: list[str], paths: list[str], marks: str) -> tuple[dict[str, list[str]], dict[str, float]]:
-    """The test functions that execute each line, by `file:line`, and the processor seconds of each function."""
+@dataclass(frozen=True)
+class Known:
+    """What a run of the tests on the unchanged tree has shown of the test functions.
+
+    executing  those that execute a line, by `file:line`
+    costs      processor seconds of each
+    tiers      the tier of each: default, ci or release
+    """
+
+    executing: dict[str, list[str]]
+    costs: dict[str, float]
+    tiers: dict[str, str]
+
+    def groups(self, functions: list[str]) -> Iterator[tuple[str, list[list[str]]]]:
+        """Each tier that has some of these functions, the quickest tier first, and its functions in the order of their
+        costs, so many together that pytest's start does not cost most."""
+        for tier in ("default", "ci", "release"):
+            groups: list[list[str]] = []
+            of_tier = [each for each in functions if self.tiers[each] == tier]
+            for function in sorted(of_tier, key=self.costs.__getitem__):
+                if not groups or len(groups[-1]) == 100 or sum(self.costs[each] for each in groups[-1]) > 3.0:
+                    groups.append([])
+                groups[-1].append(function)
+            if groups:
+                yield tier, groups
+
+
+def trace(tree: Path, files: list[str], paths: list[str], marks: str) -> Known:
+    """Run the tests on the unchanged tree, to know what they execute of some files and what they cost."""
     with tempfile.TemporaryDirectory() as out:
         words = ["-p", "tests.mutants", "-n", str(os.cpu_count() or 1), "-m", marks, *paths]
         known = {"MET_MUTANTS_FILES": ":".join(files), "MET_MUTANTS_OUT": out, "MET_MUTANTS_ROOT": str(tree)}
         _pytest(tree, words, known)
-        executing, costs = defaultdict(set), defaultdict(float)
+        executing: dict[str, list[str]] = defaultdict(list)
+        costs: dict[str, float] = defaultdict(float)
+        tiers: dict[str, str] = {}
         for part in Path(out).glob("*.json"):
             table = json.loads(part.read_text())
             for function, lines in table["lines"].items():
                 for line in lines:
-                    executing[line].add(function)
+                    executing[line].append(function)
             for function, seconds in table["costs"].items():
                 costs[function] += seconds
-    return {line: sorted(names, key=lambda each: costs[each]) for line, names in executing.items()}, dict(costs)
+            tiers.update(table["tiers"])
+        return Known({line: sorted(set(functions)) for line, functions in executing.items()}, dict(costs), tiers)
 
 
 # trying them
 
 
-def tried(tree: Path, mutant: Mutant, functions: list[str], costs: dict[str, float], cap: float) -> str | None:
-    """The cheapest of the test functions that notices a mutant; None where none does within the cap."""
+def tried(tree: Path, mutant: Mutant, known: Known, cap: float) -> tuple[str, str] | None:
+    """The tier and the name of the cheapest test function that notices a mutant; None where none does within the
+    cap."""
     path = tree / mutant.file
     kept = path.read_bytes()
     path.write_text(mutant.text, encoding="utf-8")
     try:
-        spent = 0.0
-        for group in _groups(functions, costs):
-            if spent > cap:
-                return None
-            seconds = 10.0 + 10.0 * sum(costs[each] for each in group)  # a mutant that never ends is noticed too
-            if _pytest(tree, ["-x", *group], {}, seconds) not in (0, 5):
-                return group[0] if len(group) == 1 else f"one of {len(group)}, {group[0]} ... {group[-1]}"
-            spent += sum(costs[each] for each in group)
+        for tier, groups in known.groups(known.executing.get(f"{mutant.file}:{mutant.line}", [])):
+            spent = 0.0
+            for group in groups:
+                if spent > cap:
+                    break
+                cost = sum(known.costs[each] for each in group)
+                # A mutant that never ends is noticed too.
+                if _pytest(tree, ["-x", *group], {}, 10.0 + 10.0 * cost) not in (0, 5):
+                    return tier, group[0] if len(group) == 1 else f"one of {len(group)}, {group[0]} ... {group[-1]}"
+                spent += cost
         return None
     finally:
         path.write_bytes(kept)
-
-
-def _groups(functions: list[str], costs: dict[str, float]) -> Iterator[list[str]]:
-    """Functions in the order of their costs, so many together that pytest's start does not cost most."""
-    group: list[str] = []
-    for function in functions:
-        group.append(function)
-        if sum(costs[each] for each in group) > 3.0 or len(group) == 100:
-            yield group
-            group = []
-    if group:
-        yield group
 
 
 def main() -> int:
@@ -258,21 +290,23 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="met-mutants-") as folder:
         tree = Path(folder, "tree")
         shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".git", ".venv", "build", "__pycache__"))
-        executing, costs = trace(tree, asked.modules, asked.paths, asked.tests)
-        print(f"{len(costs)} test functions, {sum(costs.values()):.0f} s of processor time while traced", flush=True)
-        counts = defaultdict(int)
+        known = trace(tree, asked.modules, asked.paths, asked.tests)
+        seconds = sum(known.costs.values())
+        print(f"{len(known.costs)} test functions, {seconds:.0f} s of processor time while traced", flush=True)
+        counts: dict[str, int] = defaultdict(int)
         for file in asked.modules:
             every = mutants(file, (ROOT / file).read_text(encoding="utf-8"))
             sample = random.Random(f"{asked.seed}/{file}").sample(every, min(asked.count, len(every)))
             for mutant in sorted(sample, key=lambda each: each.line):
-                functions = executing.get(f"{file}:{mutant.line}", [])
-                killer = tried(tree, mutant, functions, costs, asked.cap)
-                how = "killed" if killer else "survived" if functions else "no test"
+                killer = tried(tree, mutant, known, asked.cap)
+                tier, test = killer or (None, None)
+                executed = f"{file}:{mutant.line}" in known.executing
+                how = f"noticed by {tier}" if tier else "survived" if executed else "no test"
                 counts[how] += 1
-                if killer is None:
-                    print(f"{how:9} {file}:{mutant.line}: {mutant.change}", flush=True)
+                if tier != "default":
+                    print(f"{how:18} {file}:{mutant.line}: {mutant.change} {test or ''}".rstrip(), flush=True)
                 if asked.output is not None:
-                    entry = {"file": file, "line": mutant.line, "change": mutant.change, "killer": killer, "how": how}
+                    entry = {"file": file, "line": mutant.line, "change": mutant.change, "test": test, "tier": tier}
                     with asked.output.open("a", encoding="utf-8") as out:
                         out.write(json.dumps(entry) + "\n")
         print(", ".join(f"{number} {how}" for how, number in sorted(counts.items())))
