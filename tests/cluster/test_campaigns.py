@@ -121,6 +121,7 @@ def test_words_for_sbatch_are_passed_on_and_its_refusal_is_told(
     assert "error[E358]: sbatch refuses the job: " in said and "partition" in said
 
 
+@pytest.mark.release
 def test_dask_workers_that_slurm_started_give_the_same_bytes(
     slurm: Slurm, tmp_path: Path, campaign: tuple[Path, bytes]
 ) -> None:

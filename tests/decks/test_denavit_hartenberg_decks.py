@@ -69,7 +69,7 @@ def test_the_decks_run_meets_its_requirements(deck: str) -> None:
     assert result.status.tolist() == [0] and (np.array(list(result.met.values())) == 1).all()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_standard_decks_can_be_included_together(tmp_path: Path) -> None:
     together = tmp_path / "all.ic"
     together.write_text("".join(f"#include <{each}>\n" for each in standard_decks()), encoding="utf-8")

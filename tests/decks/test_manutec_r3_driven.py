@@ -68,7 +68,7 @@ def test_the_published_trajectory_is_met_as_the_page_says(found: dict[str, np.nd
     assert largest(found) == as_the_page_says("20 kHz", "whole robot")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("rate", ["50 kHz", "100 kHz", "200 kHz", "400 kHz"])
 def test_with_shorter_steps_it_is_met_as_the_page_says(rate: str, tmp_path: Path) -> None:
     """At 200 kHz and more what is left is near the tolerance of the publication, 1e-6."""

@@ -114,7 +114,7 @@ def test_motors_and_gearboxes_take_the_arm_to_where_ideal_joints_do(arm: str) ->
     np.testing.assert_allclose(driven, ideal, atol=0.05 * DEG)  # what friction leaves
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("arm", "largest"), [("shuttle", 28.0), ("station", 120.0)])
 def test_a_heavier_payload_takes_more_until_the_motors_are_at_their_limit(arm: str, largest: float) -> None:
     (sweep,) = ic.compile(f"{arm}_arm.ic", select=[f"{arm}_arm_payloads"]).experiments
@@ -239,7 +239,7 @@ def test_the_joints_of_the_r3_keep_step_below_the_librarys_limits() -> None:
     assert np.abs(qd[:, 4]).max() > 3.1
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("deck", [
     "ets_vii.ic ets_vii_afloat", "shuttle_arm.ic shuttle_arm_afloat", "station_arm.ic station_arm_afloat",
 ])  # fmt: skip

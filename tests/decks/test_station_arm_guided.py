@@ -41,7 +41,7 @@ def lines() -> tuple[Run, list[tuple[str, float]]]:
     return engine.run(made), list(zip(starts, damping.tolist(), strict=True))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("case", FIGURES)
 def test_the_figures_of_the_page(case: tuple[str, float]) -> None:
     run, cases = lines()

@@ -186,7 +186,7 @@ def judged(kind: str, lock_step: bool, exchanges: int, folder: Path, of: str) ->
         assert found["deadman"] >= 1
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("lock_step", [True, False], ids=["lock-step", "free"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_line_with_faults(kind: str, lock_step: bool, tmp_path: Path) -> None:

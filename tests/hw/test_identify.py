@@ -185,6 +185,7 @@ def test_each_group_of_moves_has_all_kinds() -> None:
     assert all({move.name for move, group in zip(moves, its, strict=True) if group == one} == kinds for one in set(its))
 
 
+@pytest.mark.release
 def test_moves_keep_within_their_peaks_and_slews_and_end_at_rest(tmp_path: Path) -> None:
     _, _, told = moved(experiment(tmp_path, hidden(1), "typical"), 1)
     volts, amperes, rates = np.array(told).T
@@ -239,6 +240,7 @@ def test_drive_current_that_is_measured_gives_the_load_motors_constant_too(tmp_p
     assert outside(found, truth) == []
 
 
+@pytest.mark.release
 def test_friction_and_back_emf_are_not_told_apart_where_the_drive_never_reaches_its_limit(tmp_path: Path) -> None:
     truth = {**SHEET, "kt": 0.065, "f_c": 0.018}
     what, its, _ = moved(experiment(tmp_path, truth, "none"), 1, voltage=4.0)

@@ -60,7 +60,7 @@ def stepped(experiment: Experiment, bed: BedDriver) -> list[tuple[float, float, 
 SCALED = "shoulder { scale { torque = 4;  rate = 1.5;  voltage = 2; } }"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("duration", "scale"), [(2, ""), pytest.param(20, "", marks=pytest.mark.slow), (2, SCALED)])
 def test_a_run_is_the_same_to_the_bit_inside_the_kernel_in_process_and_over_a_line(
     tmp_path: Path, duration: int, scale: str

@@ -103,7 +103,7 @@ SOUND = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("wrong", "codes"), [
     ({"integrator": "rk5", "metric": "mux"}, ["D140", "D140"]),
     ({"integrator": "rk5", "channel": "elbw.qd"}, ["D125", "D140"]),

@@ -87,6 +87,7 @@ def same_bits(
     return rows, outputs
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("cpu", "lanes", "level"), [("generic", 4, None), ("neoverse-n1", 8, 3), ("generic", 2, 0)])
 @pytest.mark.parametrize(("deck", "name"), [("two_link.ic", "gains"), ("panda.ic", "swing")])
 def test_a_whole_run_with_friction_has_the_same_bits(

@@ -201,7 +201,7 @@ def test_a_file_that_cannot_be_read_is_the_users_to_mend_not_a_defect(
     assert capsys.readouterr().err == "error[E338]: `/no/such/file`: No such file or directory\n\n1 error\n"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("closed", ["stdout", "stderr"])
 def test_a_stream_that_the_shell_has_closed_is_no_defect(closed: str) -> None:
     program = f"import sys; sys.{closed} = None; from met.cli import main; sys.exit(main(['check', 'two_link.ic']))"

@@ -32,7 +32,7 @@ def ran(folder: Path, servo: str, environment: str, when: str) -> Run:
     return engine.run(experiment(folder, *deck))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("servo", "environment"), [
     (LOCKED, ""),
     (IDEAL.replace("COMMAND", "rate(step(to = 0.2 rad/s, at = WHEN))"), ""),

@@ -384,7 +384,7 @@ def test_the_compiler_fuses_nothing_by_itself():
         assert kernel.compile(program, level=level).run(x, 0)[1].tolist() == [[0.1 * 0.1, 0.0]]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_long_section_cut_into_pieces_has_the_same_bits():
     from met.backends.llvm import machine as llvm
     from met.backends.llvm.emit import emit
@@ -656,7 +656,7 @@ def _write_many(_):
     return [outcome(answer(float(i)))[0] for i in range(5)]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_many_processes_may_share_a_cache(empty_cache):
     with multiprocessing.get_context("spawn").Pool(4) as pool:
         assert pool.map(_write_many, range(8)) == [[1.0 + i for i in range(5)]] * 8

@@ -65,7 +65,7 @@ def test_without_servo_and_friction_energy_is_conserved():
     assert abs(without[1] / without[0] - 1.0) > 1e-3  # and so the law is not empty
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_two_tolerances_agree_so_the_digits_have_converged():
     times = np.linspace(0.0, 4.0, 41)
     drive = {"command": sine_rate(0.03, 0.5), "servo_hz": 100.0, "friction": True}
@@ -87,7 +87,7 @@ def test_a_motion_started_from_a_later_servo_tick_is_the_same_motion():
     np.testing.assert_allclose(second.qd[-1], whole.qd[-1], rtol=1e-11)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_reversing_command_makes_joints_stick_and_release():
     motion = reference(np.linspace(0.0, 6.0, 601), command=sine_rate(0.03, 0.5), servo_hz=100.0)
     for joint in (0, 1):
@@ -126,7 +126,7 @@ def test_a_stuck_joint_breaks_away_between_ticks_where_its_need_reaches_friction
     np.testing.assert_allclose(abs(just_before.tau[0, 1]), motor.ratio * motor.f_c, rtol=1e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_steady_rate_takes_the_voltage_of_back_emf_and_friction():
     motion = reference(np.array([0.0, 20.0]), command=rate(0.03), servo_hz=25.0)
     w = 1570.0 * 0.03

@@ -57,7 +57,7 @@ def ran(experiment: Experiment, of: kernel.LlvmKernel, cases: np.ndarray | None 
     return rows
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("lanes", [4, pytest.param(2, marks=slow), pytest.param(16, marks=slow)])
 def test_bits_of_hybrid_cases_do_not_depend_on_lanes(
     recorded: tuple[Experiment, Recording, np.ndarray], lanes: int
@@ -99,7 +99,7 @@ def test_a_bed_without_numbers_ends_its_case_only(recorded: tuple[Experiment, Re
         print(f"{path}: {run.cause[9][:60]} ... after {run.n_valid[9]} rows of {columns}")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("cases", "duration"), [([8], 0.05), ([1, 19], 0.25)])
 def test_the_kernel_computes_what_the_plain_run_does(cases: list[int], duration: float) -> None:
     """All faults but converters, which would take the last bit of a sum for a whole step.
@@ -130,7 +130,7 @@ def still(seed: int, gain: str) -> engine.Run:
     return engine.run(compiled(text, "bench"))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_noise_is_the_same_whatever_the_gain_and_another_for_each_joint_and_seed() -> None:
     """A noise of 0.1 rad/s behind the filter: 50 Hz of the 500 Hz that there are leave about a third of it."""
     run = still(7, "[0.01, 0.02]")

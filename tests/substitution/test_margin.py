@@ -60,7 +60,7 @@ def _margin(servo: str, law: str = "velocity_tracking", bed: str = "emulated") -
     return found[0][0], "\n".join(margin_lines(experiment, found))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("gain", [1.0, 10.0, 30.0])
 def test_under_a_position_command_the_limit_is_that_of_the_position_loop(gain: float) -> None:
     """J s^3 + (D + K kp) s^2 + K (ki + kp k) s + K ki k is stable where (D + K kp)(ki + kp k) > J ki k.

@@ -12,7 +12,7 @@ KT = 0.061  # N m/A, table 1
 RANGE = [*R, *np.geomspace(0.1, 18.0, 12).tolist()]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("share", "command"), [
     (0.93, "slow"), (1.07, REVERSING),
     pytest.param(0.93, REVERSING, marks=pytest.mark.slow), pytest.param(1.07, "slow", marks=pytest.mark.slow),

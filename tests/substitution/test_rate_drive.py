@@ -55,7 +55,7 @@ def rates(bed: str, law: str = "velocity_tracking", more: str = "") -> np.ndarra
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_with_the_deck_s_own_loop_it_is_the_run_in_software() -> None:
     plain = software()
     assert off(rates("rate_drive()"), plain) < 1e-4
@@ -63,7 +63,7 @@ def test_with_the_deck_s_own_loop_it_is_the_run_in_software() -> None:
     assert off(rates("emulated(delay = 1)"), plain) > 1e-3  # whose servo sees the shaft through a filter
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("kp", "ki", "drift", "most"), [(1.2, 1.0, "1e-5", 0.15), (1.0, 1.28, "1e-5", 0.06), (5.0, 8.0, "1e-3", 0.05)]
 )
@@ -166,7 +166,7 @@ def turner(folder: Path, law: str, loads: list[float]) -> Experiment:
     return torque_drive.turner(folder, law, loads, "rate_drive(delay = 1, kp = 0.03 V*s/rad)")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("law", ["measured_acceleration", "velocity_tracking"])
 def test_a_pole_of_the_whole_program_leaves_the_unit_circle_at_the_limit_of_its_margin(
     law: str, tmp_path: Path
@@ -223,7 +223,7 @@ def test_the_work_of_its_motors_is_what_shaft_and_friction_take() -> None:
     assert abs(left) < 0.01 * np.trapezoid(np.abs(found.drive[0] * w), found.time)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     "backend", ["reference", *(pytest.param(name, marks=pytest.mark.slow) for name in ("c", "wasm"))]
 )

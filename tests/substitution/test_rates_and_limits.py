@@ -29,7 +29,7 @@ def test_a_loop_that_is_up_to_three_ticks_late_stays_within_the_limits_at_1_khz(
         worst.below(limit)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("servos", "dynamics", "base"), [
     (1000.0, 100.0, None),
     (100.0, 1000.0, None),

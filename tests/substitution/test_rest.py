@@ -20,7 +20,7 @@ def ran_both(law: str, command: str, duration: float) -> tuple[np.ndarray, np.nd
     return own.signals["qd"][0, :, 0], shaft(ran(text, "bench"), "shoulder")[0]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("law", ["velocity_tracking", pytest.param("torque_balance_observer", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("command", "duration"), [("slow", 5.0), (REVERSING, 5.0), (LONG, 12.0)])
 def test_a_heavy_arm_breaks_away_and_turns_back_as_on_its_own_motor(law: str, command: str, duration: float) -> None:
@@ -65,7 +65,7 @@ HANGING = (
 )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("command", "limit"), [("slow", 0.5), (REVERSING, 0.6), ("0 rad/s", 0.5)])
 def test_a_rod_that_is_pulled_down_holds_or_gives_way_as_on_its_own_motor(command: str, limit: float) -> None:
     """Friction holds 32 N m. With 20 N m a rod at rest stays there exactly, with 40 N m it turns its motor back."""

@@ -89,7 +89,7 @@ def apart(deck: str) -> float:
 LAWS = ["velocity_tracking", "torque_balance_observer", "torque_balance", "bare", "measured_acceleration"]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("law", LAWS)
 def test_an_exact_model_of_the_motor_makes_the_same_run_but_for_rounding(law: str) -> None:
     assert apart(text(SCALES, law=law)) < 1e-11
@@ -184,7 +184,7 @@ def test_a_scaled_bed_is_unstable_where_its_margin_says_so() -> None:
         assert not np.isfinite(rates).all() or np.abs(rates).max() > 0.06, "twice what it is commanded"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     "backend", ["reference", pytest.param("c", marks=pytest.mark.slow), pytest.param("wasm", marks=pytest.mark.slow)]
 )

@@ -157,7 +157,7 @@ def test_no_other_law_grows_however_heavy_the_arm(
     assert [each[0].limit for each in margins(compiled(text, "bench"), first_of_each)] == [None] * len(found)
 
 
-@slow
+@pytest.mark.release
 @pytest.mark.parametrize("rate", [100, 1000])
 def test_the_gain_of_velocity_tracking_has_the_limit_that_the_margin_says(rate: int) -> None:
     """With a delay: without one there is none up to 1.6. r = 5; it hardly matters."""
@@ -228,7 +228,7 @@ def test_a_servo_with_much_gain_grows_below_one_r_and_above_another_as_the_margi
     assert all(one.limit == pytest.approx(4.01, rel=0.01) for one in told)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_joints_together_grow_where_the_least_r_of_all_their_motions_is_too_small() -> None:
     """Each joint by itself would not: the lighter of the two is at twice the r that its servo needs.
 

@@ -56,7 +56,7 @@ def apart(deck: str, other: str) -> float:
     return float(np.sqrt(np.mean((rates[0] - rates[1]) ** 2)) / SLOW)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("law", LAWS)
 def test_a_perfect_drive_makes_the_run_of_a_motor_told_a_voltage(law: str) -> None:
     """It is no further from the run in software. The voltage's torque changes in a tick by back-EMF, of which the drive
@@ -132,7 +132,7 @@ def turner(
     return with_loads(made, loads)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("law", ["measured_acceleration", "velocity_tracking"])
 def test_a_pole_of_the_whole_program_leaves_the_unit_circle_at_the_limit_of_its_margin(
     law: str, tmp_path: Path

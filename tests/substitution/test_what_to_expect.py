@@ -36,7 +36,7 @@ def test_the_arms_are_as_heavy_as_the_table_says() -> None:
     worst.below(1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("law", "rates", "command", "to", "limit"), [
     ("velocity_tracking", "1 kHz", "slow", 5.0, 0.3),
     ("velocity_tracking", "1 kHz", "slow", 20.0, 0.5),

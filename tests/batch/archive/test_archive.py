@@ -161,7 +161,7 @@ def test_the_unit_a_requirement_is_written_in(text: str, unit: str, written: tup
     assert limits.written_unit(text, unit) == written
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("engine_name", ENGINES)
 def test_several_experiments_are_groups_of_a_tree(here: Path, engine_name: str) -> None:
     import xarray
@@ -173,7 +173,7 @@ def test_several_experiments_are_groups_of_a_tree(here: Path, engine_name: str) 
         assert tree["nominal"].attrs["structure_key"] != ""
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_open_gives_a_dataset_or_a_tree(here: Path) -> None:
     import xarray
 
@@ -480,7 +480,7 @@ def damaged(change: Any, *experiments: Any) -> str:
     return "; ".join(f"{d.code}: {d.message}" for d in caught.value.diagnostics)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -589,7 +589,7 @@ print("done")
     assert said.returncode < 0 or said.stdout == "done\n", said.stderr  # a signal is HDF5's own end
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_may_be_written_over_is_seen_without_hdf5(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import h5py
 

@@ -40,7 +40,7 @@ def beside(*words: str) -> object:
     return json.loads(Path("a.h5.run.json").read_text())["beds"]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_beds_stand_beside_the_archive(here: Path) -> None:
     [found] = beside("wired", "--port", "firmware")  # type: ignore[misc]
     timing, beds = found.pop("timing"), found.pop("beds")
@@ -51,7 +51,7 @@ def test_beds_stand_beside_the_archive(here: Path) -> None:
     assert 0.0 < timing["trip"]["median"] <= timing["trip"]["p99"] <= timing["trip"]["largest"] < 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_beds_in_lock_step_have_no_timing(here: Path) -> None:
     assert beside("wired", "--port", "emulated") == [
         {

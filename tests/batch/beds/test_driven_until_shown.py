@@ -30,7 +30,7 @@ sweep few of brief {
 """
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_each_case_is_looked_at_before_the_next_is_driven(
     met_bed: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

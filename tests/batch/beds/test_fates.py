@@ -31,6 +31,7 @@ def run(met_bed: Met, port: str, *words: str) -> tuple[int, str, str]:
     return met_bed("run", "deck.ic", "wired", "--port", port, "-o", "a.h5", "--no-picture", *words)
 
 
+@pytest.mark.release
 def test_a_case_whose_bed_did_not_arm_is_driven_the_next_time(met_bed: Met, on_pty: Callable[..., str]) -> None:
     device = Device(limits=LIMITS)
     device.state, device.faults = STOPPED, DEAD
@@ -152,6 +153,7 @@ def test_a_sweep_ends_where_a_bed_stopped_itself_and_goes_on_once_it_is_cleared(
     assert [str(cause) for cause in batch.open("a.h5").cause.values if "the bed stopped itself: rate" in cause][2:]
 
 
+@pytest.mark.release
 def test_a_sweep_that_clears_goes_on_by_itself(met_bed: Met, on_pty: Callable[..., str]) -> None:
     device = Device(limits=(60.0, 3.0, 20.0, 5.0, 2e5, 1e4, 1e9))
     status, said, _ = sweep(met_bed, on_pty(device), "--clear")
@@ -160,6 +162,7 @@ def test_a_sweep_that_clears_goes_on_by_itself(met_bed: Met, on_pty: Callable[..
     assert (device.voltage, device.current) == (0.0, 0.0)
 
 
+@pytest.mark.release
 def test_what_was_measured_is_not_written_over(met_bed: Met) -> None:
     Path("deck.ic").write_text(SWEEP)
     words = ("run", "deck.ic", "tuning", "--port", "emulated", "-o", "a.h5", "--no-picture")
@@ -186,6 +189,7 @@ def test_a_transcript_of_another_run_is_refused_and_then_the_right_one_is_replay
     assert batch.open("b.h5").q.values.tobytes() == batch.open("a.h5").q.values[:1].tobytes()
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 def test_a_transcript_that_was_broken_off_is_replayed_to_where_it_ends(met_bed: Met) -> None:
     Path("kept").mkdir()
@@ -199,6 +203,7 @@ def test_a_transcript_that_was_broken_off_is_replayed_to_where_it_ends(met_bed: 
     assert 10 < rows < 100 and part.q.values[0, :rows].tobytes() == whole.q.values[0, :rows].tobytes()
 
 
+@pytest.mark.release
 def test_cases_that_were_driven_elsewhere_are_not_taken_for_driven_here(
     met_bed: Met, monkeypatch: pytest.MonkeyPatch
 ) -> None:

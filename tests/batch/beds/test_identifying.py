@@ -100,6 +100,7 @@ def test_the_deck_that_is_written_holds_the_truth_and_can_be_included(
     assert len(records.read(here / "shoulder.identified.records").rows) > 40_000
 
 
+@pytest.mark.release
 def test_a_scaled_bed_is_identified_as_it_is_and_its_deck_has_both_sizes(
     identify: Callable[..., tuple[int, str, str]], here: Path
 ) -> None:

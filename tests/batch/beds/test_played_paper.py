@@ -66,7 +66,7 @@ def test_figures_7_and_8_with_drives_that_close_the_rate_loop(dialect: str, gain
         assert paper.apart(there, believed)[0] > 3.0 * off[0]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_load_that_gives_nothing_is_far_from_all_of_that(tmp_path: Path) -> None:
     """Else the figures above could not fail: the arm is 1.4 times the rotor."""
     bed = paper.bench("odrive", "torques", tmp_path)

@@ -72,7 +72,7 @@ def test_a_sweep_in_lock_step_has_the_bits_of_the_simulation(
     assert not Path("bench.h5.campaign").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_slow_servo_is_repeated_on_the_wire(bed: Callable[..., tuple[int, str, str]]) -> None:
     assert bed("slow", "--port", "emulated", "-o", "slow.h5")[0] == cli.YES
     batch.run(ic.compile("deck.ic", select=["slow"]), output="sim.h5")
@@ -81,7 +81,7 @@ def test_a_slow_servo_is_repeated_on_the_wire(bed: Callable[..., tuple[int, str,
     assert np.abs(one - other).max() < 2e-3 * np.abs(other).max()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_it_is_not_driven_again_unless_it_is_asked_for(bed: Callable[..., tuple[int, str, str]]) -> None:
     assert bed("wired", "--port", "emulated", "-o", "a.h5")[0] == cli.YES
     before = Path("a.h5").stat().st_mtime_ns
@@ -93,6 +93,7 @@ def test_it_is_not_driven_again_unless_it_is_asked_for(bed: Callable[..., tuple[
     assert bed("wired", "--port", "emulated", "-o", "a.h5", "--fresh")[0] == cli.YES
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 def test_a_transcript_is_replayed_to_the_same_bits(bed: Callable[..., tuple[int, str, str]], here: Path) -> None:
     (here / "kept").mkdir()
@@ -103,7 +104,7 @@ def test_a_transcript_is_replayed_to_the_same_bits(bed: Callable[..., tuple[int,
     assert batch.diff("a.h5", "b.h5").verdict == "identical"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -231,7 +232,7 @@ def test_of_a_sweep_the_least_margin_is_said_once_a_joint_and_of_which_case(here
     assert some[0].endswith(" (case #2, the least margin of 2 cases)")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_killed_midway_everything_up_to_then_is_in_the_archive(here: Path) -> None:
     """SIGKILL of the process that drives the bed, and of who started it."""
     text = DECK.replace("duration = 1 s;\n    record ", "duration = 300 s;\n    record ")

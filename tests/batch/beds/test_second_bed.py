@@ -66,7 +66,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
     models.available.cache_clear()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.usefixtures("installed")
 def test_a_second_bed_model_at_a_port_is_its_simulation_to_the_counts_of_the_wire(
     met_bed: Callable[..., tuple[int, str, str]],
@@ -100,7 +100,7 @@ def test_a_port_that_reads_more_of_a_model_than_it_declares_is_refused_at_the_de
         assert met_bed(command, "deck.ic", "wired", "--port", "firmware")[0] == cli.BAD_INPUT
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.usefixtures("installed")
 def test_a_second_driver_is_probed_without_a_deck_and_run_with_one(
     met_bed: Callable[..., tuple[int, str, str]],

@@ -201,7 +201,7 @@ def test_the_rotors_of_both_parts_are_on_the_shaft(pushed: ShaftWork) -> None:
         assert check.asked == pytest.approx(1.5 * abs(rotors - 1e-4 - 0.3 / 2500.0) * 50.0 * 2.0 / 0.55, rel=3e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_a_data_sheet_leaves_out_is_no_fit(met_bed: Bed, here: Path) -> None:
     bare = '[[motor]]\nname = "bare"\nsource = "a sticker"\ntorque_rated = "1 N*m"\nrate_max = "9000 rpm"\n'
     (here / "mine.toml").write_text(bare, encoding="utf-8")
@@ -287,7 +287,7 @@ def test_a_joint_that_no_bed_could_take_is_told(met_bed: Bed, here: Path, run: s
     assert f"error[E440]: the servo of joint `swing` {message}" in err
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_of_several_joints_on_beds_one_is_named(met_bed: Bed, here: Path) -> None:
     deck = """#include <two_link.ic>
 run both like nominal { duration = 0.2 s;  substitute shoulder { }  substitute elbow { } }

@@ -281,7 +281,7 @@ class TestInThisProcess:
             assert client.scheduler.address.startswith("inproc://") and client.submit(abs, -1).result() == 1
             assert listening() == before
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_the_same_bytes_as_with_threads(self, here: Path) -> None:
         plan = plans.plan(plans.nominal(), plans.gains(100))
         expected = batch.run(plan, output="t.h5", threads=1).path.read_bytes()
@@ -291,7 +291,7 @@ class TestInThisProcess:
         assert '"workers": "Dask, 2 workers"' in Path("a.h5.run.json").read_text()
         assert not whole.workers(os.getpid())
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_a_client_that_the_user_made_stays_open_and_nothing_of_ours_on_its_workers(self, here: Path) -> None:
         with cluster(here, workers=1, threads=2) as started, Client(started, set_as_default=False) as client:
             (worker,) = (each for each in started.workers.values())
@@ -349,7 +349,7 @@ class TestInThisProcess:
             asyncio.run(dask_worker.WorkerChildren.on(worker, order))
         assert not [name for name in worker.plugins if "met" in name]
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_children_that_get_nothing_to_do_go_home(
         self, many: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:

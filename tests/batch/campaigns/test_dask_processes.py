@@ -84,6 +84,7 @@ def part_done(archive: Path) -> bool:
     return whole.done(archive, CASES) >= CASES / 3
 
 
+@pytest.mark.release
 def test_on_this_machine_the_same_bytes_as_on_threads(archive: Path, undisturbed: bytes) -> None:
     done = whole.met(words(archive), archive.parent, whole.SHORT_TASKS)
     assert (done.returncode, done.stderr) == (0, "")
@@ -94,6 +95,7 @@ def test_on_this_machine_the_same_bytes_as_on_threads(archive: Path, undisturbed
     assert workers in archive.with_name("a.h5.run.json").read_text()
 
 
+@pytest.mark.release
 def test_a_local_child_that_is_killed_costs_nothing(archive: Path, undisturbed: bytes) -> None:
     with whole.started(words(archive), archive.parent, whole.SHORT_TASKS) as driver:
         whole.until(lambda: part_done(archive) and whole.workers(driver.pid), driver)
@@ -124,6 +126,7 @@ def test_workers_may_come_and_go(archive: Path, undisturbed: bytes, tmp_path: Pa
     assert '"workers": "Dask, 2 workers"' in archive.with_name("a.h5.run.json").read_text()
 
 
+@pytest.mark.release
 def test_where_the_scheduler_is_lost_what_is_done_is_kept(
     archive: Path, undisturbed: bytes, tmp_path: Path, scheduler: subprocess.Popen[bytes]
 ) -> None:
@@ -166,6 +169,7 @@ def test_whatever_ends_the_driver_ends_its_cluster(archive: Path, name: str) -> 
         assert said == f"\n{kept}; the same command goes on\n\nmet: {last}\n"
 
 
+@pytest.mark.release
 @pytest.mark.usefixtures("scheduler")
 def test_a_driver_that_is_killed_leaves_nothing_on_the_workers_of_others(archive: Path, tmp_path: Path) -> None:
     with worker(tmp_path) as theirs:
@@ -178,6 +182,7 @@ def test_a_driver_that_is_killed_leaves_nothing_on_the_workers_of_others(archive
         assert (done.returncode, done.stderr, theirs.poll()) == (0, "", None)
 
 
+@pytest.mark.release
 def test_a_script_needs_no_guard_for_it_is_not_run_again(tmp_path: Path) -> None:
     plan_file.write(plans.plan(plans.gains(9)), tmp_path / "p.json")
     text = 'import batch\nbatch.run("p.json", output="a.h5", dask="local")\nprint("once")\n'

@@ -191,6 +191,7 @@ class TestTenThousandCases:
             [*POISONED, *DIVERGE]
         )
 
+    @pytest.mark.release
     @pytest.mark.parametrize("row", [1235, 99])
     def test_a_case_is_run_again_with_the_same_bits(
         self, ran: tuple[Path, int, str], undisturbed: Path, here: Path, row: int
@@ -333,6 +334,7 @@ class TestWorkers:
         assert [f.cases for f in archive.summaries[0].failures] == [(0, 1, 2, 3)]
         assert np.isnan(values(archive.path)["qd"]).all()
 
+    @pytest.mark.release
     def test_a_lost_case_may_be_run_again_for_its_history(self, here: Path) -> None:
         archive = batch.run(
             plans.plan(plans.gains(40)), output="a.h5", executor=Poisoned(row_7="SIGKILL"), histories="failed"
@@ -340,6 +342,7 @@ class TestWorkers:
         assert values(archive.path, ("recorded_case",))["recorded_case"].tolist() == [7]
         assert np.isnan(values(archive.path, ("qd",))["qd"]).all()
 
+    @pytest.mark.release
     def test_a_case_that_was_lost_and_then_is_not(self, here: Path) -> None:
         poison = Poisoned(row_7="SIGKILL", section=0)
         archive = batch.run(plans.plan(plans.gains(40)), output="a.h5", executor=poison, histories="failed")
@@ -350,6 +353,7 @@ class TestWorkers:
         archive = batch.run(plans.plan(plans.gains(4)), output="a.h5", executor=Poisoned(timeout=0.5, fsync=1.0))
         assert archive.summaries[0].failed == 0
 
+    @pytest.mark.release
     @pytest.mark.usefixtures("kept")
     def test_a_disk_that_is_full_for_a_worker(self, here: Path) -> None:
         plan, path = small(here), here / "a.h5"

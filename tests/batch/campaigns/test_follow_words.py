@@ -117,7 +117,7 @@ def test_a_rate_that_is_not_come_to_within_the_run_is_told(tmp_path: Path) -> No
     assert " rad/s off, of 0.5 rad/s that it is told, and `j.servo.tau_max`" in found.message
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     "name", ["move", "sagging", "on_its_way", "late", "swinging", "pushed", "let_go", "fastest", "soft"]
 )

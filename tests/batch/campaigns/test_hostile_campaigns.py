@@ -90,7 +90,7 @@ class Losing(whole.Watched):
 # What is lost
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_case_of_a_sweep_of_structures_does_not_take_its_sweeps_place(here: Path) -> None:
     whole_sweep = batch.run(deck(here, DECK, "kinds")).path.read_bytes()
     batch.run(deck(here, DECK, "kinds"), cases=["#1"])
@@ -140,7 +140,7 @@ def test_what_was_begun_afresh_is_gone_on_with(here: Path, monkeypatch: pytest.M
     assert "goes on: " in batch.run(plan(), output="a.h5").notes[0]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_replaces_an_archive_is_refused_before_it_is_submitted(
     submitted: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -181,7 +181,7 @@ def test_a_worker_that_was_thought_dead_is_heard(here: Path) -> None:
 # Memory
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_histories_that_are_written_do_not_stay_in_memory(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     experiment = plans.gains(400, ticks=4000)
     monkeypatch.setattr(tasks, "MOST_BYTES", 2 << 20)
@@ -275,7 +275,7 @@ def test_a_job_with_other_code_than_was_submitted_computes_nothing(
     assert not list((submitted / "shards").iterdir())
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("cores, number", [("", 0), ("2(x3)", 0), ("1", 9)])
 def test_odd_words_of_the_queue_stop_no_share(
     submitted: Path, monkeypatch: pytest.MonkeyPatch, cores: str, number: int
@@ -353,7 +353,7 @@ def test_a_case_that_failed_may_be_run_again_on_another_machine(here: Path, monk
     batch.run(deck(here, DOOR), output="a.h5", histories="failed")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("single", [True, False])
 def test_signals_of_another_width_are_compared(here: Path, single: bool) -> None:
     batch.run(plan(), output="a.h5", float32=single)
@@ -516,7 +516,7 @@ def test_processes_where_many_files_are_open(here: Path) -> None:
 # What held
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_cases_at_the_edges_of_blocks(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Blocks of eight, of 23 to 25 cases; cases that are lost or kept on both sides of each edge."""
     monkeypatch.setattr(merge, "BLOCK", 8)

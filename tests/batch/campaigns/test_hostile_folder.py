@@ -167,7 +167,7 @@ def test_a_picture_takes_nothing_of_the_folder(
     assert (folder / "a.png").exists() and (folder / "a.svg").read_bytes() == (folder / "b.svg").read_bytes()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_jobs_of_a_queue_run_nothing_of_the_folder(
     met: Callable[..., subprocess.CompletedProcess[str]], folder: Path
 ) -> None:

@@ -250,7 +250,7 @@ run carrying {
 LATER = "position = [1, 0, 0] m;  grapple = 1 s;"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("servo", "rate", "event", "code"),
     [

@@ -47,6 +47,7 @@ def part_done(archive: Path, share: float) -> int:
     return kept
 
 
+@pytest.mark.release
 def test_a_worker_that_is_killed_costs_nothing(archive: Path, undisturbed: bytes) -> None:
     with whole.started(words(archive, "--processes", "2"), archive.parent, whole.SHORT_TASKS) as process:
         whole.until(lambda: whole.done(archive, CASES) >= CASES / 3, process)
@@ -131,6 +132,7 @@ def test_a_signal_keeps_what_is_done_and_says_how_to_go_on(
     assert archive.read_bytes() == undisturbed
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way[0])
 @pytest.mark.parametrize(("name", "status", "last"), SIGNALS)
 def test_an_end_before_a_second_of_work_leaves_nothing(

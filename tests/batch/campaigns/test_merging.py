@@ -33,7 +33,7 @@ def test_a_case_that_gives_other_numbers_when_it_is_run_again_stops_the_merge(
     assert not (here / "a.h5").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_code_of_a_plan_is_that_of_its_file(tmp_path: Path) -> None:
     """Workers read the plan from a file: a shard of theirs must count here."""
     import ic

@@ -80,7 +80,7 @@ def offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     models.available.cache_clear()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("does", "how"),
     [
@@ -141,7 +141,7 @@ def test_a_package_that_leaves_while_it_is_loaded_is_named(
     )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_model_that_does_none_of_it_is_run(offered: Callable[[str], Path]) -> None:
     offered("print('here')")
     assert cli.main(["run", "deck.ic", "stopped", "--processes", "1", "-o", "a.h5", "-q", "--no-picture"]) == cli.YES

@@ -139,7 +139,7 @@ class TestTheRealEngine:
         np.testing.assert_array_equal(found.metrics["kp"], plain.metrics["settle"])
         assert not found.status.any()
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_a_case_run_alone_is_the_case_of_the_sweep(self, here: Path) -> None:
         plan = plans.plan(plans.gains(9))
         with (

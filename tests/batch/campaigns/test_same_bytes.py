@@ -92,7 +92,7 @@ def test_tasks_of_any_size(
     assert max(task.cases for task in executor.tasks) == min(cases, 40)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("cases", [5, 32])
 def test_tasks_of_so_many_bytes(
     here: Path, plan: Plan, undisturbed: bytes, cases: int, monkeypatch: pytest.MonkeyPatch
@@ -103,7 +103,7 @@ def test_tasks_of_so_many_bytes(
     assert max(task.cases for task in executor.tasks if task.section == 0) == cases
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_blocks_that_are_merged_decide_nothing_but_where_text_lies(
     here: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -141,7 +141,7 @@ def test_interrupted_and_gone_on_with_tasks_of_another_size(
     assert batch.run(plan, output="a.h5", threads=1).path.read_bytes() == undisturbed
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_deck_and_its_plan_file(
     place: Path, tmp_path: Path, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -328,13 +328,13 @@ def check_kept(path: Path, kept: list[int], full: Path, single: bool = False) ->
 
 @pytest.mark.parametrize("single", [False, True], ids=["float64", "float32"])
 class TestWhatIsKept:
-    @pytest.mark.slow
+    @pytest.mark.release
     @pytest.mark.parametrize("every", [7, 60])
     def test_every_so_many(self, here: Path, kept_whole: Path, every: int, single: bool) -> None:
         path = batch.run(plans.plan(sweep()), output="a.h5", histories=f"every:{every}", float32=single).path
         check_kept(path, list(range(0, 60, every)), kept_whole, single)
 
-    @pytest.mark.slow
+    @pytest.mark.release
     @pytest.mark.parametrize(("metric", "count"), [("settle", 5), ("volts", 5), ("volts", 100)])
     def test_the_worst(self, here: Path, kept_whole: Path, metric: str, count: int, single: bool) -> None:
         path = batch.run(plans.plan(sweep()), output="a.h5", histories=f"worst:{count}:{metric}", float32=single).path
@@ -362,7 +362,7 @@ class TestWhatIsKept:
         path = batch.run(plans.plan(sweep()), output="a.h5", histories=rules, float32=single).path
         check_kept(path, sorted({0, 20, 40, 3, *worst(kept_whole, "volts", 2)}), kept_whole, single)
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_all_and_none(self, here: Path, kept_whole: Path, single: bool) -> None:
         for histories, kept in (("all", list(range(60))), ("none", [])):
             path = batch.run(plans.plan(sweep()), output=f"{histories}.h5", histories=histories, float32=single).path

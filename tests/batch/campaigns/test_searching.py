@@ -220,7 +220,7 @@ def test_a_case_that_fails_hurts_most(here: Path, capsys: pytest.CaptureFixture[
 # However it is run
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     "way",
     [{"threads": 2}, {"processes": 2}, pytest.param({"dask": "local"}, marks=pytest.mark.slow)],
@@ -238,7 +238,7 @@ def test_tasks_of_any_size_give_the_same_bytes(
     assert batch.run(plan, output="a.h5").path.read_bytes() == undisturbed
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("after", [1, 4, 9])
 def test_what_was_interrupted_goes_on_to_the_same_bytes(
     here: Path, plan: Plan, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch, after: int
@@ -361,7 +361,7 @@ def test_other_histories_are_kept_where_they_are_asked_for(here: Path, plan: Pla
         assert group.recorded == (group.count if kept is None else kept)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_its_cases_are_run_again_to_the_same_bits(here: Path, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     archive = str(place / "undisturbed.h5")
     position = answers(place / "undisturbed.h5")["back"].position
@@ -373,7 +373,7 @@ def test_its_cases_are_run_again_to_the_same_bits(here: Path, place: Path, capsy
     assert main(["diff", archive, "again.h5"]) == 0
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_every_reader_of_archives_reads_it(here: Path, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     archive = str(place / "undisturbed.h5")
     for words in (

@@ -156,7 +156,7 @@ def test_cases_fail_in_these(here: Path) -> None:
     assert 0 < found.failed < found.cases
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("more", [{"threads": 1}, pytest.param({"processes": 2}, marks=pytest.mark.slow)])
 def test_its_bytes_are_the_same_whoever_ran_it(
     here: Path, more: dict[str, int], monkeypatch: pytest.MonkeyPatch
@@ -280,7 +280,7 @@ def test_what_needs_a_row_a_case_is_refused_with_the_remedy(here: Path, what: st
     assert "`met run DECK --rows all` keeps a row a case, and `--rows worst:N:METRIC` a summary" in said.text
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", ["many", pytest.param("ways", marks=pytest.mark.slow)])
 def test_python_is_warned_that_its_rows_are_no_sample(here: Path, name: str) -> None:
     archives(name)
@@ -373,7 +373,7 @@ UNSOUND = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("what", UNSOUND)
 def test_a_forged_summary_is_told(here: Path, tmp_path: Path, what: str) -> None:
     name, place, value = UNSOUND[what]

@@ -319,7 +319,7 @@ def test_sweeps_beside_it_and_structures_of_it_give_the_same_bytes_with_historie
     assert recorded[0] == 0 and all(0 < kept < count for kept, count in zip(recorded[1:], counts[1:], strict=True))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_was_killed_goes_on_to_the_same_bytes(here: Path, place: Path, undisturbed: bytes) -> None:
     words = ["run", str(place / "p.json"), "-o", "a.h5", "--no-picture", "--processes", "2"]
     settings = {"batch.campaigns.tasks.MOST_CASES": 32, "batch.campaigns.until_shown.FIRST_CASES": 32}
@@ -377,7 +377,7 @@ def test_the_history_of_a_case_that_is_dropped_is_told_of(here: Path, plan: Plan
     assert told.open()["recorded_case"].values.tolist() == [0]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_cases_are_run_again_with_the_same_bits(
     place: Path, here: Path, undisturbed: bytes, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -59,7 +59,7 @@ def by_hand(a: np.ndarray, b: np.ndarray, allowed: SignalTolerance) -> tuple[int
     return beyond, nan, largest if beyond else within, first, first_beyond
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", range(200))
 def test_cases_at_once_are_what_each_is_by_itself_and_by_hand(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -101,7 +101,7 @@ def test_where_the_difference_is_largest() -> None:
     assert third is not None and (third.row, third.column, third.largest, third.beyond) == (1, 0, 0.0, 0)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("words", [[], ["q=1e-7rad", "rel=1e-9"], ["time=50ms"]])
 def test_blocks_of_any_size_give_one_answer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, words: list[str]) -> None:
     def plant(run: Run, place: dict[int, int]) -> None:
@@ -117,7 +117,7 @@ def test_blocks_of_any_size_give_one_answer(monkeypatch: pytest.MonkeyPatch, tmp
         assert as_data(diff(a, b, tolerances(words))) == as_data(found)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("key", ["", "123", "0123456789abcdeg", "0123456789abcdef0"])
 def test_a_case_key_that_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, key: str) -> None:
     import h5py

@@ -35,7 +35,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Mcap, dict[str, A
     return Mcap(done.path), json.loads(done.layout.read_text("utf-8"))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_it_opens_on_the_arm_beside_plots_and_the_log(written: tuple[Mcap, dict[str, Any]]) -> None:
     _, layout = written
     assert list(leaves(layout["layout"])) == ["3D!arm", "Plot!q", "Plot!qd", "Plot!tau", "RosOut!log"]

@@ -53,7 +53,7 @@ def test_the_frames_are_where_the_archive_has_the_links(pick: tuple[ArchiveFile,
             np.testing.assert_allclose(world[:3, :3], kept_turn[:3, :3], rtol=0, atol=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_frames_are_where_the_kinematics_have_them(reaches: tuple[ArchiveFile, Mcap]) -> None:
     file, read = reaches
     [experiment] = file.plan().experiments
@@ -195,7 +195,7 @@ def test_a_solid_is_where_its_mass_is(pick: tuple[ArchiveFile, Mcap]) -> None:
     assert (lamp.pose.position.x, lamp.pose.position.y, lamp.pose.position.z) == (0.1, 0.0, 0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_solid_whose_inertia_is_written_is_only_a_look(tmp_path: Path) -> None:
     boom = "link boom     { mass = 5 kg;  com = [0.7, 0, 0] m;  inertia = [0.1, 1, 1] kg*m^2;"
     read = Mcap(export(made(tmp_path, "pick", DECK.replace("link boom     { mass = 5 kg;", boom))).path)

@@ -56,7 +56,7 @@ def killed(output: str, after: int, when: str = "") -> None:
     assert subprocess.run(words, env=surroundings, timeout=120).returncode == -9
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("after", [0, 10, 2000, 20_000])
 def test_a_writer_that_is_killed_leaves_no_file_under_the_name(archive: Path, after: int) -> None:
     killed("a.mcap", after)
@@ -65,7 +65,7 @@ def test_a_writer_that_is_killed_leaves_no_file_under_the_name(archive: Path, af
     assert not temporary_of(Path("a.mcap")).exists()  # taken over
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("form", FORMATS)
 def test_nor_does_one_that_is_killed_before_it_is_named_and_what_was_there_stays(archive: Path, form: str) -> None:
     killed(f"a.{form}", 1 << 30, "settled")
@@ -76,7 +76,7 @@ def test_nor_does_one_that_is_killed_before_it_is_named_and_what_was_there_stays
         assert Path("a.mcap").read_bytes() == before
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("form", FORMATS)
 @pytest.mark.parametrize("reason", [KeyboardInterrupt, MemoryError])
 def test_what_stops_a_writer_leaves_nothing(

@@ -19,7 +19,7 @@ HELD = "    payload crate { mass = 3 kg;  shape = sphere(radius = 0.1 m);  on = 
 RECORD = "record   = [links.lower.position, payloads.crate.position, "
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_frames_are_where_the_archive_has_the_links(tmp_path: Path) -> None:
     deck = tmp_path / "deck.ic"
     deck.write_text(ARM + changed(RUN, (BOX, BOX + HELD), ("record   = [", RECORD)), encoding="utf-8")
@@ -44,7 +44,7 @@ def test_frames_are_where_the_archive_has_the_links(tmp_path: Path) -> None:
     assert told["box"] == {"payload": "box", "mass": "12 kg"}
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_payload_that_flies_and_was_not_recorded_is_not_drawn(tmp_path: Path) -> None:
     deck = tmp_path / "deck.ic"
     deck.write_text(ARM + changed(RUN, ("payloads.box.orientation, ", "")), encoding="utf-8")

@@ -39,7 +39,7 @@ def there(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()} - {"deck.ic"}
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_archive_and_the_export(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert met("few", "-o", "x.mcap") == cli.YES
     assert there(here) == {"x.h5", "x.h5.run.json", "x.png", "x.mcap"}
@@ -62,7 +62,7 @@ def test_of_python_and_for_programs(here: Path, capsys: pytest.CaptureFixture[st
     assert (said["archive"], said["export"]) == ("y.h5", "y.parquet") and Path("y.parquet").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_it_may_be_run_again(here: Path) -> None:
     assert met("brief", "-o", "x.mcap", "-q") == cli.YES
     before = (here / "x.mcap").read_bytes()

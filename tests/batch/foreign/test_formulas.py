@@ -15,7 +15,7 @@ from tests.batch.foreign.archives import changed, met
 EVIL = ("=1+2", "+cmd|' /C calc'!A0", "-2+3", "@SUM(1)", "'=1")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", EVIL)
 def test_a_name_that_is_a_formula_gets_an_apostrophe_before_it(name: str, archive: Path, here: Path) -> None:
     with changed(archive, here) as (copy, file):

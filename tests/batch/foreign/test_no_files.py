@@ -85,7 +85,7 @@ def test_a_pipe_where_a_plans_table_is_to_be_written(here: Path) -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("output", ["a.h5", "a.mcap", "a.parquet", "a.html", "a.svg", "a.json"])
 def test_a_pipe_where_something_is_to_be_written(output: str, archive: Path, here: Path) -> None:
     os.mkfifo(output)

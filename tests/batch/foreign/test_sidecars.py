@@ -140,7 +140,7 @@ def test_whatever_it_says_the_campaign_goes_on_or_says_why_not(
 # .run.json
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     "text",
     [
@@ -206,7 +206,7 @@ HEADS: dict[str, Callable[[dict[str, Any]], object]] = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", HEADS)
 def test_a_shard_with_a_right_checksum_and_a_wrong_head_counts_as_none(name: str, campaign: Path) -> None:
     first = sorted((campaign / "shards").iterdir())[0]

@@ -42,7 +42,7 @@ def poisoned(file: Any) -> None:
     file["provenance/source_text"][0] = NASTY
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_no_command_prints_what_a_terminal_obeys(archive: Path, tmp_path: Path) -> None:
     with changed(archive, tmp_path) as (copy, file):
         poisoned(file)
@@ -169,7 +169,7 @@ def test_a_report_escapes_what_would_end_its_script(archive: Path, tmp_path: Pat
     )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_pictures_and_pages_hold_what_was_made_visible(archive: Path, tmp_path: Path) -> None:
     with changed(archive, tmp_path) as (copy, file):
         poisoned(file)

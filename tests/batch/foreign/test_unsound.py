@@ -73,7 +73,7 @@ UNSOUND: dict[str, tuple[Change, str]] = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", UNSOUND)
 def test_what_no_run_gives_is_told(name: str, archive: Path, tmp_path: Path) -> None:
     change, why = UNSOUND[name]

@@ -24,7 +24,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_is_printed_is_whole(folder: Path) -> None:
     said = met(folder, "linear", "deck.ic", "--at", "0.5 s", "--open", "hinge.servo.voltage", status=0)
     lines = said.splitlines()
@@ -36,7 +36,7 @@ def test_what_is_printed_is_whole(folder: Path) -> None:
     assert [line.split()[0] for line in lines[9:]] == ["gain", "phase", "delay", "disk"]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_programs_get_the_same_as_numbers(folder: Path) -> None:
     told = json.loads(
         met(folder, "linear", "deck.ic", "--at", "0.5", "--open", "hinge.servo.voltage", "--format", "json", status=0)
@@ -47,7 +47,7 @@ def test_programs_get_the_same_as_numbers(folder: Path) -> None:
     assert len(told["poles"]) == 3
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_an_opened_loop_that_is_unstable_is_exit_status_1(folder: Path) -> None:
     text = DECK.replace("command = rate", "kp = 3 V*s/rad;  v_max = 1e6 V;  tau_max = 1e6 N*m;  command = rate")
     (folder / "deck.ic").write_text(text)
@@ -85,7 +85,7 @@ def test_all_cases_of_a_sweep_have_a_row_each_and_the_tightest_is_named(folder: 
     assert lines[8].startswith(f"  tightest: gain {gain:.4g} times in #1, phase ")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_case_of_it_says_the_same(folder: Path) -> None:
     every = json.loads(
         met(folder, "linear", swept(folder), "gains", "--all-cases", *OPEN, "--format", "json", status=1)
@@ -94,7 +94,7 @@ def test_a_case_of_it_says_the_same(folder: Path) -> None:
     assert every[1] == one
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_case_of_several_says_which_it_is_also_where_none_is_asked_for(folder: Path) -> None:
     said = met(folder, "linear", swept(folder), "gains", *OPEN, status=0).splitlines()[0]
     assert said.startswith("gains, case #0 of 3: linear at t = 0 s, ")
@@ -111,7 +111,7 @@ def test_what_cases_have_no_answer_is_told_below_with_the_reason_of_each(folder:
     assert "\nno answer in 2 cases of 2\n" in said
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_picture_of_all_cases_is_a_root_locus(folder: Path) -> None:
     path = folder / swept(folder)
     question = LinearQuestion(ic.compile(path, select=["gains"]).experiments[0], 0.0, (), (), OPEN[1:])

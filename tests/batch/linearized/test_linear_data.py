@@ -129,7 +129,7 @@ def test_without_python_control_that_is_said(answer: LinearAnswer, monkeypatch: 
     assert told.help == ("`pip install control`, or what MET's extra `control` names",)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_picture_is_drawn_alike_each_time(answer: LinearAnswer, tmp_path: Path) -> None:
     for name in ("a.png", "b.png", "a.svg"):
         answer.draw(tmp_path / name)

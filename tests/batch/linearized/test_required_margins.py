@@ -62,7 +62,7 @@ def plan_of(folder: Path, name: str = "gains") -> Plan:
     return plan_file.read(folder / f"{name}.json")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("how", [{"threads": 2}, {"processes": 2}])
 def test_threads_and_processes_make_the_same_archive(
     how: dict[str, Any], folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -122,14 +122,14 @@ def test_a_case_that_is_run_again_for_its_history_is_the_same_case(folder: Path,
     assert data.recorded_case.values.tolist() == [int(np.argmin(before.firm.values))]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_summary_and_evidence_have_them(folder: Path, tmp_path: Path) -> None:
     batch.run(plan_of(folder, "drawn"), output=tmp_path / "b.h5", rows="summary")
     said = met(tmp_path, "show", "b.h5", "--evidence", "--format", "json", status=None)
     assert "firm" in json.dumps(json.loads(said))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_search_finds_the_least_margin_and_a_tuning_keeps_it(folder: Path, tmp_path: Path) -> None:
     """The loop has least phase at one end of its gains; a tuning goes as far as its limits let it."""
     worst = batch.run(plan_of(folder, "worst"), output=tmp_path / "w.h5").open()

@@ -38,7 +38,7 @@ def chain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[xarray.DataTree]
         yield tree
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_all_links_of_all_cases_are_where_the_archive_recorded_them(reaches: xarray.Dataset) -> None:
     frames = reaches.met.frames()
     assert frames["position"].dims == ("recorded_case", "time", "link", "axis")

@@ -115,7 +115,7 @@ def test_words_where_there_is_no_case(tmp_path: Path, monkeypatch: pytest.Monkey
     assert causes.isnull().sum() == 1 and causes.values[0, 0] == ""
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_structures_are_side_by_side(tmp_path: Path) -> None:
     with batch.open(made(tmp_path, ["brief", "ways"])) as tree:
         ways = tree.met.sel(run="ways")
@@ -135,7 +135,7 @@ def test_structures_are_side_by_side(tmp_path: Path) -> None:
         assert tree["ways.rk4"].met.grid("qd").sizes == {"gearbox.kp": 2, "time": 11, "joint": 2}
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_sum_of_sweeps_that_vary_different_things(tmp_path: Path) -> None:
     deck = tmp_path / "sum.ic"
     deck.write_text(

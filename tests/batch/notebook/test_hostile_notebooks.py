@@ -162,7 +162,7 @@ def test_a_signal_that_one_run_lacks_is_put_in_another_unit_in_the_others(tmp_pa
         assert turned["swing"]["q"].attrs["units"] == "deg" and "qd" in turned["blind"]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", ["time", "joint"])
 def test_a_parameter_called_as_a_dimension_is_unfolded(tmp_path: Path, name: str) -> None:
     with made(tmp_path, BRIEF.replace("reach_back", name), "backs") as data:
@@ -178,7 +178,7 @@ def test_a_parameter_called_position_is_no_position(tmp_path: Path) -> None:
         assert frames["position"].dims == ("time", "link", "axis") and frames["coordinates.position"].item() == 0.2
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_archive_may_be_told_by_a_path(tmp_path: Path) -> None:
     with made(tmp_path, BRIEF, "brief") as data:
         lost = data.drop_encoding()

@@ -38,7 +38,7 @@ def test_xarray_is_loaded_by_who_opens_and_not_by_who_imports() -> None:
     subprocess.run([sys.executable, "-W", "error", "-c", script], check=True)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("engine", ["h5netcdf", pytest.param("netcdf4", marks=pytest.mark.oracle), None])
 def test_what_xarray_opens_alone_has_it_too(archive: Path, data: xarray.Dataset, engine: Any) -> None:
     with xarray.open_dataset(archive, engine=engine) as same:
@@ -69,7 +69,7 @@ def test_copies_and_what_was_sent_elsewhere(data: xarray.Dataset) -> None:
         xarray.testing.assert_identical(same.met.frames("lower", case=4).load(), expected.load())
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_an_archive_that_is_run_anew_meanwhile(tmp_path: Path) -> None:
     archive = made(tmp_path, ["tuning"])
     with batch.open(archive) as data:
@@ -158,7 +158,7 @@ class TestWhatWasRun:
             '  name one: `data.met.parameters("#0")`; of several runs, `data.met.sel(run=NAME)` before',
         )
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_of_one_run_among_several(self, tmp_path: Path) -> None:
         with batch.open(made(tmp_path, ["brief", "ways"])) as tree:
             assert tree["brief"].met.parameters().loc["shoulder.servo.kp", "value"] == 0.02

@@ -39,7 +39,7 @@ def rows(data: xarray.Dataset) -> list[int]:
     return data["case"].values.tolist()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("value", [0.02, "0.02 V*s/rad", "20 mV*s/rad", "20 N*mm/A", np.float64(0.02), 0.02000000001])
 def test_a_value_may_have_any_unit_and_the_rounding_of_who_types_it(tuning: xarray.Dataset, value: Any) -> None:
     chosen = tuning.met.sel({"gearbox.kp": value})
@@ -140,7 +140,7 @@ class TestOfSeveral:
         assert rows(node.met.sel({"gearbox.kp": 0.03})) == [3]
         assert rows(node.to_dataset().met.sel({"gearbox.kp": 0.03})) == [3]
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_a_run_or_a_sweep(self, tmp_path: Path) -> None:
         with batch.open(made(tmp_path, ["brief", "ways"])) as tree:
             assert list(tree.met.sel(run="ways").children) == ["ways.rk4", "ways.midpoint"]

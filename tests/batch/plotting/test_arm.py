@@ -41,7 +41,7 @@ def refused(path: Path, **options: Any) -> str:
     return render(caught.value.diagnostics).rpartition("\n1 error")[0]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_links_are_where_the_simulation_recorded_them(folder: Path) -> None:
     compared = 0
     with ArchiveFile(folder / "lengths.h5") as file:

@@ -34,7 +34,7 @@ def sweep(here: Path) -> Path:
     return archives.made(here / "a.h5", one)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("options", "labels"),
     [
@@ -53,7 +53,7 @@ def test_names_are_those_of_signals_or_of_metrics(
     assert {ax.get_ylabel() for ax in shown(figures[0])} - {""} == labels
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("options", "said"),
     [

@@ -98,7 +98,7 @@ def test_limits_are_those_of_requirements_stops_and_servos(ran: dict[str, Archiv
     }
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_limits_that_are_near_are_thin_lines_with_their_names(
     ran: dict[str, ArchiveFile], figures: list[Any], tmp_path: Path
 ) -> None:

@@ -114,7 +114,7 @@ def dashed(ax: Any) -> list[Any]:
     return [line for line in ax.lines if line.is_dashed() and len(line.get_xdata())]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_command_is_drawn_over_what_follows_it_and_nowhere_else(
     here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

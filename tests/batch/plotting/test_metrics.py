@@ -122,7 +122,7 @@ class TestPoints:
 
 
 class TestLogarithmicAxes:
-    @pytest.mark.slow
+    @pytest.mark.release
     @pytest.mark.parametrize(
         ("kps", "expected"),
         [
@@ -226,7 +226,7 @@ class TestMaps:
         np.testing.assert_allclose(mesh(ax)[0], 0.1 / np.array(steps[::2]), rtol=1e-14)  # the longest of each two
         assert said(figures[0]) == "3,000 cases: up to 2 cases in a cell, which shows the worst by what is required"
 
-    @pytest.mark.slow
+    @pytest.mark.release
     @pytest.mark.parametrize("count", [49, 60, MOST_CELLS, MOST_CELLS + 1])
     def test_of_a_dense_logarithmic_sweep_have_a_logarithmic_axis_and_no_gaps(
         self, count: int, here: Path, figures: list[Any]
@@ -264,7 +264,7 @@ class TestMaps:
         assert left < 0.010 and right > 0.041 and low < 20e3 and high > 30e3
         assert "0.020" in [text.get_text() for text in ax.get_xticklabels()]
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_have_axes_of_the_values_and_logarithmic_ones_of_factors(self, here: Path, figures: list[Any]) -> None:
         made(kps=[0.02, 0.04, 0.06, 0.08, 0.1], masses=[1.0, 10.0, 100.0, 1000.0, 10000.0])
         plot("a.h5")

@@ -31,7 +31,7 @@ def test_the_ending_says_the_format_and_the_same_archive_gives_the_same_bytes(he
     assert not re.search(rb"CreationDate|<dc:date>", first)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_letters_of_an_svg_are_drawn_and_those_of_a_pdf_are_letters(here: Path) -> None:
     with archive(3) as file:
         drawn = draw(file, "a.svg").read_text(encoding="utf-8")

@@ -42,7 +42,7 @@ def volts(archive: Path) -> np.ndarray:
     return np.asarray(batch.open(archive)["all"].volts.values).reshape(3, 2, 2)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_maps_stand_beside_one_another_for_a_third_parameter(archive: Path, figures: list[Any], tmp_path: Path) -> None:
     plot(archive, tmp_path / "a.png", ["volts"], over=["gearbox.kp", "gearbox.ki", "links.lower.mass"])
     light, heavy, bar = shown(figures[0])

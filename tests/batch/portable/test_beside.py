@@ -47,7 +47,7 @@ def chromium() -> Iterator[Chromium]:
         yield started
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_log_is_in_si_on_straight_lines_between_its_rows_and_nothing_outside_of_them(folder: Path) -> None:
     columns = [{"channel": f"{joint}.q", "signal": "q", "unit": "rad"} for joint in ("elbow", "shoulder", "wrist")]
     found = log_data(folder / "log.csv", columns, np.array([0.0, 0.3, 0.6, 0.7]))

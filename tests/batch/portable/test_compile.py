@@ -85,7 +85,7 @@ def test_a_module_and_its_description_belong_together(folder: Path, capsys: pyte
     assert (folder / "tuned.wasm").read_bytes() == module
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_an_archive_and_a_plan_give_the_module_of_their_deck(folder: Path) -> None:
     assert met("compile", "deck.ic", "tuned", "-q") == 0
     assert met("run", "deck.ic", "tuned", "-q", "--no-picture") == 0

@@ -123,6 +123,7 @@ def shown_at(page: Page, time: float) -> list[str]:
     return page.run(AROUND)  # type: ignore[no-any-return]
 
 
+@pytest.mark.release
 @pytest.mark.browser
 @pytest.mark.parametrize(("width", "dark"), [(1280, True), (400, False)])
 def test_each_kind_is_drawn_while_it_acts_and_its_switch_takes_it_away(
@@ -201,6 +202,7 @@ def test_kinds_differ_in_colour_from_each_other_and_from_paper(chromium: Chromiu
         page.close()
 
 
+@pytest.mark.release
 @pytest.mark.browser
 def test_names_of_loads_and_payloads_are_texts_whatever_they_hold(
     chromium: Chromium, acting: Path, tmp_path: Path

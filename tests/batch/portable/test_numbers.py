@@ -104,7 +104,7 @@ def test_limits_are_where_the_deck_is_refused() -> None:
                 assert made.broken({**own, path: np.array([further])}, 1)[0]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_another_deck_is_refused(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "other.ic").write_text(DECK.replace("12.3", "12.4"), encoding="utf-8")
     assert met("view", folder / "it.h5", "--numbers", tmp_path / "other.ic") == 2
@@ -442,6 +442,7 @@ def test_the_page_loosens_no_rule_for_a_second_module(folder: Path) -> None:
     assert (folder / "it.view.html").read_text().count("<script") == 1
 
 
+@pytest.mark.release
 @pytest.mark.browser
 @pytest.mark.parametrize("dark", [False, True])
 def test_nothing_of_other_numbers_is_wider_than_a_phone(

@@ -43,7 +43,7 @@ def sent(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_page_is_whole_and_allows_itself_one_script_and_webassembly(sent: Path) -> None:
     page = (sent / "tuned.view.html").read_text(encoding="utf-8")
     rules = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
@@ -111,6 +111,7 @@ def test_each_case_has_the_archives_bits_and_says_so(chromium: Chromium, sent: P
     page.close()
 
 
+@pytest.mark.release
 @pytest.mark.browser
 @pytest.mark.parametrize("machine", ["false", "METKernel.fuses()"])
 def test_every_recorded_number_in_the_browser_has_the_archives_bits(

@@ -70,7 +70,7 @@ def group_of(file: ArchiveFile, name: str) -> tuple[ArchiveGroup, SearchAnswer, 
     return group, answer, answer_outcome(answer)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_tuning_is_judged_in_the_cases_of_its_sweep(archive: Path) -> None:
     with ArchiveFile(archive) as file:
         group, answer, outcome = group_of(file, "still")
@@ -131,7 +131,7 @@ def test_a_search_says_what_another_case_misses(archive: Path) -> None:
         assert outcome.requirements[0].elsewhere and not outcome.requirements[1].elsewhere
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", NAMES)
 def test_a_requirement_over_a_share_is_asked_of_each_case_and_stands_once(archive: Path, name: str) -> None:
     with ArchiveFile(archive) as file:
@@ -157,7 +157,7 @@ def test_some_cases_of_a_tuning_are_held_without_a_confidence_too(archive: Path,
         assert all(row.at_least is None and row.share is None and row.cases == 3 for row in rows)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("name", "word", "said"), [
     ("still", "Requirements met", "The answer meets all requirements in all 5 cases of loads."),
     ("poor", "Requirements not met", "The answer misses far &gt; -0.05 m in "),
@@ -197,7 +197,7 @@ def test_programs_are_told_the_requirements_of_the_answer(archive: Path, capsys:
     assert [row["cases"] for row in told["evidence"]] == [5, 5]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_notebooks_say_the_requirements_of_the_answer(archive: Path) -> None:
     data = batch.open(archive)["still"]
     said = str(data.met)

@@ -135,7 +135,7 @@ def test_the_worst_case_decides_between_designs() -> None:
     assert designs.order([designs.goal("2 * late - kp")])[0] == 1
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_of_a_margin_the_largest_is_meant_whatever_its_name(tmp_path: Path) -> None:
     """Of metrics that differ in their models alone, which say what they are."""
     deck = DECK.replace("REQUIRED", """
@@ -196,7 +196,7 @@ def test_a_value_is_written_in_as_few_digits_as_give_it_again() -> None:
             assert si == value or abs(si - value) <= 2.0**-52 * value, (unit, value)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_command_that_is_printed_gives_the_same_numbers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -260,7 +260,7 @@ def test_a_pick_by_drawn_cases_is_not_called_demonstrated(tmp_path: Path, capsys
     assert "--set seed=5 -o confirmed.h5" in said and "demonstrated" not in said
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("command", "said"), [
     (["--over", "links.lowr.mass"], """\
 error[E394]: no varied parameter `links.lowr.mass` in `grid`
@@ -318,7 +318,7 @@ error[E396]: nothing says which design of `grid` is better
     assert "  it reaches the end in both of its cases (links.lower.mass 15 .. 30 kg)" in said
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_parts_of_a_sum_choose_what_is_theirs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     parts = """
 sweep some of arm { vary gearbox.kp = linspace(0.010, 0.034, 4) V*s/rad; }
@@ -335,7 +335,7 @@ sweep sum = some + more;
     assert main(["report", str(out), "-o", str(tmp_path / "a.html"), "-q"]) == 0
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_command_repeats_macros_and_what_was_set(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     macro = "#ifndef LIMIT\n#define LIMIT 40\n#endif\nrun arm"
     deck = DECK.replace("REQUIRED", "require past < LIMIT %;").replace("run arm", macro, 1)
@@ -380,7 +380,7 @@ def test_what_varies_in_no_case_is_no_design() -> None:
         Designs(made({"a": np.zeros(3)}, np.ones(3, bool)))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("start", "limit", "label"),
     [

@@ -95,7 +95,7 @@ def test_without_requirements_the_order_is_the_tables(here: Path) -> None:
         assert cases.title(file.groups[0]) == "cases:"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("largest", [False, True])
 @pytest.mark.parametrize("name", ["settle", "volts", "gearbox.kp"])
 def test_by_a_metric_or_what_is_varied_and_without_a_value_last(

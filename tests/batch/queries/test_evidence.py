@@ -64,7 +64,7 @@ def test_each_design_point_has_its_verdict_from_its_own_cases(tmp_path: Path) ->
     assert len({row.verdict for row in rows}) > 1, "the limits tell the design points apart"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("required", "cases", "code", "said"), [
     ("require late < 5 s in 95 % of cases with 90 % confidence;", 45, 0, "demonstrated  45 of 45 cases meet it: at "
      "least 95.01 % of all do"),

@@ -63,7 +63,7 @@ def rows_of(path: Path) -> list[RequirementEvidence]:
         return requirement_evidence(file.groups, path.name)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_row_has_the_numbers_of_the_cases_of_its_design_point(folder: Path) -> None:
     data = batch.open(folder / "a.h5")
     rows = [row for row in rows_of(folder / "a.h5") if row.share is not None]

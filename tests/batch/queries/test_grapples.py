@@ -76,7 +76,7 @@ def test_a_payload_that_turns_fast_is_told(tmp_path: Path) -> None:
     assert found.message.startswith("payload `p` is grappled at 12 rad/s against its link: momentum is kept, and ")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("run", ["r", "gentle", "late", "meant"])
 def test_what_a_gripper_makes_is_not_told_nor_what_never_comes_or_is_meant(tmp_path: Path, run: str) -> None:
     assert warned(tmp_path, run) == []

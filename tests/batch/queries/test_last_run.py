@@ -40,7 +40,7 @@ def shown(editor: Editor, deck: Path) -> list[tuple[int, str, Any]]:
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_lenses_say_cases_and_what_the_last_run_said_of_each_requirement(deck: Path) -> None:
     with Editor(deck.parent) as editor:
         editor.open(deck)

@@ -17,7 +17,7 @@ sweep limits of weak { vary shoulder.bed.i_max = [0.05, 3] A; }
 """
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_ticks_at_a_beds_limit_are_counted_and_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "weak.ic").write_text(DECK, encoding="utf-8")
     out = str(tmp_path / "a.h5")

@@ -48,7 +48,7 @@ def many(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(streamed, "MANY", 100)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_evidence_is_that_of_rows_that_are_held(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with ArchiveFile(archive) as file:
         held = requirement_evidence(file.groups, "d.h5")

@@ -110,7 +110,7 @@ class TestTheVerdict:
             f"#{number(12)}",
         )
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_has_improvements_and_regressions_apart(self, planted: tuple[Path, Path]) -> None:
         found = gathered(*planted)
         settle, volts = found.verdicts[-1].flows
@@ -177,7 +177,7 @@ class TestThePage:
         self.all_told(*reversed(planted))
         self.all_told(planted[0], planted[0])
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_says_it_of_several_structures_and_runs(self, here: Path) -> None:
         batch.run(archives.compiled(here, "ways", "brief"), output="a.h5")
         deck = archives.DECK.replace("0.03]", "0.04]").replace("duration = 4 s", "duration = 5 s")
@@ -193,7 +193,7 @@ class TestThePage:
         deck_says, command_says = only.allowed
         assert deck_says.startswith("the deck of a.h5 allows rel ") and command_says.startswith("--tol allows qd ")
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_of_other_seeds_has_distributions(self, here: Path, engine: None) -> None:
         one = plans.gains(40)
         archives.made(here / "a.h5", one)
@@ -235,7 +235,7 @@ class TestThePage:
         assert {tag for tag, _ in wild.elements} <= {tag for tag, _ in usual.elements}
         assert page(hostile(found)).count("</script>") == 2
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_has_the_same_bytes_for_the_same_archives(self, planted: tuple[Path, Path]) -> None:
         one, other = (report(planted[1], name, against=planted[0]).read_bytes() for name in ("1.html", "2.html"))
         assert one == other
@@ -298,7 +298,7 @@ class TestThePoints:
         assert said == {3: "identical", 5: "equivalent", 7: "different", 12: "different"}
         assert outcome.words[int(outcome.values[MIXED.index(14)])] == "meets all, and did not"
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_of_a_case_that_is_new_have_nothing_before(self, planted: tuple[Path, Path]) -> None:
         columns = self.columns(gathered(planted[1], planted[0]))
         assert np.flatnonzero(np.isnan(columns["metric:volts"].before)).tolist() == [12, *GONE]  # type: ignore[arg-type]
@@ -334,7 +334,7 @@ class TestThePoints:
         assert overview is not None
         assert overview.maps[0].values["change:metric:volts"] == pytest.approx(np.full((2, 3), 0.5))
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_of_many_keep_those_that_changed_most(
         self, planted: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -348,7 +348,7 @@ class TestThePoints:
 
 
 class TestTheSignals:
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_that_changed_most_come_first_and_then_the_worst(self, planted: tuple[Path, Path]) -> None:
         found = gathered(*planted).sections[0].signals
         assert found is not None and found.most[:1] == (MIXED.index(12),) == found.shown
@@ -429,7 +429,7 @@ class TestNames:
 
 
 class TestTheCommand:
-    @pytest.mark.slow
+    @pytest.mark.release
     @pytest.mark.parametrize("swap", [False, True])
     def test_ends_well_when_the_page_is_written(
         self, planted: tuple[Path, Path], swap: bool, capsys: pytest.CaptureFixture[str]
@@ -485,7 +485,7 @@ def test_says_which_cases_meet_a_requirement_whose_limit_is_another(here: Path) 
     assert verdict.headline in words(page(found))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_structure_says_how_many_met_all_before(here: Path) -> None:
     batch.run(archives.compiled(here, "ways"), output="a.h5")
     deck = archives.DECK.replace("run brief like nominal { ", "run brief like nominal { require settle < 2.2 s; ")

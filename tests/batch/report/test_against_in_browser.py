@@ -50,6 +50,7 @@ def choose(page: Page, selector: str, value: str) -> None:
     page.settle()
 
 
+@pytest.mark.release
 def test_it_opens_in_silence_and_its_plots_are_drawn(page: Page) -> None:
     inked = page.run(f"{INK}('.plot canvas')")
     assert len(inked) == 1 + 4 and all(share > 0.01 for share in inked)
@@ -177,6 +178,7 @@ def test_it_prints_with_what_was_before(chromium: Chromium, sent: Path, tmp_path
     page.close()
 
 
+@pytest.mark.release
 def test_pictures_of_it_for_people(chromium: Chromium, sent: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     folder = tmp_path_factory.mktemp("pictures")
     for name, width, dark in (("desktop", 1200, False), ("dark", 1200, True), ("narrow", 400, False)):

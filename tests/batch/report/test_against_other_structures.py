@@ -73,7 +73,7 @@ def test_what_has_no_counterpart_is_told(kind: str, tmp_path: Path) -> None:
         assert each in text, each
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_run_that_only_one_of_them_has_is_told(tmp_path: Path) -> None:
     now, before = archive(tmp_path / "now.h5", DECK, "it", "cranes"), archive(tmp_path / "before.h5", DECK, "it")
     assert "cranes is only in now.h5" in told(now, before)

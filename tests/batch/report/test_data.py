@@ -146,7 +146,7 @@ class TestWorstCases:
         worst = found.sections[1].worst
         assert worst is not None and worst.commands[0].startswith("met run 'it is.h5' gains --case '#")
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_are_run_again_by_that_command(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         import shlex
 
@@ -399,7 +399,7 @@ class TestSignals:
         assert found.histories[0].values[0][0] == pytest.approx([30.0, -20.0])
         assert found.histories[0].values[1][0] == pytest.approx([3.0, 3.0, *[np.rad2deg(0.03)] * 2])
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_of_another_archive_are_in_the_same_units(self, tmp_path: Path) -> None:
         deck = "#include <two_link.ic>\nrun short like nominal { duration = 0.2 s;  initial { q = %s; } }\n"
         for name, start in (("a", "0.5 rad"), ("b", "30 deg")):

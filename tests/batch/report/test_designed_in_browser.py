@@ -188,6 +188,7 @@ def sparse(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return report(folder / "few.h5", folder / "few.html")
 
 
+@pytest.mark.release
 def test_a_short_logarithmic_axis_has_several_numbers(chromium: Chromium, sparse: Path) -> None:
     page = opened(chromium, sparse)
     said = page.run("MET.models[0].plot.u.axes[0]._values.filter((text) => text)")

@@ -49,7 +49,7 @@ def told(patch: pytest.MonkeyPatch, *, settle: list[float] | None = None, voltag
 
 
 class TestAgainst:
-    @pytest.mark.slow
+    @pytest.mark.release
     @pytest.mark.parametrize("histories", ["all", "none"])
     def test_one_with_the_same_sweep_and_no_case_in_common(self, here: Path, histories: str) -> None:
         archives.made(here / "a.h5", some(plans.gains(32), range(5)), histories=histories)

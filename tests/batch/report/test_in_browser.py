@@ -274,6 +274,7 @@ def test_cases_without_a_number_are_in_strips_and_can_be_chosen(
     page.close()
 
 
+@pytest.mark.release
 def test_pictures_of_it_for_people(chromium: Chromium, sent: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     folder = tmp_path_factory.mktemp("pictures")
     for name, width, dark in (("desktop", 1280, False), ("dark", 1280, True), ("narrow", 390, False)):

@@ -70,7 +70,7 @@ def sent(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class TestWhatIsInIt:
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_is_each_case_as_it_was_run_and_what_came_of_it(self, sent: Path) -> None:
         found = gathered(sent / "ways.h5").sections[0].simulation
         assert found is not None and found.said == ()
@@ -139,7 +139,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_another_archive_s_cases_are_there_under_the_numbers_of_this_one(compared: Path) -> None:
     with ArchiveFile(compared / "b.h5") as file, ArchiveFile(compared / "a.h5") as other:
         before = ComparedArchive(other, batch.diff(compared / "a.h5", compared / "b.h5"))
@@ -177,6 +177,7 @@ def opened(chromium: Chromium, path: Path, **words: Any) -> Page:
 
 @pytest.mark.browser
 class TestInTheBrowser:
+    @pytest.mark.release
     def test_every_recorded_number_of_every_case_has_the_archive_s_bits(self, chromium: Chromium, sent: Path) -> None:
         page = opened(chromium, sent / "ways.html")
         count = 0
@@ -399,6 +400,7 @@ class TestInTheBrowser:
         quiet(page)
         page.close()
 
+    @pytest.mark.release
     def test_on_paper_it_is_a_filmstrip(self, chromium: Chromium, sent: Path, tmp_path: Path) -> None:
         page = opened(chromium, sent / "many.html")
         page.pdf(tmp_path / "a.pdf")

@@ -42,7 +42,7 @@ def test_nothing_is_missing(archive: Path, tmp_path: Path, capsys: pytest.Captur
     assert whole.beside_it(archive) == ["a.h5", "a.h5.run.json"]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9, 1.0])
 def test_a_flipped_bit_in_the_archive_is_noticed(archive: Path, undisturbed: bytes, share: float) -> None:
     go_on(archive)
@@ -52,7 +52,7 @@ def test_a_flipped_bit_in_the_archive_is_noticed(archive: Path, undisturbed: byt
     assert archive.read_bytes() == undisturbed
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("text", ["", "[]", "null", "{}", '{"campaign": 7}', "\0\xff"])
 def test_a_damaged_sidecar_costs_time_alone(archive: Path, undisturbed: bytes, text: str) -> None:
     go_on(archive)

@@ -121,7 +121,7 @@ DAMAGES = (
 )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("damage", "why"), DAMAGES, ids=[damage.__name__ for damage, _ in DAMAGES])
 def test_a_shard_that_does_not_count(
     archive: Path, undisturbed: bytes, damage: Callable[[Path], None], why: str
@@ -202,7 +202,7 @@ def test_what_workers_had_begun_to_write_is_swept_away(archive: Path, undisturbe
     assert archive.read_bytes() == undisturbed
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"updated": 1}', '{"updated": "now"}', "\0\xff"])
 def test_a_damaged_status_file_is_harmless(archive: Path, undisturbed: bytes, text: str) -> None:
     begin(archive)

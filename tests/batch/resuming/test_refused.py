@@ -126,7 +126,7 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("what", CHANGES)
 def test_another_campaign_is_left_alone(archive: Path, here: Path, what: str) -> None:
     change, told = CHANGES[what]

@@ -113,7 +113,7 @@ class TestCallAfterCall:
         assert arm.run({"load": 25})["settle"].attrs["units"] == "s"
         np.testing.assert_array_equal(first["settle"], was["settle"])
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_a_thousand_calls_leak_nothing_and_write_nothing(
         self, arm: batch.Simulation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -59,7 +59,7 @@ class TestSameAsARun:
         np.testing.assert_array_equal(seen[0].q, data.q.values[0, 0])
         assert state.metrics == {name: data[name].item() for name in ("settle", "volts")}
 
-    @pytest.mark.slow
+    @pytest.mark.release
     @pytest.mark.parametrize(
         ("deck", "run"),
         [
@@ -205,7 +205,7 @@ class TestBeginningsAndEnds:
             arm.start(commands="elbow").step([0.1, 0.2])
         assert caught.value.diagnostics[0].help == ("in SI: `state.step([0.1])`",)
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_a_thousand_cases_leak_nothing(self, arm: batch.Simulation) -> None:
         def cases(count: int) -> None:
             for number in range(count):

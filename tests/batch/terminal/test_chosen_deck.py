@@ -78,7 +78,7 @@ DIFF = (
 )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_change_is_shown_and_written_only_when_it_is_asked_for(
     archive: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -94,7 +94,7 @@ def test_the_change_is_shown_and_written_only_when_it_is_asked_for(
     assert f"kp = {kp} V*s/rad;  ki = {ki} V/rad;" in Path("arm.ic").read_text(encoding="utf-8")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_deck_that_is_written_gives_the_numbers_of_the_chosen_design(
     archive: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -154,7 +154,7 @@ def test_a_deck_that_is_another_now_is_left_alone(archive: str, capsys: pytest.C
     assert said(capsys, archive, "--write") == (2, "", GONE)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_deck_of_met_is_not_written_to(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -210,7 +210,7 @@ def test_where_no_design_is_good_none_is_written(
     assert Path("arm.ic").read_text(encoding="utf-8") == deck
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_table_that_the_sweep_takes_values_from_is_part_of_its_deck(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

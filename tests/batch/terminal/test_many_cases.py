@@ -25,7 +25,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("sweep", ["some", "wild"])
 def test_the_verdict_is_that_of_an_archive_that_is_read(
     sweep: str, here: Path, monkeypatch: pytest.MonkeyPatch

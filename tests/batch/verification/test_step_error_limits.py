@@ -38,7 +38,7 @@ def said(archive: batch.Archive) -> list[str]:
     return [line for line in verdict(archive.summaries[0], 100) if "step_error" in line]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_share_and_a_size_are_met_and_missed(tmp_path: Path) -> None:
     archive = made(tmp_path, "require step_error(turn) < 1 %; require step_error(turn) < 1e-4 rad;")
     assert said(archive) == [
@@ -51,7 +51,7 @@ def test_a_share_and_a_size_are_met_and_missed(tmp_path: Path) -> None:
     assert first == {"text": "step_error(turn) < 1 %", "met": True, "said": "0.21 % in case #0"}
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_it_is_verified_by_itself_and_unknown_where_that_is_refused(tmp_path: Path) -> None:
     bare = made(tmp_path, "", "gain")
     assert bare.summaries[0].verified is None  # three cases are too dear
@@ -97,7 +97,7 @@ def test_an_infinite_value_at_one_step_alone_misses_and_at_every_step_has_no_err
     )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     "forged",
     [

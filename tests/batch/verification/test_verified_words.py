@@ -133,7 +133,7 @@ def test_a_report_of_what_was_not_verified_says_nothing_of_it(tmp_path: Path) ->
 BRIEF = "#include <two_link.ic>\nrun brief like nominal { duration = 2 s; metric turn = final { of = elbow.q; } }\n"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_difference_below_the_errors_says_so(tmp_path: Path) -> None:
     a = made(tmp_path, "a", "some", BRIEF, "brief")
     b = made(tmp_path, "b", "some", BRIEF, "brief", {"gearbox.kp": "0.020001 V*s/rad"})
@@ -151,7 +151,7 @@ def test_a_difference_below_the_errors_says_so(tmp_path: Path) -> None:
     assert "± " in "\n".join(diff_lines(found)) and found.verdict == "different"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_difference_above_the_errors_is_none_of_them(tmp_path: Path) -> None:
     a = made(tmp_path, "a", "some", BRIEF, "brief")
     b = made(tmp_path, "b", "some", BRIEF, "brief", {"gearbox.kp": "0.06 V*s/rad"})

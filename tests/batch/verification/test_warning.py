@@ -77,7 +77,7 @@ def test_one_that_the_run_allows_is_not_given(tmp_path: Path) -> None:
         assert "D310, because the limit is soft" in show(file, plots=False)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_step_that_is_named_would_do(tmp_path: Path) -> None:
     """At the rate that the warning names, there is none, and the metric is nearer to the truth than the margin was."""
     refined = DECK.replace("duration", "rates { dynamics = 100 Hz; servos = 100 Hz; record = 25 Hz; } duration")

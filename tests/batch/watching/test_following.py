@@ -52,7 +52,7 @@ def doubles(text: object) -> list[float]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_each_save_is_a_new_page_with_the_cases_that_met_run_has(tmp_path: Path) -> None:
     deck = write_deck(tmp_path)
     with viewing(deck, *WATCHED) as view:
@@ -96,7 +96,7 @@ def test_a_mistake_is_told_as_met_check_tells_it_beside_the_page_until_it_is_men
         assert (state["broken"], state["messages"]) == (False, "")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_changes_no_number_changes_no_page(tmp_path: Path) -> None:
     deck = write_deck(tmp_path)
     with viewing(deck, *WATCHED) as view:
@@ -121,7 +121,7 @@ def test_a_file_that_was_missing_is_noticed_when_it_comes(tmp_path: Path) -> Non
 SEVERAL = DECK.replace("default ", "") + "sweep ways of brief { vary integrator = [modified_euler, rk4]; }\n"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_of_several_runs_one_is_chosen_on_the_page_or_named(tmp_path: Path) -> None:
     deck = write_deck(tmp_path, SEVERAL)
     with viewing(deck, *WATCHED) as view:
@@ -141,7 +141,7 @@ def test_of_several_runs_one_is_chosen_on_the_page_or_named(tmp_path: Path) -> N
         assert view.whole(page=1)["run"] == "tuned"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_is_set_on_the_command_line_counts_each_time(tmp_path: Path) -> None:
     deck = write_deck(tmp_path)
     with viewing(deck, "brief", "--vary", "gearbox.kp=[0.01, 0.02] V*s/rad", "-D", "SPARE", *WATCHED) as view:
@@ -151,7 +151,7 @@ def test_what_is_set_on_the_command_line_counts_each_time(tmp_path: Path) -> Non
         assert len(view.numbers()["status"]) == 2
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_of_many_cases_the_first_are_shown_and_run(tmp_path: Path) -> None:
     deck = write_deck(tmp_path, DECK.replace("[0.005, 0.01, 0.02] V", "linspace(0.005, 0.02, 600) V"))
     with viewing(deck, *WATCHED) as view:
@@ -176,7 +176,7 @@ default sweep damped of it { vary environment.drag.sliding = [50, 220] N*s/m; }
 """
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_cases_that_fail_are_told_with_their_cause(tmp_path: Path) -> None:
     deck = write_deck(tmp_path, FAILING)
     with viewing(deck, *WATCHED) as view:
@@ -191,7 +191,7 @@ def test_cases_that_fail_are_told_with_their_cause(tmp_path: Path) -> None:
 SEARCH = DECK + "search hardest of brief { gearbox.kp = between(0.005, 0.02) V*s/rad; maximise volts; at_most = 20; }\n"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_met_check_says_at_the_start_stands_in_the_terminal_too(tmp_path: Path) -> None:
     deck = write_deck(tmp_path, DECK.replace("volts < 3.55 V", "vols < 3.55 V"))
     with viewing("deck.ic", "brief", cwd=tmp_path) as view:
@@ -322,7 +322,7 @@ def test_a_defect_is_told_in_terminal_and_page_and_the_next_save_is_shown(
     loop.give_up(60)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_two_views_of_one_deck_and_two_pages_of_one_view_follow_it(tmp_path: Path) -> None:
     deck = write_deck(tmp_path)
     with viewing(deck, *WATCHED) as one, viewing(deck, "brief", *WATCHED) as other:
@@ -337,7 +337,7 @@ def test_two_views_of_one_deck_and_two_pages_of_one_view_follow_it(tmp_path: Pat
         assert [view.state["run"] for view in views] == ["tuned", "brief", "tuned"]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 0), (signal.SIGTERM, 143), (signal.SIGHUP, -1)])
 def test_it_ends_when_it_is_told_to_without_a_word(tmp_path: Path, sent: signal.Signals, status: int) -> None:
     deck = write_deck(tmp_path)
@@ -366,7 +366,7 @@ def test_it_ends_with_its_terminal(tmp_path: Path) -> None:
         assert process.wait(60) == -signal.SIGHUP
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_killed_in_the_middle_it_leaves_nothing_and_its_port_is_free(tmp_path: Path) -> None:
     deck = write_deck(tmp_path, DECK.replace("[0.005, 0.01, 0.02] V", "linspace(0.005, 0.02, 500) V"))
     work = tmp_path / "tmp"

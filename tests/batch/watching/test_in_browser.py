@@ -330,6 +330,7 @@ def test_a_margin_comes_with_the_cases_and_is_not_known_between_them(chromium: C
         page.close()
 
 
+@pytest.mark.release
 @pytest.mark.browser
 def test_of_eight_tabs_each_is_new_and_the_next_hears_when_the_first_is_closed(
     chromium: Chromium, tmp_path: Path

@@ -372,7 +372,7 @@ def through(folder: Path, kind: str, exchanges: int) -> tuple[Tally, TextSpoiler
     return tally, spoiler
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("kind", TEXT_FAULTS)
 def test_no_wrong_answer_is_taken_of_lines_that_are_spoilt(tmp_path: Path, kind: str) -> None:
     tally, spoiler = through(tmp_path, kind, 600)

@@ -124,6 +124,7 @@ def test_a_deck_s_bed_that_firmware_cannot_count_is_said(bed: str, reason: str, 
     )
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 @pytest.mark.parametrize("bed", ["", "inertia = 1e-9 kg*m^2", "tau_max = 1e9 N*m", "f_c = 0 N*m, f_v = 0 N*m*s/rad"])
 def test_a_deck_s_bed_is_counted_however_light_and_free(bed: str) -> None:
@@ -231,6 +232,7 @@ def test_what_is_not_as_it_was_built_is_built_anew(
     assert not list(fresh.glob(".*"))
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 def test_another_config_plant_kind_or_flag_is_another_build(fresh: Path) -> None:
     paths = {
@@ -243,6 +245,7 @@ def test_another_config_plant_kind_or_flag_is_another_build(fresh: Path) -> None
     assert len(paths) == 5
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 def test_the_firmware_of_hello_is_that_of_sources_config_and_plant(fresh: Path) -> None:
     def told(config: Config, plant: str) -> bytes:

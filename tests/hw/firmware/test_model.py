@@ -75,6 +75,7 @@ def said(payload: bytes) -> tuple[object, ...]:
     return ("sample", found.number, found.status, found.tick, found.rate)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     "capabilities", [Capability(0), Capability.SIMULATED, LOCK_STEP], ids=["motor", "free", "lock-step"]
 )

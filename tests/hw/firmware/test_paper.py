@@ -158,6 +158,7 @@ def test_no_guard_speaks_up_in_a_run_however_heavy_the_arm(law: str, command: st
         driven(experiment, exchange, 4000, case=case)
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 @pytest.mark.parametrize(("sign", "fault"), [(0, wire.DEAD), (-1, wire.REVERSED)])
 @pytest.mark.parametrize("law", ["velocity_tracking", "torque_balance_observer"])

@@ -38,6 +38,7 @@ def test_the_core_s_tests_pass_with_the_address_and_undefined_behaviour_sanitize
     assert " passed" in done.stdout and "skipped" not in done.stdout
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 def test_the_program_runs_with_the_sanitizers() -> None:
     with behind_a_terminal(STEPPED, flags=SANITIZERS) as (line, process):

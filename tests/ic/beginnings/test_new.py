@@ -83,7 +83,7 @@ wrote my_arm.ic
     assert capsys.readouterr() == ("my_arm.ic: 1 run, 1 sweep, 7 cases: no errors\n", "")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_deck_runs_and_meets_its_requirement_in_every_case() -> None:
     cli.main(["new", "deck", "my_arm", "-q"])
     archive = batch.run(ic.compile("my_arm.ic", select="all"), histories="none")
@@ -151,7 +151,7 @@ def test_a_model_does_what_every_model_must(
             test(kind, "begun", joint, tmp_path)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("kind", MODELS)
 def test_its_deck_checks_without_a_word_and_runs_and_is_laid_out(kind: str, begin: Callable[[str], Path]) -> None:
     deck = begin(kind) / "begun.ic"

@@ -19,7 +19,7 @@ from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experim
 TWO_LINK = LIBRARY / "two_link.ic"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_decks_that_come_with_met_compile() -> None:
     for deck in sorted(LIBRARY.glob("*.ic")):
         compiled = ic.check(deck, select="all")

@@ -233,7 +233,7 @@ class GivenReplies(CheckerProcess):
             yield each
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_file_of_values_belongs_to_its_deck_also_while_a_check_has_not_come_to_it(tmp_path: Path) -> None:
     deck = OpenText((tmp_path / "arm.ic").as_uri(), "", 1)
     partial = CheckReply((), (), {"arm.ic": ""}, audited=False)

@@ -137,7 +137,7 @@ def test_a_mistake_in_a_macro_is_shown_where_it_is_used_with_the_way_there(tmp_p
     assert "note: in expansion of macro LONG" in related(found)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_an_editor_that_shows_nothing_related_has_the_help_in_the_message(tmp_path: Path) -> None:
     deck = tmp_path / "arm.ic"
     for given in ({"related": False}, {"options": {"helpInMessage": True}}):
@@ -264,7 +264,7 @@ def test_a_checker_that_dies_is_told_in_the_log_and_started_again(tmp_path: Path
     assert editor.of(deck) == []
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_crash_in_a_check_is_told_in_the_log_and_the_server_lives_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -116,7 +116,7 @@ def test_a_value_of_all_turns_is_shown(tmp_path: Path, editor: Editor) -> None:
     assert "`span` = 0.1 m" in found and "let `span`" in found
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_loops_in_loops_are_answered_however_deep_they_go(editor: Editor, tmp_path: Path) -> None:
     deck = tmp_path / "deep.ic"
     text = "arm a { " + "for i in [1] { " * 2000

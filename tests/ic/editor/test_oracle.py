@@ -9,7 +9,7 @@ import pytest
 from tests.ic.editor.oracle import asked, shipped
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_answers_at_random_places_of_two_decks_are_right() -> None:
     decks = [deck for deck in shipped() if deck.endswith(("two_link.ic", "free_flyer.ic"))]
     roles, wrong = asked(80, 24, decks)
@@ -52,7 +52,7 @@ tune gains of move { choose drive.kp = between(0.01, 0.1) V*s/rad;  against heav
 """
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_answers_at_every_place_of_a_deck_with_loops_and_units_of_its_own_are_right(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

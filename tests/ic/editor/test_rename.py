@@ -56,7 +56,7 @@ def refused(editor: Editor, deck: Path, mark: str, new: str = "another", n: int 
     return str(reason.value.args[0]["message"])
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("mark", "old", "new", "files"),
     [

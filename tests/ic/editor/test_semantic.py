@@ -81,7 +81,7 @@ def test_each_key_that_stands_in_a_shipped_deck_is_known() -> None:
                 assert entry.head.offset in known, (path.name, entry.texts)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_an_editor_is_told_all_words_in_order(tmp_path: Path, editor: Editor) -> None:
     deck = tmp_path / "chain.ic"
     editor.open(deck, CHAIN)

@@ -142,7 +142,7 @@ def test_definitions_are_listed_in_order_also_of_a_text_that_is_not_whole(tmp_pa
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("text", "folded"),
     [

@@ -37,7 +37,7 @@ ADDED = (
 )  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("name", "text"), DECKS, ids=[name for name, _ in DECKS])
 def test_the_decks_of_the_library_and_of_the_pages_are_laid_out(name: str, text: str) -> None:
     after = formatted(name, text)
@@ -83,14 +83,14 @@ def meaning(folder: Path, text: str) -> list[str]:
     return [token.text for token in preprocess(folder / "a.ic").tokens]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("first", range(0, 300, 50))
 def test_a_ruffled_deck_keeps_its_tokens_and_is_done_at_once(tmp_path: Path, first: int) -> None:
     outcomes = [check(tmp_path, ruffled(seed), seed) for seed in range(first, first + 50)]
     assert any(outcomes) and not all(outcomes)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_mutilated_deck_is_laid_out_or_told_where_it_is_broken(tmp_path: Path) -> None:
     outcomes = [check(tmp_path, mutilated(seed), seed) for seed in range(60)]
     assert any(outcomes) and not all(outcomes)
@@ -103,7 +103,7 @@ def test_a_thousand_ruffled_decks_keep_their_tokens(tmp_path: Path, first: int) 
         check(tmp_path, ruffled(seed), seed)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("name", "text"), DECKS, ids=[name for name, _ in DECKS])
 def test_a_deck_whose_indentation_is_lost_gets_it_back(name: str, text: str) -> None:
     text = formatted(name, re.sub(r"(?<=\S) +//.*", "", text))  # how far out such a comment is, depends on its line

@@ -147,7 +147,7 @@ def flattened(pick: random.Random, depth: int = 0) -> tuple[str, list[str]]:
     return f"{head} {{ {' '.join(parts)} }}", [line for iteration in iterations for line in made[iteration]]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", range(40))
 def test_random_loops_are_what_they_stand_for_and_stay_so_laid_out(desk: Desk, seed: int) -> None:
     text, lines = flattened(random.Random(seed))

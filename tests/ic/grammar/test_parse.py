@@ -541,7 +541,7 @@ FUZZ = settings(
 )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @FUZZ
 @given(st.lists(st.sampled_from(PIECES), max_size=60).map("".join))
 def test_no_heap_of_pieces_raises_anything_but_a_problem(desk: Desk, text: str):

@@ -53,7 +53,7 @@ def test_programs_are_told_what_several_decks_have_in_common_once(capsys: pytest
     assert json.loads(out)["errors"] == 2
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_mistake_of_an_include_is_told_once_whatever_line_includes_it(capsys: pytest.CaptureFixture[str]) -> None:
     """Also through one more file, and in every form for programs; its place in a macro is the same mistake's, too."""
     part = PART.replace("recrod = [q];", "BAD").replace("#include <", "#define BAD recrod = [q];\n#include <")
@@ -134,7 +134,7 @@ ADDRESSES = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("text", ADDRESSES)
 def test_a_path_that_stands_as_an_entry_is_written_as_the_block_that_it_means(
     text: str, capsys: pytest.CaptureFixture[str]

@@ -52,6 +52,7 @@ def bare(experiment: Experiment) -> object:
 # What the file says
 
 
+@pytest.mark.release
 @pytest.mark.oracle
 def test_random_robots_move_as_pinocchio_reads_them(tmp_path: Path) -> None:
     poses, torques, accelerations = Worst("poses"), Worst("tau against rnea"), Worst("qdd against aba")

@@ -68,7 +68,7 @@ def test_a_hostile_file_ends_in_a_diagnostic_within_bounded_memory(what: str) ->
     assert peak < 400e6
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_longest_robot_that_is_read_is_told_of(tmp_path: Path) -> None:
     assert [each.code for each in check(tmp_path, LONGEST).diagnostics] == ["D217"]
 
@@ -78,7 +78,7 @@ def test_a_file_cut_anywhere_is_told() -> None:
         assert outcome(TWO[:end]) is not None, end
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_mutilated_file_is_a_robot_or_told_and_never_a_traceback() -> None:
     pick = random.Random(SEED)
     texts = [TWO, RICH, random_urdf(1), random_urdf(4)]

@@ -92,7 +92,7 @@ def test_every_published_robot_that_is_taken_moves_as_pinocchio_reads_it(tmp_pat
     assert taken == int(re.findall(r"(\d+) robots in all", PAGE.read_text(encoding="utf-8"))[0])
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_pages_table_is_what_becomes_of_the_files() -> None:
     table = re.findall(r"^\| `\S+\.urdf` \|.*$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
     assert table == list(rows())

@@ -41,7 +41,7 @@ def lists(folder: Path, written: list[str]) -> list[tuple[float, ...]]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", range(3))
 def test_random_lists_end_where_they_are_written_to_the_last_bit(tmp_path: Path, seed: int) -> None:
     rng = random.Random(seed)

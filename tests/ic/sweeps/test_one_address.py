@@ -53,7 +53,7 @@ def codes(deck: Path, text: str, **options: object) -> set[str]:
     return {each.code for each in ic.check(deck, **options).diagnostics if each.severity == "error"}  # type: ignore[arg-type]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_every_path_that_explain_lists_is_known_to_what_sets_values(
     tmp_path: Path, paths: tuple[str, dict[str, str]]
 ) -> None:

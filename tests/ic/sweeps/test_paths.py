@@ -35,7 +35,7 @@ def values(run: Experiment, path: str) -> np.ndarray:
     return np.asarray(run.formulas.replay(inputs)[found.output] if isinstance(found, Formula) else found)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("axis", "component", "swept_over"),
     [

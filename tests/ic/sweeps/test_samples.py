@@ -64,7 +64,7 @@ BOUNDED = [
 ]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", range(20))
 def test_samples_stay_within_the_bounds_that_the_deck_writes_to_the_last_bit(
     tmp_path: Path, seed: int, monkeypatch: pytest.MonkeyPatch

@@ -51,7 +51,7 @@ def refused(folder: Path, *settings: str, text: str = ARM + SERVO + OTHERS + RUN
     return messages(compiled)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("setting", "old", "new"), [
     ("drive.kp=0.2 V*s/rad", "kp = 0.1", "kp = 0.2"),
     ("hinge.servo.kp=0.2 V*s/rad", "hinge = drive;", "hinge = drive { kp = 0.2 V*s/rad; };"),
@@ -116,7 +116,7 @@ def test_it_holds_for_all_runs_that_are_asked_for(settings: list[str], old: str,
     assert same(made(tmp_path, text, "all", settings), made(tmp_path, edited, "all"))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("setting", "body", "old", "new"), [
     ("drive.kp=0.2 V*s/rad", "vary drive.ki = [1, 2] V/rad;", "kp = 0.1", "kp = 0.2"),
     ("integrator=rk4", "vary drive.ki = [1, 2] V/rad;", "duration", "integrator = rk4; duration"),

@@ -15,7 +15,7 @@ def _nested(name: str, count: int) -> str:
     return f"{name}(" * count + "1" + ")" * count
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("text", "code"),
     [

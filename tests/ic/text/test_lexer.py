@@ -91,7 +91,7 @@ def test_every_token_stands_where_it_says(text):
         assert re.sub(r"\\[ \t]*(\n|\Z)", "", written).startswith(token.text)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @given(st.text(max_size=200))
 def test_any_text_is_cut_into_lines_that_end_with_a_newline_token(text):
     for line in logical_lines(Text("a.ic", text)):

@@ -571,7 +571,7 @@ def test_nothing_is_written_beside_the_deck_or_the_library(desk: Desk):
     assert sorted(p.name for p in Path(pcpp.__file__).parent.iterdir()) == before
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_deck_that_was_read_is_forgotten(tmp_path: Path) -> None:
     """An exception made once for all keeps every place it was raised at: 60 KB a deck, which the fuzzer found."""
     deck = tmp_path / "deck.ic"

@@ -67,7 +67,7 @@ def test_its_limit_is_that_of_the_closed_form(tmp_path: Path) -> None:
     assert found.joints == ("hinge",) and found.gain == pytest.approx(0.5, rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("hz", [1000, 50, 25, 10])
 def test_it_is_on_the_right_side_of_the_limit_of_runs(hz: int, tmp_path: Path) -> None:
     """Steps shorter than a tick, as long, and longer: then memory goes evenly over the step."""

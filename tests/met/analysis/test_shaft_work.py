@@ -104,7 +104,7 @@ ARMS = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("arm", ARMS)
 def test_the_load_is_what_the_shafts_equation_leaves_over(tmp_path: Path, arm: str) -> None:
     """Torque by the arm's dynamics, against that by voltage, rate and its slope: two ways that share nothing. A step's
@@ -148,7 +148,7 @@ def test_the_two_link_arms_load_is_its_mass_matrix_times_its_accelerations(tmp_p
     np.testing.assert_allclose(work(experiment, "shoulder").load[0], load, rtol=0, atol=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("arm", ARMS)
 def test_the_figures_are_those_of_the_engines_metrics(tmp_path: Path, arm: str) -> None:
     text, joint, numbers = ARMS[arm]

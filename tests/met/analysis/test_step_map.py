@@ -120,7 +120,7 @@ run hold {
 PLACES = ("s.q", "e.q", "t.q", "s.qd", "e.qd", "t.qd")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", ["modified_euler", "semi_implicit_euler", "rk4"])
 def test_it_is_the_difference_of_runs_of_one_step(integrator: str, tmp_path: Path) -> None:
     """Three joints that move, turn against each other and slide, in a pose of no symmetry."""

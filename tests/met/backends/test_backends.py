@@ -28,7 +28,7 @@ def bits(numbers: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(numbers).view(np.int64)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("run", ["nominal", pytest.param("hybrid", marks=pytest.mark.slow)])
 def test_all_have_the_bits_of_the_default(name: str, run: str) -> None:

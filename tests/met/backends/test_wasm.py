@@ -99,6 +99,7 @@ def test_every_model_has_the_native_bits(kind: models.Kind, name: str, machine: 
     assert counted(whole_run(name, deck, cases=7), machine)[1] == 0
 
 
+@pytest.mark.release
 @pytest.mark.node
 @MACHINE
 @pytest.mark.parametrize(
@@ -110,6 +111,7 @@ def test_whole_runs_of_published_arms_have_the_native_bits(deck: str, run: str, 
     assert wrong == 0 and count > 4_000
 
 
+@pytest.mark.release
 @pytest.mark.node
 @MACHINE
 @pytest.mark.parametrize(("arm", "model"), whole_runs.REVERSING, ids=lambda of: of.name if isinstance(of, Arm) else of)

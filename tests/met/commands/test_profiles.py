@@ -326,7 +326,7 @@ def test_every_profile_is_here() -> None:
     assert {name for name, *_ in JUMPS} == set(models.find_own("command"))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("name", "given", "jump"), JUMPS)
 def test_a_profile_jumps_as_it_says(name: str, given: dict[str, Any], jump: str) -> None:
     assert profile(name).jump(filled(name, **given)) == jump

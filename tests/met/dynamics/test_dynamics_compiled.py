@@ -84,6 +84,7 @@ def states_of(arm: RandomArm) -> list[RandomArm]:
     return result
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(
     "joints",
     [

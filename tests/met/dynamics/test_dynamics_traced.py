@@ -92,7 +92,7 @@ def close(ours: Sequence[float], plain: Sequence[float], seed: int, share: float
     assert not wrong.size, f"seed {seed}: entries {wrong}: {a[wrong]} against {b[wrong]}"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_recorded_state_gives_the_plain_results(seed: int) -> None:
     arm = random_tree(seed)
@@ -126,7 +126,7 @@ def test_an_arm_whose_every_number_is_a_cases_gives_the_same_motion(seed: int) -
     close(record.replayed(recorded), everything(Tree.build(arm.bodies), arm, arm.mode), seed, 1e-10)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", SEEDS)
 def test_numpys_numbers_take_the_traced_path(seed: int) -> None:
     arm = random_tree(seed)

@@ -127,7 +127,7 @@ def order(coarse: float, fine: float) -> float:
     return math.log2(coarse / fine)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda integrator: integrator.name)
 def test_a_run_without_losses_keeps_energy_to_the_integrators_order(integrator: Integrator) -> None:
     found = []

@@ -87,6 +87,7 @@ def whole(solved: Solved) -> np.ndarray:
     return np.concatenate([*solved.base_acceleration, solved.qdd])
 
 
+@pytest.mark.release
 @pytest.mark.oracle
 def test_accelerations_agree_with_pinocchios_free_flyer() -> None:
     # As a share of the largest of all.
@@ -131,7 +132,7 @@ def test_energy_and_momentum_agree_with_pinocchios_free_flyer() -> None:
         each.below(CLOSE)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_momentum_changes_by_the_external_wrench_alone() -> None:
     # From the accelerations, by an independent sum over the links; as a share of the largest part of the wrench's rate.
     worst = Worst("free base: d(momentum)/dt against the external wrench")
@@ -164,7 +165,7 @@ def test_qdd_given_back_in_acceleration_mode_returns_the_same_motion_and_torques
     torques.below(CLOSE)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_inertia_and_torque_felt_agree_with_linear_algebra_in_every_mode() -> None:
     # The base's six coordinates are those of a stand without matter that yields: three slides and three hinges.
     held, yielding, bias = (Worst(f"free base: {what}") for what in ("J_eff, held", "J_eff, yielding", "b"))
@@ -267,7 +268,7 @@ def test_a_free_base_is_given_no_acceleration_and_moves_with_all_velocity_produc
             solve(tree, (0.0,), (0.0,), **given)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", range(20))
 def test_a_recorded_state_gives_the_plain_results_in_every_mode(seed: int) -> None:
     arm, base = floated(random_tree(seed)), flight(seed)

@@ -12,7 +12,7 @@ from tests.met.dynamics.test_free_base import fleet, vector
 from tests.oracles.pinocchio_floating import Flight, FloatingPinocchio
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_answer_leaves_no_momentum() -> None:
     worst = 0.0
     for arm, tree, flight in fleet()[::5]:

@@ -17,6 +17,7 @@ from tests.oracles.two_link_lagrange import Rods, mass_matrix, velocity_torque
 from tests.oracles.worst import Worst, relative
 
 
+@pytest.mark.release
 @pytest.mark.oracle
 def test_qdd_given_back_in_acceleration_mode_returns_the_same_motion_and_torques() -> None:
     motion, torques = Worst("qdd given back: qdd"), Worst("qdd given back: tau")
@@ -35,7 +36,7 @@ def test_qdd_given_back_in_acceleration_mode_returns_the_same_motion_and_torques
     torques.below(CLOSE)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_renumbering_branches_changes_nothing_beyond_rounding() -> None:
     motion, torques = Worst("renumbered: qdd"), Worst("renumbered: tau")
     for arm, tree in forest():
@@ -51,7 +52,7 @@ def test_renumbering_branches_changes_nothing_beyond_rounding() -> None:
     torques.below(CLOSE)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_joints_are_given_back_in_the_order_asked_for() -> None:
     for arm, tree in forest():
         turned = [body.joint for body in arm.bodies if body.kind != "fixed"][::-1]
@@ -62,7 +63,7 @@ def test_joints_are_given_back_in_the_order_asked_for() -> None:
         assert ours.qdd[::-1] == passed(arm, arm.mode, tree).qdd, f"seed {arm.seed}"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_cutting_a_link_in_two_at_a_fixed_joint_changes_nothing_beyond_rounding() -> None:
     motion, torques, borne = Worst("cut: qdd"), Worst("cut: tau"), Worst("cut: reactions")
     for arm, tree in forest():
@@ -107,7 +108,7 @@ def test_a_base_that_accelerates_is_a_gravity_that_points_back() -> None:
         assert ours.qdd == passed(arm, arm.mode, tree).qdd, f"seed {arm.seed}"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_base_that_moves_is_six_more_joints_in_acceleration_mode() -> None:
     motion, torques, borne = Worst("moving base: qdd"), Worst("moving base: tau"), Worst("moving base: reactions")
     for arm, tree in forest():

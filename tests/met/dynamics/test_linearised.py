@@ -183,7 +183,7 @@ def test_any_modes_and_wrenches_move_as_the_recorded_recursion_does(joints: int)
     worst.below(CLOSE)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_modes_decided_when_the_program_runs_give_what_modes_decided_before_do() -> None:
     worst = Worst("masks against truths, share of the largest entry")
     for arm, tree in forest()[:12]:

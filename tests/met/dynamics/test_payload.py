@@ -121,7 +121,7 @@ def total(arm: RandomArm, tree: Tree, qd: tuple[float, ...], base: Pose, twist: 
     return sum(np.array([each.kinetic, *each.linear, *each.angular]) for each in (own, *others))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("free", [False, True])
 def test_the_jump_of_the_rates_agrees_with_linear_algebra_in_every_mode(free: bool) -> None:
     joints, bases = Worst("impact: joints"), Worst("impact: base")
@@ -143,7 +143,7 @@ def test_the_jump_of_the_rates_agrees_with_linear_algebra_in_every_mode(free: bo
         bases.below(1e-11)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_momentum_goes_over_to_rounding_and_energy_is_lost_as_the_formula_says() -> None:
     kept, lost = Worst("impact on a free base: momentum"), Worst("impact: energy lost")
     for seed in range(60):

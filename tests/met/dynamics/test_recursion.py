@@ -16,6 +16,7 @@ from tests.oracles.random_tree import random_tree
 from tests.oracles.worst import Worst, relative
 
 
+@pytest.mark.release
 @pytest.mark.oracle
 def test_accelerations_agree_with_pinocchio() -> None:
     # As a share of the arm's largest acceleration.
@@ -66,7 +67,7 @@ def test_mixed_modes_agree_with_pinocchio_both_ways() -> None:
     forward.below(CLOSE)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_mixed_modes_agree_with_linear_algebra() -> None:
     accelerations, torques = Worst("mixed modes: qdd against M"), Worst("mixed modes: tau against M")
     for arm, tree in forest():

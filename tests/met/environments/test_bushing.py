@@ -116,7 +116,7 @@ def held(links: Placed) -> float:
     return float(x @ (np.array([100.0, 60.0, 30.0]) * x) + phi @ (np.array([12.0, 30.0, 6.0]) * phi)) / 2.0
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", [each for each in INTEGRATORS if each.order > 1], ids=lambda each: each.name)
 def test_with_what_it_holds_energy_is_kept_to_the_integrators_order(tmp_path: Path, integrator: Integrator) -> None:
     """Stiffnesses that differ and large angles: kept, since the moment is that of the energy at any angle."""

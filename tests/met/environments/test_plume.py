@@ -136,7 +136,7 @@ def test_a_plate_right_before_the_nozzle_takes_its_momentum_with_few_cells(expon
             assert force[2] == pytest.approx(2.0 * THRUST, rel=off + lost), (far, cells)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_on_a_plate_beside_the_plume_few_cells_come_near_many() -> None:
     """In general position, and where the plume goes along the plate."""
     for nozzle, axis in (

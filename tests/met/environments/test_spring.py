@@ -82,7 +82,7 @@ def held(links: Placed) -> float:
     return web + stretched(boom.p + boom.R @ [0.5, 0.0, 0.0], np.ones(3), 250.0, 1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", [each for each in INTEGRATORS if each.order > 1], ids=lambda each: each.name)
 def test_with_what_springs_hold_energy_is_kept_to_the_integrators_order(tmp_path: Path, integrator: Integrator) -> None:
     assert order_of_loss(tmp_path, MODEL, held, integrator.name) > integrator.order - 0.15

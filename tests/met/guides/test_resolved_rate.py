@@ -135,6 +135,7 @@ def test_an_open_loop_goes_by_its_commands_and_shows_where_the_arm_is(tmp_path: 
     assert shown == pytest.approx(np.linalg.norm(begun[1] + far - p), abs=1e-12)
 
 
+@pytest.mark.release
 @pytest.mark.oracle
 def test_the_path_is_kept_better_in_proportion_to_the_period(tmp_path: Path) -> None:
     # Open loop with a position command: the law's own error, no servo's. Euler's steps of the path's rate, so order 1.
@@ -161,7 +162,7 @@ def test_between_its_ticks_a_position_goes_on_with_the_rate(tmp_path: Path) -> N
     np.testing.assert_allclose(steps, np.broadcast_to(steps[:, :1], steps.shape), rtol=0, atol=1e-14)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_continuous_servo_follows_between_the_ticks(tmp_path: Path) -> None:
     ends = []
     for servos in ("2 kHz", "continuous"):
@@ -173,7 +174,7 @@ def test_a_continuous_servo_follows_between_the_ticks(tmp_path: Path) -> None:
     assert np.ptp(ends[0], axis=0).max() > 0.1
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_base_that_is_moved_is_made_up_for(tmp_path: Path) -> None:
     # It begins at rest, as the joints do: else these lag behind it from the first step on.
     base = "base = prescribed { x = sine(amplitude = 5 cm, frequency = 0.7 Hz, phase = 90 deg);"
@@ -201,7 +202,7 @@ FLYING = "base = free;"
 TUMBLING = "base.velocity = [0.02, -0.01, 0.03] m/s; base.rate = [3, -2, 4] deg/s;"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("initial", ["", TUMBLING])
 def test_the_generalized_jacobian_knows_what_a_free_base_does(initial: str, tmp_path: Path) -> None:
     text = f"{path()} max_damping = 0 m; threshold = 0 m; gain = 3 1/s; jacobian = "
@@ -225,7 +226,7 @@ def test_the_generalized_jacobian_knows_what_a_free_base_does(initial: str, tmp_
     assert errors["arm"] > 5 * errors["generalized"]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_generalized_jacobian_knows_the_payloads_that_are_held_for_a_time(tmp_path: Path) -> None:
     """Held for good, released as the run ends, grappled as it begins: one motion, and so one course of the error."""
     text = f"{path()} max_damping = 0 m; threshold = 0 m; gain = 3 1/s; jacobian = generalized;"

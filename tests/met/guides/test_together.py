@@ -39,7 +39,7 @@ def length(joints: list[SimpleNamespace], begins: list[float]) -> float:
     return 1.0 / rate + rate / acceleration if rate**2 < acceleration else 2.0 / np.sqrt(acceleration)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", range(30))
 def test_all_arrive_together_within_their_limits_and_one_is_at_its_own(seed: int) -> None:
     joints, begins = random_moves(seed)

@@ -38,7 +38,7 @@ def test_all_integrators_are_held_to_their_order() -> None:
     assert {name: model.order for name, model in models.find_own("integrator").items()} == ORDERS
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", ORDERS)
 def test_the_error_falls_with_the_order_through_the_whole_program(integrator: str) -> None:
     """Measured at 800 Hz, share of the rates' range: 6e-4, 6e-6 (both of order 2), 3e-10."""
@@ -125,7 +125,7 @@ def test_friction_keeps_order_two_where_the_integrator_has_it(integrator: str) -
     np.testing.assert_array_equal(runs[-1].signals["qd"][0] == 0.0, exact.qd == 0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", ORDERS)
 def test_a_joint_held_below_its_friction_stops_and_does_not_creep(integrator: str) -> None:
     pushed = {"dynamics_hz": 25, "servo_hz": 25, "record_hz": 1, "duration": 120}

@@ -34,7 +34,7 @@ def in_the_source() -> Iterator[str]:
                     yield from (str(each) for each in words[:1] if len(str(each)) == 4)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_table_has_every_code_that_warns_and_no_other() -> None:
     assert {*in_the_source(), *ELSEWHERE} - OF_NO_RUN == WARNINGS
 

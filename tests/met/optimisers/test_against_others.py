@@ -21,6 +21,7 @@ def found(landscape: Landscape, dimension: int, below: float) -> tuple[int, int]
     return searched, drawn
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("dimension", [1, 2, 5, 16])
 def test_a_resonance_is_found_in_every_seed_to_a_tenth_of_its_height(dimension: int) -> None:
     searched, drawn = found(landscapes.resonance, dimension, -90.0)
@@ -29,6 +30,7 @@ def test_a_resonance_is_found_in_every_seed_to_a_tenth_of_its_height(dimension: 
         assert drawn <= 2
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("dimension", [2, 5, 16])
 def test_a_resonance_under_a_trend_of_the_others_is_found_in_every_seed(dimension: int) -> None:
     """The least is about -100 less what the trend has in the corner that it falls to."""
@@ -44,6 +46,7 @@ def test_a_peak_in_two_dimensions_without_a_slope_to_it_is_found_about_as_often_
     assert searched >= drawn - 5
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("dimension", [5, 16])
 @pytest.mark.parametrize(
     "landscape",

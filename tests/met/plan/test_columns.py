@@ -121,7 +121,7 @@ def test_any_draws_are_had_in_any_order() -> None:
     assert columns.ends(column) == (int(np.argmin(array)), int(np.argmax(array)))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("sweep", SWEEPS)
 def test_a_long_sweep_has_the_values_keys_and_plan_of_a_listed_one(
     sweep: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -137,7 +137,7 @@ def test_what_makes_another_program_changes_the_structure_key() -> None:
     assert keys.structure_key(structure, ["gearbox.kp"]) not in found
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_million_cases_have_names_of_their_own() -> None:
     """In 1.5 s; a row-by-row JSON would take a minute. tests/costs.py sees to that."""
     experiment = plans.gains(1_000_000)

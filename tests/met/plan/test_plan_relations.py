@@ -54,7 +54,7 @@ def test_a_plan_with_all_of_them_is_read_as_it_was_written(tmp_path: Path) -> No
     assert json.loads(written)["experiments"][0]["parameters"]["environment.push.force_y"]["value"] == []
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("change", "said"),
     [

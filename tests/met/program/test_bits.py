@@ -87,7 +87,7 @@ def test_cases_of_one_block_have_events_of_their_own(swung: Swung) -> None:
     assert ((per_step.max(axis=1) == 2.0) & (per_step.min(axis=1) == 0.0)).any(), "split twice in some, not in others"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("lanes", [2, 4, 16, 32])
 def test_bits_do_not_depend_on_lanes(swung: Swung, lanes: int) -> None:
     assert swung.differences(*swung.run(kernel.from_recording(swung.recording, lanes))) == 0

@@ -46,7 +46,7 @@ def assert_declared(made: Experiment) -> set[str]:
     return used
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("name", "some"),
     [

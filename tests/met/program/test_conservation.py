@@ -46,6 +46,7 @@ def energy(bodies: list[Body], rotor: tuple[float, ...], q: np.ndarray, qd: np.n
     return float(qd @ dense.mass_matrix(q) @ qd / 2.0 - np.dot(GRAVITY, weighed) + SPRING * q[2] ** 2 / 2.0)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda integrator: integrator.name)
 def test_an_arm_without_losses_keeps_energy_to_its_integrators_order(tmp_path: Path, integrator: Integrator) -> None:
     lost = []

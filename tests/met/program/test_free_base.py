@@ -32,7 +32,7 @@ def last(run: Run) -> np.ndarray:
     return np.concatenate([run.signals[name][0, -1].ravel() for name in STATE])
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", models.find_own("integrator"))
 def test_a_tumbling_free_flyer_is_integrated_to_the_integrators_order(tmp_path: Path, integrator: str) -> None:
     order = models.find("integrator", integrator).order
@@ -225,7 +225,7 @@ def test_a_base_that_runs_away_fails_and_says_so(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("integrator", "limit"),
     [

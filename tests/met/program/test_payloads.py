@@ -71,7 +71,7 @@ def test_a_run_with_a_grapple_and_a_release_keeps_the_integrators_order(tmp_path
     assert abs(found - order) < 0.15
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", models.find_own("integrator"))
 def test_momentum_is_kept_from_end_to_end_to_the_integrators_order(tmp_path: Path, integrator: str) -> None:
     order = models.find("integrator", integrator).order
@@ -192,7 +192,7 @@ BARE = changed(
 SAME = ("q", "qd", "qdd", "tau", "J_eff", "b", "reaction.moment", "reaction.force", "energy.kinetic", *KEPT)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("base", ["free", "fixed"])
 @pytest.mark.parametrize("released", [True, False])
 def test_a_payload_that_is_held_is_a_link_behind_a_fixed_joint(tmp_path: Path, base: str, released: bool) -> None:
@@ -310,7 +310,7 @@ run it {
 """
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_gas_of_a_thruster_pushes_a_payload_in_flight(tmp_path: Path) -> None:
     # straight on: 2 q A with q = (n + 2) thrust/(4 pi r^2), the plate a hundredth of the distance wide
     run = engine.run(experiment(tmp_path, PLUME))
@@ -346,7 +346,7 @@ def both(folder: Path, servos: str, *changes: tuple[str, str]) -> tuple[Run, Run
     return runs[0], runs[1]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_dry_friction_holds_no_joint_against_a_blow(tmp_path: Path) -> None:
     run, before = both(tmp_path, "shoulder = rub;", ("shoulder.qd   = 0.5", "shoulder.qd   = 0"))
     assert before.signals["qd"][0, 8, 0] == 0.0
@@ -362,7 +362,7 @@ def test_a_locked_joint_does_not_jump_and_momentum_is_kept_all_the_same(tmp_path
     assert_kept(momentum(run)[8, :6], momentum(before)[8, :6])
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_rotor_behind_a_compliant_gear_goes_on_turning_through_the_blow(tmp_path: Path) -> None:
     recorded = ("record   = [", "record   = [shoulder.servo.motor_rate, ")
     runs = both(tmp_path, "shoulder = soft;", recorded, ("shoulder.qd   = 0.5", "shoulder.qd   = 0"))
@@ -384,7 +384,7 @@ def _turned(orientation: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return vector + 2.0 * np.cross(u, np.cross(u, vector) + w * vector)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_rigid_gears_rotor_takes_its_share_of_the_blow(tmp_path: Path) -> None:
     # With the base fixed, and rotors as heavy as can be: what is nearly held does not jump.
     free, _ = both(tmp_path, "", *FIXED[1:], ("base = free;", ""))
@@ -410,7 +410,7 @@ def test_a_rigid_gears_rotor_takes_its_share_of_the_blow(tmp_path: Path) -> None
     assert free.cause == [""]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_motor_on_a_bed_turns_on_as_its_shaft_does(tmp_path: Path) -> None:
     run, before = both(
         tmp_path,
@@ -422,7 +422,7 @@ def test_a_motor_on_a_bed_turns_on_as_its_shaft_does(tmp_path: Path) -> None:
     assert run.signals["J_eff"][0, 8, 0] > 1.2 * before.signals["J_eff"][0, 8, 0], "and feels what is held now"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_two_payloads_that_are_grappled_at_once_are_one_impact(tmp_path: Path) -> None:
     other = changed(
         BOX,
@@ -451,7 +451,7 @@ def test_two_payloads_that_are_grappled_at_once_are_one_impact(tmp_path: Path) -
         np.testing.assert_allclose(swapped.signals[name], run.signals[name], rtol=0, atol=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("link", ["base", "lower"])
 def test_on_a_base_that_is_told_its_way_a_payload_goes_along_and_off_with_its_speed(tmp_path: Path, link: str) -> None:
     told = (
@@ -501,7 +501,7 @@ sweep some of tumbling {
 """
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_cases_that_are_grappled_at_other_times_leave_each_other_alone(tmp_path: Path) -> None:
     found = experiment(tmp_path, ARM, RUN, SWEEP, select=["some"])
     run = engine.run(found)

@@ -113,7 +113,7 @@ def test_the_arm_upon_it_moves_as_pinocchio_says(tmp_path: Path) -> None:
         assert np.max(np.abs(tau)) < 2e-13 * np.max(np.abs(held)), f"{t} s"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_plain_numbers_and_every_lane_give_the_same(tmp_path: Path) -> None:
     sweep = """\
 sweep some of shaken {

@@ -50,7 +50,7 @@ def lost(run: Run) -> np.ndarray:
     return np.max(np.abs(whole - whole[0]))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("model", MODELS)
 def test_momentum_is_kept_to_the_integrators_order(tmp_path: Path, model: str) -> None:
     errors = [lost(flown(tmp_path, model, hz)) for hz in (1000, 2000, 4000)]

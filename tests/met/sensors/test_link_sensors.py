@@ -421,7 +421,7 @@ def test_both_frames_of_the_gradient_feel_the_same(tmp_path: Path) -> None:
         np.testing.assert_allclose(of(a, name), of(b, name), rtol=1e-6, atol=size, err_msg=name)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_plain_numbers_lanes_and_threads_give_the_same(tmp_path: Path) -> None:
     sensors = (
         "sensor tip = accelerometer { link = lower; at = [1, 0, 0] m; along = [1, 2, 3]; cutoff = 5 Hz; "

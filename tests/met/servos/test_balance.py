@@ -134,7 +134,7 @@ def test_unloaded_it_falls_into_its_gears(tmp_path: Path) -> None:
     assert np.abs(run.signals["qdd"][0, 0]).max() > 1.0 and np.abs(run.signals["qd"]).max() > 0.05
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", ["modified_euler", "rk4"])
 def test_on_a_base_that_moves_the_joints_do_not(tmp_path: Path, integrator: str) -> None:
     """The base floats or swings; what its motion asks of the joints is in the balance."""
@@ -160,7 +160,7 @@ def test_joints_that_cannot_be_balanced_move_and_are_reckoned_with(tmp_path: Pat
     assert abs(qdd[3]) > 1.0 and np.abs(np.delete(qdd, 3)).max() < 1e-9
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("level", [50.0, 2.0])
 @pytest.mark.parametrize("by", ["friction", "brake"])
 def test_what_holds_a_joint_that_is_not_balanced_is_reckoned_with(by: str, level: float, tmp_path: Path) -> None:

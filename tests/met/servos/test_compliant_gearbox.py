@@ -164,7 +164,7 @@ def test_a_gear_with_a_loss_takes_more_to_drive_and_less_to_hold_back(tmp_path: 
         assert of(run, "servo.motor_torque")[-1] == pytest.approx(share * -float(moment) / 100.0, rel=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_modified_euler_keeps_its_order_through_events_of_both_sides(tmp_path: Path) -> None:
     """Motor and joint stick and slip under an alternating torque of the motor."""
     moving = (

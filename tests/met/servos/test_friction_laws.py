@@ -86,7 +86,7 @@ def test_bristles_bend_as_a_spring_before_they_slip(tmp_path: Path) -> None:
             assert np.nanmax(q) > 0.5  # and fails at last, where it is too fast for the step
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("law", sorted(LAWS))
 def test_friction_takes_energy_out_or_stores_what_it_gives_back(law: str) -> None:
     """Over any motion of the shaft the energy taken in is never less than nothing (LuGre's bristles store some)."""

@@ -103,7 +103,7 @@ def slipping() -> tuple[np.ndarray, int]:
     return np.array(rows), releases
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("integrator", ["modified_euler", "midpoint", "rk4"])
 def test_a_block_that_breaks_away_between_steps_is_met_with_order_two(tmp_path: Path, integrator: str) -> None:
     exact, releases = slipping()

@@ -82,7 +82,7 @@ STEADY = [each for each in LIMITS if each[1] != "v_max" or not each[0].startswit
 """All but those where an amplifier's voltage limits: there the current falls from the start on, and is not balanced."""
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("servo", "name"), STEADY)
 def test_dry_friction_at_the_motor_holds_its_share(servo: str, name: str, tmp_path: Path) -> None:
     """A motor of 90 % of the torque, and friction of 11 or 9 % of it: the joint stays, or falls."""
@@ -138,7 +138,7 @@ def test_a_joint_that_turns_is_judged_at_its_rate(tmp_path: Path) -> None:
     assert f"it takes 14.7 N m, and its servo can hold {0.5 * LOAD:.3g} N m" in said
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("servo", "name"), LIMITS)
 def test_many_cases_are_told_what_each_would_be_alone(servo: str, name: str, tmp_path: Path) -> None:
     """Their servos are judged together; the last can hold its joint."""

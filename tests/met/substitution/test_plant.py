@@ -105,7 +105,7 @@ def test_at_the_wire_it_makes_the_run_of_the_bed_inside_to_the_bit(
     assert_same_run(experiment(tmp_path, dynamics=dynamics, servos=servos, faults=faults))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(("law", "delay"), [("torque_balance_observer", 0), ("torque_balance", 2)])
 def test_so_it_does_under_other_laws_and_with_a_delay(tmp_path: Path, law: str, delay: int) -> None:
     assert_same_run(experiment(tmp_path, dynamics=250, servos=500, law=law, delay=delay), ticks=2000)
@@ -119,7 +119,7 @@ def test_so_do_two_at_two_wires(tmp_path: Path) -> None:
     assert_same_run(found, ticks=2000)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("case", [0, 5, 14])
 def test_a_case_of_a_sweep_over_the_bed_has_its_own_plant(tmp_path: Path, case: int) -> None:
     found = experiment(tmp_path, "several", dynamics=250, servos=500)

@@ -102,6 +102,7 @@ def one_number(name):
 # in each limit, 0.5 is the last rounding. exp, log: a polynomial's last sum. sin, cos: what is left of the angle may be
 # a unit off. tan: a quotient of two that are 0.8 off. atan2: a quotient, then two sums. tanh: 1 off in e^x - 1 twice.
 # asin, acos: a leg that is 0.8 off goes into atan2.
+@pytest.mark.release
 @pytest.mark.oracle
 @pytest.mark.parametrize(
     ("name", "limit"),

@@ -189,6 +189,7 @@ def same(program: Program, cases: np.ndarray, folder: Path, words: tuple[str, ..
     assert different(expected[1], outputs) == 0
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 @pytest.mark.parametrize("words", HERE, ids=" ".join)
 def test_every_operation_has_the_bits_of_kernel_and_definition(tmp_path: Path, words: tuple[str, ...]) -> None:
@@ -199,6 +200,7 @@ def test_every_operation_has_the_bits_of_kernel_and_definition(tmp_path: Path, w
     assert different(rows[:, 0].copy(), meant(program, cases)) == 0
 
 
+@pytest.mark.release
 @pytest.mark.compiler
 @pytest.mark.parametrize("words", HERE, ids=" ".join)
 def test_elementary_functions_and_noise_have_the_kernels_bits(tmp_path: Path, words: tuple[str, ...]) -> None:

@@ -133,7 +133,7 @@ def test_arrays_have_the_bits_of_plain_numbers():
     assert np.array_equal(philox(columns[0], 0.0, columns[2], 7.0, 3.0, 0.0, 1), wanted[:, 4], equal_nan=True)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("lanes", [2, 4, 8, 16, 32])
 @pytest.mark.parametrize("cpu", [None, *RUNNABLE])
 def test_machine_code_has_the_bits_of_plain_numbers(recording, cpu, lanes):

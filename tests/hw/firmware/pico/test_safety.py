@@ -228,6 +228,7 @@ def test_an_encoder_counts_both_ways(emulator: Emulator) -> None:
             assert after == pytest.approx(emulator.told["angle"], abs=0.004)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("rate", [40.0, -40.0])
 def test_without_a_tachometer_the_rate_is_the_encoder_s(tmp_path: Path, rate: float) -> None:
     lines = SHIPPED.read_text(encoding="utf-8").splitlines()
@@ -248,6 +249,7 @@ def damaged(flash: bytes, at: int) -> bytes:
     return flash[:at] + bytes([flash[at] ^ 0x10]) + flash[at + 1 :]
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("at", [0x10C, 0x140, 0x400, 0x1000, -1])
 def test_an_image_with_a_bit_that_changed_drives_no_pin(at: int) -> None:
     flash = pico_image(pico_bench())
@@ -256,6 +258,7 @@ def test_an_image_with_a_bit_that_changed_drives_no_pin(at: int) -> None:
         assert told["enables"] == 0 and told["deepest"] == 0
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("at", [0x20000000, 0x20001FFC, 0x20002800])
 def test_ram_with_a_bit_that_sticks_drives_no_pin(at: int) -> None:
     with Emulator(pico_image(pico_bench()), motor=True, stuck=[at, 8]) as emulator:

@@ -212,7 +212,7 @@ def test_it_may_be_allowed(tmp_path: Path) -> None:
     assert codes(tmp_path, ARM, SERVO, run) == []
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("seed", range(40))
 def test_random_sane_decks_are_told_nothing_of_it(tmp_path: Path, seed: int) -> None:
     assert not {"D296", "D297", "D298"} & set(codes(tmp_path, random_deck(seed)))

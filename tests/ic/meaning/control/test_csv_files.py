@@ -682,7 +682,7 @@ def test_one_mistake_of_a_file_is_told_once_however_many_joints_read_it(tmp_path
     assert [d.code for d in said.diagnostics] == ["D195"]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_broken_file_is_told_with_a_place_whatever_is_wrong_with_it(tmp_path: Path) -> None:
     pick = random.Random(190)
     odd = b'0123456789.,;[]"#\n\r\t -+eE\xff\x00am/^*'

@@ -56,7 +56,7 @@ def compiled(text: str) -> Compiled:
     return check("", include_dirs=(), defines=(), select="all", text=text)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("more", MORE)
 def test_all_is_as_if_each_joint_had_its_servo_by_itself(monkeypatch: pytest.MonkeyPatch, more: str) -> None:
     found = compiled(LINKS + more)

@@ -51,7 +51,7 @@ def compiled(text: str) -> Compiled:
     return check("", include_dirs=(), defines=(), select="all", text=text)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("more", MORE)
 def test_all_is_as_if_each_run_resolved_its_arm(monkeypatch: pytest.MonkeyPatch, more: str) -> None:
     found = compiled(DECK + more)

@@ -78,7 +78,7 @@ EXPRESSIONS = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("text", EXPRESSIONS)
 def test_expressions_are_what_numpy_makes_of_the_recorded_channels(tmp_path: Path, text: str) -> None:
     found = made(
@@ -322,7 +322,7 @@ def test_a_plan_whose_expressions_are_damaged_is_refused(tmp_path: Path, old: st
         plan_file.loads(text[:start] + text[start:].replace(old, new))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_reference_and_the_kernel_agree(tmp_path: Path) -> None:
     more = "sweep both of hold { vary limit = [0.2, 0.4] rad/s; }\n"
     found = made(

@@ -68,7 +68,7 @@ def agree(program: PeriodProgram, flows: Sequence[Flow]) -> int:
     return sum(same(each, program, flow) for each, flow in zip(found, flows, strict=True))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("count", [3, pytest.param(20, marks=pytest.mark.slow, id="of 20 states")])
 @pytest.mark.parametrize(("deck", "name"), shipped())
 def test_of_shipped_decks_about_scattered_states(deck: str, name: str, count: int) -> None:

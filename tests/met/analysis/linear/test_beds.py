@@ -38,7 +38,7 @@ def with_loads(made: Experiment, loads: list[float]) -> Experiment:
     return replace(made, cases=cases)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("delay", [0, 1, 2])
 @pytest.mark.parametrize("rate", ["100 Hz", pytest.param("1 kHz", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("law", ["measured_acceleration", "bare"])

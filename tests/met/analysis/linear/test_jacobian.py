@@ -33,7 +33,7 @@ def mapped(made: Experiment, time: float = 0.0, inputs: bool = False) -> PeriodM
     return period_map(program, at_instant(program, 0, tick))
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     "count", [2, pytest.param(30, marks=pytest.mark.slow, id="of 30 states")]
 )  # fmt: skip

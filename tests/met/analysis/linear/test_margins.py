@@ -113,6 +113,7 @@ def test_the_search_over_gains_finds_the_same_limits(loop: ScalarLoop) -> None:
             assert searched is not None and exact is not None and math.isclose(searched, exact, rel_tol=1e-6)
 
 
+@pytest.mark.release
 @pytest.mark.oracle
 def test_200_loops_have_the_margins_that_python_control_finds() -> None:
     """To 1e-9, where the crossings that it names are ones: it goes by polynomials, and knows none at the half of the

@@ -186,7 +186,7 @@ ARMS: Mapping[str, Machine] = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", ARMS)
 def test_the_predicted_gain_limit_is_that_of_a_sweep(name: str) -> None:
     """Of four random arms each, within 1 %: the gain at which runs of the kernel begin to swing up, by bisection."""

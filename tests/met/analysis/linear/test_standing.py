@@ -65,7 +65,7 @@ def solved(folder: Path, run: str, block: str) -> tuple[LinearQuestion, Flow]:
     return asked, found
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("run", ["hold", "slow"])
 def test_an_arm_that_is_put_there_stays_for_a_thousand_periods(tmp_path: Path, run: str) -> None:
     """In all that it remembers, and its joints are where they are asked for."""

@@ -36,7 +36,7 @@ run faulty like there { hinge { bed = emulated(tachometer = 0.1 rad/s);  law = v
 LAWS = ["velocity_tracking", "torque_balance_observer", "torque_balance", "bare", "measured_acceleration"]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("delay", [0, 2])
 @pytest.mark.parametrize("law", LAWS)
 def test_an_arm_on_a_bed_that_is_put_there_stays_and_moves_as_its_map_says(
@@ -87,7 +87,7 @@ def test_a_shaft_that_no_friction_holds_has_no_derivative_at_rest(tmp_path: Path
     )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("delay", [0, 2])
 @pytest.mark.parametrize("law", LAWS)
 def test_a_bed_whose_servo_is_commanded_a_torque_stands_by_the_one_that_bears_the_weight(

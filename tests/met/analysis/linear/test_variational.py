@@ -50,7 +50,7 @@ def gradients(count: int) -> tuple[np.ndarray, np.ndarray]:
     return found.value[0], found.slope[0]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("count", [each if each < 8 else pytest.param(each, marks=pytest.mark.slow) for each in COUNTS])
 def test_a_run_moves_with_where_it_begins_as_variational_equations_have_it(count: int) -> None:
     """Of joints that turn freely, by Runge-Kutta's steps: to 1e-10 of the largest entry."""
