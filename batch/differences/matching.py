@@ -75,7 +75,7 @@ def _keys(group: ArchiveGroup) -> np.ndarray:
 
 def _nth(keys: np.ndarray) -> np.ndarray:
     """Sorted keys, each with its number among its equals."""
-    starts = np.concatenate([[True], keys[1:] != keys[:-1]]) if len(keys) else np.empty(0, bool)
+    starts = np.concatenate([[True], keys[1:] != keys[:-1]])[: len(keys)]
     place = np.arange(len(keys))
     nth = place - np.maximum.accumulate(np.where(starts, place, 0))
     out = np.empty(len(keys), dtype=[("key", np.uint64), ("nth", np.int64)])
