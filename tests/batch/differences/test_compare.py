@@ -59,7 +59,7 @@ def by_hand(a: np.ndarray, b: np.ndarray, allowed: SignalTolerance) -> tuple[int
     return beyond, nan, largest if beyond else within, first, first_beyond
 
 
-@pytest.mark.release
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(200))
 def test_cases_at_once_are_what_each_is_by_itself_and_by_hand(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -100,7 +100,7 @@ def test_a_frame_of_the_host_s_that_comes_back_is_no_other_master_s(tmp_path: Pa
         assert bed.read().state == BedState.ARMED
 
 
-@pytest.mark.release
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(
     ("dialect", "heard", "told"),

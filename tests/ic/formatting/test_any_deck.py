@@ -37,7 +37,7 @@ ADDED = (
 )  # fmt: skip
 
 
-@pytest.mark.release
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "text"), DECKS, ids=[name for name, _ in DECKS])
 def test_the_decks_of_the_library_and_of_the_pages_are_laid_out(name: str, text: str) -> None:
     after = formatted(name, text)
@@ -103,7 +103,7 @@ def test_a_thousand_ruffled_decks_keep_their_tokens(tmp_path: Path, first: int) 
         check(tmp_path, ruffled(seed), seed)
 
 
-@pytest.mark.release
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "text"), DECKS, ids=[name for name, _ in DECKS])
 def test_a_deck_whose_indentation_is_lost_gets_it_back(name: str, text: str) -> None:
     text = formatted(name, re.sub(r"(?<=\S) +//.*", "", text))  # how far out such a comment is, depends on its line

@@ -33,14 +33,13 @@ TEXT, GRAMMAR, LOOPS, EDITIONS = (cases(f"{name}.txt") for name in ("text", "gra
 ALL = {**TEXT, **GRAMMAR, **LOOPS, **EDITIONS}
 
 
-@pytest.mark.release
 @pytest.mark.parametrize("title", ALL)
 def test_a_mistake_is_this_message(desk: Desk, title: str) -> None:
     deck, others, said = ALL[title]
     assert desk.told(deck, (), others) == said
 
 
-@pytest.mark.release
+@pytest.mark.slow
 @pytest.mark.parametrize("title", [title for title in ALL if "include" not in title])
 def test_in_an_included_file_it_is_the_same_message_with_the_includes_that_led_there(desk: Desk, title: str) -> None:
     deck, others, said = ALL[title]

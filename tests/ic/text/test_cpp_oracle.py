@@ -64,7 +64,6 @@ def ours(desk: Desk, text: str) -> list[str] | None:
     return None if refused else [token.text for token in made.tokens[:-1]]
 
 
-@pytest.mark.release
 @pytest.mark.compiler
 @pytest.mark.parametrize(("text", "others"), texts("macros.txt"))
 def test_a_text_is_read_as_gcc_reads_it(desk: Desk, text: str, others: dict[str, str]) -> None:
@@ -80,7 +79,6 @@ def test_what_gcc_refuses_is_refused(desk: Desk, text: str, others: dict[str, st
     assert ours(desk, text) is None
 
 
-@pytest.mark.release
 @pytest.mark.compiler
 @pytest.mark.parametrize("condition", TEXTS.joinpath("conditions.txt").read_text().splitlines())
 def test_a_condition_holds_where_gcc_says_so(desk: Desk, condition: str) -> None:

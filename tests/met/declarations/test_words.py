@@ -60,7 +60,7 @@ def test_any_other_word_is_refused_with_those_there_are(kind: models.Kind, name:
             assert f"one of: {', '.join(parameter.words)}" in refused.help
 
 
-@pytest.mark.release
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["1", "1 N*m", '"world"', "[1, 2]"])
 @pytest.mark.parametrize(("kind", "name"), WITH_WORDS)
 def test_what_is_no_word_is_refused(kind: models.Kind, name: str, text: str, tmp_path: Path) -> None:

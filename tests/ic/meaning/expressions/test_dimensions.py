@@ -155,7 +155,7 @@ def test_a_quantity_of_the_wanted_dimension_is_taken_at_pints_size(
         assert experiment.parameters[path].value == pytest.approx(in_si(registry, written), rel=1e-14)
 
 
-@pytest.mark.release
+@pytest.mark.slow
 @pytest.mark.parametrize(("place", "written"), REFUSED)
 def test_a_quantity_of_another_dimension_is_refused_where_it_stands(place: str, written: str, tmp_path: Path) -> None:
     compiled = check(tmp_path, deck(**{place: written}))
