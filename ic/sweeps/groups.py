@@ -11,10 +11,7 @@ import numpy as np
 
 from ic.grammar.settings import path_of
 from ic.grammar.syntax import Deck, Expression, Name, Word, children
-from ic.meaning.checks.balance import check_balance
-from ic.meaning.checks.beds import check_beds
-from ic.meaning.checks.steps import check_steps
-from ic.meaning.checks.stops import check_stops
+from ic.meaning.checks.programs import check_program
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import allowances_of, places_of
@@ -101,10 +98,7 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
             own.report(source.complaints, [run.name])
             check_overridden(scope, run, made_here)
             if not source.complaints.errors:
-                check_stops(source.complaints, made)
-                check_balance(source.complaints, made)
-                made = check_steps(scope, made, source.memo)
-                check_beds(source.complaints, made, source.memo)
+                made = check_program(scope, made, source.memo)
             source.complaints.settle()
             return [(made, scope)]
     if definition.parts:
@@ -275,11 +269,8 @@ class _Sweep:
             return ((made, scope), rows), dropped
         if not self.complaints.errors:
             check_effects(self.complaints, there, made, self.source.memo)
-            check_stops(self.complaints, made)
-            check_balance(self.complaints, made)
             made = replace(made, notes=(*made.notes, *check_confidences(self.complaints, there, made)))
-            made = check_steps(scope, made, self.source.memo)
-            check_beds(self.complaints, made, self.source.memo)
+            made = check_program(scope, made, self.source.memo)
         self.complaints.settle()
         self.source.effects.examine(scope, run, made, self.source.memo, self.definition.group.body)
         self.own.examine(scope, run, made, self.source.memo, self.definition.group.body)

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
+from ic.meaning.checks.constants import constant_value
 from ic.meaning.control.schedule import Ticks
 from ic.meaning.control.servos import Use
 from ic.meaning.parameters.scope import Scope
@@ -157,8 +158,7 @@ def _check_full(scope: Scope, failure: ServoFailure, servo: Use) -> None:
 
 def _window(scope: Scope, failure: ServoFailure) -> tuple[float, float] | None:
     """The window in which it acts, from and until, s; None where that varies, or the model has no such window."""
-    found = [scope.parameters.get(f"environment.{failure.use.name}.{name}") for name in ("from", "until")]
-    begins, ends = (each.value if each is not None else None for each in found)
+    begins, ends = (constant_value(scope, f"environment.{failure.use.name}.{name}") for name in ("from", "until"))
     return (begins, ends) if isinstance(begins, float) and isinstance(ends, float) else None
 
 

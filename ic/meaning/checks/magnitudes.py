@@ -129,8 +129,6 @@ MEANT = 'if it is meant so, `allow {} because "...";`'
 
 def check_magnitudes(scope: Scope, structure: Structure) -> None:
     """Warn about implausible numbers and bodies; about several of one kind once, with the worst."""
-    if scope.complaints.error_count:
-        return
     found: dict[Magnitude, list[tuple[str, Settled]]] = {}
     for path, settled in (*scope.parameters.items(), *scope.auxiliary.items()):
         for kind in BY_UNIT.get(settled.unit, ()):

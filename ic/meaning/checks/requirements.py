@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from ic.meaning.checks.constants import constant_values
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.diagnostic import Label, Place, leave_out
@@ -17,7 +17,6 @@ from met.metrics.window import ROUNDING
 from met.plan import Structure
 from met.plan.judged import MetricUse, Requirement
 from met.plan.linear_uses import FIGURES, LinearFigure
-from met.trace import Scalar
 
 NEAR = 0.02
 """Share of its way within which a command counts as being at its target: as with a settling time's default band."""
@@ -31,8 +30,6 @@ def check_requirements(
 ) -> None:
     """Warn about requirements that are decided before the run, and metrics that this run cannot show. linear: the
     metrics of linear answers"""
-    if scope.complaints.error_count:
-        return
     uses = {use.name: use for use in structure.metrics}
     figures = {use.name: FIGURES[use.model] for use in linear}
     for requirement in requirements:
@@ -95,7 +92,7 @@ def _remark_window(
     scope: Scope, requirement: Requirement, use: MetricUse, metric: Metric, duration: float, place: Place
 ) -> bool:
     """Return True, with a warning, for a window that begins or ends after the run's end."""
-    p = _parameters(scope, use, metric) if metric.condition else None
+    p = constant_values(scope, f"metrics.{use.name}", metric.parameters) if metric.condition else None
     after, within = getattr(p, "after", 0.0), getattr(p, "within", math.inf)
     if after <= duration and (within == math.inf or after + within <= duration * (1.0 + ROUNDING)):
         return False
@@ -111,7 +108,8 @@ def _remark_window(
 
 def _remark_begin(scope: Scope, requirement: Requirement, use: MetricUse, metric: Metric, place: Place) -> bool:
     """Return True, with a warning, for a metric that is undefined at its channel's initial value."""
-    first, p = scope.parameters.get(f"initial.{use.of}"), _parameters(scope, use, metric)
+    first = scope.parameters.get(f"initial.{use.of}")
+    p = constant_values(scope, f"metrics.{use.name}", metric.parameters)
     if metric.undefined is None or first is None or not isinstance(first.value, float) or p is None:
         return False
     why = metric.undefined(p, first.value)
@@ -135,7 +133,8 @@ def _remark_target(
     if not metric.target or command is None or not command.model or command.kind != FOLLOWED.get(quantity):
         return False
     profile = models.find("command", command.model)
-    p, course = _parameters(scope, use, metric), _numbers(scope, f"{joint}.servo.command", profile.parameters)
+    p = constant_values(scope, f"metrics.{use.name}", metric.parameters)
+    course = constant_values(scope, f"{joint}.servo.command", profile.parameters)
     if profile.content is None or p is None or course is None:
         return False
     duration, target = structure.schedule.duration, getattr(p, metric.target)
@@ -158,15 +157,3 @@ def _remark_target(
 
 def _value_at(course: Callable[[Any, float], tuple[Any, Any]], p: Any, t: float) -> float:
     return float(np.asarray(course(p, t)[0]))
-
-
-def _parameters(scope: Scope, use: MetricUse, metric: Metric) -> SimpleNamespace | None:
-    """The metric's parameters; None where one of them varies."""
-    return _numbers(scope, f"metrics.{use.name}", metric.parameters)
-
-
-def _numbers(scope: Scope, head: str, declared: Iterable[Any]) -> SimpleNamespace | None:
-    settled = {each.name: scope.parameters.get(f"{head}.{each.name}") for each in declared}
-    if any(each is None or isinstance(each.value, Scalar) for each in settled.values()):
-        return None
-    return SimpleNamespace(**{name: each.value for name, each in settled.items() if each is not None})

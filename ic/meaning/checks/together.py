@@ -5,11 +5,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
+from ic.meaning.checks.constants import constant_value, constant_values
 from ic.meaning.control.servos import Use
 from ic.meaning.parameters.scope import Scope
 from met import models
@@ -18,7 +17,6 @@ from met.diagnostic import Label
 from met.environments.environment import Environment
 from met.parameter import WORLD
 from met.plan import EnvironmentUse, Structure
-from met.trace import Scalar
 
 INSTANTS = 1000
 """Number of instants of a run at which a command is examined."""
@@ -64,16 +62,13 @@ def _stays_between(scope: Scope, load: EnvironmentUse, model: Environment, servo
     if command is None or command.kind != "position" or command.guide:
         return False
     profile = models.find("command", command.model)
-    declared = [f"{servo.joint}.servo.command.{each.name}" for each in profile.parameters]
-    ends = [f"environment.{load.name}.{name}" for name in model.initial_range]
-    begins, moves = (f"initial.{servo.joint}.{part}" for part in ("q", "qd"))
-    found: dict[str, Any] = {path: _value(scope, path, False) for path in (*declared, *ends, begins, moves)}
-    if None in found.values() or found[moves] != 0.0:
+    course = constant_values(scope, f"{servo.joint}.servo.command", profile.parameters)
+    lower, upper = (constant_value(scope, f"environment.{load.name}.{name}") for name in model.initial_range)
+    begins, moves = (constant_value(scope, f"initial.{servo.joint}.{part}") for part in ("q", "qd"))
+    if course is None or None in (lower, upper, begins) or moves != 0.0:
         return False
-    p = SimpleNamespace(**{each.name: found[path] for each, path in zip(profile.parameters, declared, strict=True)})
     with np.errstate(all="ignore"):
-        asked = np.append(profile.course(p, np.linspace(0.0, duration, INSTANTS))[0], found[begins])
-    lower, upper = (found[path] for path in ends)
+        asked = np.append(profile.course(course, np.linspace(0.0, duration, INSTANTS))[0], begins)
     return bool(np.all((asked > lower) & (asked < upper)))
 
 
@@ -85,13 +80,10 @@ def _remark_hold(scope: Scope, load: EnvironmentUse, servos: Mapping[str, Use], 
         return
     if model.may_be_load and any(_is_of_torques(use.of) for use in structure.metrics):
         return
-    values = {
-        each.name: _value(scope, f"environment.{load.name}.{each.name}", each.shape == "vector")
-        for each in model.parameters
-    }
-    if None in values.values():
+    p = constant_values(scope, f"environment.{load.name}", model.parameters)
+    if p is None:
         return
-    bodies = [str(values[name]) for name in model.holds(SimpleNamespace(**values))]
+    bodies = [str(getattr(p, name)) for name in model.holds(p)]
     between = _joints_between(structure, bodies) if bodies else None
     if not between or any(joint not in servos for joint in between):
         return
@@ -149,13 +141,10 @@ def _remark_alone(scope: Scope, environment: Iterable[EnvironmentUse]) -> None:
     first: dict[str, EnvironmentUse] = {}
     for load in environment:
         model = models.find("environment", load.model, load.place)
-        values = {
-            each.name: _value(scope, f"environment.{load.name}.{each.name}", each.shape == "vector")
-            for each in model.parameters
-        }
-        if model.alone is None or load.place is None or None in values.values():
+        p = constant_values(scope, f"environment.{load.name}", model.parameters)
+        if model.alone is None or load.place is None or p is None:
             continue
-        what = model.alone(SimpleNamespace(**values))
+        what = model.alone(p)
         before = first.setdefault(what, load)
         if what and before is not load:
             scope.complaints.remark(
@@ -165,12 +154,3 @@ def _remark_alone(scope: Scope, environment: Iterable[EnvironmentUse]) -> None:
                 also=[Label(before.place, "this one")] if before.place is not None else [],
                 help="leave one of them out",
             )
-
-
-def _value(scope: Scope, path: str, vector: bool) -> object:
-    """The constant value of a parameter; None where it varies or is unknown."""
-    if vector:
-        parts = [_value(scope, f"{path}.{axis}", False) for axis in "xyz"]
-        return None if None in parts else tuple(parts)
-    settled = scope.parameters.get(path)
-    return None if settled is None or isinstance(settled.value, Scalar) else settled.value

@@ -3,43 +3,32 @@ plan."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Name, Word
 from ic.language.runs import DURATION, ENVIRONMENT, INITIAL, RATES, RUN, SEED, TOLERANCES
-from ic.meaning.checks.failures import check_failures, check_friction
-from ic.meaning.checks.idle import remark_beginnings
-from ic.meaning.checks.magnitudes import check_magnitudes
-from ic.meaning.checks.reach import check_reach
-from ic.meaning.checks.reading import remark_unread
-from ic.meaning.checks.requirements import check_requirements
-from ic.meaning.checks.sampling import check_sampling
-from ic.meaning.checks.spin import check_spins
-from ic.meaning.checks.swings import check_circuits, check_sensor
-from ic.meaning.checks.together import check_together
-from ic.meaning.control.guides import check_guides, name_guides, resolve_guides
-from ic.meaning.control.link_sensors import Sensing, resolve_link_sensors
-from ic.meaning.control.schedule import Rate, Ticks, check_stability, fastest_rate
-from ic.meaning.control.servos import Use, check_rest, check_start, resolve_servos
-from ic.meaning.control.substitution import check_brakes, check_runaways, check_ticks, resolve_substitutions
+from ic.meaning.control.guides import name_guides, resolve_guides
+from ic.meaning.control.link_sensors import resolve_link_sensors
+from ic.meaning.control.schedule import Rate
+from ic.meaning.control.servos import resolve_servos
+from ic.meaning.control.substitution import resolve_substitutions
 from ic.meaning.definitions.merge import WITH, Item, MergedBlock, with_meant_names
 from ic.meaning.definitions.resolve import Definition
 from ic.meaning.mechanics.arm import ResolvedArm, resolve_arm
-from ic.meaning.mechanics.bodies import check_moved
-from ic.meaning.mechanics.payloads import check_payloads, resolve_payloads
+from ic.meaning.mechanics.payloads import resolve_payloads
 from ic.meaning.parameters.addresses import in_run
 from ic.meaning.parameters.models import body_of, find_bare_model, overriding_place, refuse_statements, word_of
 from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import ALLOW
-from ic.meaning.runs.base import check_base, initial_base, resolve_base
+from ic.meaning.runs.base import initial_base, resolve_base
 from ic.meaning.runs.environment import resolve_environment
 from ic.meaning.runs.expressions import resolve_signals
-from ic.meaning.runs.initial import check_balanced, resolve_initial
+from ic.meaning.runs.initial import resolve_initial
 from ic.meaning.runs.keys import resolve_run_keys
 from ic.meaning.runs.linear import resolve_linear, resolve_linear_metrics
 from ic.meaning.runs.metrics import resolve_metrics
@@ -47,6 +36,7 @@ from ic.meaning.runs.over_time import metrics_over_time
 from ic.meaning.runs.rates import resolve_rates, resolve_schedule
 from ic.meaning.runs.record import names_in_record, resolve_record
 from ic.meaning.runs.requirements import read_requirements, resolve_requirements
+from ic.meaning.runs.run_checks import RunParts, check_run
 from ic.meaning.runs.step_errors import resolve_step_errors
 from ic.meaning.runs.tolerances import resolve_tolerances
 from ic.text.complaints import known_words, where_it_belongs
@@ -110,33 +100,16 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     guides = resolve_guides(scope, block, arm, uses, duration)
     substitutions = resolve_substitutions(scope, block, arm, uses)
     payloads = resolve_payloads(scope, block, arm)
-    if arm.free_of_errors:
-        check_moved(scope, arm.links, arm.joints, payloads)
     sensors = resolve_link_sensors(scope, block, arm, payloads)
     environment = resolve_environment(scope, body_of(scope, block.get("environment")), arm, base, payloads, duration)
     initial = body_of(scope, block.get("initial"))
     resolve_initial(scope, initial, arm, uses)
     kept = resolve_run_keys(scope, run, block, Structure)
-    check_balanced(scope, initial.get("servos"), uses, kept["balanced"])
-    remark_beginnings(scope, environment)
     initial_base(scope, initial, base)
-    for use in uses:
-        check_rest(scope, use)
-        check_start(scope, use)
     schedule, ticks, others = resolve_schedule(scope, run, block, rates, uses, [*guides, *sensors], duration)
-    # else a part has a mistake: checks that depend on it are left out, all others are made
-    known = integrator is not None and "dynamics" in rates
+    dynamics = rates.get("dynamics") if integrator is not None else None
     integrator = integrator or models.find_own("integrator")["modified_euler"]
-    check_ticks(scope, substitutions, ticks, schedule)
-    check_brakes(scope, substitutions, environment)
-    check_runaways(scope, substitutions, environment)
-    check_failures(scope, uses, ticks, substitutions, environment, schedule)
-    check_friction(scope, uses, environment)
     _keep_settings(scope, block, arm, integrator, rates, schedule)
-    on_beds = [each.joint for each in substitutions]
-    if known:
-        scope.rate_place = rates["dynamics"].place
-        _check_steps(scope, uses, sensors, on_beds, schedule, ticks, integrator, rates["dynamics"])
     servos = tuple(
         ServoUse(
             joint=use.joint,
@@ -168,11 +141,6 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         sensors=tuple(sensor.use(others[sensor.path]) for sensor in sensors),
         **kept,
     )
-    check_base(scope, base, structure, body_of(scope, block.get("environment")), block.get("base"))
-    check_payloads(scope, block, structure)
-    if known:
-        check_spins(scope, block, structure)
-    check_guides(scope, guides, structure)
     signals = resolve_signals(scope, block, structure, names_in_record(block.get("record")))
     structure = replace(structure, expressions=tuple(signals.expressions))
     record = resolve_record(scope, run, block.get("record"), structure, signals.known)
@@ -180,52 +148,20 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     structure = replace(structure, metrics=metrics, record=record, expressions=(*structure.expressions, *watched))
     linear = resolve_linear(scope, block, structure)
     linear_metrics = resolve_linear_metrics(scope, block, structure, linear)
-    remark_unread(scope, uses, structure)
-    check_sampling(scope, structure)
-    check_together(scope, uses, structure)
-    check_reach(scope, block, structure)
-    check_magnitudes(scope, structure)
     scope.keep_setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure, linear_metrics)
     step_errors = resolve_step_errors(scope, block, structure, linear_metrics)
-    check_requirements(scope, requirements, structure, linear_metrics)
+    check_run(
+        RunParts(
+            scope, block, arm, structure, uses, ticks, integrator, dynamics, guides, sensors, requirements,
+            linear_metrics,
+        )
+    )  # fmt: skip
     tolerances = resolve_tolerances(scope, body_of(scope, block.get("tolerances")), structure, linear_metrics)
     settings = resolve_run_keys(scope, run, block, Experiment)
     return Resolved(
         structure, requirements, step_errors, tolerances, seed, definition.place, settings, linear, linear_metrics
     )
-
-
-def _check_steps(
-    scope: Scope,
-    uses: Sequence[Use],
-    sensors: Sequence[Sensing],
-    on_beds: Sequence[str],
-    schedule: Schedule,
-    ticks: Mapping[str, Ticks],
-    integrator: Any,
-    dynamics: Rate,
-) -> None:
-    """Check that the integrator's steps can follow the declared rate constants of servos and sensors.
-
-    on_beds  joints whose motor is on a bed, and so no part of the step
-    """
-    fastest = []
-    for use in uses:
-        if use.parameters is not None and use.joint not in on_beds:
-            x = fastest_rate(
-                scope, use.servo, use.parameters, f"{use.joint}.servo", continuous=ticks[use.joint].continuous
-            )
-            if x is not None:
-                fastest.append((use, x))
-    for use, x in sorted(fastest, key=lambda each: -scope.checks.first(each[1])):  # the worst is reported
-        check_stability(scope, f"servo `{use.definition}`", x, schedule, integrator, dynamics, f"{use.joint}.servo")
-    for sensor in sensors:
-        if sensor.values:
-            model = models.find("sensor", sensor.model)
-            check_sensor(scope, sensor.label, model, sensor.values, schedule, integrator, dynamics, sensor.path)
-    for use in uses:
-        check_circuits(scope, use, schedule, integrator, dynamics, on_bed=use.joint in on_beds)
 
 
 def _keep_settings(

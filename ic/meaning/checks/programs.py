@@ -1,0 +1,20 @@
+"""The checks of an experiment for which the engine's program is built and looked into."""
+
+from __future__ import annotations
+
+from ic.meaning.checks.balance import check_balance
+from ic.meaning.checks.beds import check_beds
+from ic.meaning.checks.steps import check_steps
+from ic.meaning.checks.stops import check_stops
+from ic.meaning.parameters.scope import Scope
+from met.analysis.memo import AnalysisMemo
+from met.plan import Experiment
+
+
+def check_program(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Experiment:
+    """Check stops, a balanced start, the integrator's steps and beds; the experiment with a note on its steps."""
+    check_stops(scope.complaints, experiment)
+    check_balance(scope.complaints, experiment)
+    experiment = check_steps(scope, experiment, memo)
+    check_beds(scope.complaints, experiment, memo)
+    return experiment
