@@ -105,9 +105,9 @@ def test_a_bus_within_a_process_carries_exchanges(tmp_path: Path, dialect: str) 
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_a_host_that_is_killed_leaves_the_drives_off_within_their_watchdog(tmp_path: Path, dialect: str) -> None:
     # where the machine was busy the bed may have stopped by itself just before
-    after = next((each for each in (stopped_after(tmp_path, dialect) for _ in range(5)) if each > 0.0), None)
+    after = next((each for each in (stopped_after(tmp_path, dialect) for _ in range(25)) if each > 0.0), None)
     if after is None:
-        pytest.skip("the machine is too busy: five times the bed had stopped by itself")
+        pytest.skip("the machine is too busy: 25 times the bed had stopped by itself")
     assert after < 0.020 + 0.005 + 0.05, after  # a tick of the player's, and a busy machine's delay
 
 
