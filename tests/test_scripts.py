@@ -406,3 +406,50 @@ def test_scripts_benchmark_writes_its_figures(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     (figure,) = json.loads((tmp_path / "figures.json").read_text())["figures"]
     assert 0.0 < figure["median"] < 5.0  # a start of Python, however busy the machine
+
+
+SMALL = '''"""A module."""
+
+import ast
+limit: int = 3
+"""What is said of it."""
+
+
+def small(numbers):
+    """A function."""
+    if (first := numbers[0]) > limit:
+        return [-n if n < 0 else n for n in numbers for _ in range(2)]
+    return lambda: ...
+'''
+
+
+def test_scripts_weigh_counts_statements_and_what_is_folded_into_expressions(tmp_path: Path) -> None:
+    git = ["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=a@b.c"]
+    for name, text in {"ic/small.py": SMALL, "tests/text": "if not Python", "scripts/small.py": "a = 1\n"}.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    shutil.copy(ROOT / "scripts" / "weigh", tmp_path / "scripts")
+    for words in (["init", "--quiet"], ["add", "."], ["commit", "--quiet", "--message=small"]):
+        subprocess.run([*git, *words], check=True)
+    (tmp_path / "ic" / "small.py").unlink()
+    (tmp_path / "hw").mkdir()
+    (tmp_path / "hw" / "text.py").write_text("pass\npass\n")
+
+    def weigh(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([tmp_path / "scripts" / "weigh", *words], capture_output=True, text=True)
+
+    # import, limit, def, if, two returns; `:=`, a conditional expression, two `for`, a lambda
+    done = weigh("--against", "HEAD")
+    rows = re.findall(r"^(\w+) +(\d+).*, (\S+) since HEAD$", done.stdout, re.MULTILINE)
+    weights = {name: (int(weight), int(change)) for name, weight, change in rows}
+    weight_of_scripts, change_of_scripts = weights.pop("scripts")
+    assert weight_of_scripts > 40 and change_of_scripts == 0  # the script itself, which has no suffix
+    nothing = {"met": (0, 0), "batch": (0, 0), "tests": (0, 0)}
+    assert weights == {"ic": (0, -11), "hw": (2, 2), "product": (2, -9), **nothing}
+    assert weigh("--against", "HEAD~1").returncode == 2
+
+
+def test_the_page_for_contributors_says_what_the_product_may_weigh() -> None:
+    [limit] = re.findall(r"^MOST = (\S+)", (ROOT / "scripts" / "weigh").read_text(), re.MULTILINE)
+    page = " ".join((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split())
+    assert f"at most {int(limit):,} statements" in page
