@@ -276,6 +276,18 @@ def test_every_entry_stands_in_the_section_that_the_table_of_contents_says() -> 
         assert {code for code, (at, _) in entries(PAGE).items() if start < at < end} <= among | {""}, title
 
 
+def test_codes_are_in_order_in_each_section_and_in_the_tables_of_all_pages() -> None:
+    for section in re.split(r"^## ", PAGE, flags=re.MULTILINE):
+        heads = re.findall(r"^### ([A-Z]\d{3}): ", section, re.MULTILINE)
+        assert heads == sorted(heads)
+    for file in FILE.parent.glob("*.md"):
+        for table in re.findall(r"(?:^\|.*\n)+", file.read_text(encoding="utf-8"), re.MULTILINE):
+            firsts = re.findall(r"^\| ([A-Z]\d{3})\b", table, re.MULTILINE)
+            assert firsts == sorted(firsts), file.name
+    for row in re.findall(r"^\| \[.*\]\(#.*\) \| (.*) \|$", PAGE, re.MULTILINE):
+        assert row.split(", ") == sorted(row.split(", "))
+
+
 def test_every_other_page_that_is_named_is_there() -> None:
     named = set(re.findall(r"\]\((\w+\.md)\)", PAGE))
     assert named and all((FILE.parent / name).is_file() for name in named)
