@@ -19,7 +19,7 @@ from met.version import VERSION  # noqa: E402  (only once the checkout is on the
 
 # In the order in which a user needs them; the headings stand in the sidebar.
 PAGES = {
-    "A first campaign": ["tutorial"],
+    "Begin": ["README", "tutorial"],
     "Decks": ["deck", "loops", "editions", "robots", "servos", "environments", "models", "substitution", "reference",
               "diagnostics", "editors"],
     "Campaigns and results": ["cluster", "best", "search", "verification", "evidence", "sensitivity", "linear", "plots",

@@ -1,4 +1,4 @@
-"""docs/architecture.md, models.md and physics.md say what the code says."""
+"""docs/architecture.md, models.md and physics.md say what the code says, and docs/README.md lists all pages."""
 
 from __future__ import annotations
 
@@ -140,3 +140,25 @@ def test_the_stability_figure_has_one_name_in_messages_and_pages() -> None:
         assert "h * lambda" in text
     assert "h * fastest" not in page("physics.md")
     assert all("1.15" in text for text in (page("physics.md"), page("paper.md")))
+
+
+LINK = re.compile(r"\[[^\]]*\]\(([^)\s#:]*)(?:#([^)\s]+))?\)")
+"""A link of a page to a file, to a heading of one, or to a heading of its own."""
+
+
+def headings(file: Path) -> set[str]:
+    """The names by which links lead to the headings of a page."""
+    text = re.sub(r"^```.*?^```$", "", file.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def test_every_page_stands_in_the_list_of_questions_and_its_links_lead_somewhere() -> None:
+    folder = ROOT / "docs"
+    links = LINK.findall(page("README.md"))
+    pages = {file.name for file in folder.iterdir() if file.suffix in (".md", ".ipynb")}
+    assert pages - {name for name, _ in links} == {"README.md"}
+    for name, heading in links:
+        assert (folder / name).is_file(), name
+        assert not heading or heading in headings(folder / name), f"{name}#{heading}"
+    assert "(docs/README.md)" in (ROOT / "README.md").read_text(encoding="utf-8")
