@@ -30,7 +30,7 @@ def test_all_of_them_are_compared() -> None:
     assert names == list(BEFORE) and len(names) >= 68
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     "sweep",
     [pytest.param(each, id=each[0], marks=() if each[0] in QUICK else pytest.mark.slow) for each in sweeps()],

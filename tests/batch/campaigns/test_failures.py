@@ -130,7 +130,7 @@ def told(words: list[str], choose: Callable[..., Any] | None = None) -> tuple[in
     return status, said.getvalue()
 
 
-@pytest.mark.slow
+@pytest.mark.release
 class TestTenThousandCases:
     @pytest.mark.release
     def test_all_others_are_done_with_the_same_bits(self, ran: tuple[Path, int, str], undisturbed: Path) -> None:

@@ -431,7 +431,7 @@ def test_signals_in_another_order_are_told(here: Path, monkeypatch: pytest.Monke
     assert told == "changed since: record: in another order"
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_case_is_drawn_whichever_structure_it_is_of(here: Path) -> None:
     batch.run(deck(here, DECK, "kinds"), output="a.h5")
     assert cli.main(["plot", "a.h5", "--case", "#2"]) == 0

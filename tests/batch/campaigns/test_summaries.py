@@ -112,7 +112,7 @@ def test_its_evidence_is_that_of_all_rows(here: Path, name: str) -> None:
         assert a == b
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", SWEEPS)
 def test_its_outcome_is_that_of_all_rows(here: Path, name: str) -> None:
     archives(name)

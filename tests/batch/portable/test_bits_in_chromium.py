@@ -36,7 +36,7 @@ def test_whole_runs_of_published_arms_have_the_native_bits(
 
 
 @pytest.mark.browser
-@pytest.mark.slow
+@pytest.mark.release
 @MACHINE
 @pytest.mark.parametrize(("arm", "model"), whole_runs.REVERSING, ids=lambda of: of.name if isinstance(of, Arm) else of)
 def test_arms_that_reverse_have_the_native_bits(page: Page, arm: Arm, model: str, machine: bool | None) -> None:

@@ -170,7 +170,7 @@ class TestThePage:
         word, rest = re.split("[,;:]", last, maxsplit=1)
         assert squeezed(word) in source and squeezed(rest.replace("`", "")) in source
 
-    @pytest.mark.slow
+    @pytest.mark.release
     def test_says_all_that_met_diff_says(self, planted: tuple[Path, Path]) -> None:
         self.all_told(*planted)
         self.all_told(*planted, "q=1e-6rad,qd=1rad/s,rel=1e-3,time=1ms")

@@ -56,7 +56,7 @@ def through(folder: Path, dialect: str, told: DriveCommand, late: float, seed: i
     return tally
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("told", ["voltage", "rate"])
 @pytest.mark.parametrize("late", LATE)
 @pytest.mark.parametrize("exchanges", [300, pytest.param(2000, marks=pytest.mark.slow)])

@@ -64,7 +64,7 @@ def test_every_path_that_explain_lists_is_known_to_what_sets_values(
     assert sum(not found for found in told.values()) > len(values) // 3
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_run_and_the_command_line_take_the_same_paths(tmp_path: Path, paths: tuple[str, dict[str, str]]) -> None:
     text, values = paths
     for path, value in values.items():

@@ -38,7 +38,7 @@ def test_inertia_and_torque_felt_agree_with_linear_algebra_in_every_mode() -> No
     bias.below(CLOSE)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_joints_own_rotor_and_own_mode_are_not_felt() -> None:
     worst = Worst("J_eff with another rotor or mode of its own")
     for arm, tree in forest():

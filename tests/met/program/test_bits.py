@@ -101,7 +101,7 @@ def test_bits_do_not_depend_on_the_instruction_set(swung: Swung, cpu: str) -> No
     assert swung.differences(*swung.run(made)) == 0
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("level", [0, 1, 3])
 def test_bits_do_not_depend_on_optimisation(swung: Swung, level: int) -> None:
     assert swung.differences(*swung.run(kernel.from_recording(swung.recording, 8, level=level))) == 0

@@ -39,7 +39,7 @@ def chain(joints: int, duration: str) -> str:
     return "\n".join([*lines, "}", RUN.format(duration=duration)])
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("joints", [1, pytest.param(100, marks=pytest.mark.slow)])
 def test_arms_of_one_joint_and_of_a_hundred_run_from_decks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, joints: int

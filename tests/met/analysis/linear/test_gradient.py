@@ -176,7 +176,7 @@ def test_a_case_that_fails_or_never_settles_has_none() -> None:
     assert refusals(found) == {("settle", "drive.kp"): "the metric is infinite"}
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize(
     ("kind", "name"), [each if each[0] == "metric" else pytest.param(*each, marks=pytest.mark.slow) for each in EVERY]
 )

@@ -83,7 +83,7 @@ def by_complex_step(count: int) -> np.ndarray:
     return y.imag.T / step
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("count", [4, pytest.param(30, marks=pytest.mark.slow)])
 def test_a_run_moves_with_where_it_begins_as_lagranges_equations_do(count: int) -> None:
     """By the same Runge-Kutta's steps, of up to thirty joints: to 1e-10 of the largest entry."""
