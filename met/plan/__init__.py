@@ -107,11 +107,15 @@ class Quantity:
 
 @frozen
 class Link:
-    """A rigid body; its numbers are parameters. `shape` is its picture, in words of `ic` (kind, numbers in SI)."""
+    """A rigid body; its numbers are parameters. `shape` is its picture, in words of `ic` (kind, numbers in SI).
+
+    lumped  whether its numbers are an identified set (base parameters), which need not be those of a body
+    """
 
     name: str
     place: Place | None = keyed("never", default=None)
     shape: tuple[str, tuple[tuple[str, float], ...]] | None = keyed("never", default=None)
+    lumped: bool = keyed("never", default=False)
 
 
 @frozen

@@ -404,7 +404,9 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
         head = f"links.{link.name}"
         tests.append((f"{head}.mass", [f"{head}.mass"], _is_mass, "it should be at least 0"))
         inertia = [f"{head}.inertia.{entry}" for entry in INERTIA]
-        tests.append((f"{head}.inertia", inertia, _is_inertia, "a principal moment is below 0: no body has that"))
+        no_body = (_is_inertia, "a principal moment is below 0: no body has that")
+        wanted = (_are_finite, "it should be finite") if link.lumped else no_body
+        tests.append((f"{head}.inertia", inertia, *wanted))
     for payload in structure.payloads:
         head = f"payloads.{payload.name}"
         inertia = [f"{head}.inertia.{entry}" for entry in INERTIA]
@@ -490,6 +492,10 @@ def _is_solid(values: np.ndarray) -> np.ndarray:
         second, side = yy - xy * xy / xx, yz - xy * xz / xx
         third = zz - xz * xz / xx - side * side / second
         return np.logical_and.reduce([pivot > ROUNDING for pivot in (xx, second, third)])
+
+
+def _are_finite(values: np.ndarray) -> np.ndarray:
+    return np.asarray(np.isfinite(values).all(axis=1))
 
 
 def _is_inertia(values: np.ndarray) -> np.ndarray:
