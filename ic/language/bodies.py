@@ -10,6 +10,13 @@ COM = Parameter(name="com", unit="m", shape="vector", doc="centre of mass, in th
 INERTIA = Parameter(
     name="inertia", unit="kg*m^2", shape="list", doc="inertia about the centre of mass, along the {}'s axes"
 )
+LUMPED = Parameter(
+    name="lumped",
+    shape="word",
+    words=("on", "off"),
+    default="off",
+    doc="whether the numbers of this link are an identified set (base parameters), not those of a body",
+)
 
 LINK = BlockDeclaration(
     name="link",
@@ -30,6 +37,9 @@ LINK = BlockDeclaration(
               path="links.LINK.inertia", default="that of the shape; without a shape, needed",
               doc="inertia about the centre of mass, along the link's axes: `[xx, yy, zz]` or "
                   "`[xx, yy, zz, xy, xz, yz]`"),
+        Entry(name="lumped", written="lumped = on;", parameter=LUMPED, path="links.LINK.lumped", default="`off`",
+              doc="`on`: the numbers of this link are an identified set (base parameters), not those of a body; each "
+                  "run checks the mass matrix of the arm instead"),
     ),
 )  # fmt: skip
 

@@ -244,8 +244,8 @@ class WeighedBody:
 
 
 def _bodies(scope: Scope, structure: Structure) -> Iterator[WeighedBody]:
-    """Links and payloads with known numbers."""
-    named = [("link", "links", each.name) for each in structure.links]
+    """Links and payloads with known numbers, but for lumped links, whose numbers are no body's."""
+    named = [("link", "links", each.name) for each in structure.links if not each.lumped]
     named += [("payload", "payloads", each.name) for each in structure.payloads]
     shapes: dict[str, dict[str, Settled]] = {}
     for path, settled in scope.auxiliary.items():

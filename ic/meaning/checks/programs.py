@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ic.meaning.checks.balance import check_balance
 from ic.meaning.checks.beds import check_beds
+from ic.meaning.checks.lumped import check_lumped
 from ic.meaning.checks.steps import check_steps
 from ic.meaning.checks.stops import check_stops
 from ic.meaning.parameters.scope import Scope
@@ -12,7 +13,9 @@ from met.plan import Experiment
 
 
 def check_program(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Experiment:
-    """Check stops, a balanced start, the integrator's steps and beds; the experiment with a note on its steps."""
+    """Check lumped links, stops, a balanced start, the integrator's steps and beds; the experiment with notes on its
+    mass matrix and its steps."""
+    experiment = check_lumped(scope.complaints, experiment, memo)
     check_stops(scope.complaints, experiment)
     check_balance(scope.complaints, experiment)
     experiment = check_steps(scope, experiment, memo)

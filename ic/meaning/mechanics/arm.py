@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from ic.grammar.syntax import Call, Expression, Name, Unary
 from ic.language import HEADS
-from ic.language.bodies import ARM, AT, AXIS, JOINT, JOINT_KINDS, JOINT_LIMITS, LINK, Q_MIN, RPY
+from ic.language.bodies import ARM, AT, AXIS, JOINT, JOINT_KINDS, JOINT_LIMITS, LINK, LUMPED, Q_MIN, RPY
 from ic.meaning.definitions.merge import Item, MergedBlock, no_block, with_meant_names
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.names import FoundNames
@@ -285,7 +285,9 @@ def resolve_link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | Non
         )
         return None
     check_keys(scope, item.body, LINK.keys, owner)
-    return Link(item.name, item.place, use_matter(scope, owner, "link", item.name, item.body))
+    given = item.body.get(LUMPED.name)
+    lumped = given is not None and scope.word(owner, LUMPED, given) != "off"  # None: no such word, already reported
+    return Link(item.name, item.place, use_matter(scope, owner, "link", item.name, item.body, lumped=lumped), lumped)
 
 
 # Joints

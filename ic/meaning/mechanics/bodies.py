@@ -22,10 +22,18 @@ from met.trace import Real
 
 
 def check_body(
-    scope: Scope, owner: Owner, kind: str, name: str, item: Item | None, inertia: tuple[Real, ...], mass: Real | None
+    scope: Scope,
+    owner: Owner,
+    kind: str,
+    name: str,
+    item: Item | None,
+    inertia: tuple[Real, ...],
+    mass: Real | None,
+    *,
+    lumped: bool = False,
 ) -> None:
     """Check that the inertia is a body's, in every case. item: the inertia as written, None where it follows from a
-    shape; kind: in words"""
+    shape; kind: in words; lumped: it need only be finite, for the arm's mass matrix is checked instead"""
     helps = [
         f"inertia is about the centre of mass, in {kind} axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2",
         "products have the sign of -sum(m x y)",
@@ -35,17 +43,21 @@ def check_body(
     weightless = isinstance(mass, float) and mass == 0.0
     if weightless:
         helps = [f"leave `inertia` out, or write the {kind}'s mass"]
-    place = owner.place
+    place, of_file = owner.place, False
     if item is not None:
         place = item.place if item.value is None else place_of(item.value)
-        if scope.definitions.robot_files.hold(place):
+        of_file = scope.definitions.robot_files.hold(place)
+        if of_file:
             entry = f"{name} {{ {'remove inertia;' if weightless else 'inertia = [...] kg*m^2;'} }}"
             if name == BASE:  # which the arm does not hold, so that there is nothing to change
                 entry = f"link {BASE} {{ mass = ...;  inertia = [...] kg*m^2; }}"
             helps.append(f"in the arm's block: `{entry}`")
+    if kind == "link" and not lumped and not (of_file and name == BASE):
+        entry = f"in the arm's block, `{name} {{ lumped = on; }}`" if of_file else "write `lumped = on;` in the link"
+        helps.append(f"if it is of an identified set (base parameters), which need be no body's: {entry}")
     scope.checks.require(
         (*inertia, 1.0 if mass is None else mass),
-        lambda values: in_pieces(lambda rows: _not_a_body(rows, kind), values),
+        lambda values: in_pieces(lambda rows: _not_a_body(rows, kind, lumped=lumped), values),
         code="D087",
         needs=(f"{owner.path}.mass", f"{owner.path}.shape"),
         message=f"the inertia of {kind} `{name}` is no body's",
@@ -62,8 +74,9 @@ def _is_plainly_a_body(inertia: Sequence[Real], mass: Real | None) -> bool:
     return mass != 0.0 and not any(inertia[3:]) and least >= 0.0 and most <= least + middle
 
 
-def _not_a_body(values: np.ndarray, kind: str) -> tuple[np.ndarray, list[str]]:
-    """The rows [n, 7], moments and mass, that no rigid body has, as a mask, and the reason in words.
+def _not_a_body(values: np.ndarray, kind: str, *, lumped: bool) -> tuple[np.ndarray, list[str]]:
+    """The rows [n, 7], moments and mass, that no rigid body has, as a mask, and the reason in words; of a lumped
+    link those that are not finite.
 
     The tolerance, 1e-9 of the largest moment, is for rounding alone: published tables have ten digits at most. With a
     moment of 0 the other two are alike, for neither may be above the sum of 0 and the other.
@@ -77,7 +90,7 @@ def _not_a_body(values: np.ndarray, kind: str) -> tuple[np.ndarray, list[str]]:
     negative = least < -slack
     triangle = least + middle < most - slack
     weightless = (mass == 0.0) & ~point
-    bad = ~finite | negative | triangle | weightless
+    bad = ~finite if lumped else ~finite | negative | triangle | weightless
     causes = []
     for row in np.flatnonzero(bad)[:1]:
         shown = f"principal moments {least[row]:.6g}, {middle[row]:.6g} and {most[row]:.6g} kg*m^2"
@@ -93,13 +106,13 @@ def _not_a_body(values: np.ndarray, kind: str) -> tuple[np.ndarray, list[str]]:
 
 
 def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint], payloads: Sequence[Payload] = ()) -> None:
-    """Check that every moving joint carries a link with mass, or a permanent payload, in every case; behind one that
-    does not, none is reported.
+    """Check that every moving joint carries a link with mass, a lumped one, or a permanent payload, in every case;
+    behind one that does not, none is reported.
 
     The joints make a tree.
     """
-    masses = {
-        link.name: settled.value
+    masses = {  # of a lumped link any, as its inertia alone may be enough: D182 looks at that
+        link.name: 1.0 if link.lumped else settled.value
         for link in links
         if (settled := scope.parameters.get(f"links.{link.name}.mass")) is not None
     }

@@ -22,17 +22,20 @@ Shape = tuple[str, tuple[tuple[str, float], ...]]
 """A shape as in a plan: kind, and numbers in SI."""
 
 
-def use_matter(scope: Scope, owner: Owner, kind: str, name: str, body: MergedBlock) -> Shape | None:
+def use_matter(
+    scope: Scope, owner: Owner, kind: str, name: str, body: MergedBlock, *, lumped: bool = False
+) -> Shape | None:
     """Enter mass, centre and inertia as parameters, and check that they are a body's; returns its shape, if it has one.
 
-    kind  what it is in words: "link" or "payload"
+    kind    what it is in words: "link" or "payload"
+    lumped  whether its numbers are an identified set, of which only finite ones are asked
     """
     mass = scope.number(owner, _of(MASS, kind), body.get("mass"))
     solid = _shape(scope, owner, body.get("shape"))
     _com(scope, owner, kind, body.get("com"), solid)
     inertia = _inertia(scope, owner, kind, body.get("inertia"), solid, mass)
     if inertia is not None:
-        check_body(scope, owner, kind, name, body.get("inertia"), inertia, mass)
+        check_body(scope, owner, kind, name, body.get("inertia"), inertia, mass, lumped=lumped)
     if solid is None:
         return None
     return solid.kind, tuple((name, scope.checks.first(value)) for name, value in solid.numbers)

@@ -162,6 +162,7 @@ error[D087]: the inertia of link `bar` is no body's
   |                                       ^^^^^^^^^^^^^^^^ principal moments 1, 1 and 3 kg*m^2; no body has one above the sum of the others
   = help: inertia is about the centre of mass, in link axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2
   = help: products have the sign of -sum(m x y)
+  = help: if it is of an identified set (base parameters), which need be no body's: write `lumped = on;` in the link
 """
     )
 

@@ -257,6 +257,15 @@ def test_the_inertia_of_the_root_is_that_of_a_free_base_and_of_no_other(tmp_path
     assert made(tmp_path, WEIGHTY, like).parameters["links.base.mass"].value == 7.0
 
 
+@pytest.mark.parametrize("change", [('izz="0.2"', 'izz="0.9"'), ('value="2"', 'value="0"')])
+def test_a_link_of_a_file_is_lumped_as_the_message_says(change: tuple[str, str], tmp_path: Path) -> None:
+    robot = changed(TWO, change)
+    (entry,) = re.findall(r"which need be no body's: in the arm's block, `(.*)`\n", said(tmp_path, robot))
+    found = made(tmp_path, robot, changed(DECK, ("{ }", f"{{ {entry} }}")))
+    assert [link.name for link in found.structure.links if link.lumped] == ["bar"]
+    assert any(note.startswith("lumped links: bar; mass matrix positive definite at ") for note in found.notes)
+
+
 def test_a_root_of_no_body_is_told_where_its_base_moves_and_replaced_as_the_message_says(tmp_path: Path) -> None:
     robot = changed(WEIGHTY, ('ixx="1"', 'ixx="9"'))
     assert made(tmp_path, robot) is not None

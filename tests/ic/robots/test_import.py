@@ -263,6 +263,7 @@ error[D087]: the inertia of link `bar` is no body's
   = help: inertia is about the centre of mass, in link axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2
   = help: products have the sign of -sum(m x y)
   = help: in the arm's block: `bar { inertia = [...] kg*m^2; }`
+  = help: if it is of an identified set (base parameters), which need be no body's: in the arm's block, `bar { lumped = on; }`
   = help: write a deck with `arm NAME from urdf("FILE") { ... }`: its block can change what the file says
 """
     )

@@ -104,6 +104,7 @@ error[D087]: the inertia of link `bar` is no body's
   |       ^^^^^^^^ the link has no mass, and so no inertia
   = help: leave `inertia` out, or write the link's mass
   = help: in the arm's block: `bar { remove inertia; }`
+  = help: if it is of an identified set (base parameters), which need be no body's: in the arm's block, `bar { lumped = on; }`
 """,
 )
 mistake(
@@ -130,6 +131,7 @@ error[D087]: the inertia of link `bar` is no body's
   = help: inertia is about the centre of mass, in link axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2
   = help: products have the sign of -sum(m x y)
   = help: in the arm's block: `bar { inertia = [...] kg*m^2; }`
+  = help: if it is of an identified set (base parameters), which need be no body's: in the arm's block, `bar { lumped = on; }`
 """,
 )
 mistake(
