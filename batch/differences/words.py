@@ -480,7 +480,7 @@ def _of_values(found: Diff) -> str:
 
 
 def _beyond_any_tolerance(found: Diff) -> list[str]:
-    """What differs other than values: runs and cases that one archive has alone, and how cases end."""
+    """Name the differences that are not of values: runs and cases that one archive has alone, and how cases end."""
     out = unmatched_runs(found)
     several = len(found.experiments) > 1
     for each in found.experiments:

@@ -121,7 +121,7 @@ class PageServer(ThreadingHTTPServer):
             self.shutdown_request(request)
 
     def begun(self, request: socket) -> bytes:
-        """What was read of a request, before its connection was let in."""
+        """Give back the bytes that were read of a request before its connection was let in; empty the second time."""
         return self._begun.pop(request, b"")
 
     def process_request_thread(self, request: socket | Any, client_address: Any) -> None:

@@ -31,7 +31,7 @@ SELDOM = "a few commands that last less than a period, and those that arm what i
 
 
 class SetpointChecks:
-    """What a drive is asked, and what it should answer.
+    """Chooses what a drive is asked of its own setpoint and settings, and judges whether the answer is this master's.
 
     apart     the largest difference of two values that are the same, besides `SAME`
     asked     what was asked for last, where it is not answered; "" where it is
@@ -62,7 +62,7 @@ class SetpointChecks:
         self._told.append(value)
 
     def next(self) -> str:
-        """What to ask for now; "" where there is nothing to ask for."""
+        """Choose the setpoint or setting to ask for now; "" where there is nothing to ask for."""
         self._count += 1
         self._doubts = max(0, self._doubts - 1)
         settings = tuple(self._settings)

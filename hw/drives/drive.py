@@ -269,7 +269,7 @@ class Talk:
 
     @property
     def other_master(self) -> str:
-        """What was noticed of another master, in words; "" where nothing was."""
+        """The sign of another master on the line, in words; "" where none was noticed."""
         return self._heard or next((each.disturbed for each in self.drives if each.disturbed), "")
 
     def forget_other_master(self) -> None:

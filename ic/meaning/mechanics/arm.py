@@ -285,8 +285,8 @@ def resolve_link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | Non
         )
         return None
     check_keys(scope, item.body, LINK.keys, owner)
-    given = item.body.get(LUMPED.name)
-    lumped = given is not None and scope.word(owner, LUMPED, given) != "off"  # None: no such word, already reported
+    written = item.body.get(LUMPED.name)
+    lumped = written is not None and scope.word(owner, LUMPED, written) != "off"  # None: no such word, already reported
     return Link(item.name, item.place, use_matter(scope, owner, "link", item.name, item.body, lumped=lumped), lumped)
 
 
