@@ -70,6 +70,12 @@ def same_bed(one: str, other: str) -> bool:
     return kinds[0] is kinds[1]
 
 
+def bench_at(name: str) -> dict[str, str]:
+    """What tells the bench at a port from another, in words by name; empty where the port says nothing of it. Raises
+    Problem."""
+    return dict(kind_of(name).bench(name.partition(":")[2]))
+
+
 def kind_of(name: str) -> PortKind:
     """The kind of a port. Raises Problem E215 where another package offers its scheme wrongly."""
     for kind in PORTS:

@@ -7,7 +7,7 @@ one of a port. docs/bed.md, "A driver of your own", is an example.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from hw.bed import BedDriver
 from hw.line import BAUD
@@ -98,6 +98,8 @@ class PortKind:
                 whether the user says `--lock-step`
     replays     True where the bed answers from a transcript, so that only what made it can be asked again
     recognizes  (port) -> True where a port is of this kind that begins with no scheme
+    bench       (address) -> what tells the bench there from another, in words by name, as it is now; empty where the
+                address says nothing of it. Cases of one bench are not taken for those of another. Raises Problem
     """
 
     doc: str
@@ -110,6 +112,7 @@ class PortKind:
     lock_step: Callable[[str, bool], bool] = as_requested
     replays: bool = False
     recognizes: Callable[[str], bool] = lambda name: False
+    bench: Callable[[str], Mapping[str, str]] = lambda address: {}
 
     @property
     def written(self) -> str:

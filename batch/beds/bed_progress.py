@@ -111,6 +111,7 @@ def sidecar_entries(executor: OnBeds) -> Mapping[str, Any]:
                 "baud": executor.baud,
                 "lock_step": executor.lock_step,
                 "beds": executor.known.beds[joint],
+                **({"bench": executor.benches[joint]} if executor.benches[joint] else {}),
                 "timing": _figures(kept[joint]) if joint in kept else None,
             }
             for joint, port in executor.ports.items()

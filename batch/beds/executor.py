@@ -21,10 +21,11 @@ from batch.beds.case_result import CaseResult, case_result
 from batch.campaigns import shard, tasks
 from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
+from batch.campaigns.resuming import changed_since
 from batch.campaigns.tasks import CampaignSection, Done, Task
 from hw import records
 from hw.case import CaseRequest, pace_of
-from hw.drivers import same_bed
+from hw.drivers import bench_at, same_bed
 from hw.process import talk
 from met import run as engine
 from met.diagnostic import Problem, error
@@ -88,6 +89,7 @@ class OnBeds:
         self.driving: Driving | None = None
         self._done = 0
         self.ports = ports.by_joint
+        self.benches = {joint: bench_at(port) for joint, port in ports.by_joint.items()}
         self.lock_step, self.baud = ports.lock_step, ports.baud
 
     @property
@@ -100,9 +102,10 @@ class OnBeds:
         for path in folder.beds.glob("*.records"):
             with contextlib.suppress(records.UnsoundRecords, OSError):
                 ports = records.read(path).head.get("ports", {})
+                benches = records.read(path).head.get("benches", {})
                 if not isinstance(ports, dict) or not all(isinstance(port, str) for port in ports.values()):
                     raise records.UnsoundRecords("has a head that is damaged")
-                self.check(ports, f"{folder.path} holds cases of this campaign")
+                self.check(ports, benches, f"{folder.path} holds cases of this campaign")
 
     def know_all(self) -> None:
         """Add the records of cases that an earlier run of the campaign has driven."""
@@ -141,14 +144,19 @@ class OnBeds:
     def close(self) -> None:
         self._waiting.clear()
 
-    def check(self, before: Mapping[str, str], what: str) -> None:
-        """Raise Problem E353 where cases were driven at other ports. before: port by joint; what: the place of those
-        cases, in words"""
+    def check(self, before: Mapping[str, str], benches: Any, what: str) -> None:
+        """Raise Problem E353 where cases were driven at other ports, or on other benches. before: port by joint;
+        benches: what told its bench from others, in words by name, by joint; what: the place of those cases, in
+        words"""
+        helps = "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it"
         for joint, port in before.items():
+            message = f"{what}, driven at `{port}`, and is left as it is"
             if not same_bed(port, self.ports.get(joint, "")):
-                message = f"{what}, driven at `{port}`, and is left as it is"
-                helps = "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it"
                 raise Problem(error("E353", message, help=helps))
+            now = self.benches[joint]
+            then = benches.get(joint, {}) if isinstance(benches, dict) else {}
+            if then != now and ((isinstance(then, dict) and then) or port != self.ports[joint]):
+                raise Problem(error("E353", message, help=changed_since(_other_bench(then, now))))
 
     def _case(self, section: CampaignSection, row: int) -> tuple[CaseResult, str]:
         """Drive a case, or use its records. Returns the result, and the reason why it ended early, "" where it did
@@ -202,7 +210,7 @@ class OnBeds:
             rest=ports.rest if self.known.cases else 0.0,
             transcripts=transcripts,
             clear=ports.clear,
-            head={"key": section.key(), "ports": dict(ports.by_joint)},
+            head={"key": section.key(), "ports": dict(ports.by_joint), "benches": self.benches},
         )
         structure, schedule = experiment.structure, experiment.structure.schedule
         exchange_hz = pace_of(experiment).hz * len(structure.substitutions)
@@ -237,6 +245,14 @@ class OnBeds:
             self._say(f"{joint}: {bed}")
             if unseen:
                 self._say(f"{joint}: {unseen}")
+
+
+def _other_bench(then: Any, now: Mapping[str, str]) -> list[str]:
+    """The differences between two benches. then, now: in words by name"""
+    if not isinstance(then, dict) or not then:
+        return ["the bench; which it was is not known"]
+    names = [name for name in dict.fromkeys([*then, *now]) if then.get(name) != now.get(name)]
+    return [f"the bench, {name}: {then.get(name) or 'none'} -> {now.get(name) or 'none'}" for name in names]
 
 
 def _recorded(path: Path) -> bool:

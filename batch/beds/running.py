@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from batch.archive.read import ArchiveFile
 from batch.beds.bed_progress import BedProgress, sidecar_entries, timing_lines
@@ -145,7 +146,7 @@ def run_and_tell(
     )
     with kept(f"{campaign.output} is whole: `met show {quoted(campaign.output)}` prints what came of it"):
         if performed.whole:
-            executor.check(_ports_before(campaign.output), f"{campaign.output} holds this campaign")
+            executor.check(*beds_before(campaign.output), f"{campaign.output} holds this campaign")
             say(f"nothing is missing: {campaign.output} has all of it (`--fresh` drives it again)")
         with ArchiveFile(campaign.output) as file:
             summaries, worst = summarise(file), worst_cases(file)
@@ -157,11 +158,14 @@ def run_and_tell(
     return ok
 
 
-def _ports_before(archive: Path) -> dict[str, str]:
-    """The ports, by joint, at which an archive was driven, from the file beside it. Raises Problem E302."""
+def beds_before(archive: Path) -> tuple[dict[str, str], dict[str, Any]]:
+    """The ports at which an archive was driven, and what told their benches from others, both by joint, from the file
+    beside it. Raises Problem E302."""
     path = sidecar_path(archive)
     try:
-        return {str(each["joint"]): str(each["port"]) for each in read_json(path).get("beds", ())}
+        beds = {str(each["joint"]): each for each in read_json(path).get("beds", ())}
+        ports = {joint: str(each["port"]) for joint, each in beds.items()}
+        return ports, {joint: each.get("bench", {}) for joint, each in beds.items()}
     except (OSError, ValueError, LookupError, TypeError, AttributeError) as reason:
         helps = "`--fresh` drives it again"
         raise Problem(error("E302", f"{path} is damaged: on which beds it was is not known", help=helps)) from reason

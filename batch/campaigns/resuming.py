@@ -122,10 +122,10 @@ def guard(campaign: Campaign) -> None:
         found = ["it cannot be read any more"]
     what = "driven on motor beds" if measured else f"{duration(seconds)} of computing"
     message = f"{campaign.output} holds another campaign, {what}, and is left as it is"
-    raise Problem(error("E353", message, help=_what(found or ["what is asked for (`--case`, `--histories`)"])))
+    raise Problem(error("E353", message, help=changed_since(found or ["what is asked for (`--case`, `--histories`)"])))
 
 
-def _what(found: Sequence[str]) -> list[str]:
+def changed_since(found: Sequence[str]) -> list[str]:
     """Help for an error: the changes, and the remedies."""
     most = [*found[:MOST_CHANGES], *([f"and {len(found) - MOST_CHANGES} more"] if len(found) > MOST_CHANGES else [])]
     return [
@@ -222,7 +222,7 @@ def _of_another(folder: Folder, campaign: Campaign, values: Sequence[CampaignSec
     if not found:
         found = _other_work(campaign, values, told)
     message = f"{folder.path} holds {done:,} cases of another campaign, and is left as it is"
-    return error("E353", message, help=_what(found))
+    return error("E353", message, help=changed_since(found))
 
 
 def _other_work(campaign: Campaign, values: Sequence[CampaignSection], told: dict[str, Any]) -> list[str]:

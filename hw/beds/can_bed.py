@@ -595,4 +595,5 @@ PORT = PortKind(
     open=_opened_port,
     check=can_deck.check_deck,
     lock_step=lambda name, requested: requested,
+    bench=lambda address: can_deck.bench_at(address).identity,
 )

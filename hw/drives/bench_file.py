@@ -106,6 +106,23 @@ class TwoDrives:
     torque_at: Place | None = None
     text: str = ""
 
+    @property
+    def identity(self) -> dict[str, str]:
+        """All that tells this bench from another, in words by the names in the file. The place of its bus or lines is
+        none of it: an adapter may get another name."""
+        found = {"name": self.name, "bus.interface": str(self.bus["interface"])}
+        for table, figures in (("shaft", self.shaft), ("supply", self.supply)):
+            found |= _in_words(table, figures)
+        for each in (self.drive, self.load):
+            found |= {f"{each.role}.dialect": each.dialect, f"{each.role}.node": str(each.node)}
+            found |= {f"{each.role}.reversed": "true" if each.sense < 0 else "false", f"{each.role}.model": each.model}
+            found |= _in_words(each.role, each.figures)
+        return found
+
+
+def _in_words(table: str, figures: Mapping[str, float]) -> dict[str, str]:
+    return {f"{table}.{key}": f"{value!r} {FIGURES[table][key][0]}" for key, value in figures.items()}
+
 
 def two_drives(path: str | os.PathLike[str]) -> TwoDrives:
     """The bench that a file describes. Raises Problem E446, OSError."""

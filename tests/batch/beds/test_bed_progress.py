@@ -15,14 +15,18 @@ from batch.beds.bed_progress import BedProgress, timing_lines, timings
 from batch.beds.bed_progress import sidecar_entries as written_beside
 from batch.beds.campaign_records import CaseRecords
 from batch.beds.executor import Driving, OnBeds, Ports
+from batch.beds.running import beds_before
 from batch.campaigns.folder import Folder
+from batch.campaigns.output import sidecar_path
 from batch.terminal.progress import Bar
 from hw import records
 from hw.bed import BedSample, BedState, Fault
 from hw.records import SIZE
 from met import cli
+from met.diagnostic import Problem
 from tests.batch.beds.listening import DECK
 from tests.batch.beds.test_jitter import rows_of
+from tests.hw.drives.played import bench_file
 
 FIGURES = {"median", "p99", "p99.9", "largest"}
 
@@ -63,6 +67,44 @@ def test_beds_in_lock_step_have_no_timing(here: Path) -> None:
             "timing": None,
         },
     ]
+
+
+def test_cases_of_one_bench_are_not_those_of_another(here: Path) -> None:
+    bench = bench_file(here, "damiao")
+    folder = Folder(here / "a.h5.campaign")
+    folder.path.mkdir()
+
+    def at(port: str) -> OnBeds:
+        return OnBeds(Ports({"shoulder": port}, 921600))
+
+    first = at(f"can:{bench}")
+    first.open(folder, {}, lambda: None)
+    with (folder.beds / "0-0.records").open("wb") as file:
+        records.begin(file, {"ports": first.ports, "benches": first.benches})
+    beside = {"beds": written_beside(first)["beds"]}
+    sidecar_path(here / "a.h5").write_text(json.dumps(beside))
+    moved = bench.rename(here / "moved.toml")
+    bench.write_text(moved.read_text().replace('"damiao"', '"moteus"').replace("1.3e-4", "1.4e-4"))
+    at(f"can:{moved}").open(folder, {}, lambda: None)
+    at(f"can:{moved}").check(*beds_before(here / "a.h5"), "a.h5 holds this campaign")
+    with pytest.raises(Problem) as resumed:
+        at(f"can:{bench}").open(folder, {}, lambda: None)
+    with pytest.raises(Problem) as whole:
+        at(f"can:{bench}").check(*beds_before(here / "a.h5"), "a.h5 holds this campaign")
+    for caught, what in ((resumed, f"{folder.path} holds cases of"), (whole, "a.h5 holds")):
+        [found] = caught.value.diagnostics
+        assert found.code == "E353"
+        assert found.message == f"{what} this campaign, driven at `can:{bench}`, and is left as it is"
+        assert found.help[:3] == (
+            "changed since: the bench, shaft.inertia: 0.00013 kg*m^2 -> 0.00014 kg*m^2",
+            "               the bench, drive.dialect: damiao -> moteus",
+            "               the bench, load.dialect: damiao -> moteus",
+        )
+    # an archive of before benches were known is taken for one of the port of the same name, and of no other
+    unknown = {"shoulder": f"can:{bench}"}
+    at(f"can:{bench}").check(unknown, {}, "a.h5 holds this campaign")
+    with pytest.raises(Problem, match="driven at"):
+        at(f"can:{moved}").check(unknown, {}, "a.h5 holds this campaign")
 
 
 def test_cases_of_an_earlier_run_count_as_well(here: Path) -> None:

@@ -30,6 +30,30 @@ def test_its_figures_are_si_and_what_it_does_not_say_has_a_default(tmp_path: Pat
 
 
 @pytest.mark.parametrize(
+    ("old", "new", "changed"),
+    [
+        ("1.3e-4 kg*m^2", "1.4e-4 kg*m^2", ["shaft.inertia"]),
+        ("node          = 2", "node          = 3", ["load.node"]),
+        ("reversed      = true", "", ["load.reversed"]),
+        ('interface = "virtual"', 'interface = "socketcan"', ["bus.interface"]),
+        ('name = "paper"', 'name = "other"', ["name"]),
+        ('"40 V"', '"7 V"', ["supply.voltage_max"]),
+        ("1.3e-4 kg*m^2", "0.13 g*m^2", []),
+        ('channel   = "bench"', 'channel   = "another"  # adapter', []),
+    ],
+)
+def test_what_tells_a_bench_from_another_is_not_how_its_file_is_written(
+    tmp_path: Path, old: str, new: str, changed: list[str]
+) -> None:
+    path = bench_file(tmp_path)
+    before, text = two_drives(path).identity, path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    now = two_drives(path).identity
+    assert [name for name in before | now if before.get(name) != now.get(name)] == changed
+
+
+@pytest.mark.parametrize(
     ("old", "new", "line", "message", "help"),
     [
         ('"1.3e-4 kg*m^2"', '"1.3 N*m"', 8, "`inertia` of `[shaft]` is no quantity above zero in kg*m^2", "write"),
