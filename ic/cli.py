@@ -109,7 +109,7 @@ def _checked(file: str, include_dirs: tuple[str, ...], defines: tuple[str, ...],
 
 
 def _print_verdict(checked: _Checked, verbose: bool) -> None:
-    from ic.printing.check import notes, verdict
+    from ic.printing.check import left_out, notes, verdict
 
     assert checked.plan is not None
     if checked.file.endswith(".json"):
@@ -118,6 +118,7 @@ def _print_verdict(checked: _Checked, verbose: bool) -> None:
     if verbose:
         _print(notes(checked.plan))
         _print(f"allowed: {warning.message} ({allowance})" for warning, allowance in checked.allowed)
+    _print(left_out(checked.plan))
     say(verdict(checked.plan, checked.diagnostics, len(checked.allowed)))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ic.printing.columns import count
-from ic.printing.plan import STEP_SIZE, passive
+from ic.printing.plan import NOT_LOOKED_AT, STEP_SIZE, passive
 from met.diagnostic import Diagnostic
 from met.plan import Experiment, Plan
 
@@ -18,6 +18,16 @@ def notes(plan: Plan) -> Iterator[str]:
             freely = "which moves freely" if len(free) == 1 else "which move freely"
             yield f"{experiment.name}: no servo on {', '.join(free)}, {freely}"
         yield from (f"{experiment.name}: {note}" for note in experiment.notes if not note.startswith(STEP_SIZE))
+
+
+def left_out(plan: Plan) -> Iterator[str]:
+    """What was not looked at, in one line for all runs of which it is true."""
+    runs: dict[str, list[str]] = {}
+    for experiment in plan.experiments:
+        for note in experiment.notes:
+            if note.startswith(NOT_LOOKED_AT):
+                runs.setdefault(note, []).append(experiment.name)
+    yield from (f"{', '.join(names)}: {note}" for note, names in runs.items())
 
 
 def verdict(plan: Plan, diagnostics: Sequence[Diagnostic], allowed: int = 0) -> str:

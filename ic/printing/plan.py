@@ -23,6 +23,7 @@ CHOSEN = 88  # columns, of parameters that stand in one cell
 FIXED_SPACE = "\u00a0"  # no line ends at one
 COUNTED = 1_000_000  # largest number of drawn values that are compared
 STEP_SIZE = "step size: "  # beginning of the compiler's note on the step size
+NOT_LOOKED_AT = f"{STEP_SIZE}not looked at"  # and where the arm was too large for one
 
 
 class _Values:

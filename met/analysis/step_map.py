@@ -9,6 +9,7 @@ equal. About a moving state the second includes the change of A within the step,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -81,6 +82,10 @@ class SampledLoops:
     base_hz: float
 
 
+class TooLarge(Exception):
+    """A program has more states than are to be linearised. The text says how many, in words."""
+
+
 class Linearizer:
     """The program of an experiment at an instant, the first one or another, for several cases at once: each as it is
     there, with resting parts held by their friction, and loose. A motor on a bed lets its joint keep turning."""
@@ -92,9 +97,11 @@ class Linearizer:
         memory: Mapping[str, np.ndarray] | None = None,
         *,
         opened: bool = False,
+        most: float = math.inf,
     ) -> None:
         """memory: cells of these cases at instants that they pass, [lane]; a case may be there several times. None:
-        where they begin. opened: continuous laws are kept apart from the slopes, as laws that tick are."""
+        where they begin. opened: continuous laws are kept apart from the slopes, as laws that tick are. most: number of
+        states beyond which TooLarge is raised"""
         structure, self._given = experiment.structure, (experiment, cases, memory)
         self.continuous = frozenset(use.joint for use in structure.servos if use.continuous)
         if opened:
@@ -129,6 +136,8 @@ class Linearizer:
         self.has_laws = bool(driven)
         self.laws = tuple(each for each in driven if each.ticks)
         self.held = tuple(name for each in self.laws for name in laws.memory(each))
+        if len(self.cells) > most:
+            raise TooLarge(f"{len(self.cells):,} states, and {most:,} is the most")
         own = tuple(f"{each.path}.{part.name}" for each in self.laws for part in each.parts.memory)
         self.slope = np.zeros((2 * lanes, len(self.cells), len(self.cells) + len(self.held)))
         numbers = {name: at for at, name in enumerate((*self.cells, *self.held))}

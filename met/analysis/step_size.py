@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -26,6 +27,11 @@ if TYPE_CHECKING:
 
 LANES = 300
 """Largest number of names times cases that is analysed: it bounds the time, to some 50 ms."""
+
+
+MOST_STATES = 1000
+"""Number of states of an arm or chain beyond which a check leaves out the analysis: the time goes with the cube of
+it."""
 
 
 @frozen
@@ -100,9 +106,11 @@ def chosen_cases(experiment: Experiment, also: Iterable[int] = ()) -> tuple[int,
     return tuple(found)
 
 
-def step_size(experiment: Experiment, cases: Sequence[int], memo: AnalysisMemo | None = None) -> StepSize:
+def step_size(
+    experiment: Experiment, cases: Sequence[int], memo: AnalysisMemo | None = None, *, most: float = math.inf
+) -> StepSize:
     """The modes of these cases that the step should follow, and its faults. Raises Problem where the program cannot be
-    built.
+    built, TooLarge where what is analysed has more than `most` states.
 
     Chains of a large arm that do not act on each other are analysed one by one, and the whole arm only where one has a
     fault. memo: answers about other experiments, which may have equal chains
@@ -111,18 +119,18 @@ def step_size(experiment: Experiment, cases: Sequence[int], memo: AnalysisMemo |
     memo = memo if memo is not None else AnalysisMemo()
     of_parts = list[StepSize]()
     for part, names in map(numbered, parts):
-        of_part = memo.answer("steps of a chain", part, partial(_of_chain, part, cases, memo), cases)
+        of_part = memo.answer("steps of a chain", part, partial(_of_chain, part, cases, memo, most), cases)
         if of_part is None:
             break
         of_parts.append(_named(of_part, names))
     if parts and len(of_parts) == len(parts):
         return _together(of_parts)
-    return _Look(experiment, cases).judged(experiment)
+    return _Look(experiment, cases, most).judged(experiment)
 
 
-def _of_chain(chain: Experiment, cases: Sequence[int], memo: AnalysisMemo) -> StepSize | None:
+def _of_chain(chain: Experiment, cases: Sequence[int], memo: AnalysisMemo, most: float) -> StepSize | None:
     """The findings on a chain, without matrices; None where it has a fault, so that the whole arm is to be analysed."""
-    looked = _look(chain, cases, memo)
+    looked = _look(chain, cases, memo, most)
     if looked.may_grow(chain):
         return None
     found = looked.judged(chain)
@@ -135,11 +143,11 @@ def _of_chain(chain: Experiment, cases: Sequence[int], memo: AnalysisMemo) -> St
     return replace(found.without_matrices(), mode=mode)
 
 
-def _look(part: Experiment, cases: Sequence[int], memo: AnalysisMemo) -> _Look:
+def _look(part: Experiment, cases: Sequence[int], memo: AnalysisMemo, most: float) -> _Look:
     """The modes and frames of a chain, which are the same however long it runs."""
     schedule = replace(part.structure.schedule, ticks=part.structure.schedule.dynamics)
     endless = replace(part, structure=replace(part.structure, schedule=schedule))
-    return memo.answer_of_now("look", endless, lambda: _Look(endless, cases), cases)
+    return memo.answer_of_now("look", endless, lambda: _Look(endless, cases, most), cases)
 
 
 def _named(found: StepSize, names: Mapping[str, str]) -> StepSize:
@@ -179,9 +187,9 @@ def _speed(mode: Mode, h: float) -> tuple[float, bool]:
 class _Look:
     """An arm's modes and frames in some cases, without regard to the length of a run."""
 
-    def __init__(self, experiment: Experiment, cases: Sequence[int]) -> None:
+    def __init__(self, experiment: Experiment, cases: Sequence[int], most: float) -> None:
         self.cases = cases
-        self.linearizer = Linearizer(experiment, cases)
+        self.linearizer = Linearizer(experiment, cases, most=most)
         self.map, self.sampled = self.linearizer.map(), self.linearizer.sampled()
         self.modes = list(modes(self.map, models.find("integrator", experiment.structure.integrator)))
         self.rates = fastest(self.sampled) if self.sampled is not None else np.zeros(len(cases))

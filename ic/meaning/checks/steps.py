@@ -31,6 +31,9 @@ LARGEST = 700.0
 NOTE = "step size: "
 """The beginning of the plan's note on the step size."""
 
+NOT_LOOKED_AT = f"{NOTE}not looked at, the arm is too large: "
+"""The beginning of this note where there was no analysis."""
+
 BEYOND = 1.2
 """Factor over a servo's own figure above which the arm's is reported in its place."""
 
@@ -42,13 +45,14 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
     if not known or not experiment.cases.count or scope.rate_place is None or not experiment.structure.moving:
         complaints.settle()
         return experiment
-    from met.analysis.step_size import chosen_cases, remedy, step_size
+    from met.analysis.step_map import TooLarge
+    from met.analysis.step_size import MOST_STATES, chosen_cases, remedy, step_size
 
     rows = chosen_cases(experiment, [row for figure in declared.values() for row in figure[1]])
     looked: list[StepSize] = []
 
     def look() -> StepSize:
-        looked.append(step_size(experiment, rows, memo))
+        looked.append(step_size(experiment, rows, memo, most=MOST_STATES))
         return looked[0]
 
     try:
@@ -56,6 +60,9 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
     except Problem:  # reported where the program is built
         complaints.settle()
         return experiment
+    except TooLarge as reason:
+        complaints.settle()
+        return replace(experiment, notes=(*experiment.notes, f"{NOT_LOOKED_AT}{reason}"))
     grows = any(each.kind == "grows" for each in found.faults)
     fast = any(each.kind == "fast" for each in found.faults)
     refuted = set()

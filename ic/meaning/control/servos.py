@@ -36,7 +36,7 @@ from met import models
 from met.diagnostic import Label, Place, Problem, did_you_mean, error, leave_out, meant
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import Command, SensorUse, ServoUse
+from met.plan import Command, Quantity, SensorUse, ServoUse
 from met.plan.channel import COMMAND_UNIT
 from met.trace import Scalar, where
 from met.unit_parser import parse_unit
@@ -306,14 +306,23 @@ def check_rest(scope: Scope, use: Use) -> None:
         )
 
 
-def check_start(scope: Scope, use: Use) -> None:
-    """Warn where a joint whose servo follows regardless of the arm does not begin at its command."""
+def commands_of(scope: Scope) -> dict[str, dict[str, Quantity]]:
+    """The parameters of the commands of a run's joints: by joint, then by name."""
+    found: dict[str, dict[str, Quantity]] = {}
+    for path, quantity in scope.parameters.items():
+        joint, of_command, name = path.partition(".servo.command.")
+        if of_command:
+            found.setdefault(joint, {})[name] = quantity
+    return found
+
+
+def check_start(scope: Scope, use: Use, asked: Mapping[str, Quantity]) -> None:
+    """Warn where a joint whose servo follows regardless of the arm does not begin at its command. asked: the command's
+    parameters by name"""
     command = use.command
     if not use.servo.follows or command is None or command.kind != "position" or scope.complaints.errors:
         return
     begins = scope.parameters.get(f"initial.{use.joint}.q")
-    head = f"{use.joint}.servo.command."
-    asked = {path.removeprefix(head): each for path, each in scope.parameters.items() if path.startswith(head)}
     profile = models.find_own("command").get(command.model)  # another package's is called only to be recorded
     values = [each.value for each in asked.values()]
     if begins is None or profile is None or {p.name for p in profile.parameters} - set(asked):

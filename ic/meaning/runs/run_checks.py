@@ -18,7 +18,7 @@ from ic.meaning.checks.together import check_together
 from ic.meaning.control.guides import Guiding, check_guides
 from ic.meaning.control.link_sensors import Sensing
 from ic.meaning.control.schedule import Rate, Ticks, check_stability, fastest_rate
-from ic.meaning.control.servos import Use, check_rest, check_start
+from ic.meaning.control.servos import Use, check_rest, check_start, commands_of
 from ic.meaning.control.substitution import check_brakes, check_runaways, check_ticks
 from ic.meaning.definitions.merge import MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
@@ -88,9 +88,10 @@ def _check_beginnings(run: RunParts) -> None:
     initial = body_of(run.scope, run.block.get("initial"))
     check_balanced(run.scope, initial.get("servos"), run.uses, run.structure.balanced)
     remark_beginnings(run.scope, run.structure.environment)
+    commands = commands_of(run.scope)
     for use in run.uses:
         check_rest(run.scope, use)
-        check_start(run.scope, use)
+        check_start(run.scope, use, commands.get(use.joint, {}))
 
 
 def _check_beds(run: RunParts) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from met import cli
 from met.messages.edits import Edit, apply
+from tests.met.analysis.test_step_map import SWING
 
 GOOD = "#include <two_link.ic>\n"
 BAD = '#include "part.ic"\nrun long like nominal { duration = 2; }\n'
@@ -34,6 +35,20 @@ def test_several_decks_are_checked_one_after_the_other(capsys: pytest.CaptureFix
     assert [line.partition(":")[0] for line in out.splitlines()] == ["good.ic", "good.ic"]
     assert "error[D060]" in err and "error[D109]" in err
     assert asked(capsys, "good.ic", "good.ic", "-q") == (cli.YES, "", "")
+
+
+def test_an_arm_too_large_for_the_analysis_of_its_steps_is_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("met.analysis.step_size.MOST_STATES", 1)
+    Path("large.ic").write_text(f"{SWING}run longer like hold {{ duration = 6 s; }}\n")
+    assert asked(capsys, "large.ic") == (
+        cli.YES,
+        "hold, longer: step size: not looked at, the arm is too large: 2 states, and 1 is the most\n"
+        "large.ic: 2 runs, 2 cases: no errors\n",
+        "",
+    )
+    assert asked(capsys, "large.ic", "--quiet") == (cli.YES, "", "")
 
 
 @pytest.mark.slow

@@ -222,3 +222,14 @@ def test_slopes_are_equal_to_the_bit_in_blocks_of_any_size(tmp_path: Path, monke
     monkeypatch.setattr("met.analysis.step_map.AT_ONCE", 1)
     assert np.array_equal(Linearizer(made, [0, 1, 2]).slope, whole)
     assert ran == [12, 12]  # three cases as they are and loose, to both sides: a block for q, and one for qd
+
+
+def test_of_many_modes_the_inverse_is_taken_at_once_and_is_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found, made = step_map(experiment(tmp_path, SWING), stages=False), models.find("integrator", "modified_euler")
+    [few] = (each for each in modes(found, made) if each.lane == 0)
+    monkeypatch.setattr("met.analysis.modes.MANY", 0)
+    [many] = (each for each in modes(found, made) if each.lane == 0)
+    assert many.root == pytest.approx(few.root, rel=1e-12) and many.factor == few.factor
+    np.testing.assert_allclose(many.weights, few.weights, rtol=1e-12)
