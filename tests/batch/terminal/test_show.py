@@ -5,12 +5,15 @@ import math
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import batch
 from batch.archive.read import ArchiveFile
+from batch.queries.given import given
 from batch.queries.signals import number_text, panels, pretty_unit
 from batch.terminal import braille
 from batch.terminal.show import as_json, show
@@ -227,3 +230,18 @@ def test_an_unknown_signal_is_told_without_plots_too(sweep: ArchiveFile) -> None
         with pytest.raises(Problem) as caught:
             show(sweep, ["nothing"], plots=plots)
         assert caught.value.diagnostics[0].code == "E324"
+
+
+@pytest.mark.parametrize(
+    ("written", "defines", "lines"),
+    [
+        ("", "", []),
+        ("drive.kp=2 V/rad\nlinks.fore.mass = 3 kg\n", "", ["set: drive.kp = 2 V/rad; links.fore.mass = 3 kg"]),
+        ("N 2\nGRIP 1\nmacro PARTS=3\n", "N=2 GRIP", ["set: macro PARTS = 3", "-D: N=2 GRIP"]),
+        ("A b = c\nvary drive.kp=[1, 2] V/rad\n", "A=b = c", ["varied: drive.kp = [1, 2] V/rad", "-D: A=b = c"]),
+    ],
+)
+def test_what_the_command_line_gave_is_told(written: str, defines: str, lines: list[str]) -> None:
+    sources = {"deck.ic": "", "<command line>": written} if written else {"deck.ic": ""}
+    archive: Any = SimpleNamespace(provenance={"defines": defines}, sources=lambda: sources)
+    assert given(archive) == lines
