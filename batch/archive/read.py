@@ -73,6 +73,12 @@ class ArchiveGroup:
         with reading(self.path):
             return {name: _stored(name, node) for name, node in self._node.items() if isinstance(node, h5py().Dataset)}
 
+    @property
+    def single(self) -> bool:
+        """True if histories are kept in single precision."""
+        with reading(self.path):
+            return any(self._node[each.name].dtype.itemsize == 4 for each in self.role("signal"))
+
     def role(self, role: str) -> tuple[Stored, ...]:
         return tuple(variable for variable in self.variables.values() if variable.role == role)
 

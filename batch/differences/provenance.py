@@ -26,6 +26,7 @@ class ProvenanceChanges:
     structure  experiments whose structures differ (models, rates, what is varied)
     code       experiments whose programs differ: where none does, equal inputs give equal bits
     results    metrics and signals of the others that are computed otherwise, by experiment and name
+    kept       how histories are kept: of experiments of which one archive has them in single precision
     """
 
     versions: tuple[str, ...] = ()
@@ -36,6 +37,7 @@ class ProvenanceChanges:
     structure: tuple[str, ...] = ()
     code: tuple[str, ...] = ()
     results: tuple[tuple[str, str], ...] = ()
+    kept: tuple[str, ...] = ()
 
 
 def provenance_changes(
@@ -54,7 +56,16 @@ def provenance_changes(
         structure=tuple(one.name for one, two in pairs if _unlike(one, two, "structure_key")),
         code=tuple(one.name for one, two in pairs if _other_code(one.attributes, two.attributes)),
         results=tuple((one.name, name) for one, two in pairs for name in _other_results(one, two)),
+        kept=tuple(
+            f"histories of `{two.name}`: {_precision(one)}, now {_precision(two)}"
+            for one, two in pairs
+            if one.single != two.single
+        ),
     )
+
+
+def _precision(group: ArchiveGroup) -> str:
+    return "single precision (`--float32`)" if group.single else "double precision"
 
 
 def _other_code(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:

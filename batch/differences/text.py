@@ -48,9 +48,57 @@ def _changed(found: Diff, cut: Shortening) -> Iterator[str]:
     if not made:
         yield words.SAME
     for kind, lines in made:
-        short = [line if cut.every or len(line) <= LONGEST else f"{line[:LONGEST]} ..." for line in lines]
+        short = lines if cut.every else _shortened(lines)
         for line in cut.cut(short, OF_KIND.get(kind, MOST_LINES), ""):
             yield f"  {'' if line.startswith(' ') else kind:<10} {line}"
+
+
+def _shortened(lines: Sequence[str]) -> list[str]:
+    """The lines, of which long ones are cut where they begin to differ from their counterparts: of `-` and `+` lines of
+    a deck's difference, one by one, and of both sides of `BEFORE -> NOW`."""
+    out = list(lines)
+    for gone, new in _counterparts(lines):
+        out[gone], out[new] = _around(lines[gone], lines[new], LONGEST, len("  -"))
+    for number, each in enumerate(out):
+        before, arrow, now = each.partition(" -> ")
+        if len(each) > LONGEST + len(" ... ") * 2 and arrow and " -> " not in now:
+            head = before.rfind(": ") + len(": ") if ": " in before else 0
+            one, other = _around(before[head:], now, LONGEST // 2, 0)
+            out[number] = each = f"{before[:head]}{one}{arrow}{other}"
+        elif each == lines[number] and len(each) > LONGEST:
+            out[number] = f"{each[:LONGEST]} ..."
+    return out
+
+
+def _counterparts(lines: Sequence[str]) -> Iterator[tuple[int, int]]:
+    """The numbers of the `-` and `+` lines of a deck's difference that stand for each other, in their order."""
+    gone: list[int] = []
+    new: list[int] = []
+    for number, each in enumerate([*lines, ""]):
+        if each.startswith("  -") and not new:
+            gone.append(number)
+        elif each.startswith("  +"):
+            new.append(number)
+        else:
+            yield from zip(gone, new, strict=False)
+            gone, new = ([number], []) if each.startswith("  -") else ([], [])
+
+
+def _around(one: str, other: str, most: int, head: int) -> tuple[str, str]:
+    """Two lines, each cut to `most` characters about the first difference behind the head."""
+    both = one[head:], other[head:]
+    first = next((i for i, (x, y) in enumerate(zip(*both, strict=False)) if x != y), min(map(len, both)))
+    begin = head + max(0, first - most // 3)
+    if max(len(one), len(other)) <= most:
+        return one, other
+    if first + most // 3 < most - head:
+        begin = head
+    made = []
+    for each in (one, other):
+        before = "... " if begin > head else ""
+        after = " ..." if len(each) > begin + most else ""
+        made.append(f"{each[:head]}{before}{each[begin : begin + most]}{after}")
+    return made[0], made[1]
 
 
 def _experiment(found: Diff, experiment: ExperimentDiff, cut: Shortening) -> list[str]:

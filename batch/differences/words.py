@@ -49,6 +49,7 @@ def provenance_lines(found: Diff) -> list[tuple[str, tuple[str, ...]]]:
                 *(f"`{what}` of `{name}` is computed otherwise" for name, what in changed.results),
             ),
         ),
+        ("kept", changed.kept),
     ]
     return [(kind, tuple(map(visible, lines))) for kind, lines in said if lines]
 

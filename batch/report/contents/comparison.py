@@ -27,6 +27,7 @@ KINDS = {
     "changed": "Parameters and models",
     "follows": "What follows",
     "new": "New parameters",
+    "kept": "Histories",
 }
 
 

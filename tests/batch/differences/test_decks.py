@@ -11,7 +11,7 @@ import ic
 from batch.differences import words
 from batch.differences.decks import MOST_COMPARED, decks
 from batch.differences.provenance import provenance_changes
-from batch.differences.text import Shortening, _changed
+from batch.differences.text import Shortening, _changed, _shortened
 
 ARM = """\
 let fore_l  = 3 m;
@@ -52,7 +52,7 @@ def made(
     plan = ic.compile(folder / "deck.ic", select=[select], **options)  # type: ignore[arg-type]
     texts = {each.name: each.text for each in plan.sources}
     [experiment] = plan.experiments
-    group = SimpleNamespace(name=experiment.name, attributes={}, variables={})
+    group = SimpleNamespace(name=experiment.name, attributes={}, variables={}, single=False)
     return SimpleNamespace(plan=plan, group=group, provenance={}, sources=lambda: texts)
 
 
@@ -72,6 +72,29 @@ def told(a: SimpleNamespace, b: SimpleNamespace) -> list[str]:
 
 
 PAGE = (Path(__file__).parents[3] / "docs" / "diff.md").read_text(encoding="utf-8")
+
+
+def test_lines_are_cut_where_they_begin_to_differ(here: Path) -> None:
+    pad = "pad " * 60
+    old, new = f"{pad}1 m;{' end' * 60}", f"{pad}2 m;{' end' * 60}"
+    found = decks({"d.ic": f"{old}\n"}, {"d.ic": f"{new}\n"})
+    lines = ["said", *(f"  {line}" for line in found.files[0].lines)]
+    gone, now = _shortened(lines)[-2:]
+    assert gone.startswith("  -... pad pad") and now.startswith("  +... pad pad")
+    assert "1 m; end" in gone and "2 m; end" in now and max(len(gone), len(now)) < 140
+    assert gone.replace("1 m;", "2 m;")[3:] == now[3:]
+    # far apart lines, lines that are alike to a point, and changes in words
+    assert _shortened(["  -x", "  +" + "y" * 200])[1] == "  +" + "y" * 120 + " ..."
+    long = f"let reach: {pad}1 -> {pad}2"
+    [short] = _shortened([long])
+    assert short.startswith("let reach: ... ") and short.endswith("pad 2") and "pad 1 -> ..." in short
+    assert _shortened(["z" * 200]) == ["z" * 120 + " ..."]
+
+
+def test_an_archive_of_single_precision_is_named(here: Path) -> None:
+    a, b = made(Path()), made(Path())
+    b.group.single = True
+    assert told(a, b) == ["kept: histories of `nominal`: double precision, now single precision (`--float32`)"]
 
 
 def test_a_let_is_told_before_the_parameters_that_follow_from_it(here: Path) -> None:
@@ -247,6 +270,7 @@ def test_more_than_a_screen_is_cut_with_the_command_that_shows_it() -> None:
             structure=(),
             code=(),
             results=(),
+            kept=(),
         )
     )
     short = list(_changed(found, Shortening(remedy="`met diff a.h5 b.h5 --all`")))  # type: ignore[arg-type]
@@ -329,7 +353,15 @@ def test_what_cannot_be_seen_is_made_visible() -> None:
     lines = words.provenance_lines(
         SimpleNamespace(
             changed=SimpleNamespace(  # type: ignore[arg-type]
-                versions=(), decks=found.files, meaning=(), follows=(), defaults=(), structure=(), code=(), results=()
+                versions=(),
+                decks=found.files,
+                meaning=(),
+                follows=(),
+                defaults=(),
+                structure=(),
+                code=(),
+                results=(),
+                kept=(),
             )
         )
     )

@@ -24,7 +24,7 @@ def said(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[tuple[str, ...], t
         variables = {
             name: SimpleNamespace(attributes={} if key is None else {"code_key": key}) for name, key in own.items()
         }
-        return SimpleNamespace(name="nominal", attributes=attributes, variables=variables)
+        return SimpleNamespace(name="nominal", attributes=attributes, variables=variables, single=False)
 
     group_a, group_b = side(a), side(b)
     files: Any = [SimpleNamespace(provenance={}, sources=dict) for _ in range(2)]
