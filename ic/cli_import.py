@@ -30,13 +30,14 @@ def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet
     `arm panda from urdf("panda.urdf") { ... }`.
     """
     from ic.beginnings.files import put
-    from ic.driver.import_robot import import_robot
+    from ic.driver.import_robot import import_with_remarks
 
     if force and output is None:
         raise click.UsageError("--force is for -o: nothing is written without it")
-    text = import_robot(file, mimic)  # type: ignore[arg-type]  # click has seen to it
+    text, remarks = import_with_remarks(file, mimic)  # type: ignore[arg-type]  # click has seen to it
     if output is None:
         say(text, end="", exact=True)
+        _remark(remarks, quiet)
         return
     if not output or os.path.isdir(output):
         raise Problem(error("D216", f"`{output}` is no name of a file", help="name the deck: `-o arm.ic`"))
@@ -48,3 +49,9 @@ def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet
     if not quiet:
         with kept(f"{output} is whole"):
             say(f"wrote {output}")
+    _remark(remarks, quiet)
+
+
+def _remark(remarks: list[str], quiet: bool) -> None:
+    for each in [] if quiet else remarks:
+        say(f"note: {each}", err=True)

@@ -10,7 +10,7 @@ from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.mechanics.arm import check_arm
 from ic.meaning.parameters.scope import Scope
 from ic.read import in_order
-from ic.robots.deck import arm_name, print_deck
+from ic.robots.deck import arm_name, print_deck, remarks
 from ic.robots.entries import ArmEntries, arm_entries
 from ic.robots.files import KIND, load
 from ic.robots.following import Treatment, without_mimics
@@ -22,6 +22,12 @@ from met.diagnostic import Diagnostic, Problem
 
 def import_robot(path: str, mimic: Treatment | None = None) -> str:
     """The text of the deck. mimic: treatment of joints that follow others. Raises Problem, with the file's text."""
+    return import_with_remarks(path, mimic)[0]
+
+
+def import_with_remarks(path: str, mimic: Treatment | None = None) -> tuple[str, list[str]]:
+    """The text of the deck, and lines about what is not in it or doubtful. mimic: treatment of joints that follow
+    others. Raises Problem, with the file's text."""
     files = Files()
     try:
         found = FoundFile(path, os.path.normpath(path))
@@ -37,7 +43,7 @@ def import_robot(path: str, mimic: Treatment | None = None) -> str:
     name = os.path.basename(path)
     title = f"made by `met import {name}{option}` from a file with the SHA-256 {source.sha256[:16]}..."
     lines = print_deck(made, title)
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines) + "\n", list(remarks(made))
 
 
 def _checked(made: ArmEntries) -> ArmEntries:

@@ -51,6 +51,7 @@ class ElementKind:
     inside      the elements inside that are read, each at most once, except those of `robot`
     needed      those of them that must be there
     refuses     whether any other attribute is refused unless all of it is 0; else it is counted as not read
+    meant       other words for attributes, refused where those are not there, by word in small letters
     """
 
     usage: str
@@ -58,6 +59,7 @@ class ElementKind:
     inside: tuple[str, ...] = ()
     needed: tuple[str, ...] = ()
     refuses: bool = False
+    meant: Mapping[str, str] = field(default_factory=dict)
 
 
 @frozen
@@ -73,6 +75,20 @@ class Found:
 WORD, NAME = Attribute(count=0), Attribute(count=0, needed=True)
 NUMBER, VECTOR, NEEDED = Attribute(), Attribute(count=3), Attribute(needed=True)
 FRICTION = Attribute(not_negative=True)
+
+OF_LIMITS = {
+    "min": "lower",
+    "minimum": "lower",
+    "low": "lower",
+    "lower_limit": "lower",
+    "max": "upper",
+    "maximum": "upper",
+    "high": "upper",
+    "upper_limit": "upper",
+    "torque": "effort",
+    "force": "effort",
+    "speed": "velocity",
+}
 
 ELEMENTS: Mapping[str, ElementKind] = {
     "robot": ElementKind('<robot name="...">', {"name": WORD, "version": WORD}, ("link", "joint")),
@@ -102,6 +118,7 @@ ELEMENTS: Mapping[str, ElementKind] = {
             "effort": Attribute(no_limit=math.inf),
             "velocity": Attribute(no_limit=math.inf),
         },
+        meant=OF_LIMITS,
     ),
     "dynamics": ElementKind('<dynamics damping="..." friction="..."/>', {"damping": FRICTION, "friction": FRICTION}),
     "mimic": ElementKind('<mimic joint="..."/>', {"joint": NAME, "multiplier": NUMBER, "offset": NUMBER}),
@@ -214,7 +231,9 @@ def _other_attribute(element: Element, name: str, text: str, dropped: dict[str, 
     if name == "xmlns" or ":" in name:  # XML's own, and those of other formats
         return
     kind = ELEMENTS[element.tag]
-    alike = _alike(name, kind.attributes)
+    meant = kind.meant.get(name.lower(), "")
+    meant = "" if meant in element.attributes else meant
+    alike = bool(meant) or _alike(name, kind.attributes)
     if not alike and kind.refuses and _NOTHING.fullmatch(text):
         return
     if not alike and not kind.refuses:
@@ -226,7 +245,10 @@ def _other_attribute(element: Element, name: str, text: str, dropped: dict[str, 
             "D208",
             f"`<{element.tag}>` has no attribute `{shown(name)}`",
             element.name_place(name),
-            help=[*did_you_mean(name, kind.attributes), f"it has {listed}" if listed else "it has none"],
+            help=[
+                *([f"did you mean `{meant}`?"] if meant else did_you_mean(name, kind.attributes)),
+                f"it has {listed}" if listed else "it has none",
+            ],
         )
     )
 

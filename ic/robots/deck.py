@@ -7,7 +7,7 @@ for number. The first run holds the arm; where the file has damping or friction,
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Setting
@@ -51,8 +51,22 @@ def _about(body: ArmEntries) -> Iterator[str]:
         weight = " Its inertia is left out: no body has it."
     yield f"// `base` is the file's link `{_safe(body.robot.root.name.text)}`.{weight}"
     if body.robot.dropped:
-        kinds = sorted(body.robot.dropped.items(), key=lambda kind: (-len(kind[1]), kind[0]))
-        yield f"// Not in this deck: {', '.join(f'{len(elements)} {_safe(what)}' for what, elements in kinds)}."
+        yield f"// Not in this deck: {_counted(body.robot.dropped)}."
+
+
+def _counted(dropped: Mapping[str, Sequence[object]]) -> str:
+    kinds = sorted(dropped.items(), key=lambda kind: (-len(kind[1]), kind[0]))
+    return ", ".join(f"{len(elements)} {_safe(what)}" for what, elements in kinds)
+
+
+def remarks(body: ArmEntries) -> Iterator[str]:
+    """What whoever imports the robot should know, a line each."""
+    attributes = {what: elements for what, elements in body.robot.dropped.items() if " of " in what}
+    if attributes:
+        yield f"attributes not read, and not in the deck: {_counted(attributes)}"
+    for joint in body.robot.joints:
+        if joint.beyond:
+            yield f"joint `{shown(joint.name.text)}` is held at {spelled(joint.held)}, beyond {joint.beyond}"
 
 
 def _block(part: RobotEntry, notes: list[str]) -> Iterator[str]:
@@ -112,6 +126,7 @@ def _following(joint: Joint, mimic: Mimic) -> str:
     law = {"multiplier": (mimic.multiplier, 1.0), "offset": (mimic.offset, 0.0)}
     shown_law = ", ".join(f"{name} {spelled(value)}" for name, (value, default) in law.items() if value != default)
     here = f"here it is held at {spelled(joint.held)}" if joint.type.text == "fixed" else "here it moves by itself"
+    here += f", beyond {joint.beyond}" if joint.beyond else ""
     return f"follows `{shown(mimic.joint.text)}` in the file{f' ({shown_law})' if shown_law else ''}; {here}"
 
 

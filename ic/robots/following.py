@@ -10,7 +10,7 @@ import math
 from dataclasses import replace
 from typing import Literal
 
-from ic.robots.entries import limits, rotation
+from ic.robots.entries import limits, rotation, spelled
 from ic.robots.robot import MOVING, Joint, Numbers, Robot
 
 Treatment = Literal["free", "fixed"]
@@ -25,7 +25,10 @@ def without_mimics(robot: Robot, treatment: Treatment) -> Robot:
         if joint.mimic is None:
             return joint
         free = replace(joint, mimic=None, followed=joint.mimic)
-        return free if treatment == "free" else _fixed(free, position(joint, known))
+        if treatment == "free":
+            return free
+        at = position(joint, known)
+        return replace(_fixed(free, at), beyond=_beyond(joint, at))
 
     return replace(robot, joints=tuple(changed(joint) for joint in robot.joints))
 
@@ -40,6 +43,13 @@ def position(joint: Joint, known: dict[str, Joint]) -> float:
         assert follower.mimic is not None
         value = follower.mimic.multiplier * value + follower.mimic.offset
     return value + 0.0
+
+
+def _beyond(joint: Joint, at: float) -> str:
+    """The limits that a position is beyond, in words: `its limits, -1.5 to 1.5`; "" within them."""
+    found = {name: limit.values[0] for name, limit in limits(joint).items()}
+    lower, upper = found.get("lower", -math.inf), found.get("upper", math.inf)
+    return "" if lower <= at <= upper else f"its limits, {spelled(lower)} to {spelled(upper)}"
 
 
 def hold_position(joint: Joint) -> float:

@@ -80,7 +80,8 @@ class Joint:
               place of their element
     friction  damping and friction, not negative; `friction_at` their place, None where both are zero or not written
     mimic     the joint that it follows
-    followed  the same of a joint that follows none any more; `held` its position where it is fixed instead
+    followed  the same of a joint that follows none any more; `held` its position where it is fixed instead, `beyond`
+              the limits that this is not within, in words
     """
 
     name: Written
@@ -97,6 +98,7 @@ class Joint:
     mimic: Mimic | None = None
     followed: Mimic | None = None
     held: float = 0.0
+    beyond: str = ""
 
 
 @frozen

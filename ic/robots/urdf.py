@@ -189,7 +189,8 @@ def _check_mimics(joints: Sequence[Joint], complaints: Complaints) -> None:
                 "D213",
                 f"joint `{shown(name)}` follows itself: {' -> '.join(map(shown, [*chain, name]))}",
                 leader.place,
-                help="remove the `<mimic>` of one of these joints: it then moves by itself",
+                help="remove the `<mimic>` of one of these joints in the file: it then moves by itself; no deck and no "
+                "`--mimic` can change it",
             )
 
 

@@ -122,6 +122,10 @@ OTHER_UNITS = (1e3, 1e6, 1e9)
 OTHER_INERTIAS = ((1e4, "kg*cm^2"), (1e6, "kg*mm^2"), (1e7, "g*cm^2"), (1e9, "g*mm^2"))
 """Factors by which a moment of inertia is wrong if it was in this unit."""
 
+USUAL_GYRATION = 0.4
+"""A usual radius of gyration as a share of the arm's length: that of a rod is 0.29 of its own, 0.58 of the way to its
+middle."""
+
 OF_BASE = f"links.{BASE}"
 
 MEANT = 'if it is meant so, `allow {} because "...";`'
@@ -369,12 +373,18 @@ Remark = Callable[[OddBody], tuple[str, list[str]]]
 """What an odd body is compared with, and remedies."""
 
 
+def _unlikely(radius: float, odd: OddBody) -> float:
+    """How far this radius of gyration is from a usual one on such an arm or of such a shape, as a ratio's logarithm."""
+    usual = USUAL_GYRATION * odd.length
+    return abs(math.log(radius / usual)) if radius > 0.0 and 0.0 < usual < math.inf else 0.0
+
+
 def _too_large(odd: OddBody) -> tuple[str, list[str]]:
     """The size that a body with too large an inertia is compared with, and the units that would explain it."""
     helps = [
         f"it would be of {odd.radius / math.sqrt(times):.4g} m, were it in {unit}: "
         f"`{odd.largest:.6g} {unit}` is {odd.largest / times:.4g} kg*m^2"
-        for times, unit in OTHER_INERTIAS
+        for times, unit in sorted(OTHER_INERTIAS, key=lambda each: _unlikely(odd.radius / math.sqrt(each[0]), odd))
         if odd.radius / math.sqrt(times) <= 2.0 * odd.length
     ]
     return f"its {'shape' if odd.sizes else 'arm'} is {odd.length:.4g} m {'large' if odd.sizes else 'long'}", helps
@@ -397,7 +407,7 @@ def _too_small(odd: OddBody) -> tuple[str, list[str]]:
     helps = [
         f"it would be of {odd.radius * math.sqrt(times):.4g} m, were it {odd.largest * times:.4g} kg*m^2: was it "
         f"converted from {unit} twice?"
-        for times, unit in OTHER_INERTIAS
+        for times, unit in sorted(OTHER_INERTIAS, key=lambda each: _unlikely(odd.radius * math.sqrt(each[0]), odd))
         if 0.05 * odd.length <= odd.radius * math.sqrt(times) <= 2.0 * odd.length
     ]
     return f"weighs {odd.mass:.4g} kg; a point mass has `inertia = [0, 0, 0] kg*m^2`", helps

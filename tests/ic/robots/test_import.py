@@ -387,3 +387,38 @@ def test_the_files_limits_are_the_joints_and_a_run_that_passes_one_says_so(capsy
 
 
 LIMITS = ("q_min", "q_max", "qd_max", "tau_max")
+
+
+def test_a_follower_that_is_held_beyond_its_limits_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    limit = '<limit lower="-1.5" upper="1.5" effort="1" velocity="1"/>'
+    text = led("revolute").replace('<mimic joint="one"', f'{limit}<mimic joint="one"').replace('"0.5"', '"9"')
+    Path("led.urdf").write_text(text, encoding="utf-8")
+    assert cli.main(["import", "led.urdf", "--mimic", "fixed", "-o", "led.ic"]) == cli.YES
+    out, err = capsys.readouterr()
+    assert out == "wrote led.ic\n" and err.startswith(
+        "note: joint `two` is held at 8.4, beyond its limits, -1.5 to 1.5\n"
+    )
+    assert "here it is held at 8.4, beyond its limits, -1.5 to 1.5" in Path("led.ic").read_text()
+    assert cli.main(["import", "led.urdf", "--mimic", "fixed", "-o", "led.ic", "--force", "-q"]) == cli.YES
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("output", [(), ("-o", "two.ic")])
+def test_what_is_not_read_is_told_with_its_number(output: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    Path("two.urdf").write_text(changed(TWO, ("<axis", '<limit upper="1" lower="0" jerk="3"/> <axis')), "utf-8")
+    assert cli.main(["import", "two.urdf", *output]) == cli.YES
+    assert capsys.readouterr().err == "note: attributes not read, and not in the deck: 1 jerk of limit\n"
+
+
+@pytest.mark.parametrize(("name", "meant"), [("min", "lower"), ("Max", "upper"), ("torque", "effort")])
+def test_another_word_for_a_limit_is_refused_with_the_word(name: str, meant: str) -> None:
+    Path("two.urdf").write_text(changed(TWO, ("<axis", f'<limit {name}="1"/> <axis')), encoding="utf-8")
+    with pytest.raises(Problem) as problem:
+        import_robot("two.urdf")
+    [found] = problem.value.diagnostics
+    assert (found.code, found.message) == ("D208", f"`<limit>` has no attribute `{name}`")
+    assert found.help[0] == f"did you mean `{meant}`?"
+    # beside the word itself it is another thing
+    both = f'<limit {name}="1" lower="0" upper="1" effort="1" velocity="1"/> <axis'
+    Path("two.urdf").write_text(changed(TWO, ("<axis", both)), encoding="utf-8")
+    assert f"1 {name} of limit" in import_robot("two.urdf")

@@ -286,7 +286,7 @@ error[D213]: joint `hinge` follows itself: hinge -> other -> hinge
    |
 13 |     <mimic joint="other"/>
    |                   ^^^^^
-   = help: remove the `<mimic>` of one of these joints: it then moves by itself
+   = help: remove the `<mimic>` of one of these joints in the file: it then moves by itself; no deck and no `--mimic` can change it
 """,
 )
 mistake(

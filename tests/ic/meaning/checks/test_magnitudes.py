@@ -53,6 +53,13 @@ def test_an_inertia_in_square_millimetres_is_told_with_the_unit(tmp_path: Path) 
     assert "  = help: it would be of 0.1732 m, were it in kg*mm^2: `30000 kg*mm^2` is 0.03 kg*m^2\n" in said
 
 
+def test_of_units_that_would_explain_an_inertia_the_one_that_fits_the_arm_is_offered(tmp_path: Path) -> None:
+    """In kg*cm^2 it would be of 2.9 m, on an arm of 1.5 m; in kg*mm^2 of 0.29 m."""
+    body = "mass = 2 kg; com = [1.5, 0, 0] m; inertia = [1000, 170000, 170000] kg*m^2;"
+    said = shown(tmp_path, arm(body), SERVO, RUN)
+    assert "  = help: it would be of 0.2915 m, were it in kg*mm^2: `170000 kg*mm^2` is 0.17 kg*m^2\n" in said
+
+
 @pytest.mark.parametrize(
     ("body", "said", "cure"),
     [
