@@ -68,6 +68,12 @@ def publish(output: Path, temporary: Path, sidecar: dict[str, Any]) -> None:
     outputs.settle_named(output, code="E305")
 
 
+OF_OTHER_FILES = frozenset(
+    {".ic", ".json", ".toml", ".urdf", ".xacro", ".txt", ".md", ".py", ".html", ".png", ".svg", ".pdf"}
+)
+"""Endings of what is read or written otherwise: an archive of such a name would be taken for that."""
+
+
 def sidecar_path(output: Path) -> Path:
     return output.with_name(output.name + ".run.json")
 
@@ -93,6 +99,10 @@ def _check_output(output: Path, plan: Plan) -> None:
     if format_of(output):
         remedy = f"`-o {quoted(output.with_suffix('.h5'))}`; `met run DECK -o {quoted(output)}` writes both"
         raise Problem(error("E305", f"cannot write {output}: it is to be an archive, which ends in .h5", help=remedy))
+    if output.suffix.lower() in OF_OTHER_FILES or output.name == "-":
+        other = output.with_suffix(".h5") if output.suffix else default_output(plan)
+        message = f"cannot write {output}: it is to be an archive, which ends in .h5"
+        raise Problem(error("E305", message, help=f"`-o {quoted(other)}`"))
     check_place(output, code="E305", inside=output / default_output(plan))
     if beside(output).exists() and not beside(output).is_dir():
         message = f"cannot write {output}: {beside(output)} is no folder, and a campaign's has to be there"

@@ -13,7 +13,7 @@ from batch.queries import ordering, requirements
 from batch.queries.failures import STATUS
 from batch.queries.ordering import CaseOrder
 from batch.queries.pool import ENDED, Pool
-from batch.queries.signals import deck_unit, number_text, value_text
+from batch.queries.signals import deck_unit, number_text, number_texts, value_text
 from batch.queries.streamed import is_streamed, summed_up
 from batch.queries.summary import finite
 from met.diagnostic import Problem
@@ -52,7 +52,8 @@ def table(
         units.append("")
     for variable in (*group.role("coordinate"), *group.role("metric")):
         scale, unit = deck_unit(variable)
-        texts = [number_text(value / scale) for value in group.at(variable.name, positions)]
+        values = [value / scale for value in group.at(variable.name, positions)]
+        texts = number_texts(values) if variable.role == "coordinate" else list(map(number_text, values))
         name = variable.path
         if variable.name in marks:
             missed = marks[variable.name]
@@ -87,7 +88,8 @@ def table_across(
             words += 1
             cells.append([name, "", *("" if np.isnan(value) else column.words[int(value)] for value in values)])
             continue
-        texts = ["" if np.isnan(value) else number_text(value) for value in values]
+        written = number_texts(values) if column.role == "parameter" else map(number_text, values)
+        texts = ["" if np.isnan(value) else text for value, text in zip(values, written, strict=True)]
         if column.limits:
             judged = [pool.requirements.index(limit.text) for limit in column.limits]
             missed = (pool.outcomes[places][:, judged] == 0).any(axis=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -160,6 +160,22 @@ def number_text(value: float) -> str:
         return f"{value:.4g}"
     text = f"{value:.{max(0, 3 - size)}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def number_texts(values: Iterable[float]) -> list[str]:
+    """Numbers as `number_text` writes them, and those that it would write alike in as many digits as tell them
+    apart."""
+    values = [float(each) for each in values]
+    texts = {each: number_text(each) for each in values}
+    alike: dict[str, list[float]] = {}
+    for each, text in texts.items():
+        alike.setdefault(text, []).append(each)
+    for those in alike.values():
+        digits = 4
+        while len({texts[each] for each in those}) < len(those) and digits < 17:
+            digits += 1
+            texts.update((each, f"{each:.{digits}g}") for each in those)
+    return [texts[each] if each in texts else number_text(each) for each in values]
 
 
 def deck_unit(variable: Stored) -> tuple[float, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from batch.archive.stored import Stored
 from batch.queries.best import ENDS, Designs, Goal, Stretch
 from batch.queries.failures import failure_lines
 from batch.queries.pool import CaseColumn, Pool
-from batch.queries.signals import number_text, pretty_unit
+from batch.queries.signals import number_text, number_texts, pretty_unit
 from batch.queries.summary import finite
 from ic.driver.written_value import WrittenValue
 from ic.printing.columns import columns, count
@@ -236,7 +236,7 @@ class BestAnswer:
         numbers = [row.design for row in rows]
         cells = [["", "", *(row.label for row in rows)]]
         for column in chosen:
-            cells.append([column.label, column.unit, *(_value(column, place) for place in designs.first[numbers])])
+            cells.append([column.label, column.unit, *_values(column, designs.first[numbers])])
         if designs.steps is not None:
             cells.append(["border", "cells", *(str(designs.steps[number]) for number in numbers)])
         for goal in self.shown:
@@ -357,11 +357,11 @@ def _least(goal: Goal) -> str:
     return f"{'largest' if goal.largest else 'least'} {goal.text}"
 
 
-def _value(column: CaseColumn, place: int) -> str:
-    value = float(column.values[place])
-    if math.isnan(value):
-        return ""
-    return column.words[int(value)] if column.role == "choice" else number_text(value)
+def _values(column: CaseColumn, places: Iterable[int]) -> list[str]:
+    values = [float(column.values[place]) for place in places]
+    texts = [column.words[int(each)] if column.role == "choice" and each == each else "" for each in values]
+    numbers = texts if column.role == "choice" else number_texts(values)
+    return ["" if math.isnan(each) else text for each, text in zip(values, numbers, strict=True)]
 
 
 def _range(column: CaseColumn) -> str:
@@ -369,11 +369,12 @@ def _range(column: CaseColumn) -> str:
     if column.role == "choice":
         return f"{column.label} {', '.join(column.words)}"
     ends = column.values[np.isfinite(column.values)]
-    return f"{column.label} {number_text(ends.min())} .. {number_text(ends.max())} {column.unit}".rstrip()
+    low, high = number_texts([ends.min(), ends.max()])
+    return f"{column.label} {low} .. {high} {column.unit}".rstrip()
 
 
 def _at(column: CaseColumn, values: np.ndarray, found: Stretch) -> str:
-    low, high = (number_text(float(values[level])) for level in (found.first, found.last))
+    low, high = number_texts(float(values[level]) for level in (found.first, found.last))
     return f"{low} .. {high} {column.unit}".rstrip()
 
 

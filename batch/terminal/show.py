@@ -23,7 +23,7 @@ from batch.queries.ordering import CaseOrder
 from batch.queries.pool import Pool, pools
 from batch.queries.search_answers import SearchAnswer
 from batch.queries.selection import CaseSelection
-from batch.queries.signals import case_text, history, number_text, panels, pretty_unit
+from batch.queries.signals import case_text, history, number_text, number_texts, panels, pretty_unit
 from batch.queries.step_errors.words import NONE, about, error_text
 from batch.queries.streamed import is_streamed
 from batch.queries.structures import structures
@@ -278,8 +278,9 @@ def heading(group: ArchiveGroup, width: int) -> list[str]:
             out.append(f"  {variable.name} = values from {low} to {high} {unit}".removesuffix(" 1"))
             continue
         values = distinct(group.values(variable.name)) / scale
-        few = ", ".join(number_text(value) for value in values[:6]) if len(values) <= 6 else ""
-        many = f"{len(values)} values from {number_text(values[0])} to {number_text(values[-1])}"
+        few = ", ".join(number_texts(values)) if len(values) <= 6 else ""
+        low, high = number_texts([values[0], values[-1]])
+        many = f"{len(values)} values from {low} to {high}"
         out.append(f"  {variable.name} = {few or many} {unit}".removesuffix(" 1"))
     return out
 

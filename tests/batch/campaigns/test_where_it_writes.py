@@ -83,10 +83,21 @@ class TestRefusedBeforeAnythingRuns:
         )
 
     def test_somebody_elses_file_is_not_written_over(self, here: Path) -> None:
-        (here / "two_link.ic").write_text("run nominal { }")
-        assert self.run("two_link.ic") == (
-            "error[E305]: two_link.ic exists and is no archive of MET: it is not written over\n"
+        (here / "somebodys").write_text("run nominal { }")
+        assert self.run("somebodys") == (
+            "error[E305]: somebodys exists and is no archive of MET: it is not written over\n"
             " = help: give another name with `-o`, or remove the file\n"
+            "\n1 error\n"
+        )
+
+    @pytest.mark.parametrize(
+        ("output", "instead"),
+        [("two_link.ic", "two_link.h5"), ("-", "two_link.h5"), ("x.TXT", "x.h5"), ("out/a.png", "out/a.h5")],
+    )
+    def test_an_archive_under_the_name_of_something_else(self, here: Path, output: str, instead: str) -> None:
+        assert self.run(output) == (
+            f"error[E305]: cannot write {output}: it is to be an archive, which ends in .h5\n"
+            f" = help: `-o {instead}`\n"
             "\n1 error\n"
         )
 

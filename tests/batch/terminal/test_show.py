@@ -14,7 +14,7 @@ import pytest
 import batch
 from batch.archive.read import ArchiveFile
 from batch.queries.given import given
-from batch.queries.signals import number_text, panels, pretty_unit
+from batch.queries.signals import number_text, number_texts, panels, pretty_unit
 from batch.terminal import braille
 from batch.terminal.show import as_json, show
 from met.diagnostic import Problem
@@ -217,6 +217,13 @@ class TestBraille:
 )
 def test_numbers_are_short(value: float, text: str) -> None:
     assert number_text(value) == text
+
+
+def test_numbers_that_differ_are_written_so_that_they_do() -> None:
+    close = [0.02, 0.020000000000000004, 0.02, 0.5, math.inf]
+    assert number_texts(close) == ["0.02", "0.020000000000000004", "0.02", "0.5", "inf"]
+    assert number_texts([20.001, 20.002, math.nan]) == ["20.001", "20.002", "nan"]
+    assert number_texts([0.01, 0.015]) == ["0.01", "0.015"] and number_texts([]) == []
 
 
 @pytest.mark.parametrize(("unit", "text"), [("kg*m^2", "kg·m²"), ("1/s^10", "1/s¹⁰"), ("m*s^-2", "m·s⁻²"), ("1", "1")])
