@@ -33,6 +33,7 @@ class Macros(Pcpp):
     """The half of the preprocessor for macros."""
 
     def __init__(self, findings: Findings) -> None:
+        self.not_undefined: list[Token] = []  # names of `#undef` that were no macros
         self.findings = findings
         self._expanded = 0
         self._expanded_here = 0
@@ -90,7 +91,8 @@ class Macros(Pcpp):
             self.findings.error("D007", "`#undef` needs a name", tokens[0].place, help="write `#undef NAME`")
             return
         self._nothing_after(tokens[1:], f"#undef {tokens[0].text}")
-        self.macros.pop(tokens[0].text, None)
+        if self.macros.pop(tokens[0].text, None) is None:
+            self.not_undefined.append(tokens[0])
         self.refused.pop(tokens[0].text, None)
 
     def expand_macros(self, tokens: list[Token], expanding_from: object = ()) -> list[Token]:

@@ -130,9 +130,10 @@ def find_file(
 
 
 class _Conditional:
-    """An open conditional: the directive, whether the text around it counts, whether its present part does."""
+    """An open conditional: the directive, whether the text around it counts, whether its present part does; how many
+    names had been asked for that were no macros, where an `#ifdef` asks for one; else 0."""
 
-    __slots__ = ("active", "done", "otherwise", "outer", "token")
+    __slots__ = ("active", "asked", "done", "otherwise", "outer", "token")
 
     def __init__(self, token: Token, outer: bool, active: bool) -> None:
         self.token = token
@@ -140,6 +141,7 @@ class _Conditional:
         self.active = active
         self.done = active
         self.otherwise: Token | None = None
+        self.asked = 0
 
 
 class _Preprocessor(Macros):
@@ -160,7 +162,8 @@ class _Preprocessor(Macros):
         self._conditions = 0
         self._zeros: dict[str, Place] = {}  # names in conditions that are no macros
         # names that a condition asked for as macros and that were none, with the number of tokens handed over before
-        self._not_defined: list[tuple[Token, int]] = []
+        # it, and the `#endif` of an `#ifdef`
+        self._not_defined: list[tuple[Token, int, Token | None]] = []
         super().__init__(findings)
 
     # reading
@@ -198,9 +201,17 @@ class _Preprocessor(Macros):
             else:
                 help = f"ask `defined({name})`, or define it before: `#define {name} 1`, `-D {name}=1`"
                 self.findings.warn("D036", message, place, help=[*did_you_mean(name, self.macros), help])
-        for token, before in self._not_defined:
-            if token.text in named and (named[token.text][0] < before or _stands_before(named[token.text][2], token)):
+        for token, before, end in self._not_defined:
+            if token.text not in named:
+                continue
+            at, kind, name_token = named[token.text]
+            behind = end is not None and _stands_before(end, name_token) and kind in ("let", "param")
+            if at < before or _stands_before(name_token, token) or behind:
                 message = f"`{token.text}` is no macro, so it counts as not defined in this condition"
+                self._warn_of_definition(message, token.place, *named.pop(token.text)[1:])
+        for token in self.not_undefined:
+            if token.text in lets and token.text in named:
+                message = f"`{token.text}` is no macro, so this `#undef` changes nothing"
                 self._warn_of_definition(message, token.place, *named.pop(token.text)[1:])
         for name, token in self.given.items():
             if name not in self.asked:
@@ -433,13 +444,15 @@ class _Preprocessor(Macros):
         """Follow the conditionals beside pcpp, which gets only a name, 0 or 1."""
         if name in ("if", "ifdef", "ifndef"):
             outer = not ifs or ifs[-1].active
-            truth = False
+            truth, asked = False, len(self._not_defined)
             if name == "if":
                 truth = outer and self._condition(directive, args)
                 args[:] = [_constant(truth, directive)]
             elif outer:
                 truth = self._known(name, directive, args) == (name == "ifdef")
             ifs.append(_Conditional(directive, outer, truth))
+            if name == "ifdef" and len(self._not_defined) > asked:
+                ifs[-1].asked = len(self._not_defined)
             if len(ifs) > CONDITION_DEPTH:
                 self._give_up("D018", f"`#if` goes deeper than {CONDITION_DEPTH}", directive.place)
             return
@@ -456,7 +469,9 @@ class _Preprocessor(Macros):
             raise OutputDirective(Action.IgnoreAndRemove)
         opened = ifs[-1]
         if name == "endif":
-            ifs.pop()
+            if asked := ifs.pop().asked:  # what a deck defines behind it was not asked for, either: no order matters
+                token, before, _ = self._not_defined[asked - 1]
+                self._not_defined[asked - 1] = token, before, directive
             self._nothing_after(args, "#endif")
         elif opened.otherwise is not None:
             label = Label(opened.otherwise.place, "the `#else` is here")
@@ -499,7 +514,7 @@ class _Preprocessor(Macros):
         """Return True if there is a macro of this name; a name without is noted, for `warn_of_names`."""
         defined = self.is_macro(name.text)
         if not defined:
-            self._not_defined.append((name, len(self.output)))
+            self._not_defined.append((name, len(self.output), None))
         return defined
 
     def _condition(self, directive: Token, args: list[Token]) -> bool:

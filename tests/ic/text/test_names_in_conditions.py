@@ -40,11 +40,23 @@ def test_each_way_to_ask_and_each_definition_before_it_gets_this_warning_once(de
 
 
 @pytest.mark.parametrize("text", [
-    "#ifndef x\nlet x = 1;\n#endif", "#ifdef x\n#endif\nlet x = 1;", '#if !defined(x)\n#include "b.ic"\n#endif',
+    "#ifndef x\nlet x = 1;\n#endif", "#ifdef x\n#else\nlet x = 1;\n#endif", "#ifdef x\n#endif\nlink x { }",
+    "#ifdef 1\n#endif\nlet x = 1;", "#undef x\n#define x 1\n#undef x\nrun x { }",
+    '#if !defined(x)\n#include "b.ic"\n#endif',
 ])  # fmt: skip
 def test_to_ask_before_the_definition_is_written_gets_no_warning(desk: Desk, text: str):
     desk.write("let x = 1;\n", "b.ic")
-    assert desk.told(text + "\n") == ""
+    assert "D036" not in desk.told(text + "\n")
+
+
+@pytest.mark.parametrize(("text", "at"), [
+    ("#ifdef x\n#endif\nlet x = 1;", "1:8"),
+    ("#ifdef y\n#ifdef x\n#endif\n#endif\n#ifdef x\n#else\n#endif\nlet x = 1;", "5:8"),
+    ("#undef x\nlet x = 1;", "1:8"), ("let x = 1;\n#undef x", "2:8"),
+])  # fmt: skip
+def test_a_value_is_no_macro_wherever_it_is_written(desk: Desk, text: str, at: str):
+    told = desk.told(text + "\n")
+    assert told.startswith("warning[D036]: `x` is no macro, so ") and f"--> a.ic:{at}\n" in told and "1 warning" in told
 
 
 def test_the_words_of_definitions_that_a_condition_knows_are_those_of_the_language():
