@@ -169,7 +169,11 @@ class Loops(Expressions):
         iterations = range(first, last + (1 if step > 0 else -1), step)
         if len(iterations) > MOST_ITERATIONS:
             message = f"a loop has at most {MOST_ITERATIONS:,} iterations, and this one has {len(iterations):,}"
-            self.fail("D284", message, place, help="change its ends, or take larger steps: `by 2`")
+            least = -(-abs(last - first) // (MOST_ITERATIONS - 1))
+            by = f"by {least if step > 0 else -least}"
+            self.fail(
+                "D284", message, place, help=f"change its ends, or take larger steps: `{by}` is the smallest that fits"
+            )
         return [str(each) for each in iterations]
 
     def whole(self, help: str = _ENDS) -> int:

@@ -423,7 +423,8 @@ def _taken_over(item: Item, homes: tuple[str, ...]) -> Item:
 
 def defined_twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnostic:
     what = f"{kind} `{name}`" if kind else f"`{name}`"
-    helps: list[str] = [leave_out("remove one of the two")]
+    named = kind not in ("", WITH, REQUIREMENT)
+    helps: list[str] = [leave_out("remove one of the two"), *(["or give one of the two another name"] if named else [])]
     if (place.file, place.line, place.column) == (earlier.file, earlier.line, earlier.column):
         once = "its file is included twice: begin that file with `#pragma once`"
         helps = [write("#pragma once\n", once, at=Place(place.file, 1, 1, 0), where="before")]

@@ -133,6 +133,7 @@ error[D040]: param `long` is written twice
   |       ^^^^ again
  ::: deck.ic:1:7  first
   = help: remove one of the two
+  = help: or give one of the two another name
 """),
     ('#include "swing.ic"\nrun far like hold { param reach = 2 m; }\n', """\
 error[D051]: `param` stands inside a definition

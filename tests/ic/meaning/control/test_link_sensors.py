@@ -162,6 +162,7 @@ error[D040]: sensor `up` is written twice
   |                                                                                  ^^^^^^^^^ again
  ::: deck.ic:9:5  first
   = help: remove one of the two
+  = help: or give one of the two another name
 
 1 error
 """),
