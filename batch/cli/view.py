@@ -92,8 +92,12 @@ def _write(
 
     target = Path(archive).with_suffix(".view.html") if output is None else Path(output)
     files.check_page(target)
-    files.write_page(page(archive, () if name is None else (name,), against, numbers, include_dirs), target)
+    said: list[str] = []
+    text = page(archive, () if name is None else (name,), against, numbers, include_dirs, said.append)
+    files.write_page(text, target)
     if not quiet:
+        for each in said:
+            say(f"note: {each}", err=True)
         with kept(f"{target} is whole"):
             say(f"{target}  ({size(target.stat().st_size)})")
             say(

@@ -20,6 +20,7 @@ import numpy as np
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.plotting.against import beside
 from batch.portable.mcap_log import MeasuredSignals, mcap_signals
+from batch.queries.signals import number_texts
 from ic.meaning.definitions.csv_files import CsvTable, read_csv
 from met.diagnostic import Label, Place, Problem, error
 from met.host.files import open_regular
@@ -51,6 +52,10 @@ def is_archive(path: str | Path) -> bool:
     return names_archive(str(path))
 
 
+COVERED = 0.9
+"""Share of a log's span, and of a run's, that the other has, below which it is said."""
+
+
 def log_data(path: str | Path, columns: Sequence[Mapping[str, str]], rows: np.ndarray) -> dict[str, Any]:
     """A log at the rows of a run.
 
@@ -59,7 +64,8 @@ def log_data(path: str | Path, columns: Sequence[Mapping[str, str]], rows: np.nd
              and after its last they are none
 
     Gives `values`, of each column an array over `rows` in SI, or none where the log has not the channel; `told`, what
-    the log's columns are, with their units; and `unused`, those that are not shown. Raises Problem E478, and those of
+    the log's columns are, with their units; and `unused`, those that are not shown; `part`, a line on the
+    spans of both where one is much longer, else "". Raises Problem E478, and those of
     CSV files.
     """
     readers = {".csv": _csv_signals, ".mcap": mcap_signals}
@@ -81,10 +87,19 @@ def log_data(path: str | Path, columns: Sequence[Mapping[str, str]], rows: np.nd
         )
     begin, end = (pick(time[at] for time, _ in log.signals.values()) for pick, at in ((min, 0), (max, -1)))
     if not (begin < rows[-1] and end > rows[0]):
-        message = f"the log is from {begin:g} s to {end:g} s, and the run from {rows[0]:g} s to {rows[-1]:g} s"
+        message = _spans(begin, end, rows)
         raise Problem(error("E478", message, log.head, help="let its times begin where the run begins, at 0 s"))
+    both, run = min(end, rows[-1]) - max(begin, rows[0]), rows[-1] - rows[0]
+    whole = both >= COVERED * (end - begin) and both >= COVERED * run
     values = [_at(rows, *log.signals[name]) if name in log.signals else None for name in channels]
-    return {"values": values, "told": log.told, "unused": log.unused}
+    part = "" if whole else f"{_spans(begin, end, rows)}: what both have is shown"
+    return {"values": values, "told": log.told, "unused": log.unused, "part": part}
+
+
+def _spans(begin: float, end: float, rows: np.ndarray) -> str:
+    """The spans of a log and of a run, in words."""
+    log, run = number_texts([begin, end]), number_texts([rows[0], rows[-1]])
+    return f"the log is from {log[0]} s to {log[1]} s, and the run from {run[0]} s to {run[1]} s"
 
 
 def _at(rows: np.ndarray, time: np.ndarray, numbers: np.ndarray) -> np.ndarray:

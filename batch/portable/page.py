@@ -7,7 +7,7 @@ one script, by its digest, and WebAssembly; module and numbers are in that scrip
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -61,11 +61,12 @@ def view(
     against: str | Path | None = None,
     numbers: str | Path | None = None,
     include_dirs: Sequence[str | Path] = (),
+    tell: Callable[[str], object] = lambda line: None,
 ) -> str:
     """The page of the archive's only run or sweep, or of the one that is named. against: another archive, or a log of
     measured signals, that is shown beside it. numbers: the archive's deck, whose numbers can be others there, with
-    further folders of what it includes. Raises Problem E473 where several runs are meant, and those of
-    `batch.portable.beside` and `batch.portable.numbers`."""
+    further folders of what it includes. tell: takes a line on a log of another span than the run's. Raises
+    Problem E473 where several runs are meant, and those of `batch.portable.beside` and `batch.portable.numbers`."""
     with ArchiveFile(archive) as file:
         file.need_every_row("a page that simulates")
         groups = groups_named(file, names)
@@ -79,7 +80,7 @@ def view(
         data = data_of(experiment, file, group)
         data["report"] = visible(f"met report {quoted(Path(archive).name)}")
         if against is not None:
-            data["beside"] = _beside(against, file, group, experiment)
+            data["beside"] = _beside(against, file, group, experiment, tell)
         if numbers is not None:
             data["numbers"] = _numbers(deck_of(file, experiment, numbers, include_dirs), experiment)
             data["head"] = head_of(experiment, data, KICKER, f"{_by(data)} ({_program(data)})")
@@ -114,7 +115,9 @@ def _numbers(numbers: OtherNumbers, of: Experiment) -> dict[str, Any]:
     return data
 
 
-def _beside(against: str | Path, file: ArchiveFile, group: ArchiveGroup, experiment: Experiment) -> dict[str, Any]:
+def _beside(
+    against: str | Path, file: ArchiveFile, group: ArchiveGroup, experiment: Experiment, tell: Callable[[str], object]
+) -> dict[str, Any]:
     """The data of the other archive or log on the page: for an archive everything known about it, for a log its numbers
     at the rows of a run."""
     name = visible(Path(against).name)
@@ -129,6 +132,8 @@ def _beside(against: str | Path, file: ArchiveFile, group: ArchiveGroup, experim
     schedule = experiment.structure.schedule
     rows = np.arange(schedule.rows) * schedule.record / schedule.base_hz
     found = beside.log_data(against, described_columns(experiment), rows)
+    if found["part"]:
+        tell(found["part"])
     values = [None if each is None else doubles(each) for each in found["values"]]
     return {"name": name, "values": values, "told": found["told"], "unused": found["unused"]}
 

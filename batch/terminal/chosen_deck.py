@@ -15,7 +15,7 @@ from ic.text.limits import MOST_BYTES
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import read_regular, whole_file
-from met.outputs import quoted
+from met.outputs import quoted, refusal_text
 from met.settings import setting_option
 
 
@@ -57,7 +57,7 @@ class ChosenDeck:
             with whole_file(self.target) as file:
                 file.write(text.encode())
         except OSError as reason:
-            raise Problem(error("E338", f"cannot write `{self.target}`: {reason.strerror}")) from None
+            raise Problem(error("E338", f"cannot write `{self.target}`: {refusal_text(reason)}")) from None
 
 
 def chosen_deck(

@@ -15,6 +15,7 @@ from ic.language import HEADS
 from met import models, units
 from met.diagnostic import Problem, error
 from met.host.files import new_file
+from met.outputs import refusal_text
 
 PARTS = [each.name for each in dataclasses.fields(Beginning)]
 
@@ -88,7 +89,8 @@ def put(path: str, text: str) -> None:
     except OSError as reason:
         if not there and os.path.lexists(path):
             os.unlink(path)
-        raise Problem(error("E338", f"cannot write `{path}`: {reason.strerror}")) from None
+        helps = "nothing was kept; -o names another place"
+        raise Problem(error("E338", f"cannot write `{path}`: {refusal_text(reason)}", help=helps)) from None
 
 
 def _there(paths: Sequence[str]) -> str:

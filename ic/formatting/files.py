@@ -17,6 +17,7 @@ from ic.text.limits import MOST_BYTES
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import open_regular, whole_file
+from met.outputs import refusal_text
 
 STDIN = "-"
 
@@ -126,4 +127,4 @@ def write(path: str, text: str) -> None:
             file.write(text.encode())
     except OSError as reason:
         help = "it is as it was; what takes its place is written beside it, so its folder must allow that"
-        raise Problem(error("E338", f"cannot write `{path}`: {reason.strerror}", help=help)) from None
+        raise Problem(error("E338", f"cannot write `{path}`: {refusal_text(reason)}", help=help)) from None

@@ -176,7 +176,7 @@ class Files:
     def _keep(self, file: FoundFile, data: bytes, kind: str, most: int) -> None:
         """Keep a file's bytes as text, with its errors. Raises Problem D018."""
         if len(data) > most:
-            raise Problem(_too_large(file, kind, f"{len(data) / 2**20:.1f} MiB", most))
+            raise Problem(_too_large(file, kind, size_text(len(data)), most))
         text, complaint = decode(data, file.name, kind)
         self.found[file.name] = file
         self.read_so_far[file.name] = SourceFile(file.name, text, hashlib.sha256(data).hexdigest())
@@ -232,7 +232,7 @@ def _read_bytes(file: FoundFile, kind: str, most: int) -> bytes:
             if data == HDF5:
                 raise Problem(_archive(file, kind))
             if about.st_size > most:
-                raise Problem(_too_large(file, kind, f"{about.st_size / 2**20:.1f} MiB", most))
+                raise Problem(_too_large(file, kind, size_text(about.st_size), most))
             data += stream.read(most + 1 - len(data))
         if len(data) > most:  # a file that does not say its size, or grows
             raise Problem(_too_large(file, kind, "no end", most))
@@ -254,7 +254,12 @@ def _archive(file: FoundFile, kind: str) -> Diagnostic:
 def _too_large(file: FoundFile, kind: str, size: str, most: int) -> Diagnostic:
     whose = "deck's file" if kind == "deck" else kind
     help = "numbers in bulk belong in a CSV file, not in a deck" if kind == "deck" else "split it"
-    return error("D018", f"`{file.name}` has {size}; a {whose} has at most {most >> 20}", help=help)
+    return error("D018", f"`{file.name}` has {size}; a {whose} has at most {most >> 20} MiB", help=help)
+
+
+def size_text(n: int) -> str:
+    """A size in MiB, or in GiB where it is as large: `7.3 MiB`."""
+    return f"{n / 2**20:.1f} MiB" if n < 1 << 30 else f"{n / 2**30:.1f} GiB"
 
 
 def decode(data: bytes, name: str, kind: str) -> tuple[str, Diagnostic | None]:

@@ -11,6 +11,7 @@ import xarray
 
 from batch.portable.beside import log_data
 from met import cli
+from met.diagnostic import Problem
 from tests.batch.portable.test_arm_on_page import changed, opened, pixels
 from tests.batch.report.browser import PACKAGE, Chromium, browser, program, quiet
 
@@ -57,6 +58,28 @@ def test_a_log_is_in_si_on_straight_lines_between_its_rows_and_nothing_outside_o
     assert elbow[:3] == pytest.approx(np.radians([57.3, 60.3, 63.3]), rel=1e-15)
     assert np.isnan(shoulder[3]) and np.isnan(elbow[3])
     assert found["told"] == ["time [s]", "shoulder.q [deg]", "elbow.q [deg]"] and found["unused"] == ["heat"]
+
+
+@pytest.mark.parametrize(
+    ("last", "part"),
+    [
+        ("1", ""),
+        ("20000", "the log is from 0 s to 20000 s, and the run from 0 s to 1 s: what both have is shown"),
+        ("0.5", "the log is from 0 s to 0.5 s, and the run from 0 s to 1 s: what both have is shown"),
+    ],
+)
+def test_a_log_of_another_span_than_the_run_is_told(tmp_path: Path, last: str, part: str) -> None:
+    (tmp_path / "log.csv").write_text(f"time [s], elbow.q [deg]\n0, 1\n{last}, 2\n", encoding="utf-8")
+    columns = [{"channel": "elbow.q", "signal": "q", "unit": "rad"}]
+    assert log_data(tmp_path / "log.csv", columns, np.array([0.0, 0.5, 1.0]))["part"] == part
+
+
+def test_the_times_of_a_log_that_is_elsewhere_are_told_apart(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("time [s], elbow.q [deg]\n1700000000, 1\n1700000020, 2\n", encoding="utf-8")
+    columns = [{"channel": "elbow.q", "signal": "q", "unit": "rad"}]
+    with pytest.raises(Problem) as caught:
+        log_data(tmp_path / "log.csv", columns, np.array([0.0, 1.0]))
+    assert "the log is from 1.7e+09 s to 1.70000002e+09 s" in caught.value.diagnostics[0].message
 
 
 @pytest.mark.slow

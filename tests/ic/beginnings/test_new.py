@@ -283,7 +283,8 @@ def test_what_cannot_be_written_leaves_nothing(
         2,
         "",
         """\
-error[E338]: cannot write `bars.ic`: No space left on device
+error[E338]: cannot write `bars.ic`: no space left on device
+ = help: nothing was kept; -o names another place
 
 1 error
 """,

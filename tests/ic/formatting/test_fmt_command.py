@@ -183,7 +183,7 @@ def test_a_deck_that_cannot_be_written_stays_and_the_others_are_laid_out(
         2,
         "b.ic: formatted\n",
         """\
-error[E338]: cannot write `a.ic`: No space left on device
+error[E338]: cannot write `a.ic`: no space left on device
  = help: it is as it was; what takes its place is written beside it, so its folder must allow that
 
 1 error

@@ -42,7 +42,7 @@ def test_it_is_read_again_with_a_macro_that_a_sweep_varies() -> None:
         (OWN + "run x like brusk {}", "D041", "no run `brusk`"),
         (OWN + "\0", "D002", "`deck` is not text: it holds the byte 0x00"),
         (OWN + "\ud800", "D002", "`deck` is not UTF-8: byte 0xed"),
-        ("//" + "x" * (2 << 20), "D018", "`deck` has 2.0 MiB; a deck's file has at most 2"),
+        ("//" + "x" * (2 << 20), "D018", "`deck` has 2.0 MiB; a deck's file has at most 2 MiB"),
     ],
 )
 def test_what_is_wrong_is_placed_in_the_text(text: str, code: str, message: str) -> None:

@@ -342,7 +342,7 @@ def test_a_large_file_is_refused_at_its_include(desk: Desk) -> None:
     assert (
         desk.told('\n#include "large.ic"\n', (), {"large.ic": "a" * (2 << 20) + "b"})
         == """\
-error[D018]: `large.ic` has 2.0 MiB; a deck's file has at most 2
+error[D018]: `large.ic` has 2.0 MiB; a deck's file has at most 2 MiB
  --> a.ic:2:10
   |
 2 | #include "large.ic"
