@@ -26,6 +26,9 @@ from met.substitution.bed import DRIVES
 ASKED = 32
 """Number of times that the sensors are read, to measure the duration of an answer."""
 
+WORST = 0.01
+"""Share of questions without an answer above which no rate is fast enough; `met bed run` warns of more."""
+
 RATES = (500.0, 1000.0, 2000.0, 4000.0)
 """Rates in Hz for which the probe says whether the line is fast enough."""
 
@@ -37,6 +40,7 @@ class ProbeResult:
     """The bed at a port, and its line.
 
     trips   s from question to answer, for each of the `ASKED` questions that had one; empty where there is no line
+    lost    how many of those questions had no answer
     needed  s that the bytes of an exchange take; 0 where the line has no baud rate
     remarks  what the driver says of the bed besides, a word and a line each; its line, too, where it says that
     """
@@ -49,11 +53,14 @@ class ProbeResult:
     needed: float
     trips: tuple[float, ...]
     remarks: tuple[tuple[str, str], ...] = ()
+    lost: int = 0
 
     @property
     def fastest(self) -> float:
         """The rate of exchanges, Hz, at which one takes the largest allowed share of a period; infinite in
-        lock-step."""
+        lock-step; 0 where too many questions had no answer."""
+        if self.lost > WORST * ASKED:
+            return 0.0
         longest = max(self.needed, statistics.median(self.trips) if self.trips else 0.0)
         stepped = Capability.LOCK_STEP in self.about.capabilities
         return math.inf if stepped or longest == 0.0 else LONGEST_SHARE / longest
@@ -67,7 +74,9 @@ def probe(chosen: ChosenBed, baud: int) -> ProbeResult:
         about = bed.connect()
         sample = bed.read()
         trips = _trips(bed) if bed.has_line else ()
-        return ProbeResult(chosen.port, about, sample, bed.warnings, baud, bed.line_time(about), trips, bed.remarks)
+        lost = ASKED - len(trips) if bed.has_line else 0
+        needed = bed.line_time(about)
+        return ProbeResult(chosen.port, about, sample, bed.warnings, baud, needed, trips, bed.remarks, lost)
 
 
 def probe_and_tell(
@@ -147,6 +156,7 @@ def data(result: ProbeResult) -> dict[str, Any]:
             "bytes_take": result.needed or None,
             "answered_in": statistics.median(result.trips) if result.trips else None,
             "answered_in_at_most": max(result.trips, default=None),
+            "unanswered": result.lost,
             "fastest_hz": result.fastest if math.isfinite(result.fastest) else None,
         },
     }
@@ -209,22 +219,25 @@ def _read(sample: BedSample) -> list[tuple[str, float, str]]:
 
 def _line(result: ProbeResult) -> list[Sequence[str]]:
     """Rows about the line, and about the rates for which it is fast enough."""
-    if not result.trips and not result.needed:
+    if not result.trips and not result.needed and not result.lost:
         return [["line", "none: the bed is in this process"]]
     said = []
     if result.needed and not result.remarks:
         bytes_ = exchanged(result.about.capabilities)
         said.append(f"{result.baud} baud: {bytes_} bytes an exchange take {1e3 * result.needed:.3g} ms")
     if result.trips:
-        lost = ASKED - len(result.trips)
         median, longest = statistics.median(result.trips), max(result.trips)
         said.append(
             f"answered in {1e3 * median:.3g} ms, at most {1e3 * longest:.3g} ms, {ASKED} times asked"
-            + (f", {lost} times without an answer" if lost else "")
+            + (f", {result.lost} times without an answer" if result.lost else "")
         )
+    elif result.lost:
+        said.append(f"{result.lost} times asked, and never an answer")
     if not math.isfinite(result.fastest):
         return [["line", "; ".join(said)], ["rates", "all: the bed waits for the computer"]]
     words = [f"{hz:g} Hz {'yes' if hz <= result.fastest else 'no'}" for hz in RATES]
+    if not result.fastest:
+        return [["line", "; ".join(said)], ["rates", f"{', '.join(words)}: exchanges without an answer stop a bed"]]
     rates = (
         f"{', '.join(words)}; up to {result.fastest:.3g} Hz, where an exchange takes {LONGEST_SHARE:.0%} of a period"
     )

@@ -6,10 +6,14 @@ import json
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
+from batch.beds.probe import ASKED, ProbeResult, _line
 from hw import serial_port
+from hw.bed import Capability
 from met import cli
 from tests.batch.beds.listening import DECK, HELLO, READ, STOP, Listening
 from tests.hw.device import DEAD, DEADMAN, STOPPED, Device
@@ -207,3 +211,13 @@ def test_a_line_s_joint_may_be_named_without_a_deck(
 ) -> None:
     port = on_pty(Device(lock_step=False))
     assert probe("--port", f"elbow={port}")[1].startswith(f"bed `model` at {port}\n")
+
+
+@pytest.mark.parametrize(("lost", "answer"), [(0, "500 Hz yes"), (1, "500 Hz no"), (32, "500 Hz no")])
+def test_questions_without_an_answer_count_against_every_rate(lost: int, answer: str) -> None:
+    trips = (5e-4,) * (ASKED - lost)
+    about: Any = SimpleNamespace(capabilities=Capability(0))
+    result = ProbeResult("can:b.toml", about, cast("Any", None), (), 0, 2e-4, trips, (("bus", "x"),), lost)
+    line, rates = (row[1] for row in _line(result))
+    assert rates.startswith(answer) and (result.fastest == 0.0) == (lost > 0)
+    assert ("without an answer" in rates) == (lost > 0) and ("never an answer" in line) == (lost == ASKED)
