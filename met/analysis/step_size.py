@@ -16,6 +16,7 @@ from met.analysis.loops import MOST_EVENTS, fastest, growing, least, ticking
 from met.analysis.memo import AnalysisMemo
 from met.analysis.modes import FAST, TELLING, Mode, modes, of_lane, slowest
 from met.analysis.step_map import Linearizer, StepMap
+from met.analysis.step_map import TooLarge as TooLarge
 from met.diagnostic import Problem
 from met.frozen import frozen
 from met.integrators.integrator import Integrator

@@ -45,8 +45,8 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
     if not known or not experiment.cases.count or scope.rate_place is None or not experiment.structure.moving:
         complaints.settle()
         return experiment
-    from met.analysis.step_map import TooLarge
-    from met.analysis.step_size import MOST_STATES, chosen_cases, remedy, step_size
+
+    from met.analysis.step_size import MOST_STATES, TooLarge, chosen_cases, remedy, step_size
 
     rows = chosen_cases(experiment, [row for figure in declared.values() for row in figure[1]])
     looked: list[StepSize] = []
