@@ -291,12 +291,9 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
     of samples; the code of a message, as in `met doc D060`; any word of a deck, such as `like`, `allow` or `kp`; and a
     word of the glossary, such as `shard`. `met doc language --format json` prints all of it for programs.
     """
-    from ic.language import BLOCKS
-    from ic.printing import models as print_models
-    from ic.printing.codes import is_code, print_code
-    from ic.printing.language import print_block
-    from ic.printing.subjects import SUBJECTS
-    from met import models
+    from ic.printing.page import in_json, in_terminal, separated
+    from ic.printing.requests import requested_pages
+    from ic.printing.wrapping import terminal_width
 
     if len(words) > 2:
         raise click.UsageError("at most a kind and a model")
@@ -307,53 +304,13 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
             raise click.UsageError("--markdown is the whole page: it takes neither words nor --format")
         _print(page())
         return
-    if len(words) == 1 and is_code(words[0]):
-        if form == "json":
-            raise click.UsageError("what a code means is text: it has no --format")
-        _print_text(print_code(words[0]))
-        return
-    if words == ("language",):
-        from ic.printing.description import description, print_overview
-
-        if form == "json":
-            _print_json(description())
-        else:
-            _print_text(print_overview())
-        return
-    if len(words) == 1 and words[0] in SUBJECTS:
-        text, data = SUBJECTS[words[0]]
-        if form == "json":
-            _print_json(data())
-        else:
-            _print_text(text())
-        return
-    from ic.printing.words import print_word
-
-    try:
-        found = print_models.selected_models(words)
-    except Problem:
-        lines = list(print_word(words[0])) if len(words) == 1 else []
-        if not lines:
-            raise
-        if form == "json":
-            raise click.UsageError("what a word means is text: it has no --format") from None
-        _print_text(lines)
-        return
-    if form == "json":
-        _print_json([print_models.model_json(kind, model) for kind, model in found])
-    elif not words or (words[0].removesuffix("s") in models.GROUPS and len(words) == 1):
-        kind = words[0].removesuffix("s") if words else ""
-        if kind in BLOCKS:
-            _print_text([*print_block(BLOCKS[kind]), ""])
-        _print_text(print_models.print_list(found))
+    pages = requested_pages(words)
+    if form == "text":
+        _print_text(separated(in_terminal(each, terminal_width()) for each in pages))
+    elif any(each.records for each in pages):
+        _print_json(in_json(pages))
     else:
-        for position, (kind, model) in enumerate(found):
-            if position:
-                click.echo()
-            _print_text(print_models.print_model(kind, model))
-        others = list(print_word(words[0])) if len(words) == 1 else []
-        if others:
-            _print_text(["", f"Also `{words[0]}`", *(f"  {line}" for line in others)])
+        raise click.UsageError(f"what `{words[0]}` means is text: it has no --format")
 
 
 @click.command()

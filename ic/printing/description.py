@@ -5,7 +5,6 @@ It is made from the declarations that the compiler uses, including models of oth
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 from ic.find import library_files
@@ -13,11 +12,11 @@ from ic.language import ANYWHERE, BLOCKS, DEFINITIONS, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
 from ic.language.runs import BASE_KINDS
 from ic.meaning.expressions.evaluate import COMPARISONS, CONSTANTS, RESERVED, USAGE
-from ic.printing import codes, subjects
-from ic.printing.columns import columns, count
-from ic.printing.language import block_json
-from ic.printing.models import FIELDS, KINDS, UNIT_WORDS, model_json, where_written
-from ic.printing.sweeps import words_json
+from ic.printing import codes, subjects, sweeps
+from ic.printing.columns import count
+from ic.printing.language import block_page
+from ic.printing.models import KINDS, UNIT_WORDS, model_record, parameter_record, where_written
+from ic.printing.page import Page, Table
 from ic.text.edition import EDITIONS, FIRST
 from ic.text.preprocess import DIRECTIVES
 from met import models, units
@@ -45,21 +44,21 @@ def description() -> dict[str, Any]:
                 "head": block.head,
                 "free": block.free,
                 "entries": [
-                    {**json, "parameter": None if entry.parameter is None else parameter_json(entry.parameter)}
-                    for json, entry in zip(block_json(block), block.entries, strict=True)
+                    {**record, "parameter": None if entry.parameter is None else parameter_record(entry.parameter)}
+                    for record, entry in zip(block_page(block).records, block.entries, strict=True)
                 ],
             }
             for block in BLOCKS.values()
         ],
-        "top_level": [{key: each[key] for key in ("name", "written", "doc")} for each in block_json(TOP_LEVEL)],
-        "anywhere": [{key: each[key] for key in ("name", "written", "doc")} for each in block_json(ANYWHERE)],
+        "top_level": [{key: each[key] for key in ("name", "written", "doc")} for each in block_page(TOP_LEVEL).records],
+        "anywhere": [{key: each[key] for key in ("name", "written", "doc")} for each in block_page(ANYWHERE).records],
         "models": [
-            {**model_json(kind, model), "written": where_written(kind, model)}
+            {**model_record(kind, model), "written": where_written(kind, model)}
             for kind in KINDS
             for model in models.available(kind).values()
         ],
-        "shapes": subjects.shapes_json(),
-        "dh": subjects.dh_json(),
+        "shapes": subjects.shapes_page().records,
+        "dh": subjects.dh_page().records,
         "joint_kinds": list(JOINT_KINDS),
         "base_kinds": list(BASE_KINDS),
         "channels": subjects.channels(),
@@ -67,13 +66,13 @@ def description() -> dict[str, Any]:
         "unit_words": {**UNIT_WORDS, **subjects.MORE_WORDS},
         "functions": [
             {**each, "arguments": list(USAGE[each["name"]])}
-            for each in words_json("functions")
+            for each in sweeps.functions_page().records
             if each["name"] in USAGE
         ],
         "constants": dict(CONSTANTS),
         "comparisons": list(COMPARISONS),
-        "designs": words_json("designs"),
-        "distributions": words_json("distributions"),
+        "designs": sweeps.designs_page().records,
+        "distributions": sweeps.distributions_page().records,
         "directives": list(DIRECTIVES),
         "taken_names": _taken_names(FIRST),
         "editions": [{"edition": each, "taken_names": _taken_names(each)} for each in EDITIONS],
@@ -91,15 +90,15 @@ def _taken_names(edition: int) -> list[str]:
     return [*CONSTANTS, *RESERVED, *of_units]
 
 
-def parameter_json(parameter: Any) -> dict[str, Any]:
-    """A parameter with its whole declaration; bounds are in SI."""
-    return {field: getattr(parameter, field) for field in FIELDS}
-
-
-def print_overview() -> Iterator[str]:
-    """The parts of the description with their sizes, for a terminal."""
-    found = description()
-    yield f"language: all of it, for programs: `met doc language --format json`, {SCHEMA} {VERSION_OF_SCHEMA}"
-    yield ""
-    lists = [(name, each) for name, each in found.items() if isinstance(each, list | dict)]
-    yield from columns([(name, count(len(each), "entry", "entries")) for name, each in lists])
+def language_page() -> Page:
+    """The description for programs; a terminal shows the sizes of its parts."""
+    parts = description()
+    rows = [
+        (name, count(len(part), "entry", "entries")) for name, part in parts.items() if isinstance(part, list | dict)
+    ]
+    return Page(
+        subject="language",
+        summary=f"all of it, for programs: `met doc language --format json`, {SCHEMA} {VERSION_OF_SCHEMA}",
+        parts=(Table(head=("part", "entries"), rows=rows, headed=False),),
+        records=parts,
+    )

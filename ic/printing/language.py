@@ -6,78 +6,79 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from ic.language import BLOCKS, BlockDeclaration, Entry
-from ic.printing.columns import columns
-from ic.printing.wrapping import described, terminal_width
-from met.parameter import Parameter
-from met.units import ONE
+from ic.printing.models import range_
+from ic.printing.page import Page, Table, table_in_markdown
+from ic.text.complaints import with_article
 
 PAGE = Path(__file__).parents[2] / "docs" / "deck.md"
 MARK = "<!-- table of {} -->"
 """The comment above a generated table of docs/deck.md, with the block's name."""
 
 
-def print_block(block: BlockDeclaration) -> Iterator[str]:
-    """The page of a block, for a terminal."""
-    yield f"{block.name}: {block.doc}"
-    yield ""
-    yield f"In a deck: {block.written}" + (f", in {_an(block.within)}" if block.within else "")
-    yield ""
-    rows = [(each.written, default(each), each.doc) for each in block.entries]
-    yield from described([("written", "default", "meaning"), *rows], width=terminal_width(), head=True)
-    if block.free:
-        yield ""
-        yield f"Also {block.free}."
-    numbers = [each for each in block.entries if each.parameter is not None]
-    if numbers:
-        yield ""
-        rows = [(each.name, type_of(each), _bounds(each.parameter)) for each in numbers]
-        yield "Types, with bounds in SI units"
-        yield from columns(rows)
+def block_page(block: BlockDeclaration) -> Page:
+    """The page of a block."""
+    numbers = [
+        (each.name, type_of(each), "" if each.parameter.words else range_(each.parameter))
+        for each in block.entries
+        if each.parameter
+    ]
     varying = [(_path(each), _varies(each)) for each in block.entries if each.path and each.varies != "never"]
-    if varying:
-        yield ""
-        yield "What a sweep varies and `--set` replaces"
-        yield from columns(varying)
+    return Page(
+        subject=block.name,
+        title=f"block {block.name}",
+        summary=block.doc,
+        usage=block.written + (f", in {with_article(block.within)}" if block.within else ""),
+        parts=(
+            Table(
+                head=("written", "default", "meaning"),
+                rows=[(each.written, each.default, each.doc) for each in block.entries],
+            ),
+            f"Also {block.free}." if block.free else "",
+            Table(
+                head=("name", "type", "bounds"), rows=numbers, headed=False, caption="Types, with bounds in SI units"
+            ),
+            Table(
+                head=("path", "what varies"),
+                rows=varying,
+                headed=False,
+                caption="What a sweep varies and `--set` replaces",
+            ),
+        ),
+        records=[_entry_record(each) for each in block.entries],
+    )
 
 
 def in_block(block: BlockDeclaration) -> str:
     """Where the entries of a block stand, in words."""
-    return {"deck": "a deck", "anywhere": "any block"}.get(block.name) or _an(block.name)
+    return {"deck": "a deck", "anywhere": "any block"}.get(block.name) or with_article(block.name)
 
 
-def block_json(block: BlockDeclaration) -> list[dict[str, Any]]:
-    """The entries of a block, for programs."""
-    return [
-        {
-            "name": each.name,
-            "form": each.form,
-            "written": each.written,
-            "doc": each.doc,
-            "default": each.default,
-            "type": type_of(each),
-            "unit": each.unit,
-            "varies": each.varies,
-            "path": each.path,
-        }
-        for each in block.entries
-    ]
+def _entry_record(entry: Entry) -> dict[str, Any]:
+    """An entry of a block, for programs."""
+    return {
+        "name": entry.name,
+        "form": entry.form,
+        "written": entry.written,
+        "doc": entry.doc,
+        "default": entry.default,
+        "type": type_of(entry),
+        "unit": entry.unit,
+        "varies": entry.varies,
+        "path": entry.path,
+    }
 
 
-def table(block: BlockDeclaration) -> Iterator[str]:
+def table(block: BlockDeclaration) -> list[str]:
     """The block's entries as a table in Markdown."""
     by_key = block.within and not block.named and not block.statements
-    yield f"| {'key' if by_key else 'entry'} of {_an(block.name)} | is | default |"
-    yield "|---|---|---|"
-    for each in block.entries:
-        first = each.name if by_key else each.written
-        yield f"| `{first}` | {each.doc} | {each.default} |"
-    if block.free:
-        yield f"| others | {block.free} | |"
+    rows = [(each.name if by_key else each.written, each.doc, each.default) for each in block.entries]
+    head = (f"{'key' if by_key else 'entry'} of {with_article(block.name)}", "is", "default")
+    free = [f"| others | {block.free} | |"] if block.free else []
+    return [*table_in_markdown(Table(head=head, rows=rows)), *free]
 
 
 def type_of(entry: Entry) -> str:
@@ -91,19 +92,6 @@ def type_of(entry: Entry) -> str:
     return f"{kind}, {wanted.unit}" if wanted.unit != "1" else kind
 
 
-def default(entry: Entry) -> str:
-    """The default of an entry, in words, without the marks of Markdown."""
-    return entry.default
-
-
-def _bounds(wanted: Parameter | None) -> str:
-    if wanted is None:
-        return ""
-    above = f"above {ONE.decimal(wanted.above)}" if wanted.above is not None else ""
-    least = f"at least {ONE.decimal(wanted.at_least)}" if wanted.at_least is not None else ""
-    return above or least
-
-
 def _path(entry: Entry) -> str:
     """The path by which a sweep varies an entry; for several numbers, that of one of them."""
     shape = entry.parameter.shape if entry.parameter is not None else ""
@@ -112,10 +100,6 @@ def _path(entry: Entry) -> str:
 
 def _varies(entry: Entry) -> str:
     return "a number" if entry.varies == "number" else "a choice; each choice makes a program of its own"
-
-
-def _an(name: str) -> str:
-    return f"{'an' if name[0] in 'aeio' else 'a'} {name}"
 
 
 def with_tables(text: str) -> str:

@@ -1,23 +1,20 @@
-"""Models, as declared: their kinds, one kind's models, one model with all of its numbers."""
+"""Pages of `met doc` about models: all that a model declares, with its parameters and channels in words."""
 
 from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
-from typing import Any, get_args
+from typing import Any
 
-from ic.language import BLOCKS
-from ic.printing.glossary import entries
-from ic.printing.wrapping import described, paragraphs, terminal_width
+from ic.printing.page import Page, Table
 from met import models
-from met.diagnostic import Problem, did_you_mean, error
 from met.parameter import Parameter
 from met.plan.channel import watched_unit
 from met.units import ONE
 
-KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
+KINDS = tuple(models.GROUPS)
 WHERE_WRITTEN = {
     "servo": "servo NAME { model = MODEL; ... }",
     "sensor": "sensor QUANTITY = MODEL { ... }, in a servo, for `q`, `qd` or a state of it; on a link: "
@@ -34,15 +31,6 @@ WHERE_WRITTEN = {
 IN_SERVO = "sensor QUANTITY = MODEL { ... }, in a servo, for `q`, `qd` or a state of the servo"
 ON_LINK = "sensor NAME = MODEL { link = LINK; ... }, in a run"
 
-OF_LANGUAGE = tuple(name for name in BLOCKS if name not in KINDS)
-"""Blocks of the deck language that have no models."""
-
-OTHERS = (*OF_LANGUAGE, "channels", "designs", "dh", "distributions", "functions", "language", "shapes", "units")
-"""Further subjects of `met doc` (ic/printing/subjects.py)."""
-
-FIELDS = tuple(field.name for field in fields(Parameter))
-"""The fields of a parameter that `met doc --format json` gives."""
-
 MEANING_OF_OF = {
     "metric": "the unit of the signal that the metric evaluates",
     "sensor": "the unit of the quantity that is sensed",
@@ -57,67 +45,26 @@ UNIT_WORDS = {
 }
 
 
-def selected_models(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
-    """The models of a request to `met doc`: all, those of a kind, one of a kind, or all of one name. Raises D171."""
-    everything = [(kind, model) for kind in KINDS for model in models.available(kind).values()]
-    if not words:
-        return everything
-    kind = next((kind for kind in KINDS if words[0] in (kind, f"{kind}s")), None)
-    if kind is not None and len(words) > 1:
-        return [(kind, models.find(kind, words[1]))]
-    if kind is not None:
-        return [(kind, model) for k, model in everything if k == kind]
-    found = [(k, model) for k, model in everything if model.name == words[0]]
-    if found and len(words) == 1:
-        return found
-    if len(words) > 1 and (words[0] in OTHERS or found):
-        whole = f"{found[0][0]} {words[0]}" if found else words[0]
-        raise Problem(error("D171", f"`{words[0]}` takes no second word", help=f"`met doc {whole}` says it all"))
-    known = [*KINDS, *OTHERS, *(model.name for _, model in everything), *entries()]
-    helps = [*did_you_mean(words[0], known), f"kinds: {', '.join(KINDS)}; also: {', '.join(OTHERS)}"]
-    raise Problem(error("D171", f"no kind of model and no model `{words[0]}`", help=helps))
-
-
-def print_list(found: list[tuple[models.Kind, Any]]) -> Iterator[str]:
-    """One line a model, kind by kind."""
-    for kind in KINDS:
-        listed = [(model.name, summary(model)) for k, model in found if k == kind]
-        if listed:
-            yield f"{kind}: {WHERE_WRITTEN[kind]}"
-            yield from described(listed, width=terminal_width())
-            yield ""
-    yield "`met doc MODEL` shows everything that a model declares, `met doc channels` everything that can be recorded."
-    yield f"Blocks of a deck: {', '.join(OF_LANGUAGE)}."
-    others = [each for each in OTHERS if each not in OF_LANGUAGE and each != "channels"]
-    yield f"Also: {', '.join(others)}; and the code of a message, as in `met doc D060`."
-
-
-def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
+def model_page(kind: models.Kind, model: Any) -> Page:
     """The whole declaration of a model."""
-    yield f"{kind} {model.name}"
-    width = terminal_width()
-    doc = paragraphs(textwrap.dedent(model.doc).strip(), width=None if width is None else width - 2)
-    yield from (f"  {line}".rstrip() for line in doc)
-    yield ""
-    yield f"In a deck: {where_written(kind, model)}"
-    yield from declared_facts(kind, model)
-    parameters = models.written(model)
-    if parameters:
-        yield ""
-        yield "Parameters"
-        yield from described(rows(parameters), width=width, head=True)
-    yield from (f"  {line}" for line in sources(parameters))
-    yield from (f"  {word}: {text}" for word, text in words_in(kind, parameters))
-    for text, parts in recorded_channels(kind, model):
-        yield ""
-        yield text
-        yield from described(parts, width=width)
+    return Page(
+        subject=model.name,
+        title=f"{kind} {model.name}",
+        prose=model.doc,
+        usage=where_written(kind, model),
+        facts=list(declared_facts(kind, model)),
+        parts=(
+            parameter_table(models.written(model), caption="Parameters", kind=kind),
+            *recorded_channels(kind, model),
+        ),
+        records=[model_record(kind, model)],
+    )
 
 
-def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
+def model_record(kind: models.Kind, model: Any) -> dict[str, Any]:
     """The whole declaration of a model, for programs."""
     record: dict[str, Any] = {"kind": kind, "name": model.name, "doc": textwrap.dedent(model.doc).strip()}
-    record["parameters"] = [{field: getattr(p, field) for field in FIELDS} for p in models.written(model)]
+    record["parameters"] = [parameter_record(parameter) for parameter in models.written(model)]
     for words in ("commands", "unit", "order", "real_limit"):
         if hasattr(model, words) and (kind != "sensor" or getattr(model, words)):
             record[words] = getattr(model, words)
@@ -126,10 +73,21 @@ def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
     return record
 
 
-def rows(parameters: Iterable[Parameter]) -> list[tuple[str, str, str, str, str]]:
-    """A table of parameters with its head first."""
-    rows = [(p.name, unit_in_words(p.unit), default(p), range_(p), meaning(p)) for p in parameters]
-    return [("name", "unit", "default", "range", "meaning"), *rows]
+def parameter_record(parameter: Parameter) -> dict[str, Any]:
+    """A parameter with its whole declaration, for programs; bounds are in SI."""
+    return {field.name: getattr(parameter, field.name) for field in fields(Parameter)}
+
+
+def parameter_table(parameters: Sequence[Parameter], *, caption: str, kind: str = "") -> Table:
+    """The table of parameters, of a kind of model if it is one, with their sources."""
+    meanings = {**UNIT_WORDS, "of": MEANING_OF_OF.get(kind, UNIT_WORDS["of"])}
+    return Table(
+        head=("name", "unit", "default", "range", "meaning"),
+        rows=[(p.name, unit_in_words(p.unit), default(p), range_(p), meaning(p)) for p in parameters],
+        caption=caption,
+        notes=sources(parameters),
+        words=words_in([p.unit for p in parameters], meanings),
+    )
 
 
 def where_written(kind: models.Kind, model: Any) -> str:
@@ -142,27 +100,34 @@ def where_written(kind: models.Kind, model: Any) -> str:
     return usage.replace("MODEL", model.name)
 
 
-def recorded_channels(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
-    """Channels of a servo, guide, sensor of a link, bed or law: in words, then name, unit and meaning of each."""
-    for words, text in (
-        ("outputs", "Outputs of the control law, updated at each tick of the servo"),
-        ("integrals", "Integrals of the control law"),
-        ("states", "States of the servo, integrated with the motion of the arm"),
-        ("signals", "Signals computed at every instant"),
-    ):
-        parts = getattr(model, words, ())
-        if parts and kind == "servo":
-            yield f"{text}; recorded as JOINT.servo.NAME", [(p.name, unit_in_words(p.unit), p.doc) for p in parts]
-    if kind == "guide" and model.memory:
-        rows = [(p.name, unit_in_words(p.unit), p.doc) for p in model.memory]
-        yield "Outputs of the guide, updated at each of its ticks; recorded as guides.NAME.NAME", rows
+SERVO_CHANNELS = {
+    "outputs": "Outputs of the control law, updated at each tick of the servo; recorded as JOINT.servo.NAME",
+    "integrals": "Integrals of the control law; recorded as JOINT.servo.NAME",
+    "states": "States of the servo, integrated with the motion of the arm; recorded as JOINT.servo.NAME",
+    "signals": "Signals computed at every instant; recorded as JOINT.servo.NAME",
+}
+"""The fields of a servo's declaration that list channels, with what they are."""
+
+
+def recorded_channels(kind: models.Kind, model: Any) -> Iterator[Table]:
+    """Tables of the channels of a servo, guide, sensor of a link, bed or law."""
+    if kind == "servo":
+        for field, caption in SERVO_CHANNELS.items():
+            yield _channel_table(caption, [(p.name, p.unit, p.doc) for p in getattr(model, field)])
+    if kind == "guide":
+        caption = "Outputs of the guide, updated at each of its ticks; recorded as guides.NAME.NAME"
+        yield _channel_table(caption, [(p.name, p.unit, p.doc) for p in model.memory])
     if kind == "sensor" and model.measures is not None:
-        rows = [(p.name, unit_in_words(watched_unit(p.unit, model.unit)), p.doc) for p in model.states]
-        yield "States of the sensor, recorded as sensors.NAME.NAME; its reading is recorded as sensors.NAME", rows
-    shown = list(model.shown if kind in ("bed", "law") else ())
-    if shown:
-        rows = [(name, unit_in_words(unit), doc) for name, unit, doc in shown]
-        yield f"Values of the {kind}, updated at each tick of the servo; recorded as JOINT.{kind}.NAME", rows
+        caption = "States of the sensor, recorded as sensors.NAME.NAME; its reading is recorded as sensors.NAME"
+        yield _channel_table(caption, [(p.name, watched_unit(p.unit, model.unit), p.doc) for p in model.states])
+    if kind in ("bed", "law"):
+        caption = f"Values of the {kind}, updated at each tick of the servo; recorded as JOINT.{kind}.NAME"
+        yield _channel_table(caption, model.shown)
+
+
+def _channel_table(caption: str, channels: Iterable[tuple[str, str, str]]) -> Table:
+    rows = [(name, unit_in_words(unit), doc) for name, unit, doc in channels]
+    return Table(head=("name", "unit", "meaning"), rows=rows, headed=False, caption=caption)
 
 
 def declared_facts(kind: models.Kind, model: Any) -> Iterator[str]:
@@ -183,11 +148,10 @@ def declared_facts(kind: models.Kind, model: Any) -> Iterator[str]:
         yield f"Unit of the result: {meant.get(model.unit, unit_in_words(model.unit))}"
 
 
-def words_in(kind: models.Kind, parameters: tuple[Parameter, ...]) -> Iterator[tuple[str, str]]:
-    """The unit words that depend on the use, with their meanings."""
-    used = {word for p in parameters for word in UNIT_WORDS if word in re.split(r"\W+", p.unit)}
-    meanings = {**UNIT_WORDS, "of": MEANING_OF_OF.get(kind, UNIT_WORDS["of"])}
-    return ((word, text) for word, text in meanings.items() if word in used)
+def words_in(units: Iterable[str], meanings: Mapping[str, str]) -> list[tuple[str, str]]:
+    """The words of these that units use, with their meanings."""
+    used = {word for unit in units for word in re.split(r"\W+", unit)}
+    return [(word, text) for word, text in meanings.items() if word in used]
 
 
 def summary(model: Any) -> str:

@@ -1,10 +1,10 @@
-"""Subjects of `met doc` besides models: channels, Denavit-Hartenberg numbers, shapes, motors on beds, units, and the
-words of values and sweeps (ic/printing/sweeps.py)."""
+"""Pages of `met doc` about other subjects than models: blocks, channels, Denavit-Hartenberg numbers, shapes, units, and
+the words of values and sweeps (ic/printing/sweeps.py)."""
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any
@@ -12,11 +12,18 @@ from typing import Any
 from ic.language import BLOCKS
 from ic.meaning.control.substitution import DEFAULTS
 from ic.meaning.mechanics import dh, shapes
-from ic.printing.columns import columns
-from ic.printing.language import block_json, print_block
-from ic.printing.models import FIELDS, OF_LANGUAGE, UNIT_WORDS, default, rows, summary, unit_in_words
-from ic.printing.sweeps import print_words, words_json
-from ic.printing.wrapping import described, paragraphs, terminal_width
+from ic.printing import sweeps
+from ic.printing.language import block_page
+from ic.printing.models import (
+    UNIT_WORDS,
+    default,
+    parameter_record,
+    parameter_table,
+    summary,
+    unit_in_words,
+    words_in,
+)
+from ic.printing.page import Page, Table
 from met import models, units
 from met.plan import channel
 from met.plan.linear_uses import FIGURES
@@ -37,10 +44,6 @@ OF_ANY = (
         "reading of a sensor on a link, and a state of its filter; `sensors` is short for the readings of all sensors",
     ),
 )
-
-
-SHORT_FORMS = "`q` without `JOINT.` is that channel of all joints; `.x` behind a vector is one component of it."
-"""The forms of a channel that are shorter or longer than its path."""
 
 
 def channels() -> list[dict[str, str]]:
@@ -68,111 +71,120 @@ MORE_WORDS = {
 }
 
 
-def print_channels() -> Iterator[str]:
-    yield "channels: the signals that a run can record and a metric can evaluate"
-    yield ""
-    yield "In a deck: record = [q, JOINT.reaction, links.LINK.position, energy];"
-    yield ""
-    found = channels()
-    rows = [("channel", "unit", "components", "meaning; axes")]
-    for each in found:
-        meaning = "; ".join(filter(None, (each["meaning"], each["frame"])))
-        rows.append((each["path"], unit_in_words(each["unit"]), each["components"], meaning))
-    yield from described(rows, width=terminal_width(), head=True)
-    yield ""
-    yield from described(list(OF_ANY), width=terminal_width())
-    yield ""
-    yield SHORT_FORMS
-    yield from (f"  {word}: {text}" for word, text in words_of(found))
-
-
-def words_of(found: list[dict[str, str]]) -> list[tuple[str, str]]:
-    """The words in the units of channels that depend on the joint, with their meanings."""
-    used = {word for each in found for word in each["unit"].replace("*", "/").split("/")}
-    return [(word, text) for word, text in {**UNIT_WORDS, **MORE_WORDS}.items() if word in used]
-
-
-def print_dh() -> Iterator[str]:
-    yield "dh: the frame of a joint by Denavit-Hartenberg numbers"
-    width = terminal_width()
-    doc = paragraphs(textwrap.dedent(dh.__doc__ or "").strip(), width=None if width is None else width - 2)
-    yield from (f"  {line}".rstrip() for line in doc)
-    yield ""
-    yield "In a deck: joint NAME revolute { parent = ...; child = ...; dh = classic(a = 0.4 m, alpha = 90 deg); }"
-    yield ""
-    yield "Numbers"
-    yield from described(
-        [
-            ("name", "unit", "default", "meaning"),
-            *((each.name, each.unit, default(each), each.doc) for each in dh.NUMBERS),
-        ],
-        width=width,
-        head=True,
+def channels_page() -> Page:
+    records = channels()
+    rows = [
+        (
+            each["path"],
+            unit_in_words(each["unit"]),
+            each["components"],
+            "; ".join(filter(None, (each["meaning"], each["frame"]))),
+        )
+        for each in records
+    ]
+    words = words_in([each["unit"] for each in records], {**UNIT_WORDS, **MORE_WORDS})
+    return Page(
+        subject="channels",
+        title="Channels",
+        summary="the signals that a run can record and a metric can evaluate",
+        prose="`q` without `JOINT.` is that channel of all joints; `.x` behind a vector is one component of it.",
+        usage="record = [q, JOINT.reaction, links.LINK.position, energy];",
+        parts=(
+            Table(head=("channel", "unit", "components", "meaning; axes"), rows=rows, words=words),
+            Table(head=("channel", "is"), rows=OF_ANY, headed=False),
+        ),
+        records=records,
     )
 
 
-def dh_json() -> list[dict[str, Any]]:
-    fields = ("name", "unit", "doc", "default")
-    return [{field: getattr(each, field) for field in fields} for each in dh.NUMBERS]
-
-
-def print_shapes() -> Iterator[str]:
-    yield "shapes: uniform solids, which give a link its inertia and its centre of mass"
-    yield from (f"  {line}".rstrip() for line in BEGIN.splitlines())
-    yield ""
-    yield "In a deck: link NAME { mass = 2 kg;  shape = rod(length = 1 m, along = x); }"
-    for name, shape in shapes.SHAPES.items():
-        yield ""
-        yield name
-        yield from described(rows(shape.parameters), width=terminal_width(), head=True)
-
-
-BEGIN = (shapes.__doc__ or "").strip().split("\n\n", 1)[1]
-"""The position of each shape in its link, in the words of the module `shapes`."""
-
-
-def shapes_json() -> list[dict[str, Any]]:
-    return [
-        {"name": name, "parameters": [{field: getattr(p, field) for field in FIELDS} for p in shape.parameters]}
-        for name, shape in shapes.SHAPES.items()
-    ]
-
-
-def print_substitute() -> Iterator[str]:
-    yield from print_block(BLOCKS["substitute"])
-    for kind, usual in DEFAULTS.items():
-        yield ""
-        yield f"Models of a {kind}; the default is {usual}"
-        listed = [(name, summary(model)) for name, model in models.available(kind).items()]
-        yield from described(listed, width=terminal_width())
-    yield ""
-    yield "Parameters of a bed that have the value of the servo unless they are written"
-    yield from described(
-        [
-            (name, p.name, f"the servo's {p.of_servo}", p.doc)
-            for name, model in models.available("bed").items()
-            for p in model.parameters
-            if p.of_servo
+def dh_page() -> Page:
+    return Page(
+        subject="dh",
+        title="Denavit-Hartenberg numbers",
+        summary="the frame of a joint by Denavit-Hartenberg numbers",
+        prose=dh.__doc__ or "",
+        usage="joint NAME revolute { parent = ...; child = ...; dh = classic(a = 0.4 m, alpha = 90 deg); }",
+        parts=(
+            Table(
+                head=("name", "unit", "default", "meaning"),
+                rows=[(each.name, each.unit, default(each), each.doc) for each in dh.NUMBERS],
+                caption="Numbers",
+            ),
+        ),
+        records=[
+            {"name": each.name, "unit": each.unit, "doc": each.doc, "default": each.default} for each in dh.NUMBERS
         ],
-        width=terminal_width(),
     )
-    yield ""
-    yield "`met doc` and the name of a bed or law lists its parameters, and its channels, which can be recorded."
 
 
-def print_linear() -> Iterator[str]:
-    yield from print_block(BLOCKS["linear"])
-    yield ""
-    yield "Figures that a metric can be: metric NAME = FIGURE { of = LINEAR; }, or require FIGURE(LINEAR) > LIMIT;"
-    yield from described([(each.name, each.unit, each.doc) for each in FIGURES.values()], width=terminal_width())
+def shapes_page() -> Page:
+    return Page(
+        subject="shapes",
+        title="Shapes of links",
+        summary="uniform solids, which give a link its inertia and its centre of mass",
+        prose=(shapes.__doc__ or "").strip().split("\n\n", 1)[1],
+        usage="link NAME { mass = 2 kg;  shape = rod(length = 1 m, along = x); }",
+        parts=[parameter_table(shape.parameters, caption=name) for name, shape in shapes.SHAPES.items()],
+        records=[
+            {"name": name, "parameters": [parameter_record(each) for each in shape.parameters]}
+            for name, shape in shapes.SHAPES.items()
+        ],
+    )
 
 
-def figures_json() -> list[dict[str, Any]]:
-    """The block's entries, then the figures."""
-    return [
-        *block_json(BLOCKS["linear"]),
-        *({"figure": each.name, "unit": each.unit, "doc": each.doc} for each in FIGURES.values()),
+def substitute_page(known: Callable[[models.Kind], Mapping[str, Any]] = models.available) -> Page:
+    """The page of `substitute`, with the models of beds and laws. known: the models of a kind, by name"""
+    page = block_page(BLOCKS["substitute"])
+    tables = [
+        Table(
+            head=("name", "meaning"),
+            rows=[(name, summary(model)) for name, model in known(kind).items()],
+            headed=False,
+            caption=f"Models of a {kind}; the default is {usual}",
+        )
+        for kind, usual in DEFAULTS.items()
     ]
+    of_servo = Table(
+        head=("bed", "parameter", "default", "meaning"),
+        rows=[
+            (name, parameter.name, f"the servo's {parameter.of_servo}", parameter.doc)
+            for name, model in known("bed").items()
+            for parameter in model.parameters
+            if parameter.of_servo
+        ],
+        headed=False,
+        caption="Parameters of a bed that have the value of the servo unless they are written",
+    )
+    end = "`met doc` and the name of a bed or law lists its parameters, and its channels, which can be recorded."
+    return replace(page, parts=(*page.parts, *tables, of_servo, end))
+
+
+def linear_page() -> Page:
+    """The page of `linear`, with the figures of a linear analysis that a metric can be."""
+    page = block_page(BLOCKS["linear"])
+    table = Table(
+        head=("figure", "unit", "meaning"),
+        rows=[(each.name, each.unit, each.doc) for each in FIGURES.values()],
+        headed=False,
+        caption="Figures for `metric NAME = FIGURE { of = LINEAR; }` and `require FIGURE(LINEAR) > LIMIT;`",
+    )
+    figures = [{"figure": each.name, "unit": each.unit, "doc": each.doc} for each in FIGURES.values()]
+    return replace(page, parts=(*page.parts, table), records=[*page.records, *figures])
+
+
+def units_page() -> Page:
+    records = unit_table()
+    rows = [(each["name"], each["word"], in_si(each)) for each in records]
+    return Page(
+        subject="units",
+        title="Units",
+        summary="the units that a deck may write behind a number, combined by * / ^ and brackets",
+        parts=(
+            Table(head=("name", "word", "is"), rows=rows),
+            "An angular rate is not a frequency: 60 rpm is 2 pi rad/s, but 1 Hz is 1/s. There are no other prefixes.",
+        ),
+        records=records,
+    )
 
 
 def unit_table() -> list[dict[str, Any]]:
@@ -183,33 +195,21 @@ def unit_table() -> list[dict[str, Any]]:
     ]
 
 
-def print_units() -> Iterator[str]:
-    yield "units: the units that a deck may write behind a number, combined by * / ^ and brackets"
-    yield ""
-    yield from columns([("name", "word", "is"), *((each["name"], each["word"], in_si(each)) for each in unit_table())])
-    yield ""
-    yield "An angular rate is not a frequency: 60 rpm is 2 pi rad/s, but 1 Hz is 1/s. There are no other prefixes."
-
-
 def in_si(unit: Mapping[str, Any]) -> str:
     """The size of a unit in SI: `0.001 m`; for a share `0.01`."""
     return f"{ONE.decimal(unit['scale'])} {unit['si']}" if unit["si"] != "1" else ONE.decimal(unit["scale"])
 
 
-Subject = tuple[Callable[[], Iterator[str]], Callable[[], list[Any]]]
-
-SUBJECTS: Mapping[str, Subject] = MappingProxyType(
+BLOCK_PAGES: Mapping[str, Callable[[], Page]] = MappingProxyType(
     {
-        "channels": (print_channels, channels),
-        "designs": (partial(print_words, "designs"), partial(words_json, "designs")),
-        "dh": (print_dh, dh_json),
-        "distributions": (partial(print_words, "distributions"), partial(words_json, "distributions")),
-        "functions": (partial(print_words, "functions"), partial(words_json, "functions")),
-        "shapes": (print_shapes, shapes_json),
-        "units": (print_units, unit_table),
-        **{name: (partial(print_block, BLOCKS[name]), partial(block_json, BLOCKS[name])) for name in OF_LANGUAGE},
-        "linear": (print_linear, figures_json),
-        "substitute": (print_substitute, partial(block_json, BLOCKS["substitute"])),
+        **{name: partial(block_page, block) for name, block in BLOCKS.items()},
+        "linear": linear_page,
+        "substitute": substitute_page,
     }
 )
-"""By the word of `met doc`: the functions that print a subject, for people and for programs."""
+"""The page of each block of the deck language."""
+
+OTHER_PAGES: Mapping[str, Callable[[], Page]] = MappingProxyType(
+    {"shapes": shapes_page, "dh": dh_page, "channels": channels_page, "units": units_page, **sweeps.PAGES}
+)
+"""The page of each subject that is neither a block nor a model, in the order of docs/reference.md."""

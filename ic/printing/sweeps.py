@@ -5,14 +5,13 @@ The names, and what each takes, are those that the compiler reads by; here stand
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from ic.meaning.definitions.row_tables import CSV
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, USAGE
-from ic.printing.wrapping import described, terminal_width
+from ic.printing.page import Page, Table
 from ic.sweeps.designs import AT_MOST, DESIGNS, DIGITS, DISTRIBUTIONS, UNTIL_SHOWN
-from met.frozen import frozen
 from met.units import ONE
 
 Row = tuple[str, str, str]
@@ -63,69 +62,60 @@ OF_DISTRIBUTIONS: Mapping[str, str] = MappingProxyType({
 })  # fmt: skip
 
 
-def _functions() -> list[Row]:
+def functions_page() -> Page:
     calls = [(name, f"{name}({', '.join(USAGE[name])})", OF_FUNCTIONS[name]) for name in FUNCTIONS]
     table = (
         CSV,
         f"{CSV}({', '.join(USAGE[CSV])})",
         "table of a CSV file, for a `let NAME`; its values are NAME.ROW.COLUMN, by the names of rows and columns",
     )
-    return [*calls, table, *((name, name, ONE.decimal(value)) for name, value in CONSTANTS.items())]
+    return _words_page(
+        "functions",
+        title="Functions",
+        summary="the functions and constants that values may use",
+        usage="let step = max(1 mm, sqrt(2) * 3 mm);",
+        words=[*calls, table, *((name, name, ONE.decimal(value)) for name, value in CONSTANTS.items())],
+        end="Each argument has its unit, or one unit for all stands behind the bracket: `linspace(1, 2, 5) kg`.",
+    )
 
 
-def _designs() -> list[Row]:
+def designs_page() -> Page:
     early = ("random", f"random({UNTIL_SHOWN}, {AT_MOST} = n)", OF_UNTIL_SHOWN)
-    return [*((name, f"{name}(n)", OF_DESIGNS[name]) for name in DESIGNS), early]
+    return _words_page(
+        "designs",
+        title="Designs of samples",
+        summary="the ways to choose the points of a sample in a sweep",
+        usage="sample lhs(200) { PATH = normal(20, 1) kg; }",
+        words=[*((name, f"{name}(n)", OF_DESIGNS[name]) for name in DESIGNS), early],
+        end="`met doc distributions` lists the distributions from which the points get their values.",
+    )
 
 
-def _distributions() -> list[Row]:
-    return [(name, f"{name}({', '.join(takes)})", OF_DISTRIBUTIONS[name]) for name, takes in DISTRIBUTIONS.items()]
+def distributions_page() -> Page:
+    return _words_page(
+        "distributions",
+        title="Distributions",
+        summary="the probability distributions of a parameter in a sample",
+        usage="sample lhs(200) { PATH = uniform(0.09, 0.11) N*m/A; }",
+        words=[(name, f"{name}({', '.join(takes)})", OF_DISTRIBUTIONS[name]) for name, takes in DISTRIBUTIONS.items()],
+        end=f"A unit behind the brackets applies to all numbers inside. Values are rounded to {DIGITS} digits in it.",
+    )
 
 
-@frozen
-class Subject:
-    """A page: its subject, its syntax in a deck, a row for each word, and facts about all of them."""
+def _words_page(subject: str, *, title: str, summary: str, usage: str, words: list[Row], end: str) -> Page:
+    """A page of words, which ends with a fact about all of them."""
+    rows = [(written, meaning) for _, written, meaning in words]
+    return Page(
+        subject=subject,
+        title=title,
+        summary=summary,
+        usage=usage,
+        parts=(Table(head=("written", "is"), rows=rows, headed=False), end),
+        records=[{"name": name, "written": written, "doc": meaning} for name, written, meaning in words],
+    )
 
-    what: str
-    example: str
-    rows: Callable[[], list[Row]]
-    more: str
 
-
-SUBJECTS: Mapping[str, Subject] = MappingProxyType(
-    {
-        "functions": Subject(
-            "The functions and constants that values may use",
-            "let step = max(1 mm, sqrt(2) * 3 mm);",
-            _functions,
-            "Each argument has its unit, or one unit for all stands behind the bracket: `linspace(1, 2, 5) kg`.",
-        ),
-        "designs": Subject(
-            "The ways to choose the points of a sample in a sweep",
-            "sample lhs(200) { PATH = normal(20, 1) kg; }",
-            _designs,
-            "`met doc distributions` lists the distributions from which the points get their values.",
-        ),
-        "distributions": Subject(
-            "The probability distributions of a parameter in a sample",
-            "sample lhs(200) { PATH = uniform(0.09, 0.11) N*m/A; }",
-            _distributions,
-            f"A unit behind the brackets applies to all numbers inside. Values are rounded to {DIGITS} digits in it.",
-        ),
-    }
+PAGES: Mapping[str, Callable[[], Page]] = MappingProxyType(
+    {"functions": functions_page, "designs": designs_page, "distributions": distributions_page}
 )
-
-
-def print_words(name: str) -> Iterator[str]:
-    subject = SUBJECTS[name]
-    yield f"{name}: {subject.what[0].lower()}{subject.what[1:]}"
-    yield ""
-    yield f"In a deck: {subject.example}"
-    yield ""
-    yield from described([(written, text) for _, written, text in subject.rows()], width=terminal_width())
-    yield ""
-    yield subject.more
-
-
-def words_json(name: str) -> list[dict[str, str]]:
-    return [{"name": each, "written": written, "doc": text} for each, written, text in SUBJECTS[name].rows()]
+"""The pages of words, by subject."""

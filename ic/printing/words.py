@@ -9,10 +9,10 @@ from ic.language import ANYWHERE, BLOCKS, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
 from ic.meaning.mechanics import dh, shapes
 from ic.printing.glossary import meaning
-from ic.printing.language import default, in_block
+from ic.printing.language import in_block
 from ic.printing.models import KINDS
 from ic.printing.subjects import channels, in_si, unit_table
-from ic.printing.sweeps import SUBJECTS
+from ic.printing.sweeps import PAGES
 from ic.printing.wrapping import described, terminal_width
 from met import models
 
@@ -79,31 +79,36 @@ def print_word(word: str) -> Iterator[str]:
 
 
 def _rows(word: str) -> Iterator[Row]:
-    if word in SYNTAX:
-        yield SYNTAX[word]
+    yield from (row for name, row in _of_blocks() if name == word)
+    yield from _of_models(word)
+    yield from (row for name, row in _of_values() if name == word)
+
+
+def _of_blocks() -> Iterator[tuple[str, Row]]:
+    """The words of the grammar and of the entries of blocks, with their meanings."""
+    yield from SYNTAX.items()
     for block in (*BLOCKS.values(), TOP_LEVEL, ANYWHERE):
         for each in block.entries:
-            if each.name.split()[0] == word:
-                yield each.written, in_block(block), f"{each.doc}\ndefault: {default(each)}"
-            elif each.parameter is not None and word in each.parameter.words:
-                yield f"{each.name} = {word};", in_block(block), each.doc
-    yield from _of_models(word)
-    for subject, page in SUBJECTS.items():
-        for name, written, doc in page.rows():
-            if name == word:
-                yield written, f"a value: `met doc {subject}`", doc
+            yield each.name.split()[0], (each.written, in_block(block), f"{each.doc}\ndefault: {each.default}")
+            for word in each.parameter.words if each.parameter else ():
+                yield word, (f"{each.name} = {word};", in_block(block), each.doc)
+
+
+def _of_values() -> Iterator[tuple[str, Row]]:
+    """The words of values, shapes, units and channels, with their meanings."""
+    for subject, words_page in PAGES.items():
+        for record in words_page().records:
+            yield record["name"], (record["written"], f"a value: `met doc {subject}`", record["doc"])
     for name, shape in shapes.SHAPES.items():
-        if word == name or any(each.name == word for each in shape.parameters):
-            yield f"shape = {name}(...)", "a link or payload", "`met doc shapes` shows it"
+        for word in (name, *(each.name for each in shape.parameters)):
+            yield word, (f"shape = {name}(...)", "a link or payload", "`met doc shapes` shows it")
     for number in dh.NUMBERS:
-        if number.name == word:
-            yield f"dh = classic({word} = ...)", "a joint", number.doc
+        yield number.name, (f"dh = classic({number.name} = ...)", "a joint", number.doc)
     for unit in unit_table():
-        if unit["name"] == word:
-            yield word, "a quantity, behind its number", f"{unit['word']}, {in_si(unit)}"
+        yield unit["name"], (unit["name"], "a quantity, behind its number", f"{unit['word']}, {in_si(unit)}")
     for channel in channels():
-        if channel["path"].rpartition(".")[2] == word:
-            yield channel["path"], "a `record`, metric or signal", f"{channel['meaning']}, {channel['unit']}"
+        meaning = f"{channel['meaning']}, {channel['unit']}"
+        yield channel["path"].rpartition(".")[2], (channel["path"], "a `record`, metric or signal", meaning)
 
 
 def _of_models(word: str) -> Iterator[Row]:

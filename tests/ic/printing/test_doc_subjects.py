@@ -17,8 +17,8 @@ from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
 from ic.meaning.mechanics.shapes import SHAPES
 from ic.printing import codes, textmate
 from ic.printing.glossary import entries, meaning
-from ic.printing.models import KINDS, selected_models
-from ic.printing.subjects import SUBJECTS
+from ic.printing.models import KINDS
+from ic.printing.requests import SUBJECTS
 from ic.printing.textmate import PARTS, STATEMENTS
 from ic.printing.words import print_word
 from ic.sweeps.designs import DESIGNS, DISTRIBUTIONS
@@ -241,7 +241,7 @@ def test_met_doc_knows_every_word_of_the_language_and_of_the_glossary() -> None:
     others = (*STATEMENTS, *PARTS, *textmate.WORDS, *HEADS, *DIRECTIVES, *JOINT_KINDS, *FUNCTIONS, *CONSTANTS, *DESIGNS)
     words = {*grammar, *keys, *declared, *others, *DISTRIBUTIONS, *units.ALL_UNITS, *entries()} - {*SUBJECTS, *KINDS}
     unknown = [word for word in sorted(words) if not list(print_word(word)) and word not in SUBJECTS]
-    names = {model.name for _, model in selected_models(())}
+    names = {name for kind in KINDS for name in models.available(kind)}
     assert [word for word in unknown if word not in names] == []
 
 

@@ -8,8 +8,9 @@ import pytest
 
 from ic.language import BLOCKS
 from ic.printing.columns import columns
-from ic.printing.language import print_block
-from ic.printing.models import print_model, selected_models, sources
+from ic.printing.language import block_page
+from ic.printing.models import model_page, sources
+from ic.printing.page import in_terminal
 from ic.printing.wrapping import described, fitted, paragraphs
 from met import models
 
@@ -64,14 +65,10 @@ def test_a_line_keeps_its_indent_where_it_is_filled() -> None:
 
 @pytest.mark.parametrize("width", [90, 110])
 @pytest.mark.parametrize("kind", models.GROUPS)
-def test_pages_of_models_fit_a_terminal_and_lose_no_word(
-    kind: models.Kind, width: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_pages_of_models_fit_a_terminal_and_lose_no_word(kind: models.Kind, width: int) -> None:
     for model in models.find_own(kind).values():
-        whole = list(print_model(kind, model))
-        with monkeypatch.context() as terminal:
-            terminal.setattr("ic.printing.models.terminal_width", lambda: width)
-            shown = list(fitted(print_model(kind, model), width=width))
+        whole = list(in_terminal(model_page(kind, model), None))
+        shown = list(fitted(in_terminal(model_page(kind, model), width), width=width))
         formulas = {line for line in whole if line.startswith("      ")}
         assert [line for line in shown if len(line) > width and line not in formulas] == []
         lost = Counter(" ".join(whole).split()) - Counter(" ".join(shown).split())
@@ -80,16 +77,15 @@ def test_pages_of_models_fit_a_terminal_and_lose_no_word(
 
 
 @pytest.mark.parametrize("name", BLOCKS)
-def test_pages_of_blocks_fit_eighty_columns(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ic.printing.language.terminal_width", lambda: 80)
-    lines = list(fitted(print_block(BLOCKS[name]), width=80))
+def test_pages_of_blocks_fit_eighty_columns(name: str) -> None:
+    lines = list(fitted(in_terminal(block_page(BLOCKS[name]), 80), width=80))
     assert [line for line in lines if len(line) > 80 and not line.startswith("  ")] == []
     assert [line for line in lines if len(line) > 80 and line.startswith("      ") and "`" not in line] == []
 
 
 def test_a_source_is_said_once_for_all_its_parameters() -> None:
-    ((_, model),) = selected_models(("rigid_gearbox",))
+    model = models.find_own("servo")["rigid_gearbox"]
     (source,) = sources(model.parameters)
     assert source.endswith(": Hill, Hopping, Price 1989, table 1")
     assert source.startswith("Source of ratio, kp, ki, v_max, ") and source.count("f_c") == 1
-    assert sum("Hopping, Price" in line for line in print_model("servo", model)) == 1
+    assert sum("Hopping, Price" in line for line in in_terminal(model_page("servo", model), None)) == 1
