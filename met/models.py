@@ -11,9 +11,10 @@ offer the same name are an error, never a race.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 from typing import Any, Literal, Protocol
 
 from met.diagnostic import Place, Problem, did_you_mean, error
@@ -48,76 +49,32 @@ class Model(Protocol):
 
 @frozen
 class ModelGroup:
-    """One kind of model: the entry-point group, MET's own declarations, and the type they must have."""
+    """One kind of model: the group of entry points, and MET's module with its own models and the type of a declaration.
+
+    The module is imported when its models are asked for.
+    """
 
     entry_points: str
-    own: Callable[[], tuple[Iterable[Any], type]]
+    module: str
+    models: str
+    declaration: str
 
-
-def _servos() -> tuple[Iterable[Any], type]:
-    from met.servos import SERVOS, Servo
-
-    return SERVOS, Servo
-
-
-def _sensors() -> tuple[Iterable[Any], type]:
-    from met.sensors import SENSORS, Sensor
-
-    return SENSORS, Sensor
-
-
-def _environments() -> tuple[Iterable[Any], type]:
-    from met.environments import ENVIRONMENTS, Environment
-
-    return ENVIRONMENTS, Environment
-
-
-def _commands() -> tuple[Iterable[Any], type]:
-    from met.commands import PROFILES, Profile
-
-    return PROFILES, Profile
-
-
-def _guides() -> tuple[Iterable[Any], type]:
-    from met.guides import GUIDES, Guide
-
-    return GUIDES, Guide
-
-
-def _metrics() -> tuple[Iterable[Any], type]:
-    from met.metrics import METRICS, Metric
-
-    return METRICS, Metric
-
-
-def _integrators() -> tuple[Iterable[Any], type]:
-    from met.integrators import INTEGRATORS, Integrator
-
-    return INTEGRATORS, Integrator
-
-
-def _beds() -> tuple[Iterable[Any], type]:
-    from met.substitution import BEDS, BedModel
-
-    return BEDS, BedModel
-
-
-def _laws() -> tuple[Iterable[Any], type]:
-    from met.substitution import LAWS, Law
-
-    return LAWS, Law
+    def own(self) -> tuple[Iterable[Any], type]:
+        """MET's own declarations of this kind, and the type that all of them have."""
+        module = import_module(self.module)
+        return getattr(module, self.models), getattr(module, self.declaration)
 
 
 GROUPS: dict[Kind, ModelGroup] = {
-    "servo": ModelGroup("met.servos", _servos),
-    "sensor": ModelGroup("met.sensors", _sensors),
-    "environment": ModelGroup("met.environments", _environments),
-    "command": ModelGroup("met.profiles", _commands),
-    "guide": ModelGroup("met.guides", _guides),
-    "metric": ModelGroup("met.metrics", _metrics),
-    "integrator": ModelGroup("met.integrators", _integrators),
-    "bed": ModelGroup("met.beds", _beds),
-    "law": ModelGroup("met.laws", _laws),
+    "servo": ModelGroup("met.servos", "met.servos", "SERVOS", "Servo"),
+    "sensor": ModelGroup("met.sensors", "met.sensors", "SENSORS", "Sensor"),
+    "environment": ModelGroup("met.environments", "met.environments", "ENVIRONMENTS", "Environment"),
+    "command": ModelGroup("met.profiles", "met.commands", "PROFILES", "Profile"),
+    "guide": ModelGroup("met.guides", "met.guides", "GUIDES", "Guide"),
+    "metric": ModelGroup("met.metrics", "met.metrics", "METRICS", "Metric"),
+    "integrator": ModelGroup("met.integrators", "met.integrators", "INTEGRATORS", "Integrator"),
+    "bed": ModelGroup("met.beds", "met.substitution", "BEDS", "BedModel"),
+    "law": ModelGroup("met.laws", "met.substitution", "LAWS", "Law"),
 }
 
 
