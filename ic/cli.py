@@ -285,11 +285,10 @@ def explain(
 def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
     """Show the models, and everything that each of them declares.
 
-    KIND is servo, sensor, command, environment, guide, metric, integrator, bed or law; MODEL is the name of one model.
-    Other words are the blocks of a deck, as in `met doc run` or `met doc joint`; `channels`, the signals that can be
-    recorded; `dh`, Denavit-Hartenberg numbers; `shapes` of links; `units`; `functions`; `designs` and `distributions`
-    of samples; the code of a message, as in `met doc D060`; any word of a deck, such as `like`, `allow` or `kp`; and a
-    word of the glossary, such as `shard`. `met doc language --format json` prints all of it for programs.
+    KIND is a kind of model, such as `servo`; MODEL is the name of one model. Other words are the blocks of a deck, as
+    in `met doc run`; the signals that can be recorded, `met doc channels`; further subjects, which `met doc` lists;
+    the code of a message, as in `met doc D060`; any word of a deck, such as `like`, `allow` or `kp`; and a word of the
+    glossary, such as `shard`. `met doc language --format json` prints all of it for programs.
     """
     from ic.printing.page import in_json, in_terminal, separated
     from ic.printing.requests import requested_pages

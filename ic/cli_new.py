@@ -8,11 +8,12 @@ import sys
 
 import click
 
+from ic.beginnings.models import MODELS
 from met.cli import loudness_options
 from met.host.streams import kept
 from met.messages.visible import say
 
-KINDS = ["deck", "servo", "sensor", "environment", "command", "guide", "metric", "integrator"]
+KINDS = ["deck", *MODELS]
 
 
 @click.command()

@@ -590,8 +590,7 @@ def _opened_port(opening: Opening) -> CanBed:
 PORT = PortKind(
     scheme="can",
     address="BENCH.toml",
-    doc="Two drives on a CAN bus (ODrive, Damiao, moteus, CiA 402, RobStride) or serial lines (ODrive), as the file "
-    "says.",
+    doc=f"Two drives on a CAN bus or on serial lines, as the file says; their dialects: {', '.join(DIALECTS)}.",
     open=_opened_port,
     check=can_deck.check_deck,
     lock_step=lambda name, requested: requested,

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from ic.language.declaration import BlockDeclaration, Entry
+from met.integrators import DEFAULT_INTEGRATOR, INTEGRATORS
+from met.metrics import METRICS
+from met.models import Model
 from met.parameter import Parameter
 from met.plan import BALANCED, VELOCITY_PRODUCTS
 from met.substitution import bed_scale
@@ -28,6 +33,10 @@ SCALE_OF_INERTIA = Parameter(
 )
 BED, LAW = "emulated", "velocity_tracking"
 """The models of a bed and of its law where a deck names none."""
+
+
+def _names_of_models(models: Iterable[Model]) -> str:
+    return ", ".join(f"`{model.name}`" for model in models)
 
 
 def _rate(name: str, doc: str, default: str) -> Entry:
@@ -134,8 +143,8 @@ METRIC = BlockDeclaration(
             written="of = swing.q;",
             path="",
             doc="the signal: a channel (`met doc channels`) or an expression of channels, such as `abs(swing.q - "
-            "swing.servo.command)`; `*.q` is the channel of every joint; `always`, `eventually`, `never`, "
-            "`holds_for` and `share_of_time` take a condition",
+            "swing.servo.command)`; `*.q` is the channel of every joint; a condition for "
+            + _names_of_models(metric for metric in METRICS if metric.condition),
         ),
     ),
     free="parameters of the model, one of `met doc metrics`; a figure of a linear analysis is `of` a `linear` block "
@@ -210,9 +219,9 @@ RUN = BlockDeclaration(
               doc="gravity, other models that act from outside, and `velocity_products` (`met doc environment`)"),
         Entry(name="rates", written="rates { ... }", default="`dynamics` is needed",
               doc="rates of the computation: `dynamics`, `servos`, `record`, `base` (`met doc rates`)"),
-        Entry(name="integrator", written="integrator = NAME;", default="`modified_euler`", varies="choice",
+        Entry(name="integrator", written="integrator = NAME;", default=f"`{DEFAULT_INTEGRATOR.name}`", varies="choice",
               path="integrator",
-              doc="method of integration: `modified_euler`, `midpoint`, `semi_implicit_euler` or `rk4`"),
+              doc=f"method of integration: {_names_of_models(INTEGRATORS)} (`met doc integrators`)"),
         Entry(name="duration", written="duration = 3 s;", parameter=DURATION, varies="choice", path="duration",
               doc="length of the run, a whole number of steps of the dynamics"),
         Entry(name="record", written="record = [...];", default="needed; `[]` keeps metrics only",

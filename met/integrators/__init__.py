@@ -9,3 +9,6 @@ INTEGRATORS: tuple[Integrator, ...] = (
     semi_implicit_euler.INTEGRATOR,
     rk4.INTEGRATOR,
 )
+
+DEFAULT_INTEGRATOR = modified_euler.INTEGRATOR
+"""The integrator of a run that names none."""

@@ -51,14 +51,12 @@ def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
     name = word_of(item.value)
     if name is None or name not in SHAPES:
         helps = did_you_mean(name, SHAPES) if name else ()
+        shapes = (f"{known}({', '.join(p.name for p in shape.parameters)})" for known, shape in SHAPES.items())
         scope.complaints.error(
             "D088",
             f"no shape `{name}`" if name else "a shape is needed here",
             value_place(item),
-            help=[
-                *helps,
-                "shapes: rod(length, along), box(size, along), cylinder(radius, length, along), sphere(radius)",
-            ],
+            help=[*helps, f"shapes: {', '.join(shapes)}"],
         )
         scope.checks.fail(f"{owner.path}.shape")
         return None

@@ -40,9 +40,9 @@ from ic.meaning.runs.run_checks import RunParts, check_run
 from ic.meaning.runs.step_errors import resolve_step_errors
 from ic.meaning.runs.tolerances import resolve_tolerances
 from ic.text.complaints import known_words, where_it_belongs
-from met import models
 from met.diagnostic import Place, did_you_mean, write
 from met.frozen import frozen
+from met.integrators import DEFAULT_INTEGRATOR
 from met.plan import Experiment, Schedule, ServoUse, Structure
 from met.plan.judged import MetricUse, Requirement, StepErrorLimit, Tolerance
 from met.plan.linear_uses import LinearUse
@@ -108,7 +108,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     initial_base(scope, initial, base)
     schedule, ticks, others = resolve_schedule(scope, run, block, rates, uses, [*guides, *sensors], duration)
     dynamics = rates.get("dynamics") if integrator is not None else None
-    integrator = integrator or models.find_own("integrator")["modified_euler"]
+    integrator = integrator or DEFAULT_INTEGRATOR
     _keep_settings(scope, block, arm, integrator, rates, schedule)
     servos = tuple(
         ServoUse(
@@ -282,7 +282,7 @@ def _arm(scope: Scope, run: Owner, item: Item | None) -> ResolvedArm | None:
 
 def _integrator(scope: Scope, item: Item | None):  # type: ignore[no-untyped-def]  # any package's declaration
     if item is None:
-        return models.find_own("integrator")["modified_euler"]
+        return DEFAULT_INTEGRATOR
     return find_bare_model(scope, "integrator", item, "write `integrator = {};`: an integrator has no parameters")
 
 
