@@ -24,6 +24,8 @@ from pathlib import Path
 
 import ic
 from ic.find import standard_decks
+from ic.printing.models import KINDS
+from ic.printing.requests import SUBJECTS
 from met import cli
 from tests.ic.fuzz.sweeps import Writer
 
@@ -81,7 +83,10 @@ def write(folder: Path, sweeps: int, only: str) -> None:
         options = [word for each in writer.options for word in ("--vary", each)]
         carry_out(place, of_a_deck("deck.ic", list(writer.names), options))
     if only in "doc":
-        carry_out(folder / "doc", [("markdown", ["doc", "--markdown"]), ("doc", ["doc"]), ("help", ["--help"])])
+        subjects = [(name, ["doc", name]) for name in (*SUBJECTS, *KINDS)]
+        programs = ("language-json", ["doc", "language", "--format", "json"])
+        others = [("markdown", ["doc", "--markdown"]), ("doc", ["doc"]), ("help", ["--help"]), programs]
+        carry_out(folder / "doc", [*others, *subjects])
 
 
 def carry_out(place: Path, commands: Iterator[tuple[str, list[str]]] | list[tuple[str, list[str]]]) -> None:
