@@ -50,7 +50,7 @@ def of_a_deck(deck: str, names: list[str], options: list[str]) -> Iterator[tuple
         archive = f"{name}.h5"
         yield f"{name}-run", ["run", *about, "-o", archive, "--fresh", "--no-picture", "--threads", "1"]
         yield f"{name}-show", ["show", archive]
-        yield f"{name}-show-rows", ["show", archive, "--no-plots", "--all-cases", "--evidence"]
+        yield f"{name}-show-rows", ["show", archive, "--all-cases", "--evidence"]
         yield f"{name}-show-json", ["show", archive, "--format", "json"]
         yield f"{name}-report", ["report", archive, "-o", f"{name}.html", "--no-simulation"]
         yield f"{name}-metrics", ["export", archive, "-o", f"{name}.csv", "--metrics", "--units", "deck", "--force"]

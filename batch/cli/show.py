@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 )
 @click.option("--over", multiple=True, metavar="PATH", help="Of the cases that differ only in PATH, show the worst.")
 @click.option("--met", is_flag=True, help="Only those of the cases that meet all requirements.")
-@click.option("--no-plots", is_flag=True, help="Print numbers only, without plots.")
 @click.option("--evidence", is_flag=True, help="Only the table of requirements: share, bounds, worst case, margin.")
 @format_option
 def show(
@@ -49,7 +48,6 @@ def show(
     where: str | None,
     met: bool,
     over: tuple[str, ...],
-    no_plots: bool,
     evidence: bool,
     form: str,
 ) -> int:
@@ -58,13 +56,11 @@ def show(
     Of a sweep, also the cases that failed or missed a requirement, the worst first, or in the order of --sort.
     """
     import shutil
-    import sys
 
     from batch.archive.read import ArchiveFile
     from batch.queries.ordering import by_names
     from batch.queries.selection import CaseSelection
     from batch.terminal.show import as_json, show, show_evidence
-    from met.messages.render import wants_colour
 
     if reverse and not sort:
         raise click.UsageError("--reverse is of --sort, and nothing is sorted: `--sort NAME`")
@@ -81,7 +77,6 @@ def show(
             click.echo(as_json(file, experiments, case=case, all_cases=all_cases, by=by, some=some))
             return YES
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
-        colour = wants_colour(sys.stdout)
         if evidence:
             click.echo(show_evidence(file, experiments, width=width), nl=False)
             return YES
@@ -94,10 +89,8 @@ def show(
             by=by,
             some=some,
             width=width,
-            colour=colour,
-            plots=not no_plots,
         )
-        click.echo(text, nl=False, color=colour)  # made visible where it was made, but for our own colours
+        click.echo(text, nl=False)
     return YES
 
 

@@ -37,11 +37,10 @@ from batch.queries.summary import (
     SummedMetric,
     summary_of,
 )
-from batch.terminal import braille
 from batch.terminal.evidence import evidence_lines
 from batch.terminal.evidence_table import evidence_table_lines
 from batch.terminal.search import search_result
-from ic.printing.columns import count
+from ic.printing.columns import columns, count
 from ic.printing.columns import size as size_text
 from met.distinct import distinct
 from met.messages.visible import line
@@ -57,8 +56,8 @@ NARROWEST = 40
 
 EVERYTHING = CaseSelection()
 
-PLOTS = 4
-"""Number of signals that are drawn by default."""
+SIGNALS = 4
+"""Number of signals whose ranges are listed by default."""
 
 
 def show(
@@ -71,19 +70,16 @@ def show(
     by: CaseOrder | None = None,
     some: CaseSelection = EVERYTHING,
     width: int = 100,
-    colour: bool = False,
-    plots: bool = True,
 ) -> str:
     """The whole text: of all cases with their table, worst first or in the order `by`, or all about one `case`.
 
     By something, the cases of all structures of a sweep are in one table. some: the cases that the table is of; all
     else is of all of them.
 
-    A plot is of one case, the first recorded unless `case` names another; under the table of all cases there is none
-    unless `signals` are asked for.
+    The ranges of signals are of one case, the first recorded unless `case` names another; under the table of all cases
+    there are none unless `signals` are asked for.
     """
-    out = _Lines()
-    out += [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
+    out = [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
     out += [f"  {line(each)}" for each in given(archive)]
     shown = cases_named(archive, experiments, case)
     check_asked(archive, by, some)
@@ -107,11 +103,9 @@ def show(
                 shown = [each for each in shown if signals or each[0] not in pool.groups]
     for group, position in shown:
         out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, by, some, width), ""]
-        if plots and (signals or position is not None or not all_cases):
-            out.drawn(_plots(archive, group, signals, position, width, colour))
-        elif signals:
-            panels(group, signals)  # an unknown name is reported, drawn or not
-    return "\n".join(out.lines).rstrip() + "\n"
+        if signals or position is not None or group.count == 1:
+            out += signal_lines(archive, group, signals, position)
+    return "\n".join(map(line, out)).rstrip() + "\n"
 
 
 def check_asked(archive: ArchiveFile, by: CaseOrder | None, some: CaseSelection) -> None:
@@ -122,8 +116,7 @@ def check_asked(archive: ArchiveFile, by: CaseOrder | None, some: CaseSelection)
 
 def show_evidence(archive: ArchiveFile, experiments: Sequence[str] = (), *, width: int = 100) -> str:
     """The table of evidence of each run and sweep, or of these: the requirements with their evidence."""
-    out = _Lines()
-    out += [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
+    out = [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
     named = groups_named(archive, tuple(experiments))
     for name in dict.fromkeys(group.sweep or group.name for group in named):
         groups = [group for group in named if (group.sweep or group.name) == name]
@@ -132,27 +125,13 @@ def show_evidence(archive: ArchiveFile, experiments: Sequence[str] = (), *, widt
         of = "" if answer is None else f"its answer, {count(len(answer.found.cases), 'case')} of "
         title = f"{name}: {of}{count(cases, 'case')}"
         out += ["", title, *evidence_table_lines(_evidence(archive, groups), width)]
-    return "\n".join(out.lines).rstrip() + "\n"
+    return "\n".join(map(line, out)).rstrip() + "\n"
 
 
 def _evidence(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> list[RequirementEvidence]:
     """The rows of the table of evidence of these groups."""
     several = len({each.sweep or each.name for each in archive.groups}) > 1
     return requirement_evidence(groups, str(archive.path), several=several)
-
-
-class _Lines:
-    """Lines of text, made visible, and drawings, which are visible already and may have colours."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-
-    def __iadd__(self, lines: Sequence[str]) -> _Lines:
-        self.lines += map(line, lines)
-        return self
-
-    def drawn(self, lines: Sequence[str]) -> None:
-        self.lines += lines
 
 
 def _about(
@@ -392,28 +371,46 @@ def _metric_words(metric: MetricSummary, single: bool) -> str:
     return words
 
 
-def _plots(
-    archive: ArchiveFile, group: ArchiveGroup, signals: Sequence[str], case: int | None, width: int, colour: bool
-) -> list[str]:
+def signal_lines(archive: ArchiveFile, group: ArchiveGroup, signals: Sequence[str], case: int | None) -> list[str]:
+    """The ranges of signals in one case, a row for each joint or component, and the command that draws them.
+
+    Instants are the first at which a value is reached; a signal without finite values has none. Raises Problem E323,
+    E324.
+    """
     if not group.recorded:
         if signals:
             panels(group, signals)  # says that there are none
         return ["no histories kept"]
     position = int(group.recorded_positions[0]) if case is None else case
+    row = f"'#{group.values('case')[position]}'"
     if position not in group.recorded_positions:
-        remedy = f"`met run {quoted(group.path)} --case '#{group.values('case')[position]}'` runs it again"
-        return [line(f"its history was not kept: {remedy}")]
+        return [f"its history was not kept: `met run {quoted(group.path)} --case {row}` runs it again"]
     units = DeckUnits(archive, group)
-    wanted = [units.panel(each) for each in panels(group, signals)]
-    drawn = wanted if signals else wanted[:PLOTS]
-    out = [line(case_text(group, position))] if group.count > 1 and case is None else []
+    recorded = [units.panel(panel) for panel in panels(group, signals)]
+    listed = recorded if signals else recorded[:SIGNALS]
     time = group.values("time")
-    for panel in drawn:
-        values = history(group, panel, position)
-        about = f"  {panel.about}" if panel.about else ""
-        plot = braille.draw(time, list(values.T), panel.lines, title=f"{panel.axis}{about}", width=width, colour=colour)
-        out += [*plot, ""]
-    if len(drawn) < len(wanted):
-        rest = dict.fromkeys(panel.name for panel in wanted[len(drawn) :])
-        out.append(line(f"also recorded: {', '.join(rest)}"))
-    return out
+    rows: list[tuple[str, ...]] = [("", "", "first", "last", "smallest", "at", "largest", "at", "", "")]
+    for panel in listed:
+        unit = "" if panel.unit == "1" else pretty_unit(panel.unit)
+        for label, values in zip(panel.lines, history(group, panel, position).T, strict=True):
+            rows.append((panel.name, label, *_range_texts(time, values), unit, panel.about))
+    one_of_many = group.count > 1
+    out = [case_text(group, position)] if one_of_many and case is None else []
+    out += columns(rows, right=range(2, 8))
+    names = list(dict.fromkeys(panel.name for panel in recorded))
+    rest = [name for name in names if name not in {panel.name for panel in listed}]
+    if rest:
+        out.append(f"also recorded: {', '.join(rest)}")
+    of_run = f" --run {quoted(group.name)}" if len(archive.groups) > 1 else ""
+    of_case = f" --case {row}" if one_of_many else ""
+    return [*out, f"`met plot {quoted(group.path)} {' '.join(names)}{of_run}{of_case}` draws them"]
+
+
+def _range_texts(time: np.ndarray, values: np.ndarray) -> tuple[str, ...]:
+    """The first, last, smallest and largest finite value of a line, the latter two with their instants."""
+    finite = np.flatnonzero(np.isfinite(values))
+    if len(finite) == 0:
+        return ("-",) * 6
+    low, high = finite[np.argmin(values[finite])], finite[np.argmax(values[finite])]
+    first, last, smallest, largest = (number_text(values[row]) for row in (finite[0], finite[-1], low, high))
+    return first, last, smallest, f"{number_text(time[low])} s", largest, f"{number_text(time[high])} s"

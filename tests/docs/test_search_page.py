@@ -19,7 +19,7 @@ def test_the_command_that_confirms_the_gains_is_one(tmp_path: Path) -> None:
     command = re.search(r"^  met (run crane\.ic spread --set .* -o confirmed\.h5)$", PAGE.text, re.MULTILINE)
     assert command is not None
     printed(tmp_path, f"{command[1]} -q --no-picture")
-    assert "32 of 32 cases reached their end" in printed(tmp_path, "show confirmed.h5 --no-plots")
+    assert "32 of 32 cases reached their end" in printed(tmp_path, "show confirmed.h5")
 
 
 def test_the_tables_name_every_entry() -> None:

@@ -88,7 +88,7 @@ def test_show_finds_a_case_by_its_position_and_a_sweep_by_its_name(
     path = ran(tmp_path, compiled(tmp_path, TIMED, STRUCTURES))
 
     def shown(*words: str) -> str:
-        assert main(["show", str(path), "--no-plots", *words]) == 0
+        assert main(["show", str(path), *words]) == 0
         return capsys.readouterr().out
 
     assert "hinge.servo = brisk" in shown("--case", "#3")
@@ -130,11 +130,11 @@ def test_of_many_structures_the_table_alone_is_told_and_shown(
     told = capsys.readouterr().out
     assert "it: 12 of 12 cases reached their end, of 6 structures" in told
     assert "worst" not in told
-    assert main(["show", "deck.it.h5", "--no-plots"]) == 0
+    assert main(["show", "deck.it.h5"]) == 0
     told = capsys.readouterr().out
     assert "one structure in full: `met show deck.it.h5 --run it.1_s`; the cases of all: `--all-cases`" in told
     assert len(told.splitlines()) < 20
-    assert main(["show", "deck.it.h5", "--no-plots", "--run", "it.3_s"]) == 0
+    assert main(["show", "deck.it.h5", "--run", "it.3_s"]) == 0
     assert "duration = 3 s" in capsys.readouterr().out
 
 

@@ -170,7 +170,7 @@ class TestTenThousandCases:
         self.lists_all(said)
 
     def test_met_show_lists_them(self, ran: tuple[Path, int, str]) -> None:
-        status, said = told(["show", str(ran[0]), "--no-plots"])
+        status, said = told(["show", str(ran[0])])
         assert status == 0
         assert "\n9,895 of 10,000 cases reached their end, 105 failed\n" in said
         self.lists_all(said)

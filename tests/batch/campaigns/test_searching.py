@@ -377,7 +377,7 @@ def test_its_cases_are_run_again_to_the_same_bits(here: Path, place: Path, capsy
 def test_every_reader_of_archives_reads_it(here: Path, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     archive = str(place / "undisturbed.h5")
     for words in (
-        "show {} --no-plots", "show {} --where 'far < 0 m' --no-plots", "show {} --evidence --run still",
+        "show {}", "show {} --where 'far < 0 m'", "show {} --evidence --run still",
         "best {} --run still", "report {} -o r.html", "plot {} --run back -o p.png",
         "export {} --run back --to csv -o e.csv", "show {} --format json", "status {}",
     ):  # fmt: skip
@@ -411,7 +411,7 @@ def test_it_is_said_beforehand_and_afterwards(here: Path, capsys: pytest.Capture
     assert " in the worst of 5 cases of loads; " in said
     assert f"run it: met run d.ic loads --set 'environment.held.stiffness={answer.exact}' -o chosen.h5\n" in said
     assert "demonstrated" not in said
-    assert main(["show", "d.still.h5", "--no-plots"]) == 0
+    assert main(["show", "d.still.h5"]) == 0
     assert f"\nuse environment.held.stiffness = {answer.exact}" in capsys.readouterr().out
     assert main(["run", "d.ic", "still", "--format", "json"]) == 0
     told = json.loads(capsys.readouterr().out)["experiments"][0]["answer"]

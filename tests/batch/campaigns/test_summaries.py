@@ -250,7 +250,7 @@ def test_a_case_without_a_row_is_told_with_the_command_that_runs_it(here: Path) 
 @pytest.mark.slow
 def test_met_show_says_that_it_is_a_summary(here: Path) -> None:
     archives("wild")
-    said = met("show", "wild.summary.h5", "--no-plots").text
+    said = met("show", "wild.summary.h5").text
     assert "wild  120 cases, 4 s" in said
     assert "a summary of them, and the rows of " in said
     assert "min" in said and "mean" in said and "sigma" in said and "median" not in said
@@ -390,5 +390,5 @@ def test_numbers_that_are_forged_are_only_shown(here: Path, tmp_path: Path) -> N
     with changed(Path("many.summary.h5"), tmp_path) as (copy, file):
         file[f"{NAME}/judged_mean"][:] = 1e300
         file[f"{NAME}/judged_bound"][:] = -math.inf
-    for words in (("--no-plots",), ("--evidence",), ("--format", "json")):
+    for words in ((), ("--evidence",), ("--format", "json")):
         assert met("show", str(copy), *words).status == 0

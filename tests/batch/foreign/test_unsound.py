@@ -104,7 +104,7 @@ def test_a_name_longer_than_the_terminal_is_wide_is_shown(
     long = "masses." + "very_" * 30 + "long"
     with changed(archive, tmp_path) as (copy, file):
         file[SWEEP].attrs["experiment"] = long
-    answer = met("show", str(copy), "--run", long, "--no-plots")
+    answer = met("show", str(copy), "--run", long)
     assert answer.status == 0
     about = "3 cases, 0.2 s, rk4 at 100 Hz, recorded at 20 Hz, arm door, velocity products on"
     assert f"\n{long}\n    {about}\n" in answer.text
@@ -165,4 +165,4 @@ def test_bits_turned_over_are_read_or_told(single: Path, tmp_path: Path) -> None
         for at in chance.integers(8, len(data), 4).tolist():
             data[at] ^= 1 << int(chance.integers(8))
         copy.write_bytes(data)
-        assert met("show", str(copy), "--no-plots").status in (0, 1, 2)
+        assert met("show", str(copy)).status in (0, 1, 2)

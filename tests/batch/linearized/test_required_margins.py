@@ -101,7 +101,7 @@ def test_every_case_has_what_it_has_alone(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_show_counts_them_and_diff_finds_none_of_its_own(folder: Path) -> None:
-    said = met(folder, "show", "a.h5", "--no-plots", status=None)
+    said = met(folder, "show", "a.h5", status=None)
     assert "require firm: phase_margin(loop) > 60 deg  met by" in said and "phase_margin of loop" in said
     assert batch.diff(folder / "a.h5", folder / "a.h5").verdict == "identical"
 

@@ -144,4 +144,4 @@ def test_a_line_that_lies_on_another_has_gaps(ran: dict[str, ArchiveFile], figur
 
 def test_a_terminal_shows_the_same_units(ran: dict[str, ArchiveFile]) -> None:
     text = show(ran["slew"], ["q", "qd"])
-    assert "q  (deg)  joint position" in text and "qd  (deg/s)  joint rate" in text
+    assert " deg    joint position\n" in text and " deg/s  joint rate\n" in text

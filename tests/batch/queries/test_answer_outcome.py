@@ -178,7 +178,7 @@ def test_a_report_opens_with_the_answer_and_has_no_share(
 
 @pytest.mark.slow
 def test_the_terminal_says_the_requirements_of_the_answer(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["show", str(archive), "--run", "still", "--no-plots"]) == 0
+    assert main(["show", str(archive), "--run", "still"]) == 0
     said = capsys.readouterr().out
     assert "\n  The answer meets all requirements in all 5 cases of loads.\n" in said
     assert "  require far > -0.05 m  met in all 5 cases of loads; worst " in said

@@ -150,7 +150,7 @@ def test_cases_that_are_at_a_limit_for_most_of_the_time_are_counted(tmp_path: Pa
     (tmp_path / "d.ic").write_text(asked, encoding="utf-8")
     path = batch.run(ic.compile(tmp_path / "d.ic", select=["motors"]), output=tmp_path / "a.h5", verify="none").path
     with ArchiveFile(path) as file:
-        [said] = [line for line in show(file, plots=False).splitlines() if "share of the time at hinge" in line]
+        [said] = [line for line in show(file).splitlines() if "share of the time at hinge" in line]
     assert said.endswith(" % at most, in #0; not 0 in 2 of 3 cases, more than half in 2")
 
 
@@ -158,7 +158,7 @@ def test_cases_that_are_at_a_limit_for_most_of_the_time_are_counted(tmp_path: Pa
 def test_show_and_its_json_list_the_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, _ = made(tmp_path, "motors")
     with ArchiveFile(path) as file:
-        lines = show(file, plots=False).splitlines()
+        lines = show(file).splitlines()
     [said] = [line for line in lines if "share of the time at hinge" in line]  # to v_max no case came
     assert said.startswith("  share of the time at hinge.servo.tau_max: 25") and said.endswith(
         " % at most, in #0; not 0 in 2 of 3 cases"

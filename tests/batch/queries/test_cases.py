@@ -110,7 +110,7 @@ def test_by_a_metric_or_what_is_varied_and_without_a_value_last(
         [variable] = [v for v in (*group.role("metric"), *group.role("coordinate")) if v.path == name]
         values = group.values(variable.name)
         said = json.loads(as_json(file, by=CaseOrder(name, largest), all_cases=True))["experiments"][0]["case_table"]
-        lines = show(file, plots=False, by=CaseOrder(name, largest)).splitlines()
+        lines = show(file, by=CaseOrder(name, largest)).splitlines()
     assert sorted(order) == list(range(20)) == sorted(each["row"] for each in said)
     assert [each["row"] for each in said] == order
     known = [row for row in order if not np.isnan(values[row])]
@@ -132,7 +132,7 @@ def test_by_several_each_its_own_way_round(here: Path, monkeypatch: pytest.Monke
         assert by is not None
         order = ordering.positions(group, by).tolist()
         mass, volts = group.values("links.lower.mass"), group.values("volts")
-        text = show(file, plots=False, by=by, all_cases=True)
+        text = show(file, by=by, all_cases=True)
     assert len(set(mass.tolist())) < 20, "no two are equal in the first"
     rank = np.where(np.isnan(volts), np.inf, volts)
     assert order == sorted(range(20), key=lambda row: (-mass[row], rank[row], row))
@@ -217,7 +217,7 @@ def test_the_table_is_in_the_decks_units_and_marks_what_is_missed(here: Path) ->
     settle = Requirement("settle < 8600 ms", "settle", "<", 8.6)
     ids = keys.case_ids(required(plans.gains(4), settle))
     with made(required(plans.gains(4), settle)) as file:
-        lines = show(file, plots=False).splitlines()
+        lines = show(file).splitlines()
     assert lines[lines.index("cases, worst first:") :] == [
         "cases, worst first:",
         "      id        gearbox.kp  links.lower.mass  settle    volts",
@@ -251,7 +251,7 @@ def test_a_pure_number_has_no_unit_and_may_be_in_per_cent(here: Path) -> None:
     for limit, shown in (("settle < 1000 %", "500 %"), ("settle < 10", "5")):
         requirement = Requirement(limit, "settle", "<", 10.0)
         with made(replace(experiment, structure=structure, requirements=(requirement,))) as file:
-            lines = show(file, plots=False).splitlines()
+            lines = show(file).splitlines()
             assert summary_of(file.groups[0]).metrics[0].median == 5.0
         value, _, unit = shown.partition(" ")
         said = f"settle {value} ± 0 {unit}".rstrip()
@@ -261,7 +261,7 @@ def test_a_pure_number_has_no_unit_and_may_be_in_per_cent(here: Path) -> None:
 @pytest.mark.slow
 def test_the_worst_twenty_are_shown_and_all_on_demand(here: Path) -> None:
     with made(plans.gains(30)) as file:
-        some, whole = (show(file, plots=False, all_cases=every).splitlines() for every in (False, True))
+        some, whole = (show(file, all_cases=every).splitlines() for every in (False, True))
         assert some[-1] == "  ... 10 more; --all-cases prints them"
         assert sum("missed" in line.split() for line in some) == 20
         assert len(whole) == len(some) + 9
@@ -290,7 +290,7 @@ def test_json_says_of_each_case_what_it_met(here: Path, monkeypatch: pytest.Monk
 @pytest.mark.slow
 def test_one_case_has_its_own_metrics_and_parameters(here: Path) -> None:
     with made(plans.gains(4)) as file:
-        text = show(file, case="#1", plots=False)
+        text = show(file, case="#1")
         [said] = json.loads(as_json(file, case="#1"))["experiments"]
         count = len(file.plan().experiments[0].parameters)
     assert text[text.index("case #1") :].splitlines() == [
@@ -320,7 +320,7 @@ def test_one_case_has_its_own_metrics_and_parameters(here: Path) -> None:
 def test_a_case_is_shown_of_the_experiments_that_have_it(here: Path) -> None:
     batch.run(plans.plan(plans.nominal(), plans.gains(4)), output="a.h5")
     with ArchiveFile("a.h5") as file:
-        text = show(file, case="#3", plots=False)
+        text = show(file, case="#3")
         assert "gains  4 cases" in text and "nominal  1 case" not in text
         with pytest.raises(Problem) as caught:
             show(file, case="#4")
@@ -355,7 +355,7 @@ def test_an_archive_that_does_not_say_its_limits_has_a_table_all_the_same(here: 
     with h5py.File("a.h5", "r+") as file:
         del file["requirement"].attrs["limit"]
     with ArchiveFile("a.h5") as file:
-        text = show(file, plots=False)
+        text = show(file)
     assert text.count("  missed\n") == 4
 
 

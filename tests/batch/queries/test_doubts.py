@@ -49,7 +49,7 @@ def test_the_archive_has_the_words_where_a_case_is_done_and_doubtful(archive: Pa
 
 
 def test_runs_and_show_say_it_once_for_all_such_cases(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["show", str(archive), "--no-plots"]) == 0
+    assert main(["show", str(archive)]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     said = "2 cases warning: t = 0.8 s: joint slide: it moves faster than 1e+06 m/s, which hardly anything could make"
     assert shown.count(said) == 1 and shown.count("(#1) #1, #3") == 1
@@ -60,9 +60,9 @@ def test_runs_and_show_say_it_once_for_all_such_cases(archive: Path, capsys: pyt
 
 
 def test_of_a_case_alone_it_is_said_where_it_is_so(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["show", str(archive), "--case", "#3", "--no-plots"]) == 0
+    assert main(["show", str(archive), "--case", "#3"]) == 0
     assert "warning: t = 0.8 s: joint slide: it moves faster than" in capsys.readouterr().out
-    assert main(["show", str(archive), "--case", "#2", "--no-plots"]) == 0
+    assert main(["show", str(archive), "--case", "#2"]) == 0
     assert "warning" not in capsys.readouterr().out
 
 

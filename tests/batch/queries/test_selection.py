@@ -84,7 +84,7 @@ def test_those_that_meet_all(pool: Pool) -> None:
 @pytest.mark.slow
 def test_the_table_has_these_cases_alone(sweep: ArchiveFile) -> None:
     some = CaseSelection(where="settle < 3 s")
-    lines = show(sweep, some=some, plots=False).splitlines()
+    lines = show(sweep, some=some).splitlines()
     [said] = [line for line in lines if "where" in line]
     rows = [line for line in lines if line.strip().startswith("#")]
     assert said == f"{len(rows)} of 20 cases: where settle < 3 s" and 0 < len(rows) < 20
@@ -95,7 +95,7 @@ def test_the_table_has_these_cases_alone(sweep: ArchiveFile) -> None:
 
 @pytest.mark.slow
 def test_where_there_is_none_it_is_said(sweep: ArchiveFile) -> None:
-    lines = show(sweep, some=CaseSelection(where="settle < 0 s"), plots=False).splitlines()
+    lines = show(sweep, some=CaseSelection(where="settle < 0 s")).splitlines()
     assert "0 of 20 cases: where settle < 0 s" in lines and not any("#" in line for line in lines)
 
 

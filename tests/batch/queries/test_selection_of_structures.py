@@ -20,7 +20,7 @@ def test_structures_of_a_sweep_are_chosen_among_together(tmp_path: Path, capsys:
     out = str(tmp_path / "a.h5")
     assert main(["run", str(tmp_path / "deck.ic"), "both", "-o", out, "-q", "--no-picture"]) == 0
     capsys.readouterr()
-    assert main(["show", out, "--where", "integrator == rk4", "--all-cases", "--no-plots"]) == 0
+    assert main(["show", out, "--where", "integrator == rk4", "--all-cases"]) == 0
     said = capsys.readouterr().out
     assert "2 of 2 cases: where integrator == rk4" in said and "0 of 2 cases: where integrator == rk4" in said
-    assert main(["show", out, "--over", "integrator", "--all-cases", "--no-plots"]) == 0
+    assert main(["show", out, "--over", "integrator", "--all-cases"]) == 0

@@ -87,7 +87,7 @@ def test_the_outcome_is_that_of_rows_that_are_held(archive: Path, monkeypatch: p
 
 def test_met_show_lists_those_that_stand_out(archive: Path, many: None) -> None:
     with ArchiveFile(archive) as file:
-        said = show(file, plots=False)
+        said = show(file)
         assert "median" not in said and "sigma" in said
         assert "of 360 cases those that stand out:" in said
         assert "gearbox.kt = values from " in said
@@ -111,14 +111,14 @@ def test_no_column_of_them_is_read_whole(archive: Path, many: None, monkeypatch:
     monkeypatch.setattr(ArchiveGroup, "values", some)
     monkeypatch.setattr(ArchiveGroup, "stretch", short)
     with ArchiveFile(archive) as file:
-        assert "of 360 cases those that stand out:" in show(file, plots=False)
+        assert "of 360 cases those that stand out:" in show(file)
         assert "percentile(volts, 95 %)" in show_evidence(file)
         assert summarise(file)[0].failed == 180
 
 
 def test_all_cases_are_listed_where_they_are_asked_for(archive: Path, many: None) -> None:
     with ArchiveFile(archive) as file:
-        said = show(file, plots=False, all_cases=True)
+        said = show(file, all_cases=True)
     assert "cases, worst first" in said and "stand out" not in said
     assert sum(line.lstrip().startswith("#") for line in said.splitlines()) >= 360
 
@@ -128,4 +128,4 @@ def test_too_many_design_points_are_held(archive: Path, many: None, monkeypatch:
     monkeypatch.setattr(streamed, "MOST_POINTS", 3)
     with ArchiveFile(archive) as file:
         assert streamed.summed_up(file.groups[0]) is None
-        assert "180 of 360 cases reached their end" in show(file, plots=False)
+        assert "180 of 360 cases reached their end" in show(file)

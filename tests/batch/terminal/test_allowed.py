@@ -30,7 +30,7 @@ def test_they_are_archived_and_shown(archive: Path) -> None:
         assert file.groups[0].attributes["allowed"] == (
             "D105, because the paper's own rates\nD102, because no end is needed"
         )
-        lines = show(file, width=100, plots=False).splitlines()
+        lines = show(file, width=100).splitlines()
     assert "  allowed: D105, because the paper's own rates" in lines
     assert "  allowed: D102, because no end is needed" in lines
 

@@ -1,4 +1,4 @@
-"""`met show`: what it prints, and that its plots show what is there."""
+"""`met show`: what it prints of an archive."""
 
 import json
 import math
@@ -15,26 +15,19 @@ import batch
 from batch.archive.read import ArchiveFile
 from batch.queries.given import given
 from batch.queries.signals import number_text, number_texts, panels, pretty_unit
-from batch.terminal import braille
-from batch.terminal.show import as_json, show
+from batch.terminal.show import _range_texts, as_json, show
 from met.diagnostic import Problem
 from tests.batch import plans
 
 pytestmark = pytest.mark.usefixtures("engine")
 
 
-QD_PLOT = (
-    "   0.03 ┤          ⢀⣠⠤⠴⠒⠒⠒⢚⣉⣉⣉⣉⣙⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒⠒ shoulder\n"
-    "        │       ⢀⡤⣞⡭⠴⠒⠚⠉⠉⠉⠉    ⠈⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉⠉ elbow\n"
-    "   0.02 ┤     ⢀⣴⡿⠚⠁\n"
-    "        │    ⣰⡿⠋\n"
-    "        │  ⢀⣾⠋\n"
-    "   0.01 ┤ ⢀⡾⠁\n"
-    "        │⢠⡟\n"
-    "      0 ┤⡞\n"
-    "        └┬──────────────────────────┬─────────────────────────┬\n"
-    "         0                          1                         2 s\n"
-)
+QD_RANGES = """\
+                first     last  smallest   at  largest      at
+  qd  shoulder      0  0.02999         0  0 s  0.03094  0.72 s  rad/s  joint rate
+  qd  elbow         0  0.02699         0  0 s  0.02784  0.72 s  rad/s  joint rate
+`met plot a.h5 qd --case '#19'` draws them
+"""
 
 
 @pytest.fixture
@@ -46,7 +39,7 @@ def sweep(here: Path) -> Iterator[ArchiveFile]:
 
 @pytest.mark.slow
 def test_the_numbers_of_a_sweep(sweep: ArchiveFile) -> None:
-    lines = show(sweep, width=100, plots=False).splitlines()
+    lines = show(sweep, width=100).splitlines()
     assert lines[0].startswith("a.h5  (") and lines[0].endswith("), from two_link.ic")
     assert lines[1 : lines.index("cases, worst first:") - 1] == [
         "",
@@ -67,16 +60,15 @@ def test_the_numbers_of_a_sweep(sweep: ArchiveFile) -> None:
     ]
 
 
-def test_a_plot_in_the_terminal(sweep: ArchiveFile) -> None:
-    text = show(sweep, ["qd"], case="#19", width=72)
-    assert text[text.index("qd  (rad/s)") :] == "qd  (rad/s)  joint rate\n" + QD_PLOT
+def test_the_ranges_of_signals_of_one_case(sweep: ArchiveFile) -> None:
+    text = show(sweep, ["qd"], case="#19")
+    assert text.endswith(f"\n\n{QD_RANGES}")
 
 
 @pytest.mark.slow
-def test_a_plot_fits_the_width(sweep: ArchiveFile) -> None:
-    for width in (60, 80, 100):
-        lines = show(sweep, ["q", "tau"], width=width).splitlines()
-        assert max(len(line) for line in lines if line[:1] >= "⠀" or "│" in line or "┤" in line) <= width
+def test_a_case_has_the_ranges_of_its_first_signals_and_the_names_of_the_others(sweep: ArchiveFile) -> None:
+    lines = show(sweep, case="#3").splitlines()
+    assert lines[-1] == "`met plot a.h5 q qd tau shoulder.servo.voltage --case '#3'` draws them"
 
 
 @pytest.mark.slow
@@ -86,7 +78,7 @@ def test_failed_cases_are_named_with_their_cause(here: Path, monkeypatch: pytest
     monkeypatch.setattr(run, "run", partial(plans.answer, fails=frozenset({1, 2, 5, 6, 7, 8, 9})))
     batch.run(plans.plan(plans.gains(10)), output="a.h5")
     with ArchiveFile("a.h5") as file:
-        lines = show(file, width=100, plots=False).splitlines()
+        lines = show(file, width=100).splitlines()
     at = lines.index("3 of 10 cases reached their end, 7 failed")
     cause = "t = 0.2 s: joint elbow: D is not above 0 kg m^2, so qdd is undefined."
     assert lines[at + 1 : at + 3] == [f"  7 cases  {cause} (#1)", "    #1-#2, #5-#9"]
@@ -135,14 +127,14 @@ def test_a_position_that_no_table_has(sweep: ArchiveFile, case: str) -> None:
 def test_an_archive_without_histories_says_how_to_get_them(here: Path) -> None:
     batch.run(plans.plan(plans.gains(3)), output="a.h5", histories="none")
     with ArchiveFile("a.h5") as file:
-        assert show(file).endswith("no histories kept\n")
+        assert show(file, case="#0").endswith("no histories kept\n")
         with pytest.raises(Problem) as caught:
             show(file, ["q"])
     assert caught.value.diagnostics[0].message == "no histories of `gains` are in the archive"
 
 
 @pytest.mark.slow
-def test_joints_of_unlike_unit_are_drawn_apart(here: Path) -> None:
+def test_joints_of_unlike_unit_are_signals_apart(here: Path) -> None:
     from dataclasses import replace
 
     experiment = plans.nominal()
@@ -156,48 +148,16 @@ def test_joints_of_unlike_unit_are_drawn_apart(here: Path) -> None:
         ]
 
 
-class TestBraille:
-    def draw(self, values: list[float], **options: object) -> list[str]:
-        time = np.arange(len(values), dtype=float)
-        given = {"title": "y", "width": 30, "height": 4, **options}
-        return braille.draw(time, [np.array(values)], [""], **given)  # type: ignore[arg-type]
-
-    def test_a_rising_line_rises(self) -> None:
-        rows = [line.split("│")[-1].split("┤")[-1] for line in self.draw([0.0, 1.0])[1:5]]
-        lefts = [len(row) - len(row.lstrip()) for row in rows]
-        assert lefts == sorted(lefts, reverse=True) and lefts[0] > lefts[-1]
-
-    def test_a_spike_between_columns_is_seen(self) -> None:
-        values = [0.0] * 10_000
-        values[4321] = 1.0
-        assert self.draw(values)[1].strip(" │┤1.0") != ""
-
-    def test_a_line_that_breaks_off_ends(self) -> None:
-        rows = self.draw([0.0, 1.0, 2.0, math.nan, math.nan, math.nan, math.nan, math.nan])
-        assert max(len(row) for row in rows[1:5]) < 20
-
-    def test_a_constant_is_a_line_in_the_middle(self) -> None:
-        rows = self.draw([2.0] * 9)
-        drawn = [row for row in rows[1:5] if any("⠁" <= character <= "⣿" for character in row)]
-        assert len(drawn) == 1
-
-    def test_nothing_finite_is_said(self) -> None:
-        assert self.draw([math.nan, math.inf]) == ["y", "  (no finite values)"]
-
-    @pytest.mark.parametrize("size", [1e-300, 1e-9, 1.0, 1e9, 1e300])
-    def test_any_size_of_number_is_drawn(self, size: float) -> None:
-        for low in (0.0, -size, size * (1 - 1e-9)):
-            assert len(self.draw([low, size, low])) == 7
-
-    def test_labels_do_not_cover_one_another(self) -> None:
-        time = np.arange(5.0)
-        names = ["one", "two", "three"]
-        rows = braille.draw(time, [np.ones(5)] * 3, names, title="y", width=40, height=4)
-        assert [sum(row.endswith(name) for row in rows) for name in names] == [1, 1, 1]
-
-    def test_colour_is_undone_at_the_end_of_a_line(self) -> None:
-        for row in self.draw([0.0, 1.0, 0.0], colour=True)[1:5]:
-            assert row.count("\x1b[38") == row.count("\x1b[0m")
+@pytest.mark.parametrize(
+    ("values", "texts"),
+    [
+        ([2.0, 5.0, -1.0, 5.0], ("2", "5", "-1", "0.2 s", "5", "0.1 s")),
+        ([math.nan, 1.0, 2.0, math.nan], ("1", "2", "1", "0.1 s", "2", "0.2 s")),
+        ([math.nan, math.inf, -math.inf, math.nan], ("-",) * 6),
+    ],
+)
+def test_a_range_is_of_the_finite_values(values: list[float], texts: tuple[str, ...]) -> None:
+    assert _range_texts(0.1 * np.arange(4), np.array(values)) == texts
 
 
 @pytest.mark.parametrize(
@@ -229,14 +189,6 @@ def test_numbers_that_differ_are_written_so_that_they_do() -> None:
 @pytest.mark.parametrize(("unit", "text"), [("kg*m^2", "kg·m²"), ("1/s^10", "1/s¹⁰"), ("m*s^-2", "m·s⁻²"), ("1", "1")])
 def test_units_are_typeset(unit: str, text: str) -> None:
     assert pretty_unit(unit) == text
-
-
-@pytest.mark.slow
-def test_an_unknown_signal_is_told_without_plots_too(sweep: ArchiveFile) -> None:
-    for plots in (True, False):
-        with pytest.raises(Problem) as caught:
-            show(sweep, ["nothing"], plots=plots)
-        assert caught.value.diagnostics[0].code == "E324"
 
 
 @pytest.mark.parametrize(

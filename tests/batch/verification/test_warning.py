@@ -74,7 +74,7 @@ def test_one_that_the_run_allows_is_not_given(tmp_path: Path) -> None:
     assert warned(path, plan) == warned(path) == []
     with ArchiveFile(path) as file:
         assert file.groups[0].allows("D310") and not file.groups[0].allows("D311")
-        assert "D310, because the limit is soft" in show(file, plots=False)
+        assert "D310, because the limit is soft" in show(file)
 
 
 @pytest.mark.release
@@ -214,7 +214,7 @@ def test_people_and_programs_are_told(
     assert run_and_tell("d.ic", ("brief",), verify="some", no_picture=True, quiet=True)
     assert "D310" not in capsys.readouterr().err
     with ArchiveFile(tmp_path / "d.brief.h5") as file:
-        lines = show(file, plots=False)
+        lines = show(file)
         [summary] = summarise(file)
         assert warnings(file.groups[0]) == list(summary.warnings)
     assert "  warning[D310]: the step decides whether `turn < 0.0721 rad` is met" in lines
