@@ -293,7 +293,8 @@ def test_one_case_has_its_own_metrics_and_parameters(here: Path) -> None:
         text = show(file, case="#1")
         [said] = json.loads(as_json(file, case="#1"))["experiments"]
         count = len(file.plan().experiments[0].parameters)
-    assert text[text.index("case #1") :].splitlines() == [
+    about = text[text.index("case #1") : text.index("\n\n" + 20 * " ")]  # up to the ranges of its signals
+    assert about.splitlines() == [
         f"case #1 {keys.case_ids(plans.gains(4))[1][:8]}",
         "the case reached its end",
         "  settle      5 s  settling_time of shoulder.qd",
