@@ -188,7 +188,7 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
             scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`", continuous=True
         )
     scope.keep_setting(f"{item.name}.servo.model", servo.name, item=model)
-    scope.not_sweepable[f"{item.name}.servo.model"] = not_sweepable.chosen(f"vary `{item.name}.servo` over definitions")
+    scope.not_sweepable[f"{item.name}.servo.model"] = not_sweepable.chosen(f"{item.name}.servo", "definitions")
     words = words_chosen([each for each in servo.parameters if each.name in servo.deciding], block)
     bare = ServoUse(item.name, name, servo.name, command, 1, words=words)
     sensors = tuple(use for each in sensed if (use := use_sensor(scope, owner, bare, each)) is not None)

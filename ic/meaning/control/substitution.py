@@ -223,7 +223,7 @@ def _substitution(
             joint=kind,  # type: ignore[arg-type]
             call=True,
         )
-        scope.not_sweepable[f"{owner.path}.model"] = not_sweepable.chosen(f"vary `{owner.path}` over models")
+        scope.not_sweepable[f"{owner.path}.model"] = not_sweepable.chosen(owner.path, "models")
         body = (part.body if part is not None else None) or MergedBlock()
         if each == "bed":
             _use_bed(scope, owner, model, body, use, scale)

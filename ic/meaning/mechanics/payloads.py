@@ -90,6 +90,7 @@ def _payload(scope: Scope, item: Item, arm: ResolvedArm, taken: Collection[str])
             scope.not_sweepable[owner.join(wanted.name)] = NotSweepable(
                 "is not written, and so decides the program",
                 f"write `{wanted.name} = ...;` in the payload, and it varies",
+                setting=f"write `{wanted.name} = ...;` in the payload, and it can be set",
             )
     payload = Payload(item.name, link or BASE, grappled, released, item.place, shape)
     if grappled and released:

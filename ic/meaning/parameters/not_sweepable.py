@@ -8,6 +8,8 @@ from met.frozen import frozen
 
 A_RUN_FOR_EACH = "write a run for each, `like` the first, and `sweep NAME = ONE + OTHER;`"
 
+BY_MACRO = "write a name in its place in the deck, and give its value by `-D NAME=VALUE`"
+
 
 @frozen
 class NotSweepable:
@@ -16,11 +18,13 @@ class NotSweepable:
     reason  what it is, to go on after "it"
     sweep   what a sweep writes instead; "" where it varies over choices, by its own path
     one_of  the numbers that it is made of, any of which varies and can be set, in words; "" of what has none
+    setting what to do where it is to be set from the command line and has no such numbers
     """
 
     reason: str
     sweep: str = ""
     one_of: str = ""
+    setting: str = BY_MACRO
 
     @property
     def is_choice(self) -> bool:
@@ -37,7 +41,7 @@ class NotSweepable:
         """The help for setting it from the command line."""
         if self.one_of:
             return f"it {self.reason}; set {self.one_of}"
-        return f"it {self.reason}: write it in the deck, with a `let` that can be set"
+        return f"it {self.reason}: {self.setting}"
 
 
 DECIDES = "decides the program"
@@ -48,7 +52,7 @@ COMPILED = NotSweepable(DECIDES)
 COMPILED_ALONE = NotSweepable(DECIDES, A_RUN_FOR_EACH)
 """A compile-time constant that no sweep can choose."""
 
-LIST = NotSweepable("is a list", A_RUN_FOR_EACH)
+LIST = NotSweepable("is a list", A_RUN_FOR_EACH, setting="write it in the deck as a `let`, which can be set")
 WORD = NotSweepable("is a word", "vary it over words")
 FILE = NotSweepable("is read from a file", "it is one for the whole sweep")
 
@@ -65,12 +69,13 @@ def follows(other: str, paths: Sequence[str]) -> NotSweepable:
 
 def model(kind: str, path: str) -> NotSweepable:
     """The reason for a model, `kind` in words, whose parameters vary."""
-    return NotSweepable(f"is {kind}", f"vary a parameter of it, `{path}.PARAMETER`")
+    parameter = f"a parameter of it, `{path}.PARAMETER`"
+    return NotSweepable(f"is {kind}", f"vary {parameter}", setting=f"set {parameter}")
 
 
-def chosen(instead: str) -> NotSweepable:
-    """The reason for a path that a sweep chooses by another path, or in words of its own."""
-    return NotSweepable(DECIDES, instead)
+def chosen(path: str, choices: str) -> NotSweepable:
+    """The reason for what a sweep chooses by another `path`, over `choices` in words, and what is set by it."""
+    return NotSweepable(DECIDES, f"vary `{path}` over {choices}", setting=f"set `{path}`")
 
 
 def _one_of_them(paths: Sequence[str]) -> str:

@@ -16,6 +16,7 @@ from ic.meaning.mechanics.arm import ResolvedArm, resolve_link
 from ic.meaning.mechanics.bodies import carried_loads
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, refuse_values, word_of
+from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
@@ -43,7 +44,7 @@ NOTHING = (0.0, 0.0, 0.0)
 def resolve_base(scope: Scope, item: Item | None, arm: ResolvedArm) -> tuple[Base | None, ResolvedArm]:
     """The base, None where it is fixed or failed (already reported); and the arm, with the base as a link where it
     moves."""
-    scope.not_sweepable[BASE] = not_sweepable.chosen("write `vary base = [fixed, free];`")
+    scope.not_sweepable[BASE] = NotSweepable(not_sweepable.DECIDES, "write `vary base = [fixed, free];`")
     kind = word_of(item.value) if item is not None and item.value is not None else None
     if item is None:
         scope.keep_setting(BASE, "fixed")

@@ -490,7 +490,8 @@ error[D234]: nothing in `hold` is called `hinge.law`
 @pytest.mark.parametrize(("setting", "helps"), [
     ("links.bar.com=[0, 0, 1] m", "it is made of 3 numbers; set one of them: "
      "`links.bar.com.x`, `links.bar.com.y`, `links.bar.com.z`"),
-    ("links.bar.shape.along=y", "it is a word: write it in the deck, with a `let` that can be set"),
+    ("links.bar.shape.along=y",
+     "it is a word: write a name in its place in the deck, and give its value by `-D NAME=VALUE`"),
     ("links.bar.shape=sphere(radius = 1 m)", "set one of: links.bar.shape.length"),
     ("record=[q, qd]", "one value is set, not a block or a list: such as `rates.dynamics=1 kHz`"),
     ("environment=off", "one value is set, not a block or a list: such as `rates.dynamics=1 kHz`"),
@@ -501,6 +502,15 @@ def test_what_cannot_be_set_is_told_with_what_can(setting: str, helps: str, tmp_
         f"error[D235]: `{path}` cannot be set\n --> <command line>:1:1\n  |\n1 | {setting}\n  | {'^' * len(path)}\n"
         f"  = help: {helps}\n\n1 error\n"
     )
+
+
+def test_what_is_no_number_is_given_by_a_macro_as_the_message_says(tmp_path: Path) -> None:
+    text = ARM + SERVO + OTHERS + RUN
+    for key, value in (("parent", "base"), ("along", "x")):
+        other = changed(text, (f"{key} = {value}", f"{key} = CHOICE"))
+        compiled = check(tmp_path, other, defines=[f"CHOICE={value}"])
+        assert compiled.plan is not None, messages(compiled)
+        assert same(compiled.plan.experiments, made(tmp_path, text))
 
 
 def test_what_changes_nothing_in_any_run_that_is_asked_for_is_told(tmp_path: Path) -> None:
