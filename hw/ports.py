@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 
 from hw.bed import BedDriver
 from hw.line import BAUD
-from hw.transcript import TranscriptFile
+from hw.lines.transcript import TranscriptFile
 from met import models
 from met.frozen import frozen
 from met.parameter import Parameter

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hw.bed import About, BedDriver, BedSample, BedState, Fault, InterlockReason
-from hw.build import Uncountable
+from hw.boards.build import Uncountable
 from hw.protocol.frames import Decoder
 from hw.protocol.messages import VERSION
 from met.diagnostic import Problem, error

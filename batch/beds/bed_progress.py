@@ -12,8 +12,8 @@ import numpy as np
 from batch.beds.executor import OnBeds
 from batch.beds.jitter import duration, off
 from batch.terminal.progress import Bar
-from hw.records import ANSWERED
-from hw.timing import TimeSpread, Timing, timing
+from hw.driving.timing import TimeSpread, Timing, timing
+from hw.recording.records import ANSWERED
 from met.messages.visible import say
 
 

@@ -10,8 +10,8 @@ from batch.beds.filter_range import FilterRange, filter_range
 from batch.beds.sizing import BedFigures, Candidate, MotorFigures, PartVerdict, gather, judge_part
 from hw.bed import Capability
 from hw.beds.serial_line import least_baud
+from hw.driving.pace import Pace, pace
 from hw.motor_parts import Bench, MotorPart, PartsList
-from hw.pace import Pace, pace
 from met.analysis.shaft_work import not_for_a_bed, on_bed, servo_of, shaft_work, substitution_of
 from met.diagnostic import Problem, did_you_mean, error
 from met.frozen import frozen

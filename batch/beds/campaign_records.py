@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from batch.beds.case_result import check_head
-from hw import records
+from hw.recording import records
 from met.frozen import frozen
 
 

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from hw import records
-from hw.driven import CaseKernel
-from hw.records import ANSWERED
+from hw.driving.driven import CaseKernel
+from hw.recording import records
+from hw.recording.records import ANSWERED
 from met.frozen import frozen
 from met.host.files import is_count
 from met.program.build import OUTPUTS

@@ -23,10 +23,10 @@ from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.resuming import changed_since
 from batch.campaigns.tasks import CampaignSection, Done, Task
-from hw import records
-from hw.case import CaseRequest, pace_of
 from hw.drivers import bench_at, same_bed
-from hw.process import talk
+from hw.driving.case import CaseRequest, pace_of
+from hw.driving.process import talk
+from hw.recording import records
 from met import run as engine
 from met.diagnostic import Problem, error
 from met.frozen import frozen
@@ -217,7 +217,7 @@ class OnBeds:
         self.driving = Driving(path, exchange_hz, schedule.ticks / schedule.base_hz)
         ended: dict[str, Any] | None = None
         try:
-            for line in talk("hw.case", asked, self._say, until="began", idle=self._tell):
+            for line in talk("hw.driving.case", asked, self._say, until="began", idle=self._tell):
                 if "about" in line:
                     bed = f"bed `{line['about']['name']}`, firmware {line['about']['firmware']}"
                     self._greeted(line["bed"], bed, line.get("unseen", ""))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hw.pico import pico_image, uf2
-from hw.pico_bench import SHIPPED, pico_bench
+from hw.boards.pico import pico_image, uf2
+from hw.boards.pico_bench import SHIPPED, pico_bench
 from met.diagnostic import Problem, error
 from met.host.files import whole_file
 from met.host.streams import kept

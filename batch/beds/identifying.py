@@ -14,8 +14,8 @@ import numpy as np
 
 from batch.beds.chosen_bed import chosen_bed
 from hw.bed import About, Capability, Limits, Scales
+from hw.driving.process import talk
 from hw.identify.driving import MovesRequest
-from hw.process import talk
 from ic.printing.columns import columns
 from met import models
 from met.analysis.shaft_work import of_cases, scale_of
@@ -415,10 +415,10 @@ def _about(data: Mapping[str, Any]) -> About:
 
 
 def _fitted(path: Path, about: About, ended: Mapping[str, Any], sheet: DataSheet) -> FitResult:
-    from hw import records
     from hw.identify.fit import fitted
     from hw.identify.moves import groups, guided
     from hw.identify.series import series
+    from hw.recording import records
 
     try:
         rows = records.read(path).rows

@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from batch.beds.chosen_bed import ChosenBed, chosen_bed
-from hw.case import pace_of
 from hw.drivers import kind_of
-from hw.jitter import JitterRequest
-from hw.process import talk
-from hw.timing import EDGES
+from hw.driving.case import pace_of
+from hw.driving.jitter import JitterRequest
+from hw.driving.process import talk
+from hw.driving.timing import EDGES
 from ic.printing.columns import columns
 from met.diagnostic import Problem, error
 from met.messages.visible import say
@@ -44,7 +44,7 @@ def measured(
     question = JitterRequest(bed.port, rate, seconds, joints, baud, plan, bed.joint)
     said = list[str]()
     about, kept = dict[str, Any](), dict[str, Any]()
-    for line in talk("hw.jitter", question, said.append, until="kept", goes_on=True):
+    for line in talk("hw.driving.jitter", question, said.append, until="kept", goes_on=True):
         about = line.get("about", about)
         kept = line.get("kept", kept)
     timing = kept["timing"]

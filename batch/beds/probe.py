@@ -14,8 +14,8 @@ from batch.beds.chosen_bed import ChosenBed, chosen_bed
 from hw import refusals
 from hw.bed import About, BedDriver, BedSample, Capability, Fault
 from hw.beds.serial_line import LONGEST_SHARE, exchanged
-from hw.case import pace_of
 from hw.drivers import opened
+from hw.driving.case import pace_of
 from hw.ports import Port
 from ic.printing.columns import columns, number, quantity
 from met.diagnostic import Diagnostic

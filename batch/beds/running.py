@@ -19,8 +19,8 @@ from batch.queries.summary import summarise
 from batch.terminal.margin import in_words
 from batch.terminal.running import first_picture
 from batch.terminal.verdict import announcement, result_lines, worst_cases, writing
-from hw.case import check, pace_of
 from hw.drivers import check_model, in_lock_step, kind_of, ports_in_words
+from hw.driving.case import check, pace_of
 from met.analysis.margin import margins, remedy
 from met.diagnostic import Problem, error
 from met.host.files import read_json

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from hw.pace import pace
+from hw.driving.pace import pace
 from ic.printing.columns import columns, count
 from met.analysis.margin import HEAVIEST, Margin, remedy
 from met.plan import Experiment

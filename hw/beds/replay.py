@@ -8,10 +8,10 @@ from pathlib import Path
 from hw.bed import Scales
 from hw.beds.wire import WireBed
 from hw.line import BedLine
+from hw.lines.transcript import LOST, MAGIC, OPENED, RECEIVED, SENT, Transcript, TranscriptRecord, read
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
 from hw.protocol.frames import Decoder, unframed
-from hw.transcript import LOST, MAGIC, OPENED, RECEIVED, SENT, Transcript, TranscriptRecord, read
 from met.diagnostic import Problem, error
 from met.host.files import open_regular
 

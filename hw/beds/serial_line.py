@@ -1,4 +1,4 @@
-"""A bed on a serial line, or on a substitute for one (hw/serial_port.py)."""
+"""A bed on a serial line, or on a substitute for one (hw/lines/serial_port.py)."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from urllib.parse import urlsplit
 from hw.bed import About, Capability
 from hw.beds.wire import WireBed
 from hw.line import BAUD, BedLine
+from hw.lines.serial_port import SerialLine
+from hw.lines.transcript import TranscribedLine, TranscriptWriter
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
-from hw.serial_port import SerialLine
-from hw.transcript import TranscribedLine, TranscriptWriter
 from met.diagnostic import Problem, error
 
 LONGEST_SHARE = 0.8
@@ -25,7 +25,7 @@ class SerialBed(WireBed):
     """A bed on a serial line.
 
     url         a device, or another URL of pyserial's `serial_for_url`;  period: s from one exchange to the next
-    transcript  takes the bytes of each record of a transcript (hw/transcript.py); None: none is kept
+    transcript  takes the bytes of each record of a transcript (hw/lines/transcript.py); None: none is kept
     """
 
     def __init__(

@@ -19,11 +19,11 @@ from hw import realtime, refusals
 from hw.bed import Capability
 from hw.beds import emulated
 from hw.beds.wire import WireBed
-from hw.build import Config, Shaft, Uncountable, build, qemu
+from hw.boards.build import Config, Shaft, Uncountable, build, qemu
 from hw.line import BAUD, BedLine
+from hw.lines.transcript import TranscribedLine, TranscriptWriter
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
-from hw.transcript import TranscribedLine, TranscriptWriter
 from met.diagnostic import Problem, error
 from met.plant import plant_c
 from met.substitution.bed import SIMULATION_PARAMETERS
@@ -36,7 +36,7 @@ class SimulatedBed(WireBed):
     """A bed whose firmware runs on this machine over a simulated plant.
 
     kind          "firmware": a program of this machine; "qemu": in an emulator of a Cortex-M3
-    config, plant  as hw.build.build takes them;  period: s from one exchange to the next
+    config, plant  as hw.boards.build.build takes them;  period: s from one exchange to the next
     transcript    as of `SerialBed`
 
     The process begins when the bed is connected, and ends when it is closed.

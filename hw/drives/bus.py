@@ -17,7 +17,7 @@ from hw.drives.fdcanusb import LOST, FdcanusbLine
 from hw.drives.frames import CanFrame, CanLine
 from hw.drives.odrive_lines import PULLED, OdriveLines
 from hw.line import BAUD
-from hw.serial_port import SerialLine
+from hw.lines.serial_port import SerialLine
 from met.diagnostic import Problem, error
 
 

@@ -12,14 +12,15 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
-from hw import loop, process, refusals
+from hw import refusals
 from hw.bed import Capability, Limits
 from hw.beds import latch
-from hw.case import pace_of
 from hw.drivers import opened
+from hw.driving import loop, process
+from hw.driving.case import pace_of
 from hw.identify.moves import MoveGuide, Peaks, guided
 from hw.ports import Port
-from hw.writer import recording
+from hw.recording.writer import recording
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import file as plan_file

@@ -150,7 +150,7 @@ def _mixed() -> list[Move]:
 
 
 class MoveGuide:
-    """Leads a bed through the moves (`hw.loop.Compute`). period: s, from exchange to exchange; slews: V/s, A/s.
+    """Leads a bed through the moves (`hw.driving.loop.Compute`). period: s, from exchange to exchange; slews: V/s, A/s.
 
     began  of each move, the exchange whose answer found the bed at rest, from which on it was told the move
     done   whether all were made, and the bed is at rest

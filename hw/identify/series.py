@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hw.bed import About
-from hw.records import ANSWERED
-from hw.timing import TICK
+from hw.driving.timing import TICK
+from hw.recording.records import ANSWERED
 from met.frozen import frozen
 
 
@@ -47,7 +47,7 @@ class Series:
 
 
 def series(rows: np.ndarray, about: About, began: Sequence[int], *, lock_step: bool) -> Series:
-    """The steps of one bed's records (hw.records.LAYOUT), from its first exchange on.
+    """The steps of one bed's records (hw.recording.records.LAYOUT), from its first exchange on.
 
     began  for each move, the exchange at which the bed was at rest
 

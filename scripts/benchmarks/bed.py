@@ -23,13 +23,14 @@ import numpy as np
 
 import ic
 from benchmarks.benchmark import Benchmark, Target, Untaken
-from hw import realtime, records
+from hw import realtime
 from hw.beds.simulated import config_of
-from hw.build import build
-from hw.case import CaseRequest, pace_of
-from hw.driven import LANES, CaseKernel
-from hw.process import talk
-from hw.timing import Timing, timing
+from hw.boards.build import build
+from hw.driving.case import CaseRequest, pace_of
+from hw.driving.driven import LANES, CaseKernel
+from hw.driving.process import talk
+from hw.driving.timing import Timing, timing
+from hw.recording import records
 from met.plan import Experiment, Plan
 from met.plan import file as plan_file
 from met.plant import Plant, bed_values, plant_c
@@ -124,7 +125,7 @@ def _kept(line: str) -> tuple[Timing, int]:
             path = Path(folder) / "one.records"
             said = list[str]()
             for _ in talk(
-                "hw.case", CaseRequest(plan=plan, row=0, ports={"joint2": port}, records=str(path)), said.append
+                "hw.driving.case", CaseRequest(plan=plan, row=0, ports={"joint2": port}, records=str(path)), said.append
             ):
                 pass
             rows = records.read(path)

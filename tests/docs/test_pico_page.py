@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from hw.build import FIRMWARE
+from hw.boards.build import FIRMWARE
 from tests.docs.pico_figure import LEFT, PICTURE, RIGHT, svg
 
 PAGE = PICTURE.parents[1] / "pico.md"

@@ -11,7 +11,7 @@ import pytest
 
 from hw.beds.wire import WireBed
 from hw.line import BedLine
-from hw.transcript import TranscribedLine, TranscriptWriter
+from hw.lines.transcript import TranscribedLine, TranscriptWriter
 from met.diagnostic import Problem
 from met.messages.render import render
 from tests.hw.device import Device

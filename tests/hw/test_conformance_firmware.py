@@ -13,7 +13,7 @@ import pytest
 from hw import conformance
 from hw.bed import BedDriver
 from hw.beds.serial_line import SerialBed
-from hw.build import Config, build, qemu
+from hw.boards.build import Config, build, qemu
 from tests.hw.firmware.line import FREE, PLANT, STEPPED
 
 pytestmark = pytest.mark.alone

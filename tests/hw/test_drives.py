@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 import ic
-from hw import case
 from hw.bed import About
 from hw.beds import emulated
 from hw.beds.emulated import EmulatedBed
+from hw.driving import case
 from met.diagnostic import Problem
 from met.substitution import BEDS
 from met.substitution.bed import check

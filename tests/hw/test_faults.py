@@ -18,11 +18,11 @@ from typing import Any
 
 import pytest
 
-from hw import transcript
 from hw.bed import BedSample, BedState, Fault
 from hw.beds.replay import ReplayBed
 from hw.beds.serial_line import SerialBed
 from hw.beds.wire import WireBed
+from hw.lines import transcript
 from hw.protocol import messages
 from met.diagnostic import Problem
 from tests.hw import device as model

@@ -12,15 +12,16 @@ import numpy as np
 import pytest
 
 import ic
-from hw import loop, records
 from hw.bed import About, BedSample, Capability, Limits
 from hw.beds import emulated
 from hw.beds.emulated import EmulatedBed
+from hw.driving import loop
+from hw.driving.pace import pace
 from hw.identify.driving import MovesRequest, peaks
 from hw.identify.fit import FitResult, fitted
 from hw.identify.moves import MoveGuide, Peaks, groups, guided
 from hw.identify.series import Series, series
-from hw.pace import pace
+from hw.recording import records
 from met.diagnostic import Problem
 from met.plan import Experiment
 from met.plant import Plant, bed_values

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from hw import refusals
 from hw.bed import About, BedSample, BedState, Capability, Fault, InterlockReason, Limits, Scales
-from hw.build import FIRMWARE
-from hw.loop import _ending
+from hw.boards.build import FIRMWARE
+from hw.driving.loop import _ending
 from tests.hw.conftest import said
 
 ABOUT = About(

@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
-from hw import serial_port
 from hw.beds.serial_line import SerialBed
+from hw.lines import serial_port
 from tests.hw.conftest import LineBed, refusal
 from tests.hw.device import Device
 from tests.hw.relay import VirtualLine

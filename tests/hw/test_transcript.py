@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from hw import transcript
 from hw.bed import BedSample, BedState
 from hw.beds.replay import ReplayBed
 from hw.beds.serial_line import SerialBed
-from hw.transcript import TranscriptFile, TranscriptRecord, TranscriptWriter
+from hw.lines import transcript
+from hw.lines.transcript import TranscriptFile, TranscriptRecord, TranscriptWriter
 from met.diagnostic import Problem
 from tests.hw.conftest import LineBed, said
 from tests.hw.device import Device
@@ -120,7 +120,7 @@ def test_a_transcript_that_does_not_say_how_it_was_driven(tmp_path: Path) -> Non
 
 CHILD = """
 import sys
-from hw.transcript import TranscriptFile, TranscriptWriter
+from hw.lines.transcript import TranscriptFile, TranscriptWriter
 writer = TranscriptWriter(TranscriptFile(sys.argv[1]), {"line": "x", "period": 0.001, "first": 3})
 n = 0
 while True:

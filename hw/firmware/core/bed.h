@@ -63,7 +63,7 @@ typedef struct {
     bool (*preset)(uint8_t which, uint64_t bits);
 } bed_plant;
 
-/* One bed, as it is built: hw/build.py writes it from values in SI. */
+/* One bed, as it is built: hw/boards/build.py writes it from values in SI. */
 typedef struct {
     uint16_t capabilities;
     uint8_t firmware[8];    /* beginning of the SHA-256 of what was built */

@@ -18,7 +18,7 @@ typedef struct {
 int64_t guard_heat(const guard_heat_config *config, int64_t heat, int32_t current);
 
 /* The shaft as its data sheet has it: by how many counts of rate each thing changes the shaft's rate in a tick, times
-   2^bits, so that a tick is a few products of whole numbers. hw/build.py makes these from SI, and sees to it that no sum
+   2^bits, so that a tick is a few products of whole numbers. hw/boards/build.py makes these from SI, and sees to it that no sum
    of them leaves 62 bits. */
 typedef struct {
     uint32_t bits;     /* of a fraction: 24, or as many as leave room where a tick of a light shaft is many counts */

@@ -55,7 +55,7 @@ typedef struct {
     void (*set)(uint32_t lines); /* all lines, at each tick and at each change; those not named are off */
 } interlock_port;
 
-/* One bed's numbers; hw/pico.py writes them. A span of 0 ticks, and a limit that cannot be passed, watch nothing. */
+/* One bed's numbers; hw/boards/pico.py writes them. A span of 0 ticks, and a limit that cannot be passed, watch nothing. */
 typedef struct {
     const interlock_port *port;
     bool needs_key;

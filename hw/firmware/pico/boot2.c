@@ -1,4 +1,4 @@
-/* The first 256 bytes of the flash: what the chip's ROM copies into RAM and runs, if their CRC is right (hw/pico.py
+/* The first 256 bytes of the flash: what the chip's ROM copies into RAM and runs, if their CRC is right (hw/boards/pico.py
    writes it behind them). Makes the flash readable as memory, then starts the loader (start.c).
 
    By the plain command 03h, which every serial flash has (RP2040 datasheet 2.7.1, 2.8.1, 4.10): 8 bits of command, 24

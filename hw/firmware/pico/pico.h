@@ -28,7 +28,7 @@ void pico_halt(void);
 /* How often the main program has gone round. */
 extern volatile uint32_t pico_beats;
 
-/* One bed's numbers beside `board_config`; hw/pico.py writes them. */
+/* One bed's numbers beside `board_config`; hw/boards/pico.py writes them. */
 typedef struct {
     uint32_t reload;       /* SysTick's: clocks of the processor in a tick, less one */
     uint32_t watchdog;     /* us without a tick after which the chip is reset; 0: no watchdog */

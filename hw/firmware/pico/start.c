@@ -15,7 +15,7 @@ extern uint32_t stack_top, ram_end, image_load, image_start, image_end, bss_star
 void reset(void);
 void load(void);
 
-/* What boot2 and the loader go by, at 0x10000100. `crc` is that of all that follows, which hw/pico.py writes, as it
+/* What boot2 and the loader go by, at 0x10000100. `crc` is that of all that follows, which hw/boards/pico.py writes, as it
    does how many words these are; so what the compiler sees here is not what is read. */
 typedef struct {
     uint32_t stack; /* in a bank of RAM that the program does not use */

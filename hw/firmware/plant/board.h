@@ -19,7 +19,7 @@ typedef struct {
     double angle;
 } board_scales;
 
-/* Of the bed that was built; hw/build.py writes them. */
+/* Of the bed that was built; hw/boards/build.py writes them. */
 extern const bed_config board_config;
 extern const board_scales board_scale;
 

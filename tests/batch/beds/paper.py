@@ -28,7 +28,7 @@ from scipy import stats
 import batch
 import ic
 from hw.beds.simulated import config_of
-from hw.build import build, qemu
+from hw.boards.build import build, qemu
 from met import cli
 from met.plan import Experiment
 from met.plant import bed_values, plant_c

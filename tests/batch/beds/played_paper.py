@@ -17,22 +17,22 @@ from pathlib import Path
 import numpy as np
 
 import ic
-from hw import loop
 from hw.bed import BedDriver, BedSample
 from hw.beds import emulated
 from hw.beds.can_bed import CanBed
 from hw.beds.can_deck import BelievedLoop
 from hw.beds.emulated import EmulatedBed
-from hw.case import pace_of
-from hw.driven import LANES, CaseKernel
 from hw.drives import DIALECTS
 from hw.drives.bench_file import two_drives
+from hw.driving import loop
+from hw.driving.case import pace_of
+from hw.driving.driven import LANES, CaseKernel
 from hw.players import PLAYED
 from hw.players.cia402 import PlayedCia402
 from hw.players.odrive import PlayedOdrive, endpoints
 from hw.players.player import PlayedBench, PlayedLine
 from hw.players.shaft import Output
-from hw.records import ANSWERED, LAYOUT
+from hw.recording.records import ANSWERED, LAYOUT
 from met import models
 from met import run as engine
 from met.plan import Experiment

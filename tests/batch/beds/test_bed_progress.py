@@ -19,9 +19,9 @@ from batch.beds.running import beds_before
 from batch.campaigns.folder import Folder
 from batch.campaigns.output import sidecar_path
 from batch.terminal.progress import Bar
-from hw import records
 from hw.bed import BedSample, BedState, Fault
-from hw.records import SIZE
+from hw.recording import records
+from hw.recording.records import SIZE
 from met import cli
 from met.diagnostic import Problem
 from tests.batch.beds.listening import DECK

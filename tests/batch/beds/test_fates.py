@@ -11,7 +11,7 @@ import pytest
 
 import batch
 from batch.beds.executor import OnBeds
-from hw import records
+from hw.recording import records
 from met import cli
 from tests.batch.beds.listening import DECK
 from tests.hw.device import DEAD, DISARMED, STOPPED, Device

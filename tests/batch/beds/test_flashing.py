@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from hw import build as building
-from hw.pico_bench import SHIPPED, pico_bench
+from hw.boards import build as building
+from hw.boards.pico_bench import SHIPPED, pico_bench
 from met import cli
 from met.diagnostic import Problem
 

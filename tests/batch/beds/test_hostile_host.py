@@ -23,11 +23,12 @@ import pytest
 import batch
 from batch.beds.bed_progress import timing_lines, timings
 from batch.beds.executor import OnBeds, Ports
-from hw import records, transcript
 from hw.bed import BedSample, BedState, Fault
+from hw.lines import transcript
 from hw.protocol import messages
 from hw.protocol.frames import unframed
-from hw.writer import recording
+from hw.recording import records
+from hw.recording.writer import recording
 from met import cli
 from met.diagnostic import Problem
 from tests.hw.device import DISARMED, RATE, STOPPED, Device, payload
@@ -180,14 +181,14 @@ def test_an_orphan_stops_whoever_takes_its_parent_s_place(here: Path) -> None:
 import sys, time
 from pathlib import Path
 time.sleep(1.0)
-from hw import process
+from hw.driving import process
 stop = process.listening()
 time.sleep(0.1)
 Path("heard").write_text(str(stop()))
 """)
     (here / "starts.py").write_text("""\
 from dataclasses import dataclass
-from hw.process import talk
+from hw.driving.process import talk
 @dataclass
 class Asked:
     pass
@@ -225,7 +226,7 @@ def test_a_writer_that_is_gone_ends_the_run(here: Path) -> None:
     record = records.packed(0, 0, 0, (0, 0, 0, 0), 0.0, 0.0, BedSample(BedState.ARMED, True, Fault(0), False, 0, 0.0))
     count = 0
     with pytest.raises(Problem) as told, recording(here / "r.records", {}, 2000) as put:
-        while not (found := named(os.getpid(), b"hw.writer")):  # it has a name once it is begun
+        while not (found := named(os.getpid(), b"hw.recording.writer")):  # it has a name once it is begun
             time.sleep(0.01)
         [writer] = found
         os.kill(writer, signal.SIGKILL)

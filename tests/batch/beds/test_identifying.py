@@ -13,13 +13,13 @@ import pytest
 
 import ic
 from batch.beds.identifying import check, digits, sheet_of, widened
-from hw import records
 from hw.bed import About, Capability, Limits, Scales
 from hw.beds import emulated
 from hw.beds.emulated import EmulatedBed
 from hw.identify import driving
 from hw.identify.driving import MovesRequest
 from hw.identify.fit import Estimate, FitResult
+from hw.recording import records
 from met import cli
 from met.diagnostic import Problem
 from met.plan import Experiment, Plan
@@ -206,7 +206,7 @@ def test_moves_that_are_cut_short(
     bed = Driven(Plant(of, "shoulder", period=1e-3), emulated.scales(values), limits)
     bed.driven = rate is None
     monkeypatch.setattr(driving, "opened", lambda *_: bed)
-    monkeypatch.setattr("hw.process.listening", lambda: lambda: False)
+    monkeypatch.setattr("hw.driving.process.listening", lambda: lambda: False)
     sheet = dict(sheet_of(of, "shoulder", None).values)
     asked = MovesRequest(
         plan=plan_file.dumps(Plan("", (of,))),

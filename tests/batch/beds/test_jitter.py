@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from batch.beds.jitter import duration, histogram, lines, off
-from hw import loop
 from hw.bed import About, BedDriver, BedSample, BedState, Fault
-from hw.jitter import jitter_result
-from hw.pace import Pace
-from hw.records import ANSWERED, LATE_WOKEN, LAYOUT
+from hw.driving import loop
+from hw.driving.jitter import jitter_result
+from hw.driving.pace import Pace
+from hw.recording.records import ANSWERED, LATE_WOKEN, LAYOUT
 from met import cli
 from tests.batch.beds.listening import DECK, HELLO, READ, STOP, Listening
 

@@ -13,7 +13,7 @@ import pytest
 
 import batch
 import ic
-from hw.build import CROSS_COMPILER, EMULATOR
+from hw.boards.build import CROSS_COMPILER, EMULATOR
 from met import cli
 from tests.batch.beds import paper
 

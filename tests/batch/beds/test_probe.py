@@ -12,8 +12,8 @@ from typing import Any, cast
 import pytest
 
 from batch.beds.probe import ASKED, ProbeResult, _line
-from hw import serial_port
 from hw.bed import Capability
+from hw.lines import serial_port
 from met import cli
 from tests.batch.beds.listening import DECK, HELLO, READ, STOP, Listening
 from tests.hw.device import DEAD, DEADMAN, STOPPED, Device

@@ -18,7 +18,7 @@ import ic
 from batch.beds.executor import OnBeds
 from batch.beds.running import campaign_of, check_margins
 from batch.campaigns.campaign import prepare
-from hw import records
+from hw.recording import records
 from met import cli
 from met.diagnostic import Problem
 
@@ -294,7 +294,7 @@ error[E413]: the file of records of case #0 holds no records of a bed
 def test_a_process_that_ends_without_a_word_is_told(
     bed: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hw.process.sys.executable", "/bin/false")
+    monkeypatch.setattr("hw.driving.process.sys.executable", "/bin/false")
     status, _, complaint = bed("wired", "--port", "emulated", "-o", "a.h5")
     assert status == cli.BAD_INPUT
     assert complaint.endswith("""\

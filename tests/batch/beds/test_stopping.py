@@ -22,13 +22,15 @@ import pytest
 
 import batch
 import ic
-from hw import loop, realtime, records
+from hw import realtime
 from hw.bed import BedState, Fault
 from hw.beds import emulated
 from hw.beds.serial_line import SerialBed
 from hw.beds.simulated import config_of
-from hw.build import build
-from hw.pace import pace
+from hw.boards.build import build
+from hw.driving import loop
+from hw.driving.pace import pace
+from hw.recording import records
 from met import cli
 from met.plan import Experiment
 from met.plant import bed_values, plant_c
@@ -217,7 +219,9 @@ def test_a_host_that_is_told_to_end_stops_its_bed(host: BedHost, here: Path, how
 @slow
 def test_a_case_s_process_that_is_killed_is_told_and_the_bed_stops(host: BedHost, here: Path) -> None:
     process = running(host.terminal, here)
-    [driver] = [int(pid) for pid in _children(process.pid) if b"hw.case" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    [driver] = [
+        int(pid) for pid in _children(process.pid) if b"hw.driving.case" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    ]
     os.kill(driver, signal.SIGKILL)
     said, complaint = process.communicate(timeout=30.0)
     assert process.returncode == cli.NO, complaint

@@ -14,7 +14,7 @@ import pytest
 
 import batch
 from batch.campaigns.folder import Folder, beside
-from hw.transcript import read
+from hw.lines.transcript import read
 from met.diagnostic import Problem
 from met.messages.render import render
 from met.plan import file as plan_file

@@ -20,8 +20,9 @@ from batch.beds.executor import OnBeds, Ports
 from batch.campaigns import shard
 from batch.campaigns.folder import Folder
 from batch.terminal import job
-from hw import records, transcript
 from hw.beds.replay import ReplayBed
+from hw.lines import transcript
+from hw.recording import records
 from met.diagnostic import Problem
 from met.messages.render import render
 from met.plan import file as plan_file

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ctypes
 from dataclasses import astuple
 
-from hw.build import build
+from hw.boards.build import build
 from tests.hw import device as model
 from tests.hw.firmware import wire
 from tests.hw.firmware.line import FREE, PLANT, STEPPED

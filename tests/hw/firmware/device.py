@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from hw.bed import Capability, Limits, Scales
-from hw.build import Config, Shaft, build
+from hw.boards.build import Config, Shaft, build
 from tests.hw.firmware import wire
 from tests.hw.firmware.wire import Hello, Sample, frame, payloads, told
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from hw.bed import Capability, Limits, Scales
-from hw.build import Config, build, qemu
+from hw.boards.build import Config, build, qemu
 from tests.hw.firmware import wire
 from tests.hw.firmware.device import HERE, SHAFT
 from tests.hw.firmware.wire import frame, payloads, told

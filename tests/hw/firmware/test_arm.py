@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from hw.build import CROSS_COMPILER, EMULATOR, build
+from hw.boards.build import CROSS_COMPILER, EMULATOR, build
 from met.plant import plant_c
 from tests.hw.firmware import wire
 from tests.hw.firmware.line import FREE, STEPPED, Line, behind_a_terminal, under_qemu

@@ -14,9 +14,9 @@ from typing import Any
 
 import pytest
 
-from hw import build as building
 from hw.bed import Capability
-from hw.build import Config, build, config_c, counted, guard, qemu
+from hw.boards import build as building
+from hw.boards.build import Config, build, config_c, counted, guard, qemu
 from hw.drivers import opened
 from hw.ports import Port
 from met.diagnostic import Problem

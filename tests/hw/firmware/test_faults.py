@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from hw.build import Config, Shaft, guard
+from hw.boards.build import Config, Shaft, guard
 from tests.hw.firmware import wire
 from tests.hw.firmware.device import PLAIN, SENSORS, SHAFT, Device
 from tests.hw.firmware.wire import frame

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from hw.bed import Capability
-from hw.build import FIRMWARE, WARNINGS, config_c
-from hw.interlock import Interlock
+from hw.boards.build import FIRMWARE, WARNINGS, config_c
+from hw.boards.interlock import Interlock
 from tests.hw.firmware import wire
 from tests.hw.firmware.device import HERE, LOCK_STEP, PLAIN, SENSORS, SHAFT
 from tests.hw.firmware.test_interlock import LOCK

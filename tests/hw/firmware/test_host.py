@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from hw.build import build
+from hw.boards.build import build
 from tests.hw.firmware import wire
 from tests.hw.firmware.line import FREE, PLANT, STEPPED, Line, behind_a_terminal, ended
 

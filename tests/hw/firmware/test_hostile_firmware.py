@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from hw import build as building
 from hw import drivers
 from hw.beds import greeting
-from hw.build import CROSS_COMPILER, Config, build, counted, guard
+from hw.boards import build as building
+from hw.boards.build import CROSS_COMPILER, Config, build, counted, guard
 from hw.ports import Port
 from met.diagnostic import Problem
 from tests.hw.firmware import wire

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from hw.bed import Capability, InterlockReason
-from hw.interlock import Interlock, interlock_counts
+from hw.boards.interlock import Interlock, interlock_counts
 from tests.hw.firmware import wire
 from tests.hw.firmware.device import PLAIN, Device
 

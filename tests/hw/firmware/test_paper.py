@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from hw.bed import Capability, Scales
-from hw.build import Config, build
+from hw.boards.build import Config, build
 from met.backends.llvm import kernel
 from met.plan import Experiment
 from met.plant import Plant, plant_c

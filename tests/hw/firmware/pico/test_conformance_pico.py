@@ -12,8 +12,8 @@ import pytest
 
 from hw import conformance
 from hw.bed import BedDriver
-from hw.pico import pico_image, pico_simulation
-from hw.pico_bench import pico_bench
+from hw.boards.pico import pico_image, pico_simulation
+from hw.boards.pico_bench import pico_bench
 from tests.hw.firmware.line import PLANT, STEPPED
 from tests.hw.firmware.pico.emulated import Emulator, PicoBed, skip_without_tools
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from hw import build as building
-from hw.build import CROSS_COMPILER, FIRMWARE, build
-from hw.pico import boot2_crc, pico_image, uf2
-from hw.pico_bench import pico_bench, wiring_c
+from hw.boards import build as building
+from hw.boards.build import CROSS_COMPILER, FIRMWARE, build
+from hw.boards.pico import boot2_crc, pico_image, uf2
+from hw.boards.pico_bench import pico_bench, wiring_c
 from tests.hw.firmware.pico.emulated import STACK_TOP
 from tests.hw.firmware.test_arm import stack
 

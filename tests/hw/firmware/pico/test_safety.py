@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 from hw.bed import BedState, Capability, Fault, InterlockReason
-from hw.pico import pico_image
-from hw.pico_bench import SHIPPED, PicoBench, pico_bench
+from hw.boards.pico import pico_image
+from hw.boards.pico_bench import SHIPPED, PicoBench, pico_bench
 from tests.hw.firmware.pico.emulated import (
     BRAKE_RELEASE,
     DRIVE_ENABLE,

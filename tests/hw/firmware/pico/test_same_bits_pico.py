@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from hw.pico import pico_simulation
+from hw.boards.pico import pico_simulation
 from met.plant import plant_c
 from tests.hw.firmware import wire
 from tests.hw.firmware.line import PLANT, STEPPED, Line, behind_a_terminal

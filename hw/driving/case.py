@@ -1,4 +1,4 @@
-"""One case driven on beds, in a process of its own: `python -m hw.case`, which reads a line of JSON, a `CaseRequest`.
+"""One case driven on beds, in a process of its own: `python -m hw.driving.case`, which reads a `CaseRequest` as JSON.
 
 It says how it goes on its standard output, a line of JSON each: {"said": words}, {"bed": joint, "about": ...},
 {"began": true}, at the end {"ended": ...} or {"wrong": diagnostics}. What came of each exchange is in the records.
@@ -13,14 +13,15 @@ from dataclasses import asdict, field
 from pathlib import Path
 from typing import Any
 
-from hw import loop, process, refusals
+from hw import refusals
 from hw.bed import About, BedDriver, Capability
 from hw.beds import latch
-from hw.driven import LANES, CaseKernel, divisor, substituted
 from hw.drivers import opened
-from hw.pace import Pace, pace
+from hw.driving import loop, process
+from hw.driving.driven import LANES, CaseKernel, divisor, substituted
+from hw.driving.pace import Pace, pace
 from hw.ports import Port
-from hw.writer import recording
+from hw.recording.writer import recording
 from met import models
 from met.diagnostic import Problem, error
 from met.frozen import frozen

@@ -19,9 +19,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from hw import records
 from hw.bed import BedDriver, BedSample, BedState, Fault
-from hw.pace import MISSED, Pace
+from hw.driving.pace import MISSED, Pace
+from hw.recording import records
 from hw.refusals import interlocked
 from met.frozen import frozen
 
@@ -54,7 +54,7 @@ class LoopEnd:
 
 
 Put = Callable[[bytes], None]
-"""Takes a record, as bytes (hw/records.py)."""
+"""Takes a record, as bytes (hw/recording/records.py)."""
 
 
 def drive(

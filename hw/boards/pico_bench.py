@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from hw.bed import Capability, Limits, Scales
-from hw.build import Config, Shaft, Uncountable, config_c
-from hw.interlock import Interlock
+from hw.boards.build import Config, Shaft, Uncountable, config_c
+from hw.boards.interlock import Interlock
 from hw.toml_file import TomlFile, quantity
 from met.diagnostic import did_you_mean
 from met.frozen import frozen
 
-SHIPPED = Path(__file__).with_name("firmware") / "pico" / "bench.toml"
+SHIPPED = Path(__file__).parents[1] / "firmware" / "pico" / "bench.toml"
 MOST_BYTES = 1 << 16
 
 CLOCK = 125_000_000

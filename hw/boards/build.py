@@ -22,14 +22,14 @@ from pathlib import Path
 from typing import Literal
 
 from hw.bed import Capability, Limits, Scales
-from hw.interlock import Interlock, interlock_c
+from hw.boards.interlock import Interlock, interlock_c
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host import cache
 
 Kind = Literal["host", "library", "arm", "pico"]
 
-FIRMWARE = Path(__file__).with_name("firmware")
+FIRMWARE = Path(__file__).parents[1] / "firmware"
 """The folder with the C sources."""
 
 WARNINGS = ("-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror", "-ffp-contract=off")
@@ -157,7 +157,7 @@ def build(
     texts: Mapping[str, str] | None = None,
 ) -> Path:
     """The firmware of one bed: a program ("host"), a shared library, or an ELF file for lm3s6965evb ("arm") or a
-    Raspberry Pi Pico ("pico", which hw/pico.py makes an image of).
+    Raspberry Pi Pico ("pico", which hw/boards/pico.py makes an image of).
 
     plant_c   text of the simulated plant; None for a library, whose port is in `sources`, and for a Pico with motors
     flags     more words for the compiler;  texts: more sources, by their names
@@ -408,7 +408,7 @@ def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
     )
     in_force = ("voltage", "current", "rate", "voltage_slew", "current_slew")
     lines = [
-        "/* One bed's numbers, written by hw/build.py. */",
+        "/* One bed's numbers, written by hw/boards/build.py. */",
         '#include "board.h"' if plant else '#include "bed.h"',
         "",
         "extern const bed_config board_config;",

@@ -12,7 +12,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 
-from hw.records import SIZE
+from hw.recording.records import SIZE
 
 _COUNT = struct.Struct("<Q")
 _HEAD = 64

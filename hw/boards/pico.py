@@ -11,8 +11,8 @@ import struct
 import zlib
 from pathlib import Path
 
-from hw.build import Config, build
-from hw.pico_bench import PicoBench, lock_step_wiring, wiring_c
+from hw.boards.build import Config, build
+from hw.boards.pico_bench import PicoBench, lock_step_wiring, wiring_c
 
 FLASH, RAM = 0x1000_0000, 0x2000_0000
 FLASH_BYTES = 2 << 20
@@ -31,7 +31,8 @@ def pico_image(bench: PicoBench) -> bytes:
 
 
 def pico_simulation(config: Config, plant_c: str) -> bytes:
-    """The image with a simulated plant in place of pins, for an emulator of the chip. plant_c: as for hw.build.build"""
+    """The image with a simulated plant in place of pins, for an emulator of the chip. plant_c: as for
+    hw.boards.build.build"""
     return flash_of(build("pico", config, plant_c, texts={"wiring.c": wiring_c(lock_step_wiring(config.tick_hz))}))
 
 

@@ -1,8 +1,9 @@
 """The timing of this computer and a line, measured with a bed that is not armed, in a process of its own:
-`python -m hw.jitter`, which reads a line of JSON, a `JitterRequest`.
+`python -m hw.driving.jitter`, which reads a line of JSON, a `JitterRequest`.
 
-It runs the loop of `hw.loop` as a run has it, but that the bed is read and told nothing. On its standard output is a
-line of JSON each: {"said": words}, {"about": ...}, at the end {"kept": ...} (`JitterResult`) or {"wrong": diagnostics}.
+It runs the loop of `hw.driving.loop` as a run has it, but that the bed is read and told nothing. On its standard output
+is a line of JSON each: {"said": words}, {"about": ...}, at the end {"kept": ...} (`JitterResult`) or
+{"wrong": diagnostics}.
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from hw import loop, process
 from hw.bed import Capability
-from hw.case import pace_of
 from hw.drivers import opened
-from hw.pace import Pace
+from hw.driving import loop, process
+from hw.driving.case import pace_of
+from hw.driving.pace import Pace
+from hw.driving.timing import Timing, stops, time_spread, timing
 from hw.ports import Port
-from hw.records import ANSWERED, LAYOUT
-from hw.timing import Timing, stops, time_spread, timing
+from hw.recording.records import ANSWERED, LAYOUT
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import file as plan_file

@@ -51,7 +51,7 @@ class CaseKernel:
         return self.last * self.repeats
 
     def __call__(self, e: int, rates: Sequence[float], commands: list[list[float]]) -> None:
-        """Step to the instant of exchange e where the servos tick then, and write the commands (`hw.loop.Compute`)."""
+        """Step to the instant of exchange e where the servos tick then, and write the commands (`loop.Compute`)."""
         tick, between = divmod(e, self.repeats)
         if between:
             return

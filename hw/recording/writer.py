@@ -1,6 +1,6 @@
 """The process that writes records to the disk while the loop runs, and outlives it, so that no record is lost.
 
-    python -m hw.writer RING ROOM PIPE PATH < head
+    python -m hw.recording.writer RING ROOM PIPE PATH < head
 
 RING and PIPE are files that are open already: the ring's memory, and the reading end of a pipe whose other end the loop
 has. When the loop is done, or is no more, the pipe ends; then what is left in the ring is written, and synced.
@@ -19,8 +19,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from hw import records, ring
-from hw.ring import Ring, RingFull
+from hw.recording import records, ring
+from hw.recording.ring import Ring, RingFull
 from met.diagnostic import Problem, error
 from met.host import interpreter
 from met.host.files import settle
@@ -60,7 +60,7 @@ class RecordsWriter:
         self._ring, self._path, self._count = through, path, 0
         read, self._alive = os.pipe()
         os.set_inheritable(self._alive, False)
-        command = interpreter.command("hw.writer", str(through.file), str(through.room), str(read), str(path))
+        command = interpreter.command("hw.recording.writer", str(through.file), str(through.room), str(read), str(path))
         self._process = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,

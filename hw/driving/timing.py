@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hw.pace import MISSED
-from hw.records import ANSWERED, LATE_ANSWERED, LATE_COMPUTED, LATE_WOKEN
+from hw.driving.pace import MISSED
+from hw.recording.records import ANSWERED, LATE_ANSWERED, LATE_COMPUTED, LATE_WOKEN
 from met.frozen import frozen
 
 TICK = 1 << 32

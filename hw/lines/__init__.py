@@ -1,0 +1,1 @@
+"""A serial line or what stands for one, and transcripts of what went over a line."""
