@@ -170,9 +170,12 @@ class Loops(Expressions):
         if len(iterations) > MOST_ITERATIONS:
             message = f"a loop has at most {MOST_ITERATIONS:,} iterations, and this one has {len(iterations):,}"
             least = -(-abs(last - first) // (MOST_ITERATIONS - 1))
-            by = f"by {least if step > 0 else -least}"
+            longer = f"by {least if step > 0 else -least}"
             self.fail(
-                "D284", message, place, help=f"change its ends, or take larger steps: `{by}` is the smallest that fits"
+                "D284",
+                message,
+                place,
+                help=f"change its ends, or take larger steps: `{longer}` is the smallest that fits",
             )
         return [str(each) for each in iterations]
 

@@ -469,9 +469,9 @@ class _Preprocessor(Macros):
             raise OutputDirective(Action.IgnoreAndRemove)
         opened = ifs[-1]
         if name == "endif":
-            if asked := ifs.pop().asked:  # what a deck defines behind it was not asked for, either: no order matters
-                token, before, _ = self._not_defined[asked - 1]
-                self._not_defined[asked - 1] = token, before, directive
+            if question := ifs.pop().asked:  # what a deck defines behind it was not asked for, either: no order matters
+                token, before, _ = self._not_defined[question - 1]
+                self._not_defined[question - 1] = token, before, directive
             self._nothing_after(args, "#endif")
         elif opened.otherwise is not None:
             label = Label(opened.otherwise.place, "the `#else` is here")
@@ -490,11 +490,11 @@ class _Preprocessor(Macros):
         elif opened.outer and opened.active:
             opened.active = False
         elif opened.outer and not opened.done:
-            asked = _shown(directive)
-            if asked == "elif":
+            word = _shown(directive)
+            if word == "elif":
                 opened.active = opened.done = self._condition(directive, args)
             else:
-                opened.active = opened.done = self._known(asked, directive, args) == (asked == "elifdef")
+                opened.active = opened.done = self._known(word, directive, args) == (word == "elifdef")
             args[:] = [_constant(opened.active, directive)]
 
     def _known(self, name: str, directive: Token, args: list[Token]) -> bool:

@@ -36,7 +36,7 @@ from met import models
 from met.diagnostic import Label, Place, Problem, did_you_mean, error, leave_out, meant
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import Command, Quantity, SensorUse, ServoUse
+from met.plan import Command, SensorUse, ServoUse
 from met.plan.channel import COMMAND_UNIT
 from met.trace import Scalar, where
 from met.unit_parser import parse_unit
@@ -306,9 +306,9 @@ def check_rest(scope: Scope, use: Use) -> None:
         )
 
 
-def commands_of(scope: Scope) -> dict[str, dict[str, Quantity]]:
+def commands_of(scope: Scope) -> dict[str, dict[str, Settled]]:
     """The parameters of the commands of a run's joints: by joint, then by name."""
-    found: dict[str, dict[str, Quantity]] = {}
+    found: dict[str, dict[str, Settled]] = {}
     for path, quantity in scope.parameters.items():
         joint, of_command, name = path.partition(".servo.command.")
         if of_command:
@@ -316,7 +316,7 @@ def commands_of(scope: Scope) -> dict[str, dict[str, Quantity]]:
     return found
 
 
-def check_start(scope: Scope, use: Use, asked: Mapping[str, Quantity]) -> None:
+def check_start(scope: Scope, use: Use, asked: Mapping[str, Settled]) -> None:
     """Warn where a joint whose servo follows regardless of the arm does not begin at its command. asked: the command's
     parameters by name"""
     command = use.command
