@@ -42,6 +42,7 @@ def test_the_numbers_of_a_sweep(sweep: ArchiveFile) -> None:
     lines = show(sweep, width=100).splitlines()
     assert lines[0].startswith("a.h5  (") and lines[0].endswith("), from two_link.ic")
     assert lines[1 : lines.index("cases, worst first:") - 1] == [
+        "  -D: FAST=1",
         "",
         "gains  20 cases, 2 s, modified_euler at 25 Hz, recorded at 25 Hz, arm two_link, velocity products",
         "       off",
