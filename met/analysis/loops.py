@@ -81,6 +81,50 @@ def frame(
     A, n, cells = _over(found, lane, gains, direct, [law for law in found.laws if law.continuous])
     if all(law.divisor == found.divisor for law in laws):
         return _frame_of_a_step(found, A, n, cells, [(law, _rows(law, lane, gains, direct)) for law in laws])
+    whole = np.eye(2 * len(cells))
+    for matrix, _ in _phases(found, A, n, cells, lane, gains, direct):
+        whole = matrix @ whole
+    return whole
+
+
+def opened(
+    found: SampledLoops, lane: int | np.ndarray, joint: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The map of one frame, for a lane or several, opened where the law of a joint puts out, which has one output: A of
+    the frame's state, B of what is put in at each of its ticks in place of the output, C and D of what comes back at
+    each. All loops but this one are closed."""
+    laws = [law for law in found.laws if not law.continuous]
+    A, n, cells = _over(found, lane, None, False, [law for law in found.laws if law.continuous])
+    law = next(law for law in laws if law.joint == joint)
+    output = n + [found.held[cell - found.states] for cell in cells[n:].tolist()].index(law.memory[0])
+    ticks, size, tick, returns = _length(found) // law.divisor, 2 * len(cells), 0, list[np.ndarray]()
+    whole = np.broadcast_to(np.eye(size, size + ticks), (*A.shape[:-2], size, size + ticks)).copy()
+    for matrix, joints in _phases(found, A, n, cells, lane, None, False):
+        after = matrix @ whole
+        if joint in joints:
+            returns.append(after[..., output, :].copy())
+            after[..., output, :] = np.eye(size + ticks)[size + tick]
+            tick += 1
+        whole = after
+    back = np.stack(returns, axis=-2)
+    return whole[..., :size], whole[..., size:], back[..., :size], back[..., size:]
+
+
+def _phases(
+    found: SampledLoops,
+    A: np.ndarray,
+    n: int,
+    cells: np.ndarray,
+    lane: int | np.ndarray,
+    gains: Gains | None,
+    direct: bool,
+) -> Iterator[tuple[np.ndarray, tuple[str, ...]]]:
+    """What happens in a frame, one after the other: maps of state, memory, memory at the step's first tick, and the
+    state a step before, each with the joints whose laws tick in it.
+
+    A, n, cells  as of `_over`
+    """
+    laws = [law for law in found.laws if not law.continuous]
     p, m, held = found.positions, len(cells) - n, [found.held[cell - found.states] for cell in cells[n:].tolist()]
     h, d, hz, over = found.h, found.divisor, found.base_hz, A.shape[:-2]
     size = 2 * n + 2 * m
@@ -104,10 +148,9 @@ def frame(
     slopes = [_rows(law, lane, gains, direct)[..., cells] for law in laws]
     ticks: dict[tuple[float, tuple[bool, ...]], np.ndarray] = {}
     length = math.lcm(d, *(each.divisor for each in laws))
-    whole = unchanged()
     for k in sorted({k for each in (d, *(law.divisor for law in laws)) for k in range(0, length, each)}):
         if k % d == 0:
-            whole = step @ whole
+            yield step, ()
         since, due = (k % d) / hz, tuple(k % law.divisor == 0 for law in laws)
         if any(due):
             if (since, due) not in ticks:
@@ -117,10 +160,9 @@ def frame(
                     if ticking:
                         tick[..., at, :] = rows[..., :n] @ carried
                         tick[..., at, u] += rows[..., n:]
-            whole = ticks[since, due] @ whole
+            yield ticks[since, due], tuple(law.joint for law, ticking in zip(laws, due, strict=True) if ticking)
         if k % d == 0:
-            whole = latch @ whole
-    return whole
+            yield latch, ()
 
 
 def _frame_of_a_step(

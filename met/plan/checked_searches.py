@@ -23,6 +23,12 @@ def check_search(experiment: Experiment, search: Search, where: str) -> None:
     check_whole(search.drawn_with, 0, MOST_SEED, f"{where}.drawn_with")
     if not 0.0 <= search.margin < 1.0:
         raise Damaged(f"{where}.margin", "it should be at least 0 and below 1")
+    if not 0.0 <= search.least_margin < 2.0:
+        raise Damaged(f"{where}.least_margin", "it should be at least 0 and below 2")
+    if search.judged and not (search.kind == "tune" and search.complete):
+        raise Damaged(f"{where}.judged", "a tuning alone that has run has judged designs")
+    for index, design in enumerate(search.judged):
+        check_whole(design.case, 0, experiment.cases.count - 1, f"{where}.judged[{index}].case")
     check_whole(search.along_slopes, 0, search.at_most, f"{where}.along_slopes")
     if search.gradients and search.kind != "tune":
         raise Damaged(f"{where}.gradients", "a tuning alone goes by slopes")

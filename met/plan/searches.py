@@ -45,6 +45,52 @@ class SearchedParameter:
         return drawn_values(scale, (self.low, self.high), measure, points)
 
 
+LEAST_MARGIN, USUAL_MARGIN = 0.3, 0.67
+"""Disk margins: below the first (a gain of 1.35, or 17 deg) a design is not advised, where a deck says nothing else;
+below the second (6 dB, 37 deg) it is less than usual."""
+
+
+@frozen
+class LeastMargins:
+    """The least stability margins of an experiment's servo loops over some of its cases, at poses that these pass.
+
+    disk    alpha of a balanced disk (docs/linear.md); 0 where a loop is unstable. A gain margin g of all loops at once
+            counts as the disk that allows it, 2 (g - 1)/(g + 1)
+    gain    factor by which a loop's gain may rise or fall, or that of all at once;  delay: s by which a law's output
+            may come later; infinite where nothing limits it, not-a-number where a law ticks several times in a frame
+    joints  of the loop with the least disk, or of all of them;  case: row of the case table, and time: s, at which it
+            is so
+    loops, cases, poses  how many were looked at
+    """
+
+    disk: float
+    gain: float
+    delay: float
+    joints: tuple[str, ...]
+    case: int
+    time: float
+    loops: int
+    cases: int
+    poses: int
+
+
+@frozen
+class JudgedDesign:
+    """The stability of a candidate of a tuning.
+
+    case     row of the case table, of the first of its cases
+    margins  None where there are none, for the reason `why_not`, in words
+    """
+
+    case: int
+    margins: LeastMargins | None
+    why_not: str = ""
+
+    def keeps(self, least_margin: float) -> bool:
+        """True where the design keeps a least disk margin, or has none that could be judged."""
+        return self.margins is None or self.margins.disk >= least_margin
+
+
 @frozen
 class Search:
     """A search or a tuning: its goal, and the bounds of the chosen parameters.
@@ -59,9 +105,13 @@ class Search:
     margin       share of its limit by which a tuning would stay inside each requirement, and of its goal what it would
                  pay for that
     gradients    whether a tuning takes steps along slopes of its metrics, where they have any
+    least_margin  disk margin below which a design is not advised; 0: none is asked for;  steers: whether it is also
+                  required of the candidates, by the poses in which their cases begin
     generations  numbers of cases that each generation added to the case table; none before it has run
     along_slopes  how many of its cases were tried along slopes, and `without_slopes`: why there were none where there
                  were none last, in words, empty where there were; as found when it has run
+    judged       the designs whose stability was judged when it had run, the best by its goal first, until one keeps the
+                 least margin; none of a search, or of one that was run before MET judged it
     """
 
     kind: Literal["search", "tune"]
@@ -79,12 +129,19 @@ class Search:
     gradients: bool = False
     along_slopes: int = 0
     without_slopes: str = ""
+    least_margin: float = LEAST_MARGIN
+    steers: bool = False
+    judged: tuple[JudgedDesign, ...] = ()
     place: Place | None = None
 
     @property
     def complete(self) -> bool:
         """True where the case table holds all of its cases, and not only its first generation."""
         return bool(self.generations)
+
+    def advises(self, design: JudgedDesign) -> bool:
+        """True where a judged design keeps the least margin, or has none that could be judged."""
+        return design.keeps(self.least_margin)
 
     @property
     def goal(self) -> str:
