@@ -94,7 +94,7 @@ def _fitting(experiment: Experiment, loop: Unstable) -> str:
         for path in (f"{joint}.servo.{name}" for name in ("kp", "ki"))
         if path in experiment.parameters and len(loop.joints) == 1
     ]
-    fits = f"stable {'up to' if share < 1.0 else 'from'} {share:.2g} times the gain"
+    fits = f"stable {'up to' if share < 1.0 else 'from'} {_inside(share, share, 2)} times the gain"
     return f"{fits}: {', '.join(gains)}" if gains else fits
 
 
@@ -106,7 +106,17 @@ def _bound(experiment: Experiment, case: int, path: str, share: float) -> str:
 def _value_of(experiment: Experiment, case: int, path: str, share: float) -> str:
     """A share of a parameter's value in a case, in a deck's notation."""
     value, parameter = float(_value(experiment, path, case)) * share, experiment.parameters[path]
-    return f"{path.rpartition('.')[2]} = {value:.3g} {parameter.unit}"
+    return f"{path.rpartition('.')[2]} = {_inside(value, share, 3)} {parameter.unit}"
+
+
+def _inside(bound: float, share: float, digits: int) -> str:
+    """A bound in a few digits, rounded to the side on which the finding holds: down where the share is below 1, else
+    up, in size."""
+    if not bound or not math.isfinite(bound):
+        return f"{bound:g}"
+    step = 10.0 ** (math.floor(math.log10(abs(bound))) + 1 - digits)
+    whole = (math.floor if share < 1.0 else math.ceil)(abs(bound) / step)
+    return f"{math.copysign(whole * step, bound):.{digits}g}"
 
 
 def _gain_places(experiment: Experiment, loop: Unstable) -> Iterator[Label]:
