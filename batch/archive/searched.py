@@ -6,6 +6,9 @@
     search_against     the sweep that a tuning is held against;  search_plants: how many cases that has;
                        search_drawn_with: the seed of what it draws
     search_margin      share of its limit by which a tuning would stay inside each requirement
+    search_least_margin    disk margin below which a tuning does not advise a design;  search_steers: 1 where it was
+                           also steered by that, else 0
+    search_judged  the designs whose stability was judged, as JSON: the fields of `met.plan.searches.JudgedDesign`
     search_along_slopes    of a tuning that goes by slopes: how many of its cases were tried along them
     search_without_slopes  of such a one: why its metrics had none where they had none last; empty where they had
 
@@ -15,6 +18,7 @@ A coordinate that is chosen has its ends in SI, `low` and `high`, and `steps`, `
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -22,12 +26,14 @@ from typing import Any
 import numpy as np
 
 from batch.archive.stored import Stored, StoredGroup
-from met.plan.searches import MOST_PLANTS, MOST_SEARCHED, SHORTEST, Search, SearchedParameter
+from met.plan.codec import Damaged, decode, encode
+from met.plan.searches import MOST_PLANTS, MOST_SEARCHED, SHORTEST, JudgedDesign, Search, SearchedParameter
 
 GENERATION = "generation"
 """The variable that says which generation asked for each case."""
 
-WORDS = ("search", "search_of", "search_goal", "search_against", "search_without_slopes")
+WORDS = ("search", "search_of", "search_goal", "search_against", "search_without_slopes", "search_judged")
+Judged = tuple[JudgedDesign, ...]
 GOALS = {"maximise": True, "minimise": False}
 STEPS = {"equal": False, "ratios": True}
 
@@ -42,7 +48,10 @@ def attributes(search: Search, metric: str) -> dict[str, Any]:
         "search_seed": search.seed,
     }
     if search.kind == "tune":
-        told["search_margin"] = search.margin
+        told |= {"search_margin": search.margin, "search_least_margin": search.least_margin}
+        told["search_steers"] = int(search.steers)
+        if search.judged:
+            told["search_judged"] = json.dumps(encode(Judged, search.judged))
         if search.gradients:
             told |= {"search_along_slopes": search.along_slopes, "search_without_slopes": search.without_slopes}
     if search.against:
@@ -79,6 +88,7 @@ def why_unsound(group: StoredGroup) -> str:
         ("search_seed", 0, 1 << 53),
         ("search_drawn_with", 0, 1 << 53),
         ("search_along_slopes", 0, MOST_SEARCHED),
+        ("search_steers", 0, 1),
     ):
         value = told.get(name, 1 if name != "search_at_most" else None)
         if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
@@ -88,6 +98,15 @@ def why_unsound(group: StoredGroup) -> str:
     margin = told.get("search_margin", 0.0)
     if not isinstance(margin, float) or not 0.0 <= margin < 1.0:
         return "attribute `search_margin` is no share"
+    least_margin = told.get("search_least_margin", 0.0)
+    if not isinstance(least_margin, float) or not 0.0 <= least_margin < 2.0:
+        return "attribute `search_least_margin` is no disk margin"
+    try:
+        wrong = any(not 0 <= each.case < told["cases_in_table"] for each in _judged(told))
+    except (ValueError, RecursionError, Damaged):
+        wrong = True
+    if wrong:
+        return "attribute `search_judged` is no list of judged designs"
     coordinates = list(group.role("coordinate"))
     chosen = [each for each in coordinates if "low" in each.attributes]
     if not chosen or not all(map(_is_range, chosen)) or coordinates[: len(chosen)] != chosen:
@@ -103,12 +122,21 @@ def why_unsound(group: StoredGroup) -> str:
     )
 
 
+def _judged(attributes: Mapping[str, Any]) -> Judged:
+    """The designs whose stability was judged; raises ValueError, RecursionError or Damaged for a text that is none of
+    them."""
+    text = attributes.get("search_judged", "")
+    found: Judged = decode(Judged, json.loads(text), "") if text else ()
+    return found
+
+
 def _why_not_against(told: Mapping[str, Any], *, more: int) -> str:
     """The reason why a search cannot be judged against the stored plants. more: coordinates that are not chosen"""
     against, plants, tunes = told.get("search_against", ""), told.get("search_plants", 0), told["search"] == "tune"
     if not bool(against) == bool(plants) == (more > 0):
         return "attribute `search_plants` is not of its coordinates"
-    if not tunes and (plants or told.get("search_margin", 0.0) or "search_along_slopes" in told):
+    of_tunings = ("search_along_slopes", "search_least_margin", "search_steers", "search_judged")
+    if not tunes and (plants or told.get("search_margin", 0.0) or not told.keys().isdisjoint(of_tunings)):
         return "a tuning alone is held against something"
     least = max(plants + SHORTEST if tunes else 1, told["cases_in_table"])
     return "" if told["search_at_most"] >= least else "attribute `search_at_most` is less than its cases"
@@ -178,6 +206,9 @@ def search_of(group: StoredGroup) -> Search | None:
         plants=((),) * int(told.get("search_plants", 0)),
         drawn_with=told.get("search_drawn_with", 0),
         margin=told.get("search_margin", 0.0),
+        least_margin=told.get("search_least_margin", 0.0),
+        steers=told.get("search_steers", 0) == 1,
+        judged=_judged(told),
         gradients="search_along_slopes" in told,
         along_slopes=told.get("search_along_slopes", 0),
         without_slopes=told.get("search_without_slopes", ""),

@@ -6,6 +6,7 @@ finds them done, and goes on to the same bits and the same answer; it does not m
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,18 +14,21 @@ import numpy as np
 from batch.campaigns import shard
 from batch.campaigns.drive import Count, Driver, Stopped
 from batch.campaigns.folder import uncovered
+from batch.campaigns.judging import judged_designs
 from batch.campaigns.points import grown, write_points
 from batch.campaigns.slopes import TuningSlopes
 from batch.campaigns.tasks import CampaignSection, Task
 from batch.queries.search_answers import progress
 from met import run as engine
+from met.analysis.stability import margins_at_start
 from met.diagnostic import Problem, error
+from met.frozen import frozen
 from met.plan import Experiment
 from met.plan.searches import Search
 from met.run import DONE, Run
 from met.searches import search_method, steps_of
-from met.searches.answer import Answer, answer
-from met.searches.values import hurt, served
+from met.searches.answer import Answer, answer, designs_that_stand
+from met.searches.values import MET, MetricLimit, hurt, served
 
 READS = 2
 """Number of tries to read back results that were just computed."""
@@ -39,6 +43,23 @@ def check_first_generation(experiment: Experiment) -> None:
         message = f"the cases of `{experiment.name}` in this plan are not those that it begins with"
         helps = "they were changed, or are of another version of MET: make the plan again from its deck"
         raise Problem(error("E302", message, help=helps))
+
+
+DISK = "stability:disk"
+"""The name, among metrics, of the disk margin by which a tuning is steered: no metric of a deck has it."""
+
+
+AIM = 1.02
+"""Share of the least margin at which a tuning aims: it looks at some frequencies, and where cases begin."""
+
+
+@frozen
+class _LeastDisk:
+    """The requirement of a least disk margin, as `met.searches.values` takes one."""
+
+    limit: float
+    metric: str = DISK
+    comparison: str = ">="
 
 
 class CampaignSearch:
@@ -88,7 +109,10 @@ class CampaignSearch:
         done = run.status == DONE
         goal = run.metrics[self.search.metric]
         if self.search.kind == "tune":
-            worth = served(goal, self.search.largest, done, self._requirements, run.metrics, self.search.margin)
+            worth = self._served(run, done, self._requirements, run.metrics)
+            if self.search.steers and (worth < MET).any():
+                limits: list[MetricLimit] = [*self._requirements, _LeastDisk(AIM * self.search.least_margin)]
+                worth = self._served(run, done, limits, {**run.metrics, DISK: self._disks(run, worth < MET)})
         else:
             worth = hurt(goal, self.search.largest, done)
         self._done.append(done)
@@ -96,6 +120,21 @@ class CampaignSearch:
             self._metrics.setdefault(name, []).append(values)
         self.worth = np.concatenate([self.worth, worth])
         self._method.tell(worth)
+
+    def _served(
+        self, run: Run, done: np.ndarray, limits: Sequence[MetricLimit], metrics: Mapping[str, np.ndarray]
+    ) -> np.ndarray:
+        return served(run.metrics[self.search.metric], self.search.largest, done, limits, metrics, self.search.margin)
+
+    def _disks(self, run: Run, wanted: np.ndarray) -> np.ndarray:
+        """The least disk margin of the loops of these cases where they begin, [case]; infinite where there is none, and
+        where it is not wanted."""
+        disks = np.full(len(run.case), np.inf)
+        rows, least = run.case[wanted].tolist(), AIM * self.search.least_margin
+        found = margins_at_start(self.section.prepared.experiment, rows, least)
+        if found is not None:
+            disks[wanted] = found
+        return disks
 
     @property
     def answer(self) -> Answer:
@@ -107,6 +146,9 @@ class CampaignSearch:
     def _complete(self) -> None:
         prepared = self.section.prepared
         search = replace(self.search, generations=tuple(self._generations), **steps_of(self._method))
+        if search.kind == "tune" and search.least_margin:
+            designs = designs_that_stand(search, self._table, self.worth)
+            search = replace(search, judged=judged_designs(prepared, search, designs))
         experiment = replace(prepared.experiment, search=search)
         self.section = replace(self.section, prepared=prepared.of_cases(experiment))
 

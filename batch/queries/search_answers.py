@@ -16,6 +16,7 @@ from batch.archive.read import ArchiveGroup
 from batch.archive.searched import search_of
 from batch.queries.requirements import GroupRequirement, group_requirements, outcomes
 from batch.queries.signals import number_text, pretty_unit
+from batch.queries.stability_words import KEPT, WIDTH, margin_words, stability_data, stability_texts, wrapped
 from ic.driver.written_value import WrittenValue
 from met.plan import Experiment
 from met.plan.outputs import metric_units
@@ -25,12 +26,6 @@ from met.searches.answer import Answer, answer
 
 OVER_CASES = re.compile(r" in [^<>]* of cases\b[^<>]*$")
 """The words by which a requirement is one over a share of cases."""
-
-WIDTH = 100
-"""Largest length of a line in characters."""
-
-KEPT = "\N{NO-BREAK SPACE}"
-"""A space at which no line is broken."""
 
 NEAREST = 1
 """Number of requirements that are named as nearest to their limits."""
@@ -118,10 +113,14 @@ class SearchAnswer:
 
     def value(self, found: Answer | None = None) -> str:
         """The goal's value in the deck's unit, of the best, or of an earlier best."""
+        return self.goal((found or self.found).value)
+
+    def goal(self, value: float) -> str:
+        """A value of the goal, SI, in the deck's unit."""
         variable = next(each for each in self.group.role("metric") if each.path == self.search.metric)
         scale = float(variable.attributes.get("deck_scale", 1.0))
         unit = str(variable.attributes.get("deck_unit", variable.unit))
-        return goal_text((found or self.found).value, unit, scale)
+        return goal_text(value, unit, scale)
 
     def lines(self) -> list[str]:
         """The answer in lines, without the commands for further steps."""
@@ -141,8 +140,7 @@ class SearchAnswer:
         count, why_not = search.along_slopes, search.without_slopes
         out = [f"  {count:,} of them along exact slopes of the metrics"] if count else []
         if why_not and search.gradients:
-            out += textwrap.wrap(f"no slopes {'at some candidates' if count else 'to go by'}: {why_not}", WIDTH,
-                                 initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)  # fmt: skip
+            out += wrapped(f"no slopes {'at some candidates' if count else 'to go by'}: {why_not}")
         return out
 
     def _border(self) -> list[str]:
@@ -154,12 +152,7 @@ class SearchAnswer:
         values = ", ".join(f"{each.path} = {each.text}".replace(" ", KEPT) for each in self.values(miss.case))
         misses = f"misses {miss.text}" if miss.text else "fails"
         text = f"nearest tried that {misses}: {100.0 * miss.distance:.2g} % of a range away, case #{case} with {values}"
-        return [
-            line.replace(KEPT, " ")
-            for line in textwrap.wrap(
-                text, WIDTH, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False
-            )
-        ]
+        return wrapped(text)
 
     @property
     def _cases(self) -> str:
@@ -185,18 +178,39 @@ class SearchAnswer:
     def _tuned(self) -> list[str]:
         found, search = self.found, self.search
         none = f"none of the {self._tried} is found to meet all that is required; nearest: {self._chosen}"
-        out = [f"use {self._chosen}" if found.serves else none]
+        out = [f"use {self._chosen}" if found.serves else f"not advised: {self._chosen}" if found.stands else none]
         if found.failed:
             out += [f"  case #{self.position} of it fails; {self._cases}", *self._cause]
         else:
             among = f" in the worst of {found.tried} cases of {search.against}" if found.all > 1 else ""
             out.append(f"  {search.metric} is {self.value()}{among}; {self._cases}")
-        if found.confirmed and not found.serves and search.at_most - self.group.count < SHORTEST * found.all:
+        if found.confirmed and not found.stands and search.at_most - self.group.count < SHORTEST * found.all:
             out.append(f"  its cases are spent, of {search.at_most:,} at most; a larger `at_most` goes on")
         if not found.confirmed:
             out[0] = f"not tried with all that it must bear: {self._chosen}"
             out.append(
                 f"  {found.tried} of {found.all} cases of {search.against} were run of it; a larger `at_most` goes on"
+            )
+        return [*out, *(self._stability() if found.stands else [])]
+
+    def _stability(self) -> list[str]:
+        """Lines about the stability of the design, and of a better one that was left for it."""
+        found, search = self.found, self.search
+        if "search_least_margin" not in self.group.attributes:
+            return ["  stability not judged: this archive was made before MET judged it; run it again"]
+        out = wrapped(*stability_texts(found.stability, search.least_margin))
+        if not found.serves:
+            tried = f"none of the {len(search.judged)} designs that were judged" if search.judged[1:] else "it does not"
+            out += wrapped(f"{tried} {'keeps' if search.judged[1:] else 'keep'} the least margin of "
+                           f"{search.least_margin:g}" + ("" if search.steers else "; with `least_margin = "
+                           f"{search.least_margin:g};` in the tuning it looks for one that does"))  # fmt: skip
+        left = found.left
+        if left is not None and left.margins is not None:
+            place = int(np.flatnonzero(self.group.values("case") == left.case)[0])
+            values = ", ".join(f"{each.path} = {each.text}".replace(" ", KEPT) for each in self.values(place))
+            value = self.goal(found.left_value)
+            out += wrapped(
+                f"{search.metric} is {value} with {values}, which is not advised: {margin_words(left.margins)}"
             )
         return out
 
@@ -227,6 +241,9 @@ class SearchAnswer:
             "tried": found.tried,
             "against": found.all,
             "serves": found.serves,
+            "stability": stability_data(found.stability),
+            "stability_not_judged": found.stability.why_not or None if found.stability is not None else None,
+            "least_margin": self.search.least_margin if self.search.kind == "tune" else None,
             "missed": list(found.missed),
             "nearest": [{"requirement": room.text, "inside": room.share} for room in found.rooms],
             "at_ends": [{"path": path, "end": end} for path, end in found.ends],

@@ -10,6 +10,7 @@ from met.metrics import METRICS
 from met.models import Model
 from met.parameter import Parameter
 from met.plan import BALANCED, VELOCITY_PRODUCTS
+from met.plan.searches import LEAST_MARGIN
 from met.substitution import bed_scale
 
 DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
@@ -23,6 +24,13 @@ MARGIN = Parameter(
     at_least=0.0,
     at_most=1.0,
     doc="distance to each limit below which the goal is penalised, as a share of the limit",
+)
+LEAST_MARGIN_OF_TUNE = Parameter(
+    name="least_margin",
+    default=LEAST_MARGIN,
+    at_least=0.0,
+    at_most=2.0,
+    doc="disk margin of the servo loops below which a design is not advised; 0: stability is not judged",
 )
 BASE_KINDS = ("fixed", "prescribed", "free")
 SCALE_OF_INERTIA = Parameter(
@@ -320,6 +328,9 @@ TUNE = BlockDeclaration(
         Entry(name="margin", written="margin = 5 %;", default="5 %", parameter=MARGIN,
               doc="distance to each limit, as a share of the limit, below which the goal counts as worse: at the "
                   "limit by the same share of the goal"),
+        Entry(name="least_margin", written="least_margin = 0.5;", default="0.3", parameter=LEAST_MARGIN_OF_TUNE,
+              doc="disk margin of the servo loops below which a design is not advised: 0.3 is 1.35 times the gain, "
+                  "0.67 twice; a written one also steers the tuning; `0`: stability is not judged"),
         Entry(name="gradients", written="gradients = off;", default="`on`",
               doc="`on`: the tuning also takes steps along exact gradients of the metrics; `off`: it takes none",
               parameter=Parameter(name="gradients", shape="word", words=("on", "off"), default="on",

@@ -32,7 +32,7 @@ from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan.columns import AxisColumn, CaseValues
 from met.plan.judged import MetricUse, Requirement
-from met.plan.searches import MOST_PLANTS, MOST_SEARCHED, SHORTEST, Search, SearchedParameter
+from met.plan.searches import LEAST_MARGIN, MOST_PLANTS, MOST_SEARCHED, SHORTEST, Search, SearchedParameter
 from met.plan.swept import SweptRows
 from met.trace import Graph, Scalar
 
@@ -103,6 +103,8 @@ def read_search(
         plants=plants,
         drawn_with=0 if against is None else noise_seed if against.seed is None else against.seed,
         margin=reader.margin,
+        least_margin=reader.least_margin,
+        steers="least_margin" in reader.written and reader.least_margin > 0.0,
         gradients=reader.gradients,
         place=reader.goal_place,
     )
@@ -132,6 +134,10 @@ def read_search(
     return Sweep(definition.name, (axis,), (), None, None, 1, None, definition.place, search, drawn)
 
 
+MARGINS = ("margin", "least_margin")
+"""Keys of a tuning's numbers."""
+
+
 class _SearchReader:
     """Reader of the block of a search or a tuning, entry after entry."""
 
@@ -142,10 +148,11 @@ class _SearchReader:
         self.metric, self.largest = "", False
         self.at_most = self.seed = 0
         self.margin = float(MARGIN.default) if self.tunes and isinstance(MARGIN.default, float) else 0.0
+        self.least_margin = LEAST_MARGIN
         self.against: Name | None = None
         self.gradients = self.tunes
         self.goal_place = self.at_most_place = definition.place
-        self._written: dict[str, Place] = {}
+        self.written: dict[str, Place] = {}
         entries = [entry for entry in definition.group.body if isinstance(entry, Setting)]
         self._paths = {_path(entry): path_place(entry) for entry in entries}
 
@@ -158,7 +165,7 @@ class _SearchReader:
         """Read one entry. Raises Problem."""
         words = [word.text for word in getattr(entry, "words", ())]
         match entry:
-            case Setting() if not words and _path(entry) in ("at_most", "seed", *(["margin"] * self.tunes)):
+            case Setting() if not words and _path(entry) in ("at_most", "seed", *(MARGINS * self.tunes)):
                 self._number(entry, _path(entry))
             case Setting() if not words and _path(entry) == GRADIENTS and self.tunes:
                 self._once(GRADIENTS, path_place(entry))
@@ -187,12 +194,12 @@ class _SearchReader:
     def check(self, failed: bool) -> None:
         """Report missing entries. failed: True where the block had a mistake, which may be the cause"""
         name = self.definition.name
-        if not any(goal in self._written for goal in GOALS) and not failed:
+        if not any(goal in self.written for goal in GOALS) and not failed:
             usage = "minimise METRIC;" if self.tunes else "maximise METRIC;"
             self.complaints.error(
                 "D362", f"{self.definition.kind} `{name}` has no goal", self.definition.place, help=f"write `{usage}`"
             )
-        if "at_most" not in self._written and not failed:
+        if "at_most" not in self.written and not failed:
             self.complaints.error(
                 "D363",
                 f"{self.definition.kind} `{name}` does not say how many cases it may run",
@@ -206,12 +213,12 @@ class _SearchReader:
             )  # fmt: skip
 
     def _once(self, key: str, place: Place) -> None:
-        if key in self._written:
+        if key in self.written:
             raise Problem(
-                error("D040", f"`{key}` is written twice", place, also=[Label(self._written[key], "first")],
+                error("D040", f"`{key}` is written twice", place, also=[Label(self.written[key], "first")],
                       help="leave one out")
             )  # fmt: skip
-        self._written[key] = place
+        self.written[key] = place
 
     def _number(self, entry: Setting, key: str) -> None:
         self._once(key, path_place(entry))
@@ -227,33 +234,40 @@ class _SearchReader:
                 raise Problem(error("D363", message, found.place, help="write `margin = 5 %;`"))
             self.margin = float(number)
             return
+        if key == "least_margin":
+            if not plain or not 0.0 <= float(number) < 2.0:
+                message = "a least margin is a disk margin, from 0 to less than 2"
+                helps = ["write `least_margin = 0.5;`: 0.3 is a gain of 1.35 times, 0.67 of 2 times", "0 asks for none"]
+                raise Problem(error("D363", message, found.place, help=helps))
+            self.least_margin = float(number)
+            return
         if not plain or not float(number).is_integer() or not 1 <= float(number) <= MOST_SEARCHED:
             message = f"`at_most` is a whole number of cases from 1 to {MOST_SEARCHED:,}"
             raise Problem(error("D363", message, found.place, help="write `at_most = 2000;`"))
         self.at_most, self.at_most_place = int(number), found.place
 
     def _goal(self, entry: Statement, word: str) -> None:
-        other = next((each for each in GOALS if each in self._written), None)
+        other = next((each for each in GOALS if each in self.written), None)
         if other is not None:
             helps = ["leave one out", "what else matters is required in the run: `require METRIC < LIMIT;`"]
             raise Problem(
                 error("D362", f"`{self.definition.name}` has two goals", entry.place,
-                      also=[Label(self._written[other], "first")], help=helps)
+                      also=[Label(self.written[other], "first")], help=helps)
             )  # fmt: skip
         if not isinstance(entry.value, Name) or len(entry.value.path) > 1:
             helps = [f"write `{word} METRIC;`", "what is computed of several signals is a metric of an expression"]
             raise Problem(error("D362", f"`{word}` takes the name of a metric", place_of(entry.value), help=helps))
-        self._written[word] = entry.place
+        self.written[word] = entry.place
         self.metric, self.largest, self.goal_place = entry.value.text, GOALS[word], place_of(entry.value)
 
     def _choose(self, entry: Setting) -> None:
         path = _path(entry)
-        if path in self._written:
+        if path in self.written:
             raise Problem(
                 error("D040", f"`{path}` is chosen twice", path_place(entry),
-                      also=[Label(self._written[path], "first")], help="leave one out")
+                      also=[Label(self.written[path], "first")], help="leave one out")
             )  # fmt: skip
-        self._written[path] = path_place(entry)
+        self.written[path] = path_place(entry)
         if entry.operator == "+=":
             raise Problem(error("D056", f"nothing to append to in a {self.definition.kind}", path_place(entry),
                                 help="write `=`"))  # fmt: skip

@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from met.frozen import frozen
-from met.plan.searches import Search, SearchedParameter
-from met.searches.values import MetricLimit, hurt, served
+from met.plan.searches import JudgedDesign, Search, SearchedParameter
+from met.searches.values import MET, MetricLimit, hurt, served
 
 
 class NamedLimit(MetricLimit, Protocol):
@@ -51,6 +51,9 @@ class Answer:
     missed   texts of the requirements that are missed in any of its cases
     rooms    how far it is inside each limit in its worst case, the nearest first; those without a value are not there
     ends     paths of what is chosen that stand at an end of their range, with `lower` or `upper`
+    stability  of a tuning: what was judged of the candidate; None where nothing was
+    left     the candidate that is better by the goal, and is not advised for its stability; None where there is none;
+             left_value: of the goal in its worst case, SI
     miss     of a tuning: the nearest candidate that misses a requirement; None where none that was tried does
     """
 
@@ -65,6 +68,9 @@ class Answer:
     rooms: tuple[Room, ...]
     ends: tuple[tuple[str, str], ...]
     miss: NearestMiss | None
+    stability: JudgedDesign | None = None
+    left: JudgedDesign | None = None
+    left_value: float = float("nan")
 
     @property
     def confirmed(self) -> bool:
@@ -74,6 +80,11 @@ class Answer:
     @property
     def serves(self) -> bool:
         """True if a candidate meets all requirements with all plants; for a search, if even the worst case does."""
+        return self.stands and (self.stability is None or self.search.advises(self.stability))
+
+    @property
+    def stands(self) -> bool:
+        """True if a candidate meets all requirements with all plants, whatever its stability."""
         return self.confirmed and not self.failed and not self.missed and self.value == self.value
 
 
@@ -86,7 +97,7 @@ def answer(
 ) -> Answer:
     """The best of these cases. table: their coordinates, [case, coordinate], SI, chosen parameters first; done: which
     of them reached their end; metrics: by name, SI."""
-    goal, count = metrics[search.metric], len(search.parameters)
+    goal, count, left_value = metrics[search.metric], len(search.parameters), float("nan")
     every = max(1, len(search.plants))
     if search.kind == "tune":
         worth = served(goal, search.largest, done, requirements, metrics, search.margin)
@@ -96,9 +107,18 @@ def answer(
         worst = np.full(len(first), -np.inf)
         np.maximum.at(worst, of_case, worth)
         order = np.lexsort((first, worst, -tried))
-        cases = np.flatnonzero(of_case == order[0])
+        judged = [each for each in search.judged if each.case < len(table)]
+        kept = next((each for each in judged if search.advises(each)), None)
+        stability = kept or next(iter(judged), None)
+        best = order[0] if stability is None else of_case[stability.case]
+        left = judged[0] if kept is not None and kept is not judged[0] else None
+        cases = np.flatnonzero(of_case == best)
+        if left is not None:
+            of_left = np.flatnonzero(of_case == of_case[left.case])
+            left_value = float(goal[of_left[np.argmax(worth[of_left])]])
         case = int(cases[np.argmax(worth[cases])])
     else:
+        stability = left = None
         worth = hurt(goal, search.largest, done)
         case = int(np.argmin(worth))
         cases, every = np.array([case]), 1
@@ -116,7 +136,23 @@ def answer(
         tuple(sorted((room for room in rooms if room.share == room.share), key=lambda room: room.share)),
         tuple(_ends(search, table[case])),
         _nearest_miss(search, table, case, done, metrics, requirements) if search.kind == "tune" else None,
+        stability,
+        left,
+        left_value,
     )
+
+
+def designs_that_stand(search: Search, table: np.ndarray, worth: np.ndarray) -> list[np.ndarray]:
+    """The candidates of a tuning that meet all requirements with all plants, the best by the goal first: the places of
+    each one's cases, its worst first. table: as of `answer`; worth: of the cases, as the tuning took it"""
+    _, first, of_case = np.unique(table[:, : len(search.parameters)], axis=0, return_index=True, return_inverse=True)
+    of_case = of_case.ravel()
+    worst = np.full(len(first), -np.inf)
+    np.maximum.at(worst, of_case, worth)
+    whole = (np.bincount(of_case) == max(1, len(search.plants))) & (worst < MET)
+    order = [number for number in np.lexsort((first, worst)).tolist() if whole[number]]
+    places = [np.flatnonzero(of_case == number) for number in order]
+    return [cases[np.argsort(-worth[cases], kind="stable")] for cases in places]
 
 
 def _nearest_miss(

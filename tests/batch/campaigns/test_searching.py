@@ -337,7 +337,8 @@ def test_generations_stand_beside_the_cases(place: Path) -> None:
     assert {name: value for name, value in data["still"].attrs.items() if name.startswith("search")} == {
         "search": "tune", "search_of": "swing", "search_goal": "minimise off", "search_at_most": TUNED,
         "search_seed": 0, "search_margin": 0.05, "search_against": "loads", "search_plants": 5, "search_drawn_with": 0,
-        "search_along_slopes": 34, "search_without_slopes": "",
+        "search_along_slopes": 34, "search_without_slopes": "", "search_least_margin": 0.3, "search_steers": 0,
+        "search_judged": '[{"case": 121, "margins": null, "why_not": "no law closes a loop over the arm"}]',
     }  # fmt: skip
     assert "search_along_slopes" not in data["back"].attrs
     chosen = data["back"]["environment.held.stiffness"].attrs
@@ -511,6 +512,8 @@ def test_results_that_cannot_be_read_back_stop_it(here: Path, plan: Plan, monkey
     [
         ("search", "guess"), ("search_goal", "minimise nothing"), ("search_goal", "far"), ("search_at_most", 0),
         ("search_at_most", "many"), ("search_plants", -1), ("search_margin", 1.5), ("search_seed", -1),
+        ("search_least_margin", 2.0), ("search_judged", "["), ("search_judged", '[{"case": 9999, "margins": null}]'),
+        ("search_judged", '[{"case": 0, "margins": 7}]'), ("search_judged", "[" * 100_000),
         ("search_at_most", 20), ("search_plants", 4), ("search_plants", 10_000), ("search_against", ""),
         ("search", "search"),
     ],

@@ -1,0 +1,86 @@
+"""The stability of a tuning's design in words, and for programs."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from typing import Any
+
+from batch.queries.signals import number_text
+from met.plan.searches import USUAL_MARGIN, JudgedDesign, LeastMargins
+
+WIDTH = 100
+"""Largest length of a line in characters."""
+
+KEPT = "\N{NO-BREAK SPACE}"
+"""A space at which no line is broken."""
+
+
+def wrapped(*texts: str) -> list[str]:
+    """Indented texts of an answer in lines, of which the first of each is indented less."""
+    lines = []
+    for text in texts:
+        lines += textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
+    return [line.replace(KEPT, " ") for line in lines]
+
+
+def stability_texts(design: JudgedDesign | None, least_margin: float) -> list[str]:
+    """What is said of the stability of a design that was chosen with a least disk margin, a text for each thing."""
+    if not least_margin:
+        return ["stability not judged: the least margin that is asked for is 0"]
+    if design is None:
+        return []
+    if design.margins is None:
+        return [f"stability not judged: {design.why_not}"]
+    margins = design.margins
+    looked_at = f"{_count(margins.loops, 'loop')} in {_count(margins.cases, 'case')} at {_count(margins.poses, 'pose')}"
+    out = [f"stability: {margin_words(margins)}, the least of {looked_at}, dry friction released"]
+    if least_margin <= margins.disk < USUAL_MARGIN:
+        out.append(f"less than usual, which is a disk margin of {USUAL_MARGIN}: {_allowance(USUAL_MARGIN)}")
+    return out
+
+
+def margin_words(margins: LeastMargins) -> str:
+    """The least margins, and where they are so."""
+    if not margins.disk:
+        return f"{_loops(margins)} unstable in case #{margins.case} at {margins.time:.4g} s"
+    words = [f"disk margin {margins.disk:.3g}, {_allowance(margins.disk)}"]
+    if math.isfinite(margins.delay):
+        words.append(f"a delay of {number_text(1e3 * margins.delay)} ms")
+    where = f"{_loops(margins)} in case #{margins.case} at {margins.time:.4g} s"
+    return f"{'; '.join(words)}: {where}"
+
+
+def _loops(margins: LeastMargins) -> str:
+    if len(margins.joints) == 1:
+        return f"the loop of joint `{margins.joints[0]}`"
+    return "the loops of all joints at once"
+
+
+def _allowance(disk: float) -> str:
+    """What a disk margin allows: a factor on the gain, and an angle of phase."""
+    half = 0.5 * disk
+    gain = f"{(1.0 + half) / (1.0 - half):.4g} times the gain" if half < 1.0 else "any gain"
+    return f"{gain} or {math.degrees(2.0 * math.atan(half)):.3g} deg"
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number:,} {word}{'s' * (number != 1)}"
+
+
+def stability_data(design: JudgedDesign | None) -> dict[str, Any] | None:
+    """The stability of a design for programs, SI; None where it was not judged."""
+    if design is None or design.margins is None:
+        return None
+    margins = design.margins
+    return {
+        "disk": margins.disk,
+        "gain": margins.gain,
+        "delay": margins.delay,
+        "joints": list(margins.joints),
+        "case": margins.case,
+        "time": margins.time,
+        "loops": margins.loops,
+        "cases": margins.cases,
+        "poses": margins.poses,
+    }
