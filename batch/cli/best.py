@@ -10,6 +10,7 @@ import click
 from met.cli import NO, YES, format_option
 from met.host.streams import kept
 from met.messages.visible import line, say
+from met.plan.searches import LEAST_MARGIN
 
 if TYPE_CHECKING:
     from batch.terminal.chosen_deck import ChosenDeck
@@ -41,6 +42,14 @@ if TYPE_CHECKING:
 @click.option(
     "--front", multiple=True, metavar="METRIC", help="Also show the trade-off between two such metrics: name each."
 )
+@click.option(
+    "--least-margin",
+    type=click.FloatRange(0.0, 2.0, max_open=True),
+    default=LEAST_MARGIN,
+    metavar="ALPHA",
+    help="The disk margin of its servo loops below which a design is not advised: 0.3 is 1.35 times the gain, 0.67 "
+    f"twice; 0 judges none.  [{LEAST_MARGIN}]",
+)
 @click.option("--diff", is_flag=True, help="Show what --write would change in the deck's text.")
 @click.option("--write", is_flag=True, help="Write the chosen values into the deck's text, and show what changed.")
 @click.option(
@@ -54,6 +63,7 @@ def best(
     choose: tuple[str, ...],
     by: tuple[str, ...],
     front: tuple[str, ...],
+    least_margin: float,
     diff: bool,
     write: bool,
     output: str | None,
@@ -70,7 +80,10 @@ def best(
     --write puts the chosen values into the deck that was swept, where the old ones stand or as entries of their
     definitions, after it is proved that the run means the same as with --set.
 
-    Exit status: 0 a design meets all requirements; 1 none does; 2 the input is wrong.
+    The stability of its servo loops is judged in its cases, at poses that they pass: a design whose margin is less than
+    --least-margin is not advised, and the best that keeps it is chosen.
+
+    Exit status: 0 a design meets all requirements and keeps the margin; 1 none does; 2 the input is wrong.
     """
     import shutil
 
@@ -81,6 +94,7 @@ def best(
     from batch.queries.pool import pools
     from batch.queries.summary import finite
     from batch.terminal.best import BestAnswer, context
+    from batch.terminal.best_stability import judged_best
     from batch.terminal.chosen_deck import chosen_deck
     from batch.terminal.search import search_result
     from met.diagnostic import Problem, error
@@ -125,15 +139,18 @@ def best(
         if len(front) == 1:
             raise click.UsageError("--front is of two: name each, `--front settle --front over`")
         goals, traded = ([designs.goal(text) for text in texts] for texts in (by, front))
-        answer = BestAnswer(designs, goals, traded, **context(file, pool))
+        judged = judged_best(file, designs, designs.order(goals), least_margin)
+        answer = BestAnswer(
+            designs, goals, traded, **context(file, pool), judged=judged, least_margin=least_margin
+        )  # fmt: skip
         deck = None
-        if (diff or write) and answer.best is not None:
+        if (diff or write) and answer.best is not None and answer.advised:
             of = f"{designs.count:,} designs"
             deck = chosen_deck(file, answer.values(answer.best), output, experiment=answer.name, of=of)
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
         data = answer.as_data() if form == "json" else {}
         _tell(form, data, answer.lines(width), deck, asked=diff or write, write=write)
-        return NO if answer.best is None else YES
+        return YES if answer.advised else NO
 
 
 def _tell(

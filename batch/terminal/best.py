@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,12 +15,14 @@ from batch.queries.best import ENDS, Designs, Goal, Stretch
 from batch.queries.failures import failure_lines
 from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import number_text, number_texts, pretty_unit
+from batch.queries.stability_words import KEPT, margin_words, stability_data, stability_texts, wrapped
 from batch.queries.summary import finite
 from ic.driver.written_value import WrittenValue
 from ic.printing.columns import columns, count
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.outputs import quoted
+from met.plan.searches import JudgedDesign
 from met.settings import setting_option, setting_path, varied_run, varies
 from met.unit_parser import written
 from met.units import text as unit_text
@@ -53,6 +55,7 @@ class BestAnswer:
     defines  what `-D` defined for it, `NAME=VALUE`;  remarks: what else is to be known of it
     given    what `--set` and `--vary` set and varied for it (`met.settings`)
     front    goals that are traded off against each other
+    judged   the stability of designs, by their numbers, the best by the goals first, until one keeps `least_margin`
     """
 
     def __init__(
@@ -67,11 +70,16 @@ class BestAnswer:
         defines: Sequence[str] = (),
         given: Sequence[str] = (),
         remarks: Sequence[str] = (),
+        judged: Mapping[int, JudgedDesign] | None = None,
+        least_margin: float = 0.0,
     ) -> None:
         self.designs, self.goals, self.front = designs, tuple(goals), tuple(front)
         self.deck, self.name, self.seed = deck, name, seed
         self.defines, self.given, self.remarks = tuple(defines), tuple(given), tuple(remarks)
-        self.order = designs.order(goals)
+        self.judged, self.least_margin = dict(judged or {}), least_margin
+        order = designs.order(goals)
+        kept = [number for number, each in self.judged.items() if each.keeps(least_margin)]
+        self.order = np.concatenate([np.array(kept, order.dtype), order[~np.isin(order, kept)]])
         required = [
             goal
             for column in designs.pool.metrics()
@@ -83,8 +91,15 @@ class BestAnswer:
 
     @property
     def best(self) -> int | None:
-        """The design to use; None where none is good."""
+        """The design to use, or, where none that was judged keeps the least margin, the best by the goals; None where
+        none is good."""
         return int(self.order[0]) if len(self.order) else None
+
+    @property
+    def advised(self) -> bool:
+        """True where there is a design to use."""
+        judged = self.judged.get(self.best) if self.best is not None else None
+        return self.best is not None and (judged is None or judged.keeps(self.least_margin))
 
     def rows(self) -> list[BestRow]:
         """The rows: the best, those that are best in only one number, and the runners-up."""
@@ -109,7 +124,7 @@ class BestAnswer:
         return out
 
     def _use(self, best: int, width: int) -> list[str]:
-        out = [self.headline, *_wrapped(self.why, width)]
+        out = [self.headline, *_wrapped(self.why, width), *wrapped(*self.stability())]
         if stretches := self.stretches():
             out += ["", "how far each may go by itself:", *columns(stretches)]
         out += ["", *self.table(self.rows()), ""]
@@ -122,7 +137,23 @@ class BestAnswer:
         """The headline, `use drive.kp = 0.33 V*s/rad`, or that no design is good."""
         if self.best is None:
             return f"none of {self.designs.count:,} designs meets all requirements"
-        return f"use {', '.join(f'{path} = {value}' for path, value in self.settings(self.best))}"
+        settings = ", ".join(f"{path} = {value}" for path, value in self.settings(self.best))
+        return f"{'use' if self.advised else 'not advised:'} {settings}"
+
+    def stability(self) -> list[str]:
+        """What is said of the stability of the best, and of a better one that was left for it, a text for each."""
+        assert self.best is not None
+        out, first = stability_texts(self.judged.get(self.best), self.least_margin), next(iter(self.judged), self.best)
+        if not self.advised:
+            several = f"none of the {len(self.judged)} designs that were judged keeps"
+            keeps = several if len(self.judged) > 1 else "it does not keep"
+            out.append(f"{keeps} the least margin of {self.least_margin:g}")
+        elif first != self.best:
+            margins = self.judged[first].margins
+            assert margins is not None  # else it would be advised
+            settings = ", ".join(f"{path} = {value}".replace(" ", KEPT) for path, value in self.settings(first))
+            out.append(f"better, and not advised: {settings}, {margin_words(margins)}")
+        return out
 
     def stretches(self) -> list[list[str]]:
         """The range of the best along each axis, all else unchanged: the parameter, its ends, and the obstacles
@@ -331,6 +362,8 @@ class BestAnswer:
             "good": int(designs.good.sum()),
             "over": [column.label for column in designs.against],
             "best": None if self.best is None else self._as_row(BestRow(self.best, rows[0].label)),
+            "advised": self.advised,
+            "least_margin": self.least_margin,
             "rows": [self._as_row(row) for row in rows],
             "front": [self._as_row(BestRow(int(i), "")) for i in designs.front(self.front)] if self.front else [],
             "command": "" if self.best is None else self.command(self.best),
@@ -346,6 +379,7 @@ class BestAnswer:
             "cases": int(designs.cases[row.design]),
             "cells_to_border": None if designs.steps is None else int(designs.steps[row.design]),
             "room": float(designs.room[row.design]),
+            "stability": stability_data(self.judged.get(row.design)),
             "worst": {
                 goal.text: float(designs.worst(goal.values, largest=not goal.largest)[row.design])
                 for goal in self.shown

@@ -11,7 +11,9 @@ from batch.queries.signals import number_text
 from batch.report.contents.parts import DesignAnswer, DesignMap, TextTable
 from batch.report.contents.searches import search_answer
 from batch.terminal.best import BestAnswer, context
+from batch.terminal.best_stability import judged_best
 from met.diagnostic import Problem
+from met.plan.searches import LEAST_MARGIN
 
 MOST_CELLS = 10_000
 """Largest number of cells of a map: more would be smaller than a dot."""
@@ -27,7 +29,8 @@ def design_answer(archive: ArchiveFile, pool: Pool) -> DesignAnswer | None:
         designs = Designs(pool)
     except Problem:  # there are no choices
         return None
-    answer = BestAnswer(designs, (), (), **context(archive, pool))
+    judged = judged_best(archive, designs, designs.order(), LEAST_MARGIN)
+    answer = BestAnswer(designs, (), (), **context(archive, pool), judged=judged, least_margin=LEAST_MARGIN)
     if answer.best is None:
         table = _table(answer.cells(answer.nearest()), answer.right)
         return DesignAnswer(
@@ -43,7 +46,7 @@ def design_answer(archive: ArchiveFile, pool: Pool) -> DesignAnswer | None:
         stretches=TextTable(heads, ("",) * 3, stretches) if stretches else None,
         said=_sentence(said),
         command=command,
-        notes=tuple(f"{_sentence(note)}." for note in answer.notes()),
+        notes=tuple(f"{_sentence(note)}." for note in (*answer.stability(), *answer.notes())),
         map=design_map(designs, answer.best),
     )
 
