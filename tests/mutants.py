@@ -23,6 +23,7 @@ from __future__ import annotations
 import argparse
 import ast
 import copy
+import importlib
 import json
 import os
 import random
@@ -139,7 +140,7 @@ class Traced:
     """Plugin of pytest: writes which lines of some files each test function executes, and what it costs."""
 
     def __init__(self, files: list[str], out: Path) -> None:
-        self._files = {str(ROOT_OF_RUN / file): file for file in files}
+        self._files = {str(ROOT / file): file for file in files}
         self._lines: dict[str, set[str]] = defaultdict(set)
         self._costs: dict[str, float] = defaultdict(float)
         self._tiers: dict[str, str] = {}
@@ -182,9 +183,6 @@ class Traced:
         self._out.write_text(json.dumps({"lines": lines, "costs": self._costs, "tiers": self._tiers}))
 
 
-ROOT_OF_RUN = Path(os.environ.get("MET_MUTANTS_ROOT", ROOT))
-
-
 def pytest_configure(config: pytest.Config) -> None:
     """Start tracing where this file is given to pytest as a plugin."""
     if "MET_MUTANTS_FILES" in os.environ and (os.environ.get("PYTEST_XDIST_WORKER") or not config.option.numprocesses):
@@ -192,17 +190,22 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(Traced(os.environ["MET_MUTANTS_FILES"].split(":"), out))
 
 
-def _pytest(tree: Path, words: list[str], surroundings: dict[str, str], cap: float | None = None) -> int:
-    """Run pytest on a tree; its exit status, or -9 where its processor time was over."""
-
-    def limited() -> None:
-        if cap is not None:
+def _tests_pass(words: list[str], cap: float) -> bool:
+    """Whether pytest passes in a child of this process, which has loaded libraries and nothing of the product; False
+    where its processor time is over."""
+    child = os.fork()
+    if child == 0:
+        status = 70
+        try:
             resource.setrlimit(resource.RLIMIT_CPU, (int(cap), int(cap) + 5))
-
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *words]
-    environment = {**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1", **surroundings}
-    quiet = subprocess.DEVNULL
-    return subprocess.run(command, cwd=tree, env=environment, stdout=quiet, stderr=quiet, preexec_fn=limited).returncode
+            for stream in (1, 2):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+            sys.dont_write_bytecode = True  # no other mutant may find this one's
+            status = int(pytest.main(["-q", "-p", "no:cacheprovider", "-n", "0", *words]))
+        finally:
+            os._exit(status)
+    _, status = os.waitpid(child, 0)
+    return os.waitstatus_to_exitcode(status) in (0, 5)
 
 
 @dataclass(frozen=True)
@@ -232,12 +235,26 @@ class Known:
                 yield tier, groups
 
 
-def trace(tree: Path, files: list[str], paths: list[str], marks: str) -> Known:
-    """Run the tests on the unchanged tree, to know what they execute of some files and what they cost."""
+def trace(files: list[str], paths: list[str], marks: str) -> Known:
+    """Run the tests on the unchanged tree, this one, to know what they execute of some files and what they cost."""
     with tempfile.TemporaryDirectory() as out:
-        words = ["-p", "tests.mutants", "-n", str(os.cpu_count() or 1), "-m", marks, *paths]
-        known = {"MET_MUTANTS_FILES": ":".join(files), "MET_MUTANTS_OUT": out, "MET_MUTANTS_ROOT": str(tree)}
-        _pytest(tree, words, known)
+        words = [
+            "-q",
+            "-p",
+            "no:cacheprovider",
+            "-p",
+            "tests.mutants",
+            "-n",
+            str(os.cpu_count() or 1),
+            "-m",
+            marks,
+            *paths,
+        ]
+        known = {"MET_MUTANTS_FILES": ":".join(files), "MET_MUTANTS_OUT": out}
+        quiet = subprocess.DEVNULL
+        subprocess.run(
+            [sys.executable, "-m", "pytest", *words], env={**os.environ, **known}, stdout=quiet, stderr=quiet
+        )
         executing: dict[str, list[str]] = defaultdict(list)
         costs: dict[str, float] = defaultdict(float)
         tiers: dict[str, str] = {}
@@ -255,12 +272,14 @@ def trace(tree: Path, files: list[str], paths: list[str], marks: str) -> Known:
 # trying them
 
 
-def tried(tree: Path, mutant: Mutant, known: Known, cap: float) -> tuple[str, str] | None:
+def tried(mutant: Mutant, known: Known, cap: float) -> tuple[str, str] | None:
     """The tier and the name of the cheapest test function that notices a mutant; None where none does within the
     cap."""
-    path = tree / mutant.file
-    kept = path.read_bytes()
+    path = ROOT / mutant.file
+    unchanged = path.read_bytes()
     path.write_text(mutant.text, encoding="utf-8")
+    for compiled in (path.parent / "__pycache__").glob(f"{path.stem}.*.pyc"):
+        compiled.unlink()
     try:
         for tier, groups in known.groups(known.executing.get(f"{mutant.file}:{mutant.line}", [])):
             spent = 0.0
@@ -269,12 +288,12 @@ def tried(tree: Path, mutant: Mutant, known: Known, cap: float) -> tuple[str, st
                     break
                 cost = sum(known.costs[each] for each in group)
                 # A mutant that never ends is noticed too.
-                if _pytest(tree, ["-x", *group], {}, 10.0 + 10.0 * cost) not in (0, 5):
+                if not _tests_pass(["-x", *group], 10.0 + 10.0 * cost):
                     return tier, group[0] if len(group) == 1 else f"one of {len(group)}, {group[0]} ... {group[-1]}"
                 spent += cost
         return None
     finally:
-        path.write_bytes(kept)
+        path.write_bytes(unchanged)
 
 
 def main() -> int:
@@ -287,29 +306,47 @@ def main() -> int:
     parser.add_argument("--cap", type=float, default=60.0)
     parser.add_argument("-o", "--output", type=Path)
     asked = parser.parse_args()
+    if "MET_MUTANTS_TREE" in os.environ:
+        return _in_this_tree(asked)
+    if asked.output is not None:
+        asked.output = asked.output.resolve()
     with tempfile.TemporaryDirectory(prefix="met-mutants-") as folder:
         tree = Path(folder, "tree")
-        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".git", ".venv", "build", "__pycache__"))
-        known = trace(tree, asked.modules, asked.paths, asked.tests)
-        seconds = sum(known.costs.values())
-        print(f"{len(known.costs)} test functions, {seconds:.0f} s of processor time while traced", flush=True)
-        counts: dict[str, int] = defaultdict(int)
-        for file in asked.modules:
-            every = mutants(file, (ROOT / file).read_text(encoding="utf-8"))
-            sample = random.Random(f"{asked.seed}/{file}").sample(every, min(asked.count, len(every)))
-            for mutant in sorted(sample, key=lambda each: each.line):
-                killer = tried(tree, mutant, known, asked.cap)
-                tier, test = killer or (None, None)
-                executed = f"{file}:{mutant.line}" in known.executing
-                how = f"noticed by {tier}" if tier else "survived" if executed else "no test"
-                counts[how] += 1
-                if tier != "default":
-                    print(f"{how:18} {file}:{mutant.line}: {mutant.change} {test or ''}".rstrip(), flush=True)
-                if asked.output is not None:
-                    entry = {"file": file, "line": mutant.line, "change": mutant.change, "test": test, "tier": tier}
-                    with asked.output.open("a", encoding="utf-8") as out:
-                        out.write(json.dumps(entry) + "\n")
-        print(", ".join(f"{number} {how}" for how, number in sorted(counts.items())))
+        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".git", ".venv", "build"))
+        words = [*asked.modules, "--paths", *asked.paths, "--tests", asked.tests]
+        words += ["--count", str(asked.count), "--seed", str(asked.seed), "--cap", str(asked.cap)]
+        words += ["-o", str(asked.output)] if asked.output is not None else []
+        known = {"MET_MUTANTS_TREE": str(tree), "PYTHONPATH": str(tree)}
+        command = [sys.executable, "-m", "tests.mutants", *words]
+        return subprocess.run(command, cwd=tree, env={**os.environ, **known}).returncode
+
+
+def _in_this_tree(asked: argparse.Namespace) -> int:
+    """Try mutants in this tree, which is a copy."""
+    known = trace(asked.modules, asked.paths, asked.tests)
+    seconds = sum(known.costs.values())
+    print(f"{len(known.costs)} test functions, {seconds:.0f} s of processor time while traced", flush=True)
+    for library in ("numpy", "scipy.linalg", "scipy.optimize", "h5py", "llvmlite.binding", "click"):
+        importlib.import_module(library)  # once for all children
+    sound = sorted({name for names in known.executing.values() for name in names}, key=known.costs.__getitem__)
+    if sound and not _tests_pass(sound[:1], 60.0):
+        sys.exit(f"{sound[0]} fails without a mutant, in a child of this process")
+    counts: dict[str, int] = defaultdict(int)
+    for file in asked.modules:
+        every = mutants(file, (ROOT / file).read_text(encoding="utf-8"))
+        sample = random.Random(f"{asked.seed}/{file}").sample(every, min(asked.count, len(every)))
+        for mutant in sorted(sample, key=lambda each: each.line):
+            tier, test = tried(mutant, known, asked.cap) or (None, None)
+            executed = f"{file}:{mutant.line}" in known.executing
+            how = f"noticed by {tier}" if tier else "survived" if executed else "no test"
+            counts[how] += 1
+            if tier != "default":
+                print(f"{how:18} {file}:{mutant.line}: {mutant.change} {test or ''}".rstrip(), flush=True)
+            if asked.output is not None:
+                entry = {"file": file, "line": mutant.line, "change": mutant.change, "test": test, "tier": tier}
+                with asked.output.open("a", encoding="utf-8") as out:
+                    out.write(json.dumps(entry) + "\n")
+    print(", ".join(f"{number} {how}" for how, number in sorted(counts.items())))
     return 0
 
 
