@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import gc
 import io
+import math
 import os
 import sys
 import warnings
@@ -199,6 +200,17 @@ def check_options(
 
 PROGRAM_FORMS = ("json", "sarif", "github")
 """Forms of diagnostics that programs read; `met check` writes them all, other commands JSON alone."""
+
+
+class FiniteRange(click.FloatRange):
+    """A number of a closed range, which excludes `nan`, although no comparison refuses it."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Read the number, as `click.FloatRange` does. Raises a usage error for one that is not in the range."""
+        found = super().convert(value, param, ctx)
+        if not math.isfinite(found):
+            self.fail(f"{value} is not in the range {self._describe_range()}.", param, ctx)
+        return float(found)
 
 
 def format_option(face: Face) -> Face:

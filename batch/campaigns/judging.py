@@ -65,9 +65,9 @@ def judged_until_kept(count: int, judge: Callable[[int], JudgedDesign], least_ma
 
 
 def judged_design(prepared: engine.Prepared, cases: np.ndarray) -> JudgedDesign:
-    """The stability of a design with these cases, the worst by the goal first."""
-    first, experiment = int(cases.min()), prepared.experiment
-    looked_at = telling_cases(cases, experiment.cases.coordinates)
+    """The stability of a design with these cases, as rows of the experiment, the worst by the goal first."""
+    experiment = prepared.experiment
+    first, looked_at = int(experiment.cases.table[cases.min()]), telling_cases(cases, experiment.cases.coordinates)
     try:
         margins = least_margins(experiment, _passed(prepared, looked_at))
     except Problem as problem:

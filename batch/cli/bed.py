@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from batch.cli.run import SECONDS, measured
-from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
+from met.cli import NO, YES, FiniteRange, check_options, deck_options, format_option, loudness_options
 from met.diagnostic import Problem
 
 
@@ -45,17 +45,6 @@ class Amount(click.ParamType):
         if not 0.0 < found < math.inf:
             self.fail(f"`{value}` is none: write `12 {self._unit}`", param, ctx)
         return found
-
-
-class FiniteRange(click.FloatRange):
-    """A number of a closed range, which excludes `nan`, although no comparison refuses it."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Read the number, as `click.FloatRange` does. Raises a usage error for one that is not in the range."""
-        found = super().convert(value, param, ctx)
-        if not math.isfinite(found):
-            self.fail(f"{value} is not in the range {self._describe_range()}.", param, ctx)
-        return float(found)
 
 
 PORT = click.option("--port", "word", metavar="[JOINT=]PORT", required=True, help="The port of the bed.")

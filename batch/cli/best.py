@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from met.cli import NO, YES, format_option
+from met.cli import NO, YES, FiniteRange, format_option
 from met.host.streams import kept
 from met.messages.visible import line, say
 from met.plan.searches import LEAST_MARGIN
@@ -44,8 +44,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--least-margin",
-    type=click.FloatRange(0.0, 2.0, max_open=True),
-    default=LEAST_MARGIN,
+    type=FiniteRange(0.0, 2.0, max_open=True),
     metavar="ALPHA",
     help="The disk margin of its servo loops below which a design is not advised: 0.3 is 1.35 times the gain, 0.67 "
     f"twice; 0 judges none.  [{LEAST_MARGIN}]",
@@ -63,7 +62,7 @@ def best(
     choose: tuple[str, ...],
     by: tuple[str, ...],
     front: tuple[str, ...],
-    least_margin: float,
+    least_margin: float | None,
     diff: bool,
     write: bool,
     output: str | None,
@@ -115,7 +114,7 @@ def best(
         if output is not None and not (diff or write):
             raise click.UsageError("-o is the file for --write")
         if searched is not None:
-            if over or choose or by or front:
+            if over or choose or by or front or least_margin is not None:
                 message = (
                     f"`{pool.name}` is a search, whose cases it chose itself: nothing but its answer follows from them"
                 )
@@ -139,10 +138,9 @@ def best(
         if len(front) == 1:
             raise click.UsageError("--front is of two: name each, `--front settle --front over`")
         goals, traded = ([designs.goal(text) for text in texts] for texts in (by, front))
-        judged = judged_best(file, designs, designs.order(goals), least_margin)
-        answer = BestAnswer(
-            designs, goals, traded, **context(file, pool), judged=judged, least_margin=least_margin
-        )  # fmt: skip
+        least = LEAST_MARGIN if least_margin is None else least_margin
+        judged = judged_best(file, designs, designs.order(goals), least)
+        answer = BestAnswer(designs, goals, traded, **context(file, pool), judged=judged, least_margin=least)
         deck = None
         if (diff or write) and answer.best is not None and answer.advised:
             of = f"{designs.count:,} designs"
@@ -172,7 +170,7 @@ def _tell(
         if deck is not None:
             say("\n".join(["", *map(line, deck.diff())]))
         elif asked:
-            say("\nnothing meets all requirements, so nothing is written into the deck")
+            say("\nno design is advised, so nothing is written into the deck")
     if deck is not None and write:
         deck.write()
         if form != "json":

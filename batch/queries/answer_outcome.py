@@ -127,8 +127,11 @@ def _of_tuning(answer: SearchAnswer, found: tuple[AnswerRequirement, ...]) -> st
         return f"The answer {_misses(found, named=True)}{f' of {sweep}' if best.all > 1 else ''}"
     if not best.confirmed:
         return f"The answer was tried in {best.tried:,} of {best.all:,} cases of {sweep} alone"
-    if not answer.ok:
+    if not best.stands:
         return f"The answer has no {answer.search.metric} in case #{answer.position}"
+    if best.stability is not None and best.stability.margins is not None and not best.serves:
+        margins = f"disk margin of {best.stability.margins.disk:.3g} is below the least, {answer.search.least_margin:g}"
+        return f"The answer {_all(answer)}{(of := _cases(answer)) and f' in {of}'}, but its {margins}"
     return f"The answer {_all(answer)}{(of := _cases(answer)) and f' in {of}'}"
 
 

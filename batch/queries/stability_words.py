@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Iterable
 from typing import Any
 
 from batch.queries.signals import number_text
-from met.plan.searches import USUAL_MARGIN, JudgedDesign, LeastMargins
+from met.plan.searches import USUAL_MARGIN, JudgedDesign, LeastMargins, allowed_gain
 
 WIDTH = 100
 """Largest length of a line in characters."""
@@ -16,12 +17,27 @@ KEPT = "\N{NO-BREAK SPACE}"
 """A space at which no line is broken."""
 
 
+CONTINUED = "    "
+"""The indent of a line that goes on with a text."""
+
+
 def wrapped(*texts: str) -> list[str]:
     """Indented texts of an answer in lines, of which the first of each is indented less."""
     lines = []
     for text in texts:
-        lines += textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
+        lines += textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent=CONTINUED, break_on_hyphens=False)
     return [line.replace(KEPT, " ") for line in lines]
+
+
+def unwrapped(lines: Iterable[str]) -> list[str]:
+    """The texts of an answer's lines, without indents: what `wrapped` has broken is whole again."""
+    texts = list[str]()
+    for line in lines:
+        if line.startswith(CONTINUED):
+            texts[-1] += f" {line.strip()}"
+        else:
+            texts.append(line.strip())
+    return texts
 
 
 def stability_texts(design: JudgedDesign | None, least_margin: float) -> list[str]:
@@ -43,12 +59,15 @@ def stability_texts(design: JudgedDesign | None, least_margin: float) -> list[st
 def margin_words(margins: LeastMargins) -> str:
     """The least margins, and where they are so."""
     if not margins.disk:
-        return f"{_loops(margins)} unstable in case #{margins.case} at {margins.time:.4g} s"
-    words = [f"disk margin {margins.disk:.3g}, {_allowance(margins.disk)}"]
+        are = f"{_loops(margins)} is" if len(margins.joints) == 1 else "the servo loops are"
+        return f"{are} unstable in case #{margins.case} at {margins.time:.4g} s"
+    words = [f"disk margin {margins.disk:.3g} ({_allowance(margins.disk)})"]
+    if math.isfinite(margins.gain):
+        words.append(f"gain margin {margins.gain:.4g}")
     if math.isfinite(margins.delay):
-        words.append(f"a delay of {number_text(1e3 * margins.delay)} ms")
+        words.append(f"delay margin {number_text(1e3 * margins.delay)} ms")
     where = f"{_loops(margins)} in case #{margins.case} at {margins.time:.4g} s"
-    return f"{'; '.join(words)}: {where}"
+    return f"{', '.join(words)}: {where}"
 
 
 def _loops(margins: LeastMargins) -> str:
@@ -59,9 +78,9 @@ def _loops(margins: LeastMargins) -> str:
 
 def _allowance(disk: float) -> str:
     """What a disk margin allows: a factor on the gain, and an angle of phase."""
-    half = 0.5 * disk
-    gain = f"{(1.0 + half) / (1.0 - half):.4g} times the gain" if half < 1.0 else "any gain"
-    return f"{gain} or {math.degrees(2.0 * math.atan(half)):.3g} deg"
+    factor = allowed_gain(disk)
+    gain = f"{factor:.4g} times the gain" if math.isfinite(factor) else "any gain"
+    return f"{gain} or {math.degrees(2.0 * math.atan(0.5 * disk)):.3g} deg"
 
 
 def _count(number: int, word: str) -> str:

@@ -101,6 +101,12 @@ class BestAnswer:
         judged = self.judged.get(self.best) if self.best is not None else None
         return self.best is not None and (judged is None or judged.keeps(self.least_margin))
 
+    @property
+    def left(self) -> int | None:
+        """The design that is better by the goals than the one to use, and not advised; None where there is none."""
+        first = next(iter(self.judged), self.best)
+        return first if self.advised and first != self.best else None
+
     def rows(self) -> list[BestRow]:
         """The rows: the best, those that are best in only one number, and the runners-up."""
         designs = self.designs
@@ -108,11 +114,15 @@ class BestAnswer:
         if not self.goals and designs.steps is None:
             first = "most room"
         found = {int(self.order[0]): first}
+        if (better := self.left) is not None:
+            found = {int(self.order[0]): "keeps the margin", better: first}
         for goal in self.shown:
             if all(goal is not each for each in self.goals):
                 found.setdefault(int(designs.order([goal])[0]), _least(goal))
         for number, design in enumerate(self.order[1 : 1 + RUNNERS_UP].tolist(), start=2):
-            found.setdefault(design, f"{number}{ {2: 'nd', 3: 'rd'}.get(number, 'th') }")
+            judged = self.judged.get(design)
+            place = f"{number}{ {2: 'nd', 3: 'rd'}.get(number, 'th') }"
+            found.setdefault(design, place if judged is None or judged.keeps(self.least_margin) else "not advised")
         return [BestRow(design, label) for design, label in found.items()]
 
     # Text
@@ -143,15 +153,15 @@ class BestAnswer:
     def stability(self) -> list[str]:
         """What is said of the stability of the best, and of a better one that was left for it, a text for each."""
         assert self.best is not None
-        out, first = stability_texts(self.judged.get(self.best), self.least_margin), next(iter(self.judged), self.best)
+        out = stability_texts(self.judged.get(self.best), self.least_margin)
         if not self.advised:
             several = f"none of the {len(self.judged)} designs that were judged keeps"
             keeps = several if len(self.judged) > 1 else "it does not keep"
             out.append(f"{keeps} the least margin of {self.least_margin:g}")
-        elif first != self.best:
-            margins = self.judged[first].margins
+        elif self.left is not None:
+            margins = self.judged[self.left].margins
             assert margins is not None  # else it would be advised
-            settings = ", ".join(f"{path} = {value}".replace(" ", KEPT) for path, value in self.settings(first))
+            settings = ", ".join(f"{path} = {value}".replace(" ", KEPT) for path, value in self.settings(self.left))
             out.append(f"better, and not advised: {settings}, {margin_words(margins)}")
         return out
 

@@ -19,7 +19,12 @@ def judged_best(file: ArchiveFile, designs: Designs, order: np.ndarray, least_ma
     are of several structures is judged by the least margin of them."""
     if not least_margin or not len(order):
         return {}
-    experiments = {each.name: each for each in file.plan().experiments}
+    try:
+        experiments = {each.name: each for each in file.plan().experiments}
+    except Problem as problem:  # for instance, a model of the plan is not installed here
+        first = int(order[0])
+        case = int(designs.pool.cases[designs.first[first]])
+        return {first: JudgedDesign(case, None, problem.diagnostics[0].message)}
 
     @cache
     def prepared(name: str) -> engine.Prepared:
@@ -31,11 +36,8 @@ def judged_best(file: ArchiveFile, designs: Designs, order: np.ndarray, least_ma
         for number in np.unique(pool.group_of[cases]).tolist():
             group = pool.groups[number]
             own = pool.position_of[cases[pool.group_of[cases] == number]]
-            rows = group.values("case")[own].astype(np.int64)
-            try:
-                found.append(judged_design(prepared(group.name), rows))
-            except Problem as problem:  # a model that is not installed
-                found.append(JudgedDesign(int(rows.min()), None, problem.diagnostics[0].message))
+            rows = np.searchsorted(experiments[group.name].cases.table, group.values("case")[own])
+            found.append(judged_design(prepared(group.name), rows))
         known = [each for each in found if each.margins is not None]
         return min(known, key=lambda each: each.margins.disk) if known else found[0]  # type: ignore[union-attr]
 

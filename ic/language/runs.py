@@ -29,7 +29,7 @@ LEAST_MARGIN_OF_TUNE = Parameter(
     name="least_margin",
     default=LEAST_MARGIN,
     at_least=0.0,
-    at_most=2.0,
+    below=2.0,
     doc="disk margin of the servo loops below which a design is not advised; 0: stability is not judged",
 )
 BASE_KINDS = ("fixed", "prescribed", "free")

@@ -33,3 +33,7 @@ def search_lines(experiment: Experiment, search: Search) -> Iterator[str]:
     if search.kind == "tune" and experiment.requirements:
         required = ", ".join(requirement.text for requirement in experiment.requirements)
         yield f"  with a margin of {100.0 * search.margin:g} % to the limits of {required}"
+    if search.steers:
+        yield f"  candidates keep a disk margin of {search.least_margin:g}"
+    elif search.kind == "tune" and not search.least_margin:
+        yield "  its stability is not judged"

@@ -20,7 +20,7 @@ from met.analysis.passed import Passed
 from met.analysis.step_map import Linearizer, SampledLoops
 from met.frozen import frozen
 from met.plan import Experiment
-from met.plan.searches import LeastMargins
+from met.plan.searches import LeastMargins, allowed_gain
 
 FREQUENCIES = 60
 """Number of frequencies at which loops are compared, to find the pose whose margin is then computed exactly."""
@@ -54,7 +54,7 @@ def least_margins(experiment: Experiment, passed: Passed) -> LeastMargins | str:
         return "the rates of dynamics and servos have no common period that is short enough"
     if not np.isfinite(found.slope).all():
         return "the arm has no finite slopes at an instant"
-    closed = np.abs(np.linalg.eigvals(frame(found, np.arange(len(found.case))))).max(axis=1)
+    closed = _largest(found, np.arange(len(found.case)))
     several = list[_Least]()
     for law in found.laws:
         if law.outputs != 1:
@@ -65,17 +65,17 @@ def least_margins(experiment: Experiment, passed: Passed) -> LeastMargins | str:
     if not several:
         return "nothing comes back where a loop is opened: the arm is held"
     worst = min(several, key=lambda each: each.disk)
-    joints, together = tuple(each.joints[0] for each in several), math.inf
+    together, joints = math.inf, tuple(each.joints[0] for each in several)
     if worst.disk and several[1:]:
-        together = _together(found, worst.lane, joints)
-    disk = 2.0 * (together - 1.0) / (together + 1.0) if math.isfinite(together) else math.inf
-    disk, joints = (worst.disk, worst.joints) if worst.disk <= disk * (1.0 + TOGETHER) else (disk, joints)
+        every = _together(found, worst, joints)
+        together = every.gain
+        worst = every if every.disk * (1.0 + TOGETHER) < worst.disk else worst
     return LeastMargins(
-        disk=_rounded(disk),
+        disk=_rounded(worst.disk),
         gain=_rounded(min(together, *(each.gain for each in several))),
         delay=_rounded(float(np.min([each.delay for each in several]))),
-        joints=joints,
-        case=int(passed.case[worst.lane]),
+        joints=worst.joints if worst.disk else joints,
+        case=int(experiment.cases.table[passed.case[worst.lane]]),
         time=float(passed.tick[worst.lane]) / structure.schedule.base_hz,
         loops=len(several),
         cases=len(np.unique(passed.case)),
@@ -103,16 +103,16 @@ def margins_at_start(experiment: Experiment, rows: Sequence[int], least: float) 
     if not fine.all():
         return np.where(fine, disks, math.nan)
 
-    def largest(gain: float) -> np.ndarray:
-        closed = frame(found, lanes, dict.fromkeys((law.joint for law in found.laws), gain))
-        return np.asarray(np.abs(np.linalg.eigvals(closed)).max(axis=1))
-
-    closed, allowed = largest(1.0), (1.0 + 0.5 * least) / (1.0 - 0.5 * least)
+    closed, allowed = _largest(found, lanes), allowed_gain(least)
     for law in found.laws:
         loops = _open_loops(found, law, closed) if law.outputs == 1 else None
         if loops is not None:
             disks = np.minimum(disks, np.where(loops.stable, 1.0 / _sensitivities(loops).max(axis=0), 0.0))
-    together = np.maximum(largest(allowed), largest(1.0 / allowed)) <= 1.0 + LEAST
+    raised, lowered = (
+        _largest(found, lanes, dict.fromkeys((law.joint for law in found.laws), gain))
+        for gain in (allowed, 1.0 / allowed)
+    )
+    together = np.maximum(raised, lowered) <= 1.0 + LEAST
     return np.where(together, disks, np.minimum(disks, SHORT * least))
 
 
@@ -216,25 +216,42 @@ def _sensitivities(loops: _OpenLoops) -> np.ndarray:
     return np.stack([loops.sensitivity(w) for w in _frequencies(loops).tolist()])
 
 
-def _together(found: SampledLoops, lane: int, joints: Sequence[str]) -> float:
-    """The factor by which the gains of all these loops at once may rise or fall in a lane, to `TOGETHER`; infinite
-    where none up to `FARTHEST` is too much."""
+def _together(found: SampledLoops, least: _Least, joints: tuple[str, ...]) -> _Least:
+    """The factor by which the gains of all these loops at once may rise or fall, to `TOGETHER`, with the disk that
+    allows it: of the lanes that do not bear what the least margin of single loops allows, or of that margin's lane
+    where all bear it. Infinite where no factor up to `FARTHEST` is too much."""
+    lanes = np.array([least.lane])
 
-    def grows(gain: float) -> bool:
-        closed = frame(found, lane, dict.fromkeys(joints, gain))
-        return bool(np.abs(np.linalg.eigvals(closed)).max() > 1.0 + LEAST)
+    def largest(gain: float) -> np.ndarray:
+        return _largest(found, lanes, dict.fromkeys(joints, gain))
 
-    factors = []
+    if (allowed := allowed_gain(least.disk)) < FARTHEST:
+        lanes = np.arange(len(found.case))
+        grown = np.maximum(largest(allowed), largest(1.0 / allowed)) > 1.0 + LEAST
+        lanes = np.flatnonzero(grown) if grown.any() else np.array([least.lane])
+    factor, lane = math.inf, least.lane
     for stride in (STRIDE, 1.0 / STRIDE):
         good, bad = 1.0, stride
-        while not grows(bad) and 1.0 / FARTHEST < bad < FARTHEST:
+        while (largest(bad) <= 1.0 + LEAST).all() and 1.0 / FARTHEST < bad < FARTHEST:
             good, bad = bad, bad * stride
-        if grows(bad):
-            while abs(bad / good - 1.0) > TOGETHER:
-                middle = math.sqrt(good * bad)
-                good, bad = (good, middle) if grows(middle) else (middle, bad)
-            factors.append(max(good, 1.0 / good))
-    return min(factors, default=math.inf)
+        grown = largest(bad)
+        if (grown <= 1.0 + LEAST).all():
+            continue
+        while abs(bad / good - 1.0) > TOGETHER:
+            middle = math.sqrt(good * bad)
+            if ((tried := largest(middle)) > 1.0 + LEAST).any():
+                bad, grown = middle, tried
+            else:
+                good = middle
+        if max(good, 1.0 / good) < factor:
+            factor, lane = max(good, 1.0 / good), int(lanes[grown.argmax()])
+    disk = 2.0 * (factor - 1.0) / (factor + 1.0) if math.isfinite(factor) else math.inf
+    return _Least(disk, factor, math.nan, joints, lane)
+
+
+def _largest(found: SampledLoops, lanes: np.ndarray, gains: dict[str, float] | None = None) -> np.ndarray:
+    """The largest eigenvalue of a frame with all loops closed, in size, [lane]."""
+    return np.asarray(np.abs(np.linalg.eigvals(frame(found, lanes, gains))).max(axis=1))
 
 
 def _factors(down: float | None, up: float | None) -> Iterator[float]:

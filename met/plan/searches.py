@@ -6,6 +6,7 @@ Until then its case table is its first generation.
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import numpy as np
@@ -50,6 +51,11 @@ LEAST_MARGIN, USUAL_MARGIN = 0.3, 0.67
 below the second (6 dB, 37 deg) it is less than usual."""
 
 
+def allowed_gain(disk: float) -> float:
+    """The factor by which a disk margin allows a gain to rise or fall."""
+    return (1.0 + 0.5 * disk) / (1.0 - 0.5 * disk) if disk < 2.0 else math.inf
+
+
 @frozen
 class LeastMargins:
     """The least stability margins of an experiment's servo loops over some of its cases, at poses that these pass.
@@ -58,8 +64,8 @@ class LeastMargins:
             counts as the disk that allows it, 2 (g - 1)/(g + 1)
     gain    factor by which a loop's gain may rise or fall, or that of all at once;  delay: s by which a law's output
             may come later; infinite where nothing limits it, not-a-number where a law ticks several times in a frame
-    joints  of the loop with the least disk, or of all of them;  case: row of the case table, and time: s, at which it
-            is so
+    joints  of the loop with the least disk; of all of them where that is of all at once, or where they are unstable;
+            case: position in the case table, and time: s, at which it is so
     loops, cases, poses  how many were looked at
     """
 
@@ -78,7 +84,7 @@ class LeastMargins:
 class JudgedDesign:
     """The stability of a candidate of a tuning.
 
-    case     row of the case table, of the first of its cases
+    case     position in the case table of the first of its cases
     margins  None where there are none, for the reason `why_not`, in words
     """
 

@@ -168,7 +168,7 @@ class Answering:
         self.code_key = self.work_key = self.old_code_key = f"answers of {experiment.name}"
         self.result_keys: dict[str, str] = {}
         columns = sum(len(recorded.channels) for recorded in experiment.structure.record)
-        self.recording = SimpleNamespace(sections=())
+        self.recording = SimpleNamespace(sections=(), cells=())
         self.program = SimpleNamespace(outputs=("failure",), columns=columns)
         self.outputs = self.program.outputs
 
@@ -189,6 +189,8 @@ def computed(
     engine.run(prepared.experiment, rows)  # for what a test lets happen meanwhile
     if progress is not None:
         progress(len(rows))
+    if memories is not None:
+        memories.by_case.update((row, np.zeros((len(memories.ticks), 0))) for row in rows.tolist())
     rowsof = prepared.experiment.structure.schedule.rows
     history = np.zeros((len(rows), rowsof, prepared.program.columns)) if record else None
     return history, np.zeros((len(rows), 1))

@@ -7,6 +7,7 @@ import numpy as np
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.search_answers import SearchAnswer
 from batch.queries.signals import deck_unit
+from batch.queries.stability_words import unwrapped
 from batch.report.contents.parts import DesignAnswer, TextTable
 from batch.terminal.search import search_result
 
@@ -33,7 +34,7 @@ def search_answer(archive: ArchiveFile, group: ArchiveGroup) -> DesignAnswer | N
             rows.append(row)
     shown = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_ROWS)).astype(int))
     scale, _ = deck_unit(next(each for each in group.role("metric") if each.path == search.metric))
-    headline, *why = (line.strip() for line in answer.lines())
+    headline, *why = unwrapped(answer.lines())
     return DesignAnswer(
         headline=headline[:1].upper() + headline[1:],
         why="; ".join(why),

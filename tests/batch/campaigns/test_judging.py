@@ -72,14 +72,16 @@ def test_of_many_cases_the_worst_and_those_at_ends_are_looked_at() -> None:
 def test_margins_are_said_with_what_they_allow_and_where_they_are_so() -> None:
     design = JudgedDesign(0, margins(0.6))
     assert stability_texts(design, 0.3) == [
-        "stability: disk margin 0.6, 1.857 times the gain or 33.4 deg; a delay of 2.3 ms: the loop of joint `grip` in "
-        "case #7 at 1.25 s, the least of 3 loops in 1 case at 12 poses, dry friction released",
+        "stability: disk margin 0.6 (1.857 times the gain or 33.4 deg), gain margin 1.9, delay margin 2.3 ms: the loop "
+        "of joint `grip` in case #7 at 1.25 s, the least of 3 loops in 1 case at 12 poses, dry friction released",
         "less than usual, which is a disk margin of 0.67: 2.008 times the gain or 37 deg",
     ]
     assert len(stability_texts(JudgedDesign(0, margins(0.7)), 0.3)) == 1
-    assert margin_words(margins(0.0)) == "the loop of joint `grip` unstable in case #7 at 1.25 s"
-    words = margin_words(margins(2.0, delay=math.nan, joints=("slew", "luff")))
-    assert words == "disk margin 2, any gain or 90 deg: the loops of all joints at once in case #7 at 1.25 s"
+    assert margin_words(margins(0.0)) == "the loop of joint `grip` is unstable in case #7 at 1.25 s"
+    both = margin_words(margins(0.0, joints=("slew", "luff")))
+    assert both == "the servo loops are unstable in case #7 at 1.25 s"
+    words = margin_words(margins(2.0, gain=math.inf, delay=math.nan, joints=("slew", "luff")))
+    assert words == "disk margin 2 (any gain or 90 deg): the loops of all joints at once in case #7 at 1.25 s"
 
 
 def test_what_was_not_judged_says_why() -> None:

@@ -206,7 +206,7 @@ def test_where_no_design_is_good_none_is_written(
     main(["run", "arm.ic", "grid", "-q", "--histories", "none", "--no-picture"])
     capsys.readouterr()
     status, out, _ = said(capsys, "arm.grid.h5", "--write")
-    assert status == 1 and out.endswith("\n\nnothing meets all requirements, so nothing is written into the deck\n")
+    assert status == 1 and out.endswith("\n\nno design is advised, so nothing is written into the deck\n")
     assert Path("arm.ic").read_text(encoding="utf-8") == deck
 
 

@@ -269,6 +269,13 @@ def test_a_search_that_is_none_is_refused(tmp_path: Path, old: str, new: str, me
         ("margin = 10 %", "margin = 100 %", [
             "error[D363]: a margin is a share of a limit, from 0 % to less than 100 %",
             "= help: write `margin = 5 %;`"]),
+        *[("margin = 10 %", f"least_margin = {text}", [
+            "error[D363]: a least margin is a disk margin, from 0 to less than 2",
+            "= help: write `least_margin = 0.5;`: 0.3 is a gain of 1.35 times, 0.67 of 2 times",
+            "= help: 0 asks for none"])
+          for text in ("2", "-0.1", "1e308", "0.5 rad")],
+        ("margin = 10 %", "least_margin = 0.5;  least_margin = 0.5", [
+            "error[D040]: `least_margin` is written twice", "= help: leave one out"]),
         ("choose drive.kp", "drive.kp", [
             "error[D360]: in a tune this is written otherwise",
             "= help: write `choose drive.kp = logbetween(0.01, 0.1) V*s/rad;`"]),
@@ -340,6 +347,30 @@ def test_a_tuning_goes_by_gradients_unless_it_says_otherwise(tmp_path: Path) -> 
         (tmp_path / "d.ic").write_text(DECK + TUNE.replace("margin = 10 %;", more), encoding="utf-8")
         search = ic.compile(tmp_path / "d.ic", select=["gains"]).experiments[0].search
         assert search is not None and search.gradients is wanted
+
+
+@pytest.mark.parametrize(
+    ("written", "wanted", "explained"),
+    [
+        ("", (0.3, False), ""),
+        ("least_margin = 0.3;", (0.3, True), "  candidates keep a disk margin of 0.3\n"),
+        ("least_margin = 0.5;", (0.5, True), "  candidates keep a disk margin of 0.5\n"),
+        ("least_margin = 0;", (0.0, False), "  its stability is not judged\n"),
+    ],
+)
+def test_a_least_margin_steers_where_it_is_written_and_goes_into_the_plan(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], written: str, wanted: tuple[float, bool], explained: str
+) -> None:
+    [experiment] = plan(tmp_path, TUNE.replace("margin = 10 %;", written), "gains").experiments
+    search = experiment.search
+    assert search is not None and (search.least_margin, search.steers) == wanted
+    plan_file.write(ic.compile(tmp_path / "d.ic", select=["gains"]), tmp_path / "p.json")
+    assert plan_file.read(tmp_path / "p.json").experiments[0].search == search
+    assert main(["plan", str(tmp_path / "d.ic"), "gains"]) == 0
+    assert f"to the limits of last < 5 rad\n{explained}" in capsys.readouterr().out
+    assert main(["fmt", str(tmp_path / "d.ic")]) == 0
+    assert main(["fmt", str(tmp_path / "d.ic"), "--check"]) == 0
+    assert written in (tmp_path / "d.ic").read_text(encoding="utf-8")
 
 
 def test_python_compiles_them(tmp_path: Path) -> None:

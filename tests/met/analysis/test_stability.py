@@ -97,7 +97,7 @@ def test_the_least_of_all_cases_and_poses_is_told_and_an_unstable_loop_has_none(
     unstable = least_margins(of, at_start(of, [0, 1, 2]))
     assert isinstance(unstable, LeastMargins)
     assert (unstable.disk, unstable.gain, unstable.delay) == (0.0, 1.0, 0.0)
-    assert (unstable.case, unstable.joints) == (2, ("shoulder",))
+    assert (unstable.case, unstable.joints) == (2, ("shoulder", "elbow"))
     start = margins_at_start(of, [0, 1, 2], 0.1)
     assert start is not None and start[2] == 0.0
     own = least_margins(of, Passed(np.array([0]), np.zeros(1, int), {}))
