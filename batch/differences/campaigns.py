@@ -137,7 +137,8 @@ def _experiment(
     if not out.signals:
         out.notes.append("neither has a metric or a history: nothing is compared but how cases end")
     compare_requirements(a, b, matched, out)
-    judge_pairs(out)
+    if _is_sample(b, matched.b) or _other_noise(a, b):
+        judge_pairs(out)
     _counts(a, b, matched, out)
     out.worst = scores.ranked(a, b, matched, out.signals)
     out.cases_different = int(scores.beyond.sum())
@@ -179,6 +180,12 @@ def _how(scores: _Scores, matched: MatchedCases, b: ArchiveGroup, found: Experim
         ended = [each.case for each in found.ended]
         out[np.isin(b.values("case")[matched.b], ended)] = VERDICTS.index(DIFFERENT)
     return out
+
+
+def _is_sample(group: ArchiveGroup, cases: np.ndarray) -> bool:
+    """True if cases were drawn at random, or repeated with other noise, so that a difference may be due to chance."""
+    repeated = "repeat" in group.variables and bool(group.values("repeat")[cases].any())
+    return repeated or any(variable.attributes.get("design") for variable in group.role("coordinate"))
 
 
 def _other_noise(a: ArchiveGroup, b: ArchiveGroup) -> bool:

@@ -1,7 +1,8 @@
 """Paired comparison of two versions that ran the same cases: McNemar's test of each requirement, and the sign test of
 each metric.
 
-Each case is a pair, which is far sharper than two shares with an interval each. The probabilities of all requirements
+Each case is a pair, which is far sharper than two shares with an interval each. Only cases that were drawn are a
+sample: of a grid the counts say all there is, and chance has no part in them. The probabilities of all requirements
 and metrics of an experiment are corrected for their number by Holm's method.
 """
 

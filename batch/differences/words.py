@@ -111,26 +111,30 @@ def evidence_pairs(experiment: ExperimentDiff) -> list[tuple[str, str]]:
 
 
 def pairs_text(each: RequirementDiff) -> str:
-    """The end of a line: the number of cases that meet it in only one archive, and whether that is more than chance."""
-    if math.isnan(each.chance) or not each.gained + each.lost:
+    """The end of a line: the number of cases that meet it in only one archive, where that says more than how many meet
+    it in each, and whether it is more than chance, where cases were drawn."""
+    if not each.gained + each.lost or (math.isnan(each.chance) and not each.gained * each.lost):
         return ""
-    return f"; {each.gained:,} gained, {each.lost:,} lost: {_chance(each.chance)}"
+    return f"; {each.gained:,} gained, {each.lost:,} lost{_chance(each.chance)}"
 
 
 def paired_metrics(experiment: ExperimentDiff) -> list[str]:
     """For each metric that differs in several cases, the numbers of cases in which it rose and fell, and whether that
-    is more than chance."""
+    is more than chance, where cases were drawn."""
     return [
-        f"{each.name} rose in {each.higher:,} of {each.compared:,}, fell in {each.lower:,}: {_chance(each.chance)}"
+        f"{each.name} rose in {each.higher:,} of {each.compared:,}, fell in {each.lower:,}{_chance(each.chance)}"
         for each in experiment.signals
-        if not math.isnan(each.chance) and each.higher + each.lower
+        if each.metric and not each.why and each.compared > 1 and each.higher + each.lower
     ]
 
 
 def _chance(chance: float) -> str:
-    """A probability by chance, and whether the difference is shown by it: `not shown (p = 0.25)`."""
+    """A probability by chance, and whether the difference is shown by it: `: not shown (p = 0.25)`; empty where it was
+    not tested."""
+    if math.isnan(chance):
+        return ""
     size = f"= {chance:.2g}" if chance >= SMALLEST else f"< {SMALLEST:g}"
-    return f"{'shown' if chance < paired.LEVEL else 'not shown'} (p {size})"
+    return f": {'shown' if chance < paired.LEVEL else 'not shown'} (p {size})"
 
 
 def requirement_text(each: RequirementDiff) -> str:

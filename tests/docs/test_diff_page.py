@@ -35,7 +35,7 @@ def test_the_mended_servo_stops_at_once(folder: Path) -> None:
     [experiment] = found.experiments
     assert experiment.cases.count == 28 and not experiment.ended
     creep = "creep < 0.001 rad/s"
-    assert experiment.requirements == [RequirementDiff(creep, creep, 20, 23, 3, 0, chance=0.25)]
+    assert experiment.requirements == [RequirementDiff(creep, creep, 20, 23, 3, 0)]
     before, after = (batch.open(folder / name).sel(recorded_case=27, joint="shoulder").qd for name in
                      ("before.h5", "after.h5"))  # fmt: skip
     at_rest = [float(qd.time[np.abs(qd) > 0.01][-1]) for qd in (before, after)]

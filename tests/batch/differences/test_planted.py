@@ -214,17 +214,27 @@ def test_the_same_answer_for_programs(monkeypatch: pytest.MonkeyPatch, tmp_path:
     assert (different["name"], different["different"], different["largest"]) == ("q", 1, pytest.approx(1.0))
 
 
+def drawn(experiment: Experiment) -> Experiment:
+    """The same cases, as of a random sample."""
+    coordinates = tuple(replace(each, design="random") for each in experiment.cases.coordinates)
+    return replace(experiment, cases=replace(experiment.cases, coordinates=coordinates))
+
+
 @pytest.mark.slow
 def test_pairs_of_cases_say_which_version_is_better(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Twelve cases of forty whose metric rises, two in which it falls: both tests are exact, corrected by Holm."""
+    """Twelve cases of forty whose metric rises, two in which it falls: both tests are exact, corrected by Holm. Of a
+    grid the counts are said, and no chance."""
 
     def plant(run: Run, place: dict[int, int]) -> None:
         for case in range(14):
             if case in place:
                 run.metrics["volts"][place[case]] += 1.0 if case < 12 else -1.0
 
-    a, b = two(monkeypatch, tmp_path, list(range(40)), plant, cases=40)
-    found = diff(a, b)
+    grid = diff(*two(monkeypatch, tmp_path, list(range(40)), plant, cases=40))
+    assert "    volts rose in 12 of 40, fell in 2" in diff_lines(grid)
+    assert all(math.isnan(each.chance) for each in grid.experiments[0].signals)
+    (tmp_path / "drawn").mkdir()
+    found = diff(*two(monkeypatch, tmp_path / "drawn", list(range(40)), plant, drawn, cases=40))
     [experiment] = found.experiments
     volts = next(each for each in experiment.signals if each.name == "volts")
     tests = len(experiment.requirements) + sum(each.metric for each in experiment.signals)
