@@ -22,7 +22,7 @@ from met.plan.searches import JudgedDesign, Search
 MOST_DESIGNS = 12
 """Largest number of designs that are judged."""
 
-MOST_CASES, MOST_POSES, LEAST_POSES = 32, 96, 3
+MOST_CASES, MOST_POSES, LEAST_POSES = 32, 48, 3
 """Largest number of a design's cases that are looked at; of poses of all of them; and the smallest of each: its start,
 its middle and its end."""
 

@@ -34,6 +34,9 @@ TOGETHER = 1e-4
 SHORT = 0.95
 """Share of a least margin that counts for loops which keep it one by one, and not all at once."""
 
+AT_ONCE = 1_000_000
+"""Largest number of complex elements of matrices that are solved at once, to bound memory."""
+
 SLOWEST = 1e-4
 """Lowest of these frequencies, as a share of half the sampling rate."""
 
@@ -138,13 +141,14 @@ class _OpenLoops:
     def stable(self) -> np.ndarray:
         return self.largest <= 1.0 + LEAST
 
-    def sensitivity(self, w: float) -> np.ndarray:
-        """The largest singular value of S - 1/2 at an angular frequency, rad/s, where S is the loop's sensitivity:
-        [lane]."""
-        z, one = np.exp(1j * w * self.period), np.eye(self.D.shape[-1])
+    def sensitivities(self, frequencies: np.ndarray) -> np.ndarray:
+        """The largest singular value of S - 1/2 at angular frequencies, rad/s, where S is the loop's sensitivity:
+        [frequency, lane]."""
+        z, one = np.exp(1j * frequencies * self.period)[:, None, None, None], np.eye(self.D.shape[-1])
         P = self.C @ np.linalg.solve(z * np.eye(self.A.shape[-1]) - self.A, self.B.astype(complex)) + self.D
-        S = np.linalg.inv(one - P)
-        return np.linalg.svd(S - 0.5 * one, compute_uv=False)[:, 0]
+        if one.size == 1:
+            return np.asarray(np.abs(1.0 / (1.0 - P[..., 0, 0]) - 0.5))
+        return np.asarray(np.linalg.svd(np.linalg.inv(one - P) - 0.5 * one, compute_uv=False)[..., 0])
 
     def only(self, lane: int) -> _OpenLoops:
         """The loop in one lane."""
@@ -201,7 +205,7 @@ def _of_lane(loops: _OpenLoops, sizes: np.ndarray) -> tuple[float, float, float]
 
     grid, at = np.log(_frequencies(loops)), int(sizes.argmax())
     ends = (grid[max(0, at - 1)], grid[min(len(grid) - 1, at + 1)])
-    least = minimize_scalar(lambda w: -float(loops.sensitivity(math.exp(w))[0]), bounds=ends, method="bounded")
+    least = minimize_scalar(lambda w: -float(loops.sensitivities(np.exp([w]))[0, 0]), bounds=ends, method="bounded")
     gain = min(_factors(*gain_limits(A, B, C, D, LEAST)), default=math.inf)
     return 1.0 / max(-float(least.fun), float(sizes.max())), gain, math.nan
 
@@ -213,7 +217,8 @@ def _frequencies(loops: _OpenLoops) -> np.ndarray:
 
 def _sensitivities(loops: _OpenLoops) -> np.ndarray:
     """The largest singular value of S - 1/2 on a grid of frequencies: [frequency, lane]."""
-    return np.stack([loops.sensitivity(w) for w in _frequencies(loops).tolist()])
+    pieces = math.ceil(FREQUENCIES * loops.A.size / AT_ONCE)
+    return np.concatenate([loops.sensitivities(some) for some in np.array_split(_frequencies(loops), pieces)])
 
 
 def _together(found: SampledLoops, least: _Least, joints: tuple[str, ...]) -> _Least:
