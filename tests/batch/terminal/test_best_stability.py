@@ -16,6 +16,7 @@ import pytest
 import batch
 import ic
 from batch.archive.read import ArchiveFile
+from batch.queries.answer_outcome import answer_outcome
 from batch.queries.best import Designs
 from batch.queries.pool import Pool
 from batch.queries.search_answers import SearchAnswer
@@ -153,7 +154,8 @@ def answered(archive: Path, tmp_path: Path) -> Planted:
             found = SearchAnswer.of(file.groups[0])
             reported = search_answer(file, file.groups[0])
             assert found is not None and reported is not None
-            return found.lines(), found.as_data(), found.ok, f"{reported.headline}. {reported.why}"
+            verdict = answer_outcome(found).headline
+            return found.lines(), found.as_data(), found.ok, f"{reported.headline}. {reported.why}. {verdict}."
 
     return answer
 
@@ -178,6 +180,7 @@ def test_a_tuning_none_of_whose_designs_keeps_the_margin_advises_none(answered: 
         "tuning it looks for one that does"
     ) in text
     assert report.startswith("Not advised: ")
+    assert report.endswith("The answer meets all requirements, but its disk margin of 0.1 is below the least, 0.3.")
     lines, *_ = answered(JudgedDesign(3, margins(0.1)), search_least_margin=0.5, search_steers=1)
     assert "  it does not keep the least margin of 0.5" in lines
 
