@@ -14,10 +14,8 @@ EDITIONS = (FIRST, LATEST)
 
 EDITION_WORD = "deck"
 
-_HEADING = re.compile(
-    r"(?:\s+|//[^\n]*|/\*(?:[^*]|\*(?!/))*+\*/)*+"
-    rf"(?P<whole>{EDITION_WORD}\s+(?P<number>[0-9]{{1,9}})(?![\w.])(?:\s*(?P<end>;))?)"
-)
+_BLANK = re.compile(r"\s+|//[^\n]*|/\*(?s:.*?)\*/")
+_HEADING = re.compile(rf"{EDITION_WORD}\s+(?P<number>[0-9]{{1,9}})(?![\w.])(?:\s*(?P<end>;))?")
 
 
 @frozen
@@ -36,12 +34,13 @@ class Heading:
 
 def heading(text: str) -> Heading | None:
     """The heading of a file's text; None where it has none."""
-    found = _HEADING.match(text)
+    first = 0
+    while blank := _BLANK.match(text, first):
+        first = blank.end()
+    found = _HEADING.match(text, first)
     if found is None:
         return None
-    return Heading(
-        int(found["number"]), found.start("whole"), found.end("whole"), found.span("number"), found["end"] is not None
-    )
+    return Heading(int(found["number"]), found.start(), found.end(), found.span("number"), found["end"] is not None)
 
 
 def edition_of(text: str) -> int:

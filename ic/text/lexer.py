@@ -48,19 +48,20 @@ _SYMBOLS = {
     "/=": "CPP_DIVIDEEQUAL", "..": "RANGE", "...": "ELLIPSIS",
 }  # fmt: skip
 
-# the order of the alternatives matters; a hexadecimal number is for #if only
+# The order of the alternatives matters; a hexadecimal number is for #if only. There are no possessive repeats, as `*+`:
+# `re` of Python 3.11.2, which Debian 12 has, matches some of them wrongly.
 _SPLICE = re.compile(r"\\[ \t\f\v]*(?:\n|\Z)")
-_REST = re.compile(r"(?:\\[ \t\f\v]*\n|[^\n])*+")
+_REST = re.compile(r"[^\\\n]*(?:\\(?:[ \t\f\v]*\n)?[^\\\n]*)*")
 _TOKEN = re.compile(
     r"""
       (?P<space>[ \t\f\v]+)
     | (?P<name>[A-Za-z_][A-Za-z0-9_]*)
     | (?P<newline>\n)
     | (?P<number>0[xX][0-9a-fA-F]+|(?:[0-9]+(?:\.(?!\.)[0-9]*)?|(?<!\.)\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
-    | (?P<comment>//[^\n]*|/\*(?:[^*]|\*(?!/))*+\*/)
+    | (?P<comment>//[^\n]*|/\*(?s:.*?)\*/)
     | (?P<unclosed>/\*)
-    | (?P<string>"(?:[^"\\\n]|\\.)*+")
-    | (?P<character>'(?:[^'\\\n]|\\.)*+')
+    | (?P<string>"[^"\\\n]*(?:\\.[^"\\\n]*)*")
+    | (?P<character>'[^'\\\n]*(?:\\.[^'\\\n]*)*')
     | (?P<symbol>\#\#|\.\.\.|\.\.|<<|>>|[<>=!+*/-]=|\|\||&&|[][(){}<>=!+*/%^;:,.\#&|~?-])
     | (?P<bad>"[^\n]*|'[^\n]*|[^\x00-\x7f]+|.)
     """,
