@@ -51,7 +51,9 @@ def unpacked() -> Path:
     folder = Path(tempfile.mkdtemp(prefix="met-rp2040js-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     with tarfile.open(fileobj=io.BytesIO(data)) as archive:
-        archive.extractall(folder, filter="data")
+        if hasattr(tarfile, "data_filter"):  # Python 3.11.2 has no filters
+            archive.extraction_filter = tarfile.data_filter
+        archive.extractall(folder)
     return folder / "package"
 
 
