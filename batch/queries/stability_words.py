@@ -41,7 +41,7 @@ def unwrapped(lines: Iterable[str]) -> list[str]:
 
 
 def stability_texts(design: JudgedDesign | None, least_margin: float) -> list[str]:
-    """What is said of the stability of a design that was chosen with a least disk margin, a text for each thing."""
+    """Texts on the stability of a design that was chosen with a least disk margin, one for each thing."""
     if not least_margin:
         return ["stability not judged: the least margin that is asked for is 0"]
     if design is None:

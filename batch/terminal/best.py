@@ -151,7 +151,7 @@ class BestAnswer:
         return f"{'use' if self.advised else 'not advised:'} {settings}"
 
     def stability(self) -> list[str]:
-        """What is said of the stability of the best, and of a better one that was left for it, a text for each."""
+        """A text on the stability of the best design, and one on a better design that was left for it."""
         assert self.best is not None
         out = stability_texts(self.judged.get(self.best), self.least_margin)
         if not self.advised:
