@@ -242,15 +242,17 @@ def cases(
 
 @click.command()
 @DECK
-@click.argument("path")
+@click.argument("path", required=False)
 @click.option("--run", "name", metavar="NAME", help="The run or sweep to look in, if it is not the default one.")
+@click.option("--scales", is_flag=True, help="Show numbers of the run as multiples of others, with what is usual.")
 @deck_options
 @format_option
 @loudness_options
 def explain(
     deck: str,
-    path: str,
+    path: str | None,
     name: str | None,
+    scales: bool,
     defines: tuple[str, ...],
     include_dirs: tuple[str, ...],
     settings: tuple[str, ...],
@@ -261,12 +263,24 @@ def explain(
     """Show where a value comes from: the line that wrote it, and the values that it replaced.
 
     PATH is a parameter (elbow.servo.kt), the beginning of several (elbow.servo), one of a definition (gearbox.kp), or a
-    setting of the run (rates.dynamics).
+    setting of the run (rates.dynamics). Without PATH, `--scales` shows what the run's numbers are beside one another.
     """
     from ic.printing.explaining import Sources, explained_json, print_explained
+    from ic.printing.scales import print_scales, scales_json
 
     check_options(deck, defines=defines, include_dirs=include_dirs, settings=settings)
+    if (path is None) != scales:
+        raise click.UsageError("write a PATH, or `--scales` without one")
     names = (name,) if name else ()
+    if path is None:
+        if deck.endswith(".json"):
+            raise click.UsageError("the scales are those of a deck, which a plan does not have any more")
+        compiled = _compiled(deck, include_dirs, defines, settings, names or None)
+        if form == "json":
+            _print_json(scales_json(compiled))
+        else:
+            _print(print_scales(compiled))
+        return
     if deck.endswith(".json"):
         sources: Sources = [lambda: (_plan_in_file(deck, names), None)]
     else:  # a path that only another run of the deck has is explained for that one

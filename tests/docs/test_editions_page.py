@@ -42,7 +42,9 @@ def test_the_motor_has_the_numbers_that_its_units_say() -> None:
     ("let it = (1/2) m;", "", ""),
 ])  # fmt: skip
 def test_what_the_table_shows_is_so(entry: str, first: str, second: str) -> None:
-    run = "arm a { link b { mass = 1 kg; shape = sphere(radius = 1 m); } joint j revolute { parent = base; child = b; "
+    run = (
+        "arm a { link b { mass = 1 kg; shape = sphere(radius = 0.1 m); } joint j revolute { parent = base; child = b; "
+    )
     run += "axis = z; } } run r { arm = a; rates { dynamics = 1 kHz; } duration = 1 s; record = [q]; }"
     for edition, code in ((1, first), (2, second)):
         found = ic.check(text=f"deck {edition};\n{entry}\n{run}").diagnostics

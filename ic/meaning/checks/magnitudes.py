@@ -51,7 +51,6 @@ MASSES = Magnitude(
 )
 
 MAGNITUDES = (
-    Magnitude("m/s^2", re.compile(rf"environment\.[^.]+\.g{_VECTOR}"), 0.0, 300.0, "the Sun's surface has 274 m/s^2"),
     LENGTHS,
     MASSES,
     Magnitude("N*m/A", re.compile(r".+"), 0.0, 300.0, "the largest motors have some 100 N*m/A"),
@@ -75,9 +74,9 @@ BY_UNIT: dict[str, list[Magnitude]] = {}
 for _kind in MAGNITUDES:
     BY_UNIT.setdefault(_kind.unit, []).append(_kind)
 
-THIN, DENSE = 0.1, 1e6
-"""Smallest and largest density of a shape, kg/m^3: the lightest solids have 1, and a shape may stand for something
-hollow; the densest have 22,600, and decks draw a mass as a ball that is far too small."""
+THIN, DENSE = 1.0, 1e6
+"""Smallest and largest density of a shape, kg/m^3: the lightest solids have 1; the densest have 22,600, and decks draw
+a mass as a ball that is far too small."""
 
 HEAVY_ROD = 1e5
 """Largest mass per length of a rod, kg/m: steel of 4 m across."""
@@ -100,9 +99,9 @@ MORE = (
 )
 """Remedies of a density: words, factors of the mass, and of the density for each size."""
 
-GYRATION, LEAST_GYRATION = 10.0, 10.0
-"""Radius of gyration relative to the length of an arm or a shape, and in m: above both no link of the arm has one, and
-above the former no body of that shape."""
+GYRATION, LEAST_GYRATION = 4.0, 10.0
+"""Largest radius of gyration relative to an arm's length of links that are judged by their density, and smallest, m: a
+larger one is far from usual already (`scales`)."""
 
 SMALLEST_GYRATION = 1e-5
 """Smallest radius of gyration of a body of a milligram or more, m: a ball of lead that has it weighs 5e-11 kg, but
@@ -144,8 +143,8 @@ def check_magnitudes(scope: Scope, structure: Structure) -> None:
     _observe_densities(scope, [body for body in bodies if body.sizes and body.may_be_odd])
     of_their_own = [body for body in bodies if any(each.origin.kind != "derived" for each in body.moments)]
     # the inertia of a shape follows from it; a base may be of any size, and so may a payload
-    told = [body for body in of_their_own if body.sizes or (body.head.startswith("links.") and body.head != OF_BASE)]
-    _observe_inertias(scope, structure, told)
+    small = [body for body in of_their_own if body.sizes or (body.head.startswith("links.") and body.head != OF_BASE)]
+    _observe_inertias(scope, structure, small)
 
 
 def _observe(scope: Scope, kind: Magnitude, those: list[tuple[str, Settled]]) -> None:
@@ -302,7 +301,7 @@ def _observe_densities(scope: Scope, bodies: Sequence[WeighedBody]) -> None:
 
 
 def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[WeighedBody]) -> None:
-    """Check bodies' radii of gyration against their shapes, and those of links without one against the arm's length."""
+    """Check that bodies are no denser and no thinner than solids by their inertia alone."""
     if not bodies:
         return
     paths = [f"{joint.name}.at" for joint in structure.joints] + [f"links.{each.name}.com" for each in structure.links]
@@ -323,13 +322,10 @@ def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[Weigh
                 radius = np.sqrt(np.maximum(largest, 0.0) / np.where(mass > 0.0, mass, np.inf))
                 length = np.sqrt((sizes * sizes).sum(axis=1)) if body.sizes else arm
                 density = _ellipsoid_density(mass, inertia)
-            least = GYRATION * length if body.sizes else np.maximum(GYRATION * length, LEAST_GYRATION)
-            large = (length > 0.0) & (radius > least)
-            thin = (length > 0.0) & (radius > LEAST_GYRATION) & (density > 0.0) & (density < THIN) & ~large
+            thin = (radius > LEAST_GYRATION) & (radius <= GYRATION * length) & (density > 0.0) & (density < THIN)
             thin &= not body.sizes
             tiny = (radius > 0.0) & (radius < SMALLEST_GYRATION) & (mass >= MASSES.low)
             kinds: list[tuple[Remark, np.ndarray, np.ndarray]] = [
-                (_too_large, large, radius / np.where(large, least, 1.0)),
                 (_too_thin, thin, 1.0 / np.where(thin, density, 1.0)),
                 (_too_small, tiny, 1.0 / np.where(tiny, radius, 1.0)),
             ]
@@ -377,17 +373,6 @@ def _unlikely(radius: float, odd: OddBody) -> float:
     """How far this radius of gyration is from a usual one on such an arm or of such a shape, as a ratio's logarithm."""
     usual = USUAL_GYRATION * odd.length
     return abs(math.log(radius / usual)) if radius > 0.0 and 0.0 < usual < math.inf else 0.0
-
-
-def _too_large(odd: OddBody) -> tuple[str, list[str]]:
-    """The size that a body with too large an inertia is compared with, and the units that would explain it."""
-    helps = [
-        f"it would be of {odd.radius / math.sqrt(times):.4g} m, were it in {unit}: "
-        f"`{odd.largest:.6g} {unit}` is {odd.largest / times:.4g} kg*m^2"
-        for times, unit in sorted(OTHER_INERTIAS, key=lambda each: _unlikely(odd.radius / math.sqrt(each[0]), odd))
-        if odd.radius / math.sqrt(times) <= 2.0 * odd.length
-    ]
-    return f"its {'shape' if odd.sizes else 'arm'} is {odd.length:.4g} m {'large' if odd.sizes else 'long'}", helps
 
 
 def _too_thin(odd: OddBody) -> tuple[str, list[str]]:

@@ -73,6 +73,7 @@ class Scope:
     targets: dict[str, list[str]] = field(default_factory=dict)
     not_sweepable: dict[str, NotSweepable] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    scales: list[Any] = field(default_factory=list)  # of the first case (ic.meaning.checks.scales.Scale)
     joint_kinds: dict[str, set[str]] = field(default_factory=dict)
     failed_servos: frozenset[str] = frozenset()
     failed_parts: frozenset[str] = frozenset()

@@ -12,6 +12,7 @@ from ic.meaning.checks.reach import check_reach
 from ic.meaning.checks.reading import remark_unread
 from ic.meaning.checks.requirements import check_requirements
 from ic.meaning.checks.sampling import check_sampling
+from ic.meaning.checks.scales import check_scales
 from ic.meaning.checks.spin import check_spins
 from ic.meaning.checks.swings import check_circuits, check_sensor
 from ic.meaning.checks.together import check_together
@@ -161,6 +162,7 @@ RUN_CHECKS = (
     RunCheck(lambda run: check_together(run.scope, run.uses, run.structure)),
     RunCheck(lambda run: check_reach(run.scope, run.block, run.structure), _all_is_sound),
     RunCheck(lambda run: check_magnitudes(run.scope, run.structure), _all_is_sound),
+    RunCheck(lambda run: check_scales(run.scope, run.structure, run.uses), _all_is_sound),
     RunCheck(
         lambda run: check_requirements(run.scope, run.requirements, run.structure, run.linear_metrics), _all_is_sound
     ),

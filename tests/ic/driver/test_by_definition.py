@@ -131,7 +131,7 @@ def test_findings_of_what_is_no_more_are_not_kept() -> None:
     _, known = found(ARM + RUN, {})
     sizes = []
     for n in range(10, 40):
-        _, known = found(ARM + RUN.replace("0.2 rad/s", f"0.{n} rad/s"), known)
+        _, known = found(ARM + RUN.replace("0.2 rad/s", f"0.0{n} rad/s"), known)
         sizes.append(len(pickle.dumps(dict(known))))
     assert len(known) == 6
     assert max(sizes) <= sizes[0] + 100

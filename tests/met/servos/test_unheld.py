@@ -123,7 +123,9 @@ def test_an_integral_without_gain_holds_nothing(tmp_path: Path) -> None:
 def test_what_has_no_load_or_begins_unloaded_is_no_error(servo: str, tmp_path: Path) -> None:
     weak = deck(servo, tau_max=1e-3, i_max=1e-3)
     assert not check(tmp_path, weak.replace("-9.81", "0")).diagnostics
-    assert not check(tmp_path, weak.replace("initial { servos = balanced; }", "")).diagnostics
+    [weakness] = check(tmp_path, weak.replace("initial { servos = balanced; }", "")).diagnostics
+    assert weakness.severity == "warning" and weakness.message.startswith("`hinge.servo.")
+    assert " meets a load of 14.71 N*m, " in weakness.message
 
 
 def test_a_torque_command_decides_by_itself(tmp_path: Path) -> None:

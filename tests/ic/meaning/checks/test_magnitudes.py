@@ -28,38 +28,6 @@ def shown(folder: Path, *parts: str) -> str:
     return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
 
 
-def test_a_gravity_in_millimetres_is_told_with_what_would_be_usual(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, ARM, SERVO, inside("environment { gravity = [0, 0, -9810] m/s^2; }"))
-        == """\
-warning[D297]: `environment.gravity.g.z` is -9810 m/s^2, and the Sun's surface has 274 m/s^2
-  --> deck.ic:15:36
-   |
-15 |     environment { gravity = [0, 0, -9810] m/s^2; }
-   |                                    ^^^^^
-   = help: 1,000 times less would be -9.81 m/s^2: is a unit another, or missing?
-   = help: if it is meant so, `allow D297 because "...";`
-"""
-    )
-
-
-def test_an_inertia_in_square_millimetres_is_told_with_the_unit(tmp_path: Path) -> None:
-    body = "mass = 1 kg; com = [0.3, 0, 0] m; inertia = [200, 30000, 30000] kg*m^2;"
-    said = shown(tmp_path, arm(body), SERVO, RUN)
-    assert (
-        "warning[D298]: link `bar` has the inertia of a body of 173.2 m (its radius of gyration), and its arm is "
-        in said
-    )
-    assert "  = help: it would be of 0.1732 m, were it in kg*mm^2: `30000 kg*mm^2` is 0.03 kg*m^2\n" in said
-
-
-def test_of_units_that_would_explain_an_inertia_the_one_that_fits_the_arm_is_offered(tmp_path: Path) -> None:
-    """In kg*cm^2 it would be of 2.9 m, on an arm of 1.5 m; in kg*mm^2 of 0.29 m."""
-    body = "mass = 2 kg; com = [1.5, 0, 0] m; inertia = [1000, 170000, 170000] kg*m^2;"
-    said = shown(tmp_path, arm(body), SERVO, RUN)
-    assert "  = help: it would be of 0.2915 m, were it in kg*mm^2: `170000 kg*mm^2` is 0.17 kg*m^2\n" in said
-
-
 @pytest.mark.parametrize(
     ("body", "said", "cure"),
     [
@@ -87,7 +55,7 @@ def test_a_body_of_next_to_no_mass_is_endlessly_large_and_no_defect(tmp_path: Pa
     found = check(
         tmp_path, arm(body), SERVO, RUN, "sweep it of hold { vary links.bar.mass = [1e-320, 1] kg; }", select="it"
     )
-    assert [each.code for each in found.diagnostics] == ["D298", "D297"] and found.plan is not None
+    assert [each.code for each in found.diagnostics] == ["D297"] and found.plan is not None
 
 
 @pytest.mark.parametrize(
@@ -137,15 +105,14 @@ def test_one_row_of_a_sweep_is_told(tmp_path: Path) -> None:
     [
         ("mass = 5 kg; shape = sphere(radius = 0.3 m);", "D298",
          "link `bar` would be of 0.001768 kg/m^3 in case #2 (0.0002 kg), and solids have 1 to 22,600"),
-        ("mass = 5 kg; com = [0.3, 0, 0] m; inertia = [0.1, 0.2, 0.2] kg*m^2;", "D298",
-         "link `bar` has the inertia of a body of 31.62 m (its radius of gyration) in case #2 (0.0002 kg), and its arm "
-         "is 0.3 m long"),
+        ("mass = 5 kg; com = [0.3, 0, 0] m; inertia = [0.1, 0.2, 0.2] kg*m^2;", "D297",
+         "`links.bar.inertia` has a radius of gyration of 31.62 m in case #2, 105.4 times the arm's reach, 0.3 m; of 624 links of published robots all have 0.00018 to 1.3 times their robot's reach"),
         ("mass = 5 kg; shape = rod(length = 1 m, along = x);", "D297",
          "`links.bar.mass` is 2e-07 kg in case #2, and links weigh a milligram and more, and the largest some 400 t"),
     ],
 )  # fmt: skip
 def test_a_remark_on_a_sweep_names_the_case(tmp_path: Path, body: str, code: str, said: str) -> None:
-    small = "2e-7" if code == "D297" else "2e-4"
+    small = "2e-7" if "rod" in body else "2e-4"
     sweep = f"sweep s of hold {{ vary swing.links.bar.mass = [1, 2, {small}, 3] kg; }}\n"
     [found] = check(tmp_path, arm(body), SERVO, RUN, sweep, select="s").diagnostics
     assert found.code == code and found.message == said
@@ -166,7 +133,9 @@ def test_the_case_that_is_named_is_the_one_that_was_drawn(tmp_path: Path, count:
 
 def test_a_torque_constant_in_milli_is_told(tmp_path: Path) -> None:
     servo = changed(SERVO, ("kt = 0.05", "kt = 600"), ("resistance = 1 ohm", "resistance = 1e8 ohm"))
-    assert [code for code in codes(tmp_path, ARM, servo, RUN) if code == "D297"] == ["D297"]
+    assert [code for code in codes(tmp_path, ARM, servo, RUN) if code == "D297"] == [
+        "D297"
+    ] * 2  # such a motor turns slowly
 
 
 @pytest.mark.parametrize(
@@ -190,8 +159,8 @@ def test_what_is_only_rare_is_not_told(tmp_path: Path, body: str) -> None:
 def test_an_inertia_that_no_body_of_the_shape_has_is_told_at_the_inertia(tmp_path: Path) -> None:
     body = "mass = 2 kg; shape = box(size = [0.3, 0.1, 0.1] m);\n inertia = [3e3, 2e4, 2e4] kg*m^2;"
     [found] = check(tmp_path, arm(body), SERVO, RUN).diagnostics
-    assert found.code == "D298" and found.at is not None and found.at.place.line == 2
-    assert found.message.endswith(" m (its radius of gyration), and its shape is 0.3317 m large")
+    assert found.code == "D297" and found.at is not None and found.at.place.line == 2
+    assert "has a radius of gyration of 100 m, 301.5 times the size of its shape, 0.3317 m; of 624 " in found.message
     assert codes(tmp_path, arm(body.replace("3e3", "3e-3").replace("2e4", "2e-2")), SERVO, RUN) == []
 
 
@@ -203,9 +172,7 @@ def test_a_mistake_in_all_links_is_told_once(tmp_path: Path) -> None:
     assert found.message == "link `bar` would be of 9.549e+09 kg/m^3, and 1 more is so, and solids have 1 to 22,600"
     large = two.format("mass = 1 kg; com = [0.2, 0, 0] m; inertia = [2e4, 2e4, 2e4] kg*m^2;")
     [found] = check(tmp_path, large, SERVO, RUN).diagnostics
-    assert found.message.startswith(
-        "link `bar` has the inertia of a body of 141.4 m (its radius of gyration), and 1 more"
-    )
+    assert "has a radius of gyration of 141.4 m, 471.4 times the arm's reach, 0.3 m; 1 more is so; " in found.message
 
 
 def test_one_mistake_is_told_once(tmp_path: Path) -> None:
@@ -222,4 +189,7 @@ def test_it_may_be_allowed(tmp_path: Path) -> None:
 @pytest.mark.release
 @pytest.mark.parametrize("seed", range(40))
 def test_random_sane_decks_are_told_nothing_of_it(tmp_path: Path, seed: int) -> None:
-    assert not {"D296", "D297", "D298"} & set(codes(tmp_path, random_deck(seed)))
+    """But that their motors, which are drawn as well, are too weak or too slow, which is true of some."""
+    found = check(tmp_path, random_deck(seed)).diagnostics
+    said = [each.message for each in found if each.code in ("D296", "D297", "D298")]
+    assert [each for each in said if " meets a load of " not in each and " asks for " not in each] == []

@@ -1,0 +1,196 @@
+"""The numbers of one case of a run, and what follows from them without its equations: lengths, limits, loads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from graphlib import TopologicalSorter
+from types import SimpleNamespace
+
+import numpy as np
+
+from ic.meaning.control.servos import Use
+from ic.meaning.parameters.owner import XYZ, Settled
+from met import models
+from met.plan import BASE, Structure
+from met.plan.defaults import INERTIA
+from met.vectors import rotation_about, rotation_rpy
+
+INSTANTS = 1000
+"""Number of instants of a run at which a command is looked at."""
+
+BEARING_NOTHING = ("gravity", "gravity_gradient", "joint_damping", "dead_sensor", "free_swinging", "runaway")
+"""Models of the environment that bear no load of an arm at rest."""
+
+
+class RunNumbers:
+    """The numbers of one case of a run, and what follows from them for several scales.
+
+    settled  parameters by path, also words and lists;  numbers: those that are numbers, in this case, SI
+    """
+
+    def __init__(
+        self, structure: Structure, uses: Iterable[Use], settled: Mapping[str, Settled], numbers: Mapping[str, float]
+    ) -> None:
+        self.structure, self.uses, self.settled, self.numbers = structure, tuple(uses), settled, numbers
+        self.moved = {link.name for link in structure.links} - {BASE, *structure.ground}
+        """The links that move against the base."""
+        self.kinds = {joint.name: joint.kind for joint in structure.moving}
+        self.offsets = {joint.name: self.length(f"{joint.name}.at") for joint in structure.joints}
+        self.extents = {link.name: self.extent(f"links.{link.name}") for link in structure.links}
+        by_child = {joint.child: joint for joint in structure.joints}
+        links = TopologicalSorter({child: [joint.parent] for child, joint in by_child.items()}).static_order()
+        self.outward = tuple(by_child[link] for link in links if link in by_child)
+        """The joints, each behind those between it and the base."""
+        self.depths = {BASE: 0.0}  # of each link: length of the way from the base to its joint
+        for joint in self.outward:
+            self.depths[joint.child] = self.depths.get(joint.parent, 0.0) + self.offsets[joint.name]
+        self.beyond = dict(self.extents)  # of each link: length of the longest way from its joint to an end
+        for joint in reversed(self.outward):
+            way = self.offsets[joint.name] + self.beyond.get(joint.child, 0.0)
+            self.beyond[joint.parent] = max(self.beyond.get(joint.parent, 0.0), way)
+
+    def largest(self, head: str, unit: str) -> dict[str, float]:
+        """The parameters in this unit at this path or below it: the number, or of a list the one farthest from 0."""
+        found = {}
+        for path, settled in self.settled.items():
+            if settled.unit == unit and (path == head or path.startswith(f"{head}.")):
+                value = self.numbers.get(path, settled.value)
+                if isinstance(value, tuple):
+                    found[path] = max(value, key=abs, default=0.0)
+                elif isinstance(value, (int, float)):
+                    found[path] = float(value)
+        return found
+
+    def is_placed(self, joint: str) -> bool:
+        """True of a joint whose servo follows a position."""
+        commands = [use.command for use in self.uses if use.joint == joint and use.command is not None]
+        return any(command.kind == "position" for command in commands)
+
+    def length(self, path: str) -> float:
+        """The length of a vector; 0 where there is none."""
+        return math.hypot(*(self.numbers.get(f"{path}.{axis}", 0.0) for axis in XYZ))
+
+    def extent(self, head: str) -> float:
+        """The largest size of a body's shape, m; 0 of one without."""
+        sizes = [self.numbers.get(f"{head}.shape.{size}", 0.0) for size in ("length", "radius")]
+        return max(*sizes, self.length(f"{head}.shape.size"))
+
+    @property
+    def reach(self) -> float:
+        """The longest way from the base over joints to the end of a shape, m; else to the farthest centre of mass."""
+        return self.beyond.get(BASE, 0.0) or max(self.length(f"links.{link.name}.com") for link in self.structure.links)
+
+    @property
+    def reach_words(self) -> str:
+        return f"the arm's reach, {self.reach:.4g} m"
+
+    def is_written(self, path: str) -> bool:
+        """True where the deck wrote a number of this vector, or of this tensor."""
+        ends = [f"{path}.{part}" for part in (*XYZ, *INERTIA)]
+        found = [self.settled[each] for each in ends if each in self.settled]
+        return any(each.origin.place is not None and each.origin.kind != "derived" for each in found)
+
+    def gyration(self, head: str) -> float:
+        """The largest radius of gyration of a body about a frame axis, m; 0 of one without mass."""
+        mass = self.numbers.get(f"{head}.mass", 0.0)
+        moments = [self.numbers.get(f"{head}.inertia.{part}", 0.0) for part in INERTIA[:3]]
+        return math.sqrt(max(*moments, 0.0) / mass) if mass > 0.0 else 0.0
+
+    def of_motor(self, use: Use, name: str) -> float | None:
+        """A number of a servo's motor, by the name that all servos with motors share; None of one without."""
+        return self.numbers.get(f"{use.joint}.servo.{name}")
+
+    def largest_torque(self, use: Use) -> tuple[str, float] | None:
+        """The largest torque of a servo's motor, N m, and the parameter that sets it; None where there is none."""
+        torque, current, kt = self.limit(use, "N*m"), self.limit(use, "A"), self.of_motor(use, "kt")
+        limits = [torque] if torque is not None else []
+        if current is not None and kt is not None:
+            limits.append((current[0], kt * current[1]))
+        least = min(limits, key=lambda each: each[1], default=None)
+        return least if least is not None and least[1] > 0.0 else None
+
+    def loads(self) -> dict[str, float]:
+        """The torque (force) of gravity about (along) each moving joint's axis where the run begins, N m (N); none on a
+        base that moves, or without gravity."""
+        named = [use.name for use in self.structure.environment if use.model == "gravity"]
+        g = sum((self.vector(f"environment.{name}.g") for name in named), np.zeros(3))
+        if self.structure.base is not None or not g.any():
+            return {}
+        turned, at = {BASE: np.eye(3)}, {BASE: np.zeros(3)}
+        lines: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        for joint in self.outward:
+            parent = turned[joint.parent]
+            frame = parent @ np.array(rotation_rpy(*self.vector(f"{joint.name}.rpy")))
+            axis = frame @ self.vector(f"{joint.name}.axis")
+            q = self.numbers.get(f"initial.{joint.name}.q", 0.0)
+            origin = at[joint.parent] + parent @ self.vector(f"{joint.name}.at")
+            pivot = frame @ self.vector(f"{joint.name}.pivot")
+            turn = np.array(rotation_about(tuple(axis), q)) if joint.kind == "revolute" else np.eye(3)
+            slide = axis * q if joint.kind == "prismatic" else 0.0
+            turned[joint.child], at[joint.child] = turn @ frame, origin + pivot - turn @ pivot + slide
+            lines[joint.name] = axis, origin + pivot
+        bodies = [
+            (link.name, f"links.{link.name}", self.vector(f"links.{link.name}.com")) for link in self.structure.links
+        ]
+        for payload in self.structure.payloads:
+            if not payload.grappled:
+                head = f"payloads.{payload.name}"
+                own = np.array(rotation_rpy(*self.vector(f"{head}.rpy"))) @ self.vector(f"{head}.com")
+                bodies.append((payload.link, head, self.vector(f"{head}.at") + own))
+        masses = dict.fromkeys(at, 0.0)
+        moments = {link: np.zeros(3) for link in at}
+        for link, head, centre in bodies:
+            if link in at:
+                mass = self.numbers.get(f"{head}.mass", 0.0)
+                masses[link] += mass
+                moments[link] = moments[link] + mass * (at[link] + turned[link] @ centre)
+        found = {}
+        for joint in reversed(self.outward):
+            axis, through = lines[joint.name]
+            mass, moment = masses[joint.child], moments[joint.child]
+            force = mass * g
+            torque = np.cross(moment - mass * through, g)
+            found[joint.name] = float(axis @ (force if joint.kind == "prismatic" else torque))
+            masses[joint.parent] += mass
+            moments[joint.parent] = moments[joint.parent] + moment
+        return {joint.name: found[joint.name] for joint in self.structure.moving}
+
+    def is_helped(self, joint: str) -> bool:
+        """True where a model of the environment may bear a joint's load: one that is not of BEARING_NOTHING, nor of
+        another joint alone."""
+        others = [use.name for use in self.structure.environment if use.model not in BEARING_NOTHING]
+        joints = [self.settled.get(f"environment.{name}.joint") for name in others]
+        return any(each is None or each.value == joint for each in joints)
+
+    def vector(self, path: str) -> np.ndarray:
+        """A vector; zeros where there is none."""
+        return np.array([self.numbers.get(f"{path}.{axis}", 0.0) for axis in XYZ])
+
+    def limit(self, use: Use, unit: str) -> tuple[str, float] | None:
+        """The parameter that limits a servo's output or signal of this unit, and its value; None where none does."""
+        for each in (*use.servo.outputs, *use.servo.signals):
+            value = self.numbers.get(f"{use.joint}.servo.{each.limit}") if each.limit and each.unit == unit else None
+            if value is not None:
+                return each.limit, value
+        return None
+
+    def course(self, use: Use) -> tuple[np.ndarray, np.ndarray] | None:
+        """Values and slopes of a servo's command through the run; None where it is not known by its numbers."""
+        command = use.command
+        if command is None or not command.model:
+            return None
+        profile = models.find_own("command").get(command.model)
+        if profile is None:
+            return None
+        p = SimpleNamespace()
+        for each in profile.parameters:
+            path = f"{use.joint}.servo.command.{each.name}"
+            value = self.numbers.get(path, self.settled[path].value if path in self.settled else None)
+            if value is None:
+                return None
+            setattr(p, each.name, value)
+        t = np.linspace(0.0, self.structure.schedule.duration, INSTANTS)
+        with np.errstate(all="ignore"):  # of a swing at 1e308 Hz there are no numbers
+            values, slopes = (np.broadcast_to(np.asarray(each, float), t.shape) for each in profile.course(p, t))
+        return values, slopes

@@ -1,0 +1,373 @@
+"""Scales of a run: its numbers as multiples of others in the same run, each with the range that is usual.
+
+A number may be possible and wrong for its arm: a centre of mass 250 m away on an arm of 1 m, a command of 60 rad, a
+friction above the motor's torque. What is compared is declared as `Scale`; a multiple outside its usual range is
+remarked on (D297), and `met explain DECK --scales` prints all of them.
+
+Ranges are those of published robots where they are said to be of such, made wider by a factor of 1.8 or more: of the 43
+of 67 URDF files of example-robot-data and its neighbours that are imported. Others are of what there is to buy, or of
+what a motor can do by its own numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+
+import numpy as np
+
+from ic.meaning.checks.magnitudes import LENGTHS, MASSES, MEANT, SMALLEST_GYRATION
+from ic.meaning.checks.run_numbers import RunNumbers
+from ic.meaning.control.servos import Use
+from ic.meaning.parameters.scope import Scope
+from met import models
+from met.frozen import frozen
+from met.plan import BASE, Structure
+from met.servos.motor import RATIO
+
+TURN = 2.0 * math.pi
+
+EARTH = 9.80665
+"""Acceleration of free fall on the Earth, m/s^2."""
+
+MOST_CASES = 16
+"""Largest number of cases that are looked at: the first, and those with the ends of what varies."""
+
+
+@frozen
+class Scale:
+    """A number of a run as a multiple of another.
+
+    what    what is compared, in words
+    path    of the parameter that the number is of, or the first of them
+    size    the number;  unit: its unit, "" of one without;  verb: that leads to it from the path
+    beside  the other number, which is `other` in words; 1 and "" where the number is a multiple already
+    low     smallest usual multiple;  high: the largest;  usual: where these are from, in words
+    meant   unit of the parameter where another may have been meant, "" where it may not;  power: the multiple goes as
+            this power of the parameter
+    """
+
+    what: str
+    path: str
+    size: float
+    unit: str
+    beside: float
+    other: str
+    low: float
+    high: float
+    usual: str
+    verb: str = "is"
+    meant: str = ""
+    power: float = 1.0
+
+    @property
+    def multiple(self) -> float:
+        return self.size / self.beside
+
+    @property
+    def nearness(self) -> float:
+        """How near the multiple is to an end of its usual range: 1 at the end, more outside; of a number 0 it is 0."""
+        multiple = self.multiple
+        return max(multiple / self.high, self.low / multiple) if multiple != 0.0 and math.isfinite(multiple) else 0.0
+
+    def sentence(self, case: str, others: int) -> str:
+        """What a warning says. case: words for the case; others: number of further paths that are so"""
+        times = f", {self.multiple:.4g} times {self.other}" if self.other else ""
+        more = f"; {others} more {'is' if others == 1 else 'are'} so" if others else ""
+        return f"`{self.path}` {self.verb} {self.size:.4g} {self.unit}".rstrip() + f"{case}{times}{more}; {self.usual}"
+
+    @property
+    def remedies(self) -> list[str]:
+        """Other units of the parameter with which the multiple would be usual, if there are any, and what is usual."""
+        multiples = [(unit, self.multiple * factor**self.power) for unit, factor in OTHER_UNITS.get(self.meant, ())]
+        usual = [(unit, each) for unit, each in multiples if max(self.low, 1e-2 * self.high) <= each <= self.high]
+        usual.sort(key=lambda each: abs(math.log(each[1] / (0.1 * self.high))))
+        found = ", ".join(f"in {unit} it would be {multiple:.3g} times" for unit, multiple in usual[:2])
+        end, word = (self.low, "least") if self.multiple < self.low else (self.high, "most")
+        limit = f"at {word} {end * self.beside:.3g} {self.unit}".rstrip() + " is usual"
+        return [*([f"{found} {self.other}: is the unit another?"] if found else []), limit]
+
+
+OTHER_UNITS: Mapping[str, tuple[tuple[str, float], ...]] = {
+    "rad": (("deg", math.radians(1.0)),),
+    "rad/s": (("deg/s", math.radians(1.0)), ("rpm", TURN / 60.0)),
+    "m": (("mm", 1e-3), ("cm", 1e-2)),
+    "m/s": (("mm/s", 1e-3), ("cm/s", 1e-2)),
+    "m/s^2": (("cm/s^2", 1e-2), ("mm/s^2", 1e-3)),
+    "kg": (("g", 1e-3),),
+    "kg*m^2": (("kg*cm^2", 1e-4), ("kg*mm^2", 1e-6), ("g*cm^2", 1e-7), ("g*mm^2", 1e-9)),
+    "N*m": (("N*cm", 1e-2), ("N*mm", 1e-3)),
+}
+"""Units in which a number may have been meant, and their size in that which it has."""
+
+
+def _turns(run: RunNumbers) -> Iterator[Scale]:
+    """Positions of revolute joints at the start, and of their commands."""
+    usual = "joints of published arms turn by at most 1.6 turns"
+    for joint in run.structure.moving:
+        if joint.kind == "revolute":
+            own = max(abs(run.numbers.get(f"{joint.name}.{end}", 0.0)) for end in ("q_min", "q_max"))
+            angles = run.largest(f"initial.{joint.name}.q", "rad")
+            if run.is_placed(joint.name):
+                angles |= run.largest(f"{joint.name}.servo.command", "rad")
+            for path, angle in angles.items():
+                high = max(3.0, own / TURN)
+                yield Scale("angle of a joint", path, abs(angle), "rad", TURN, "a turn", 0.0, high, usual, meant="rad")
+
+
+def _centres(run: RunNumbers) -> Iterator[Scale]:
+    usual = "of 470 links of published robots none is above 0.73"
+    for link in run.structure.links:
+        path = f"links.{link.name}.com"
+        if link.name in run.moved and not link.lumped and run.reach > 0.0 and run.is_written(path):
+            far, other = run.length(path), run.reach_words
+            yield Scale("centre of mass", path, far, "m", run.reach, other, 0.0, 2.0, usual, meant="m")
+
+
+def _offsets(run: RunNumbers) -> Iterator[Scale]:
+    usual = "of 718 joints of published robots none is above 21.4"
+    for joint in run.structure.joints:
+        rest = run.depths.get(joint.parent, 0.0) + run.beyond.get(joint.child, 0.0)
+        rest = max(rest, *(run.length(f"links.{link}.com") for link in (joint.parent, joint.child)))
+        if joint.parent != BASE and rest > 0.0:
+            path, far = f"{joint.name}.at", run.offsets[joint.name]
+            other = f"the rest of its chain, {rest:.4g} m"
+            yield Scale("place of a joint", path, far, "m", rest, other, 0.0, 60.0, usual, meant="m")
+
+
+def _gyrations(run: RunNumbers) -> Iterator[Scale]:
+    """Radii of gyration of bodies whose inertia is written; small ones only beside a body of a usual one, and up to 2 m
+    none on a short arm, whose links may be test bodies."""
+    usual = "of 624 links of published robots all have 0.00018 to 1.3 times their robot's reach"
+    heads = [f"links.{link.name}" for link in run.structure.links if link.name in run.moved and not link.lumped]
+    heads += [
+        f"payloads.{payload.name}" for payload in run.structure.payloads if run.extent(f"payloads.{payload.name}")
+    ]
+    radii = {head: run.gyration(head) for head in heads}
+    low = 1e-4 if max(radii.values(), default=0.0) > 0.01 * run.reach else 0.0
+    for head, radius in radii.items():
+        path, shape = f"{head}.inertia", run.extent(head)
+        beside, high = (shape, 10.0) if shape else (run.reach, max(4.0, 2.0 / run.reach if run.reach else 0.0))
+        if beside > 0.0 and radius > SMALLEST_GYRATION and run.is_written(path):
+            yield Scale(
+                "radius of gyration",
+                path,
+                radius,
+                "m",
+                beside,
+                f"the size of its shape, {shape:.4g} m" if shape else run.reach_words,
+                low,
+                high,
+                usual,
+                verb="has a radius of gyration of",
+                meant="kg*m^2",
+                power=0.5,
+            )
+
+
+def _levers(run: RunNumbers) -> Iterator[Scale]:
+    """Points at which models of the environment act on links."""
+    usual = "what acts on an arm acts on it, or on what it carries"
+    for use in run.structure.environment:
+        for each in models.find("environment", use.model).parameters:
+            path = f"environment.{use.name}.{each.name}"
+            if each.name in ("point", "at") and each.unit == "m" and run.reach > 0.0:
+                far, other = run.length(path), run.reach_words
+                yield Scale("point of a load", path, far, "m", run.reach, other, 0.0, 10.0, usual, meant="m")
+
+
+def _gears(run: RunNumbers) -> Iterator[Scale]:
+    usual = "gears of arms slow their motor down, by 1 to some 3,000"
+    for use in run.uses:
+        ratio = run.of_motor(use, RATIO.name)
+        if ratio is not None and run.kinds[use.joint] == "revolute":
+            yield Scale("gear ratio", f"{use.joint}.servo.{RATIO.name}", ratio, "", 1.0, "", 0.2, 1e5, usual)
+
+
+def _speeds(run: RunNumbers) -> Iterator[Scale]:
+    """The commanded rate beside the one at which the motor's back-EMF is all of its voltage."""
+    usual = "no motor runs faster"
+    for use in run.uses:
+        ratio, kt, limit = run.of_motor(use, RATIO.name), run.of_motor(use, "kt"), run.limit(use, "V")
+        course = run.course(use)
+        if ratio is None or kt is None or limit is None or course is None or not limit[1] * kt * ratio > 0.0:
+            continue
+        rates = {"rate": course[0], "position": course[1]}.get(use.command.kind if use.command is not None else "")
+        if rates is not None:
+            unit = "rad/s" if run.kinds[use.joint] == "revolute" else "m/s"
+            most = limit[1] / (kt * ratio)
+            other = f"the rate at which the motor's back-EMF is all of `{limit[0]}`, {most:.4g} {unit}"
+            path, fastest = f"{use.joint}.servo.command", float(np.abs(rates).max())
+            yield Scale("commanded rate", path, fastest, unit, most, other, 0.0, 1.0, usual, verb="asks for")
+
+
+def _frictions(run: RunNumbers) -> Iterator[Scale]:
+    """Dry friction of a motor beside its largest torque."""
+    usual = "a motor that cannot break away moves nothing"
+    for use in run.uses:
+        friction, limit = run.of_motor(use, "f_c"), run.largest_torque(use)
+        if friction is not None and limit is not None:
+            path, other = f"{use.joint}.servo.f_c", f"the motor's largest torque, {limit[1]:.4g} N*m"
+            yield Scale("dry friction", path, friction, "N*m", limit[1], other, 0.0, 1.0, usual, meant="N*m")
+
+
+def _loads(run: RunNumbers) -> Iterator[Scale]:
+    """The load of gravity at the start beside what motor and friction hold at the joint."""
+    usual = "a motor that cannot hold its arm lets it fall"
+    loads = run.loads()
+    for use in run.uses:
+        ratio, friction, limit = run.of_motor(use, RATIO.name), run.of_motor(use, "f_c"), run.largest_torque(use)
+        if use.joint in loads and ratio is not None and limit is not None and not run.is_helped(use.joint):
+            unit = "N*m" if run.kinds[use.joint] == "revolute" else "N"
+            most = ratio * (limit[1] + (friction or 0.0))
+            path, other = f"{use.joint}.servo.{limit[0]}", f"what it holds at the joint, {most:.4g} {unit}"
+            load = abs(loads[use.joint])
+            yield Scale("load at the start", path, load, unit, most, other, 0.0, 1.0, usual, verb="meets a load of")
+
+
+def _plays(run: RunNumbers) -> Iterator[Scale]:
+    usual = "within its play a gear drives nothing"
+    for use in run.uses:
+        path, course = f"{use.joint}.servo.backlash", run.course(use)
+        if path in run.numbers and course is not None and use.command is not None and use.command.kind == "position":
+            play, span = run.numbers[path], float(np.ptp(course[0]))
+            if span > 0.0:
+                other = f"the motion that is commanded, {span:.4g} rad"
+                yield Scale("play of a gear", path, play, "rad", span, other, 0.0, 0.5, usual)
+
+
+def _sensors(run: RunNumbers) -> Iterator[Scale]:
+    """Noise and steps of sensors beside the motion that is commanded."""
+    usual = "a servo follows no motion that is less than what it sees"
+    for use in run.uses:
+        course = run.course(use)
+        if course is None or use.command is None or use.command.kind not in ("position", "rate"):
+            continue
+        values, slopes = course
+        places = use.command.kind == "position"
+        motions = {
+            "q": float(np.ptp(values)) if places else 0.0,
+            "qd": float(np.abs(slopes if places else values).max()),
+        }
+        for of, motion in motions.items():
+            for name in ("noise", "resolution", "step"):
+                path = f"{use.joint}.servo.sensor.{of}.{name}"
+                if run.numbers.get(path, 0.0) > 0.0 and motion > 0.0:
+                    unit = run.settled[path].unit
+                    size, other = run.numbers[path], f"what is commanded, {motion:.4g} {unit}"
+                    yield Scale("what a sensor sees", path, size, unit, motion, other, 0.0, 1.0, usual)
+
+
+def _bands(run: RunNumbers) -> Iterator[Scale]:
+    """Steps of sensors beside the bands in which what they see is to settle."""
+    usual = "a servo knows its joint no better than its sensor"
+    for metric in run.structure.metrics:
+        joint, _, of = metric.of.partition(".")
+        head = f"metrics.{metric.name}"
+        band = max(
+            abs(run.numbers.get(f"{head}.band", 0.0) * run.numbers.get(f"{head}.target", 0.0)),
+            run.numbers.get(f"{head}.within", 0.0),
+        )
+        for name in ("resolution", "step"):
+            path = f"{joint}.servo.sensor.{of}.{name}"
+            if run.numbers.get(path, 0.0) > 0.0 and band > 0.0:
+                step, unit = run.numbers[path], run.settled[path].unit
+                other = f"the band of metric `{metric.name}`, {band:.4g} {unit}"
+                yield Scale("step of a sensor", path, step, unit, band, other, 0.0, 2.0, usual)
+
+
+def _payloads(run: RunNumbers) -> Iterator[Scale]:
+    arm = sum(run.numbers.get(f"links.{link}.mass", 0.0) for link in run.moved)
+    weights = [run.length(f"environment.{use.name}.g") for use in run.structure.environment if use.model == "gravity"]
+    high, usual = 20.0, "industrial robots lift a tenth to a third of their mass"
+    if not any(weights):
+        high, usual = 1e4, "the arm of the Space Station is made for 116 t, some 70 times its mass"
+    for payload in run.structure.payloads:
+        path, other = f"payloads.{payload.name}.mass", f"the mass of the moved links, {arm:.4g} kg"
+        if path in run.numbers and arm > 0.0 and payload.link != BASE:
+            yield Scale("mass of a payload", path, run.numbers[path], "kg", arm, other, 0.0, high, usual, meant="kg")
+
+
+def _gravities(run: RunNumbers) -> Iterator[Scale]:
+    usual = "the Moon has 0.17 of it, Jupiter 2.5, the Sun 28"
+    for use in run.structure.environment:
+        if use.model == "gravity":
+            path = f"environment.{use.name}.g"
+            size, other = run.length(path), "that on the Earth"
+            yield Scale("gravity", path, size, "m/s^2", EARTH, other, 0.0, 30.0, usual, meant="m/s^2")
+
+
+SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
+    _turns,
+    _centres,
+    _offsets,
+    _gyrations,
+    _levers,
+    _gears,
+    _speeds,
+    _frictions,
+    _loads,
+    _plays,
+    _sensors,
+    _bands,
+    _payloads,
+    _gravities,
+)
+
+
+def scales(run: RunNumbers) -> list[Scale]:
+    """All scales of one case of a run."""
+    return [scale for kind in SCALES for scale in kind(run)]
+
+
+def check_scales(scope: Scope, structure: Structure, uses: Iterable[Use]) -> None:
+    """Warn about numbers far outside what is usual beside the run's other numbers; of one kind about the worst."""
+    settled = {**scope.parameters, **scope.auxiliary}
+    numbers_of = {path: each.value for path, each in settled.items() if not isinstance(each.value, (str, tuple))}
+    place = next((each.origin.place for each in settled.values() if each.origin.place is not None), None)
+    if place is None:
+        return
+
+    def warn(rows: np.ndarray) -> None:
+        if scope.complaints.error_count:
+            return
+        worst: dict[str, tuple[Scale, int]] = {}
+        others: dict[str, set[str]] = {}
+        by_path: dict[tuple[str, str], set[float]] = {}
+        for row in _chosen(rows):
+            numbers = dict(zip(numbers_of, rows[row].tolist(), strict=True))
+            of_case = scales(RunNumbers(structure, uses, settled, numbers))
+            scope.scales = scope.scales or of_case
+            for scale in of_case:
+                by_path.setdefault((scale.what, scale.path), set()).add(scale.multiple)
+                if scale.nearness > 1.0 and not _is_beyond_all(scale):
+                    others.setdefault(scale.what, set()).add(scale.path)
+                    if scale.what not in worst or scale.nearness > worst[scale.what][0].nearness:
+                        worst[scale.what] = scale, row
+        for scale, row in worst.values():
+            own = [each for path, each in settled.items() if path == scale.path or path.startswith(f"{scale.path}.")]
+            own.sort(key=lambda each: each.unit == "s")  # of a table rather its values than their instants
+            at = next((each.origin.place for each in own if each.origin.place is not None), place)
+            varies = len(by_path[scale.what, scale.path]) > 1
+            case = scope.checks.where(row, numbers_of.values() if varies else ())
+            scope.complaints.remark(
+                "D297",
+                scale.sentence(case, len(others[scale.what]) - 1),
+                at,
+                help=[*scale.remedies, MEANT.format("D297")],
+            )
+
+    scope.checks.observe(tuple(numbers_of.values()), warn, place)
+
+
+def _is_beyond_all(scale: Scale) -> bool:
+    """True of a length or mass that is beyond all there is, which `check_magnitudes` remarks on."""
+    kinds = [(LENGTHS, f"{scale.path}.x"), (MASSES, scale.path)]
+    return any(kind.pattern.fullmatch(path) and scale.size > kind.high for kind, path in kinds)
+
+
+def _chosen(rows: np.ndarray) -> list[int]:
+    """The first case, and those in which a number that varies is smallest or largest."""
+    varies = np.flatnonzero((rows != rows[0]).any(axis=0))
+    ends = [int(row) for column in varies for row in (rows[:, column].argmin(), rows[:, column].argmax())]
+    return list(dict.fromkeys([0, *ends]))[:MOST_CASES]

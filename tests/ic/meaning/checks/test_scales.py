@@ -1,0 +1,184 @@
+"""Numbers far outside what is usual beside others of the same run are remarked on; usual ones are not."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ic
+from ic.meaning.checks.run_numbers import RunNumbers
+from met.cli import main
+from tests.ic.small_decks import changed
+from tests.oracles.plan_tree import pinocchio
+from tests.oracles.random_deck import random_deck
+
+TWO_LINKS = """\
+arm two {
+    link upper { mass = 4 kg; com = [0.3, 0, 0] m; inertia = [0.01, 0.12, 0.12] kg*m^2; }
+    link fore { mass = 2 kg; com = [0.2, 0, 0] m; inertia = [0.004, 0.03, 0.03] kg*m^2; }
+    joint shoulder revolute { parent = base; child = upper; axis = y; }
+    joint elbow revolute { parent = upper; child = fore; axis = y; at = [0.6, 0, 0] m; }
+}
+servo drive {
+    model = rigid_gearbox;
+    ratio = 100; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm; kt = 0.05 N*m/A;
+    tau_max = 1 N*m; j_m = 1e-4 kg*m^2; f_c = 0.01 N*m; k_position = 4 1/s;
+    sensor q = encoder { step = 0.0001 rad; }
+    command = position(trapezoid(start = 0 deg, to = 60 deg, max_rate = 0.8 rad/s, max_acceleration = 2 rad/s^2));
+}
+run lift {
+    arm = two;
+    servos { shoulder = drive; elbow = drive; }
+    environment { gravity = [0, 0, -9.81] m/s^2;  push = wrench { link = fore; point = [0.4, 0, 0] m; force = [0, 0, 1] N; } }
+    payload tool { on = fore; at = [0.4, 0, 0] m; mass = 1 kg; inertia = [1e-3, 1e-3, 1e-3] kg*m^2; }
+    rates { dynamics = 1 kHz; servos = 1 kHz; record = 100 Hz; }
+    duration = 3 s;
+    record = [q];
+    metric late = settling_time(of = elbow.q, target = 60 deg, band = 2 %);
+}
+"""
+
+
+def remarks(folder: Path, *changes: tuple[str, str], text: str = TWO_LINKS) -> list[tuple[str, tuple[str, ...]]]:
+    """What D297 says of the deck after these changes, with its remedies but for the last, which allows it."""
+    path = folder / "deck.ic"
+    path.write_text("deck 2;\n" + changed(text, *changes))
+    found = ic.check(path, select="all").diagnostics
+    assert {each.code for each in found} <= {"D297", "D322"}, found  # a loop may be unstable besides
+    return [(each.message, each.help[:-1]) for each in found if each.code == "D297"]
+
+
+def test_the_deck_that_the_next_tests_change_is_usual(tmp_path: Path) -> None:
+    assert remarks(tmp_path) == []
+
+
+PUSH = "push = wrench { link = fore; point = [0.4, 0, 0] m; force = [0, 0, 1] N; }"
+"""A load on the arm, without which the motors alone hold it."""
+
+
+@pytest.mark.parametrize(
+    ("change", "said", "help"),
+    [
+        (("to = 60 deg, max_rate", "to = 60 rad, max_rate"),
+         "`shoulder.servo.command.to` is 60 rad, 9.549 times a turn; 1 more is so; joints of published arms turn by at "
+         "most 1.6 turns", ("in deg it would be 0.167 times a turn: is the unit another?", "at most 18.8 rad is usual")),
+        (("com = [0.2, 0, 0] m", "com = [20, 0, 0] cm"), "", ()),
+        (("com = [0.2, 0, 0] m", "com = [20, 0, 0] m"),
+         "`links.fore.com` is 20 m, 33.33 times the arm's reach, 0.6 m; of 470 links of published robots none is above 0.73", ("in cm it would be 0.333 times, in mm it would be 0.0333 times the arm's reach, 0.6 m: is the unit another?",
+          "at most 1.2 m is usual")),
+        (("at = [0.6, 0, 0] m", "at = [60, 0, 0] m"),
+         "`elbow.at` is 60 m, 200 times the rest of its chain, 0.3 m; of 718 joints of published robots none is above 21.4", ("in cm it would be 2 times the rest of its chain, 0.3 m: is the unit another?",
+          "at most 18 m is usual")),
+        (("[0.004, 0.03, 0.03] kg*m^2", "[40, 300, 300] kg*m^2"),
+         "`links.fore.inertia` has a radius of gyration of 12.25 m, 20.41 times the arm's reach, 0.6 m; of 624 links of published robots all have 0.00018 to 1.3 times their robot's reach",
+         ("in kg*cm^2 it would be 0.204 times the arm's reach, 0.6 m: is the unit another?", "at most 2.4 m is usual")),
+        (("[0.004, 0.03, 0.03] kg*m^2", "[4e-10, 3e-9, 3e-9] kg*m^2"),
+         "`links.fore.inertia` has a radius of gyration of 3.873e-05 m, 6.455e-05 times the arm's reach, 0.6 m; of 624 links of published robots all have 0.00018 to 1.3 times their robot's reach",
+         ("at least 6e-05 m is usual",)),
+        (("point = [0.4, 0, 0] m", "point = [400, 0, 0] m"),
+         "`environment.push.point` is 400 m, 666.7 times the arm's reach, 0.6 m; what acts on an arm acts on it, or on "
+         "what it carries", ("in mm it would be 0.667 times, in cm it would be 6.67 times the arm's reach, 0.6 m: is the unit another?", "at most 6 m is usual")),
+        (("ratio = 100", "ratio = 0.01"),
+         "`shoulder.servo.ratio` is 0.01; 1 more is so; gears of arms slow their motor down, by 1 to some 3,000",
+         ("at least 0.2 is usual",)),
+        (("max_rate = 0.8 rad/s, max_acceleration = 2", "max_rate = 8 rad/s, max_acceleration = 200"),
+         "`shoulder.servo.command` asks for 8 rad/s, 1.667 times the rate at which the motor's back-EMF is all of `v_max`, "
+         "4.8 rad/s; 1 more is so; no motor runs faster", ("at most 4.8 rad/s is usual",)),
+        (("f_c = 0.01", "f_c = 1.5"),
+         "`shoulder.servo.f_c` is 1.5 N*m, 1.5 times the motor's largest torque, 1 N*m; 1 more is so; a motor that cannot "
+         "break away moves nothing", ("in N*cm it would be 0.015 times the motor's largest torque, 1 N*m: is the unit "
+         "another?", "at most 1 N*m is usual")),
+        (("tau_max = 1 N*m", "tau_max = 0.1 N*m"), "", ()),
+        ((PUSH, ""), "", ()),
+        (("step = 0.0001 rad", "step = 0.1 rad"),
+         "`elbow.servo.sensor.q.step` is 0.1 rad, 4.775 times the band of metric `late`, 0.02094 rad; a servo knows its "
+         "joint no better than its sensor", ("at most 0.0419 rad is usual",)),
+        (("mass = 1 kg", "mass = 150 kg"),
+         "`payloads.tool.mass` is 150 kg, 25 times the mass of the moved links, 6 kg; industrial robots lift a tenth to a "
+         "third of their mass", ("at most 120 kg is usual",)),
+        (("-9.81", "-981"),
+         "`environment.gravity.g` is 981 m/s^2, 100 times that on the Earth; the Moon has 0.17 of it, Jupiter 2.5, the Sun "
+         "28", ("in cm/s^2 it would be 1 times that on the Earth: is the unit another?", "at most 294 m/s^2 is usual")),
+    ],
+)  # fmt: skip
+def test_what_is_far_outside_what_is_usual_is_told(
+    tmp_path: Path, change: tuple[str, str], said: str, help: tuple[str, ...]
+) -> None:
+    assert remarks(tmp_path, change) == ([(said, help)] if said else [])
+
+
+def test_of_a_motor_that_cannot_hold_its_arm_the_load_and_what_it_holds_are_told(tmp_path: Path) -> None:
+    """Where something else may hold the arm as well nothing is."""
+    weak = ("tau_max = 1 N*m", "tau_max = 0.1 N*m")
+    [(said, _)] = remarks(tmp_path, weak, (PUSH, ""))
+    load = 9.81 * (4.0 * 0.3 + 2.0 * 0.8 + 1.0 * 1.0)
+    assert said.startswith(f"`shoulder.servo.tau_max` meets a load of {load:.4g} N*m, ")
+    assert said.endswith("times what it holds at the joint, 11 N*m; a motor that cannot hold its arm lets it fall")
+    stop = "stop = joint_stop { joint = NAME; lower = -1 rad; upper = 1 rad; stiffness = 100 N*m/rad; }"
+    assert len(remarks(tmp_path, weak, (PUSH, stop.replace("NAME", "elbow")))) == 1
+    assert remarks(tmp_path, weak, (PUSH, stop.replace("NAME", "shoulder"))) == []
+
+
+def test_what_only_gears_and_sensors_do_is_told(tmp_path: Path) -> None:
+    play = ("model = rigid_gearbox;", "model = compliant_gearbox; backlash = 0.8 rad; stiffness = 1e4 N*m/rad;")
+    [(said, _)] = remarks(tmp_path, play)
+    assert said.startswith(
+        "`shoulder.servo.backlash` is 0.8 rad, 0.7639 times the motion that is commanded, 1.047 rad; "
+    )
+    found = dict(remarks(tmp_path, ("step = 0.0001 rad", "step = 2 rad")))
+    assert any(
+        each.startswith("`shoulder.servo.sensor.q.step` is 2 rad, 1.91 times what is commanded, ") for each in found
+    )
+
+
+def test_of_a_sweep_the_worst_case_is_told(tmp_path: Path) -> None:
+    sweep = "sweep s of lift { vary initial.elbow.q = [10, 90, 20] rad; }\n"
+    [(said, _)] = remarks(tmp_path, text=TWO_LINKS + sweep)
+    assert said.startswith("`initial.elbow.q` is 90 rad in case #1, 14.32 times a turn; ")
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_loads_of_gravity_are_those_of_pinocchio(tmp_path: Path, seed: int) -> None:
+    path = tmp_path / "deck.ic"
+    path.write_text(random_deck(seed))
+    compiled = ic.check(path)
+    assert compiled.plan is not None
+    experiment, scope = compiled.plan.experiments[0], compiled.scopes[0]
+    settled = {**scope.parameters, **scope.auxiliary}
+    numbers = {path: each.value for path, each in settled.items() if isinstance(each.value, float)}
+    run = RunNumbers(experiment.structure, (), settled, numbers)
+    g = run.vector("environment.gravity.g")
+    q = [numbers[f"initial.{joint.name}.q"] for joint in experiment.structure.moving]
+    zero = np.zeros(len(q))
+    wanted = pinocchio(experiment, gravity=g.tolist()).torques(q, zero, zero, {})
+    np.testing.assert_allclose(list(run.loads().values()), -wanted, rtol=1e-9, atol=1e-9)
+
+
+def test_all_scales_are_shown_and_given_to_programs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "deck.ic"
+    path.write_text("deck 2;\n" + changed(TWO_LINKS, ("f_c = 0.01", "f_c = 1.5")))
+    assert main(["explain", f"{path}", "--scales"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert shown[0] == "lift"
+    assert [line.split("  ")[1] for line in shown if "OUTSIDE" in line] == ["dry friction"]
+    assert any(line.split() == GRAVITY for line in shown)
+    assert main(["explain", f"{path}", "--scales", "--format", "json"]) == 0
+    [run] = json.loads(capsys.readouterr().out)
+    [friction] = [each for each in run["scales"] if each["path"] == "elbow.servo.f_c"]
+    assert (friction["multiple"], friction["high"], friction["unit"]) == (1.5, 1.0, "N*m")
+
+
+GRAVITY = ["gravity", "environment.gravity.g", "9.81", "m/s^2", "1", "that", "on", "the", "Earth", "up", "to", "30"]
+
+
+def test_a_path_or_scales_must_be_asked_for_and_a_plan_has_none(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for words, said in (([], "write a PATH, or `--scales` without one"), (["q", "--scales"], "write a PATH, or")):
+        assert main(["explain", "deck.ic", *words]) == 2
+        assert said in capfd.readouterr().err
+    assert main(["explain", "plan.json", "--scales"]) == 2
+    assert "the scales are those of a deck" in capfd.readouterr().err
