@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from met.metrics.metric import Metric
+from met.metrics.metric import Metric, as_channel
 from met.metrics.window import EVERY_JOINT, WINDOW, inside
 from met.parameter import Memory
 from met.trace import Real, maximum, where
@@ -28,6 +28,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
 METRIC = Metric(
     name="eventually",
     doc=__doc__,
+    bounds=as_channel,
     unit="of",
     condition=True,
     over_joints=EVERY_JOINT,

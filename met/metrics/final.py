@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from met.metrics.metric import Metric
+from met.metrics.metric import Metric, as_channel
 from met.parameter import Memory
 from met.trace import Real
 
@@ -21,6 +21,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
 METRIC = Metric(
     name="final",
     doc=__doc__,
+    bounds=as_channel,
     unit="of",
     memory=(Memory(name="last", unit="of", doc="latest value"),),
     update=update,

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import reduce
 from typing import Any
 
-from met.metrics.metric import Metric, OverJoints
+from met.metrics.metric import Metric, OverJoints, as_channel
 from met.parameter import Memory
 from met.trace import Real, maximum
 
@@ -23,6 +23,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
 METRIC = Metric(
     name="max",
     doc=__doc__,
+    bounds=as_channel,
     extreme="most",
     unit="of",
     over_joints=OverJoints("max", lambda values: reduce(maximum, values)),

@@ -34,6 +34,7 @@ class Metric:
     unit    of the result: "of" is the channel's, "s" a time, "1" a pure number
     share   whether it is part of a whole, seldom above 1: a limit above that without a `%` is warned of
     least   bound below which it never is; a requirement that cannot be missed, or met, is warned of
+    bounds  (least, most of the channel) -> least and most of the metric; None: the channel's bounds say nothing of it
     times   whether it is an instant of the run, or infinite: a limit after the run's end is warned of
     target  the parameter that is the value to be reached, where there is one: a command that comes to it after the
             run's end is warned of
@@ -55,6 +56,7 @@ class Metric:
     unit: str
     share: bool = False
     least: float = -math.inf
+    bounds: Callable[[float, float], tuple[float, float]] | None = None
     times: bool = False
     target: str = ""
     extreme: str = ""
@@ -71,3 +73,13 @@ class Metric:
     def margin(self) -> bool:
         """True if it is the margin of a condition, which should be large."""
         return self.condition and not self.share
+
+
+def as_channel(least: float, most: float) -> tuple[float, float]:
+    """Bounds of a metric that is a value of its channel."""
+    return least, most
+
+
+def as_size(least: float, most: float) -> tuple[float, float]:
+    """Bounds of a metric that is a size of its channel, or a mean of sizes."""
+    return max(least, -most, 0.0), max(-least, most)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import reduce
 from typing import Any
 
-from met.metrics.metric import Metric, OverJoints
+from met.metrics.metric import Metric, OverJoints, as_size
 from met.parameter import Memory
 from met.trace import Real, absolute, maximum
 
@@ -22,6 +22,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
 METRIC = Metric(
     name="peak",
     doc=__doc__,
+    bounds=as_size,
     extreme="most",
     unit="of",
     least=0.0,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from met.metrics.metric import Metric, OverJoints
+from met.metrics.metric import Metric, OverJoints, as_size
 from met.parameter import Memory
 from met.trace import Real, sqrt
 
@@ -29,6 +29,7 @@ def root_mean_square(values: list[Real]) -> Real:
 METRIC = Metric(
     name="rms",
     doc=__doc__,
+    bounds=as_size,
     unit="of",
     least=0.0,
     over_joints=OverJoints("rms", root_mean_square),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ic.meaning.checks.bounds import Bounds, channel_bounds
 from ic.meaning.checks.constants import constant_values
 from ic.meaning.parameters.scope import Scope
 from met import models
@@ -16,7 +17,7 @@ from met.metrics.metric import Metric
 from met.metrics.window import ROUNDING
 from met.plan import Structure
 from met.plan.judged import MetricUse, Requirement
-from met.plan.linear_uses import FIGURES, LinearFigure
+from met.plan.linear_uses import FIGURES
 
 NEAR = 0.02
 """Share of its way within which a command counts as being at its target: as with a settling time's default band."""
@@ -35,14 +36,16 @@ def check_requirements(
     for requirement in requirements:
         if requirement.metric in figures:
             if requirement.place is not None:
-                _remark_bound(scope, requirement, figures[requirement.metric], requirement.place)
+                figure = figures[requirement.metric]
+                _remark_bound(scope, requirement, Bounds(figure.least), figure.name, requirement.place)
             continue
         use = uses[requirement.metric]
         metric: Metric = models.find("metric", use.model, use.place)
         place, duration = requirement.place, structure.schedule.duration
         if place is not None:  # the first one: a single warning is enough
             _ = (
-                _remark_bound(scope, requirement, metric, place)
+                _remark_bound(scope, requirement, Bounds(metric.least), metric.name, place)
+                or _remark_bound(scope, requirement, _bounds(scope, structure, use, metric), metric.name, place)
                 or _remark_begin(scope, requirement, use, metric, place)
                 or (metric.times and duration < requirement.limit < math.inf)  # only the run shows whether it is seen
                 or _remark_target(scope, requirement, use, metric, structure, place)
@@ -51,30 +54,45 @@ def check_requirements(
     _remark_contradictions(scope, requirements)
 
 
-def _remark_bound(scope: Scope, requirement: Requirement, metric: Metric | LinearFigure, place: Place) -> bool:
-    """Return True, with a warning, if the limit is outside of the metric's range."""
-    upper, strict = requirement.comparison.startswith("<"), not requirement.comparison.endswith("=")
-    beyond = requirement.limit < metric.least or (requirement.limit == metric.least and strict is upper)
-    if beyond:
-        scope.complaints.remark(
-            "D340",
-            f"`require {requirement.text}` cannot be {'met' if upper else 'missed'}: a metric `{metric.name}` is never "
-            f"below {metric.least:g}",
-            place,
-            help=leave_out("write a limit that it may pass, or leave it out"),
-        )
-    return beyond
+def _bounds(scope: Scope, structure: Structure, use: MetricUse, metric: Metric) -> Bounds:
+    """The bounds of a metric that follow from its channel's."""
+    if metric.bounds is None:
+        return Bounds()
+    of = channel_bounds(scope, structure, use.of)
+    return Bounds(*metric.bounds(of.least, of.most), of.because)
+
+
+def _remark_bound(scope: Scope, requirement: Requirement, bounds: Bounds, model: str, place: Place) -> bool:
+    """Return True, with a warning, if every number within the bounds meets the requirement, or none does."""
+    upper, limit, same = requirement.comparison.startswith("<"), requirement.limit, requirement.comparison.endswith("=")
+    below = bounds.most < limit or (bounds.most == limit and same is upper)
+    above = bounds.least > limit or (bounds.least == limit and same is not upper)
+    if not (below or above):
+        return False
+    because = " by " + ", ".join(f"`{path}`" for path in bounds.because) if bounds.because else ""
+    of = f"`{requirement.metric}`" if bounds.because else f"a metric `{model}`"
+    end = f"above {bounds.most + 0.0:.6g}" if below else f"below {bounds.least + 0.0:.6g}"
+    scope.complaints.remark(
+        "D340",
+        f"`require {requirement.text}` cannot be {'missed' if below is upper else 'met'}: {of} is never {end}{because}",
+        place,
+        help=leave_out("write a limit that it may pass, or leave it out"),
+    )
+    return True
 
 
 def _remark_contradictions(scope: Scope, requirements: Iterable[Requirement]) -> None:
-    """Report two requirements of which one is always missed."""
+    """Report two requirements of which one is always missed, or of which one decides nothing beside the other."""
     lowest: dict[str, Requirement] = {}
     highest: dict[str, Requirement] = {}
     for each in requirements:
         upper = each.comparison.startswith("<")
         kept = (highest if upper else lowest).setdefault(each.metric, each)
-        if (each.limit < kept.limit) if upper else (each.limit > kept.limit):
+        tighter = (each.limit < kept.limit) if upper else (each.limit > kept.limit)
+        if tighter:
             (highest if upper else lowest)[each.metric] = each
+        if kept is not each:
+            _remark_looser(scope, *((kept, each) if tighter else (each, kept)))
     for name in lowest.keys() & highest.keys():
         low, high = lowest[name], highest[name]
         strict = "=" not in low.comparison or "=" not in high.comparison
@@ -86,6 +104,21 @@ def _remark_contradictions(scope: Scope, requirements: Iterable[Requirement]) ->
                 also=[Label(high.place, "the other")],
                 help="leave one of them out, or let the limits meet",
             )
+
+
+def _remark_looser(scope: Scope, looser: Requirement, tighter: Requirement) -> None:
+    """Warn of a requirement on all cases that decides nothing beside a tighter one; named ones may be grades."""
+    if looser.share is None and tighter.share is None and looser.place and tighter.place and ":" not in looser.text:
+        scope.complaints.remark(
+            "D340",
+            f"`require {looser.text}` decides nothing: `require {tighter.text}` is tighter",
+            looser.place,
+            also=[Label(tighter.place, "the tighter one")],
+            help=[
+                leave_out("leave one of them out"),
+                "one with a name, `require NAME: ...;`, is replaced by one of the same name in a run `like` this",
+            ],
+        )
 
 
 def _remark_window(

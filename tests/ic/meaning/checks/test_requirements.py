@@ -66,6 +66,68 @@ def test_what_is_told(tmp_path: Path, text: str, expected: list[str]) -> None:
     assert codes(tmp_path, ARM, SERVO, requiring(text)) == expected
 
 
+VOLTS = "metric volts = peak { of = hinge.servo.voltage; } metric low = min { of = *.servo.voltage; } "
+OFF = "metric off = rms { of = 2 * abs(hinge.servo.voltage) - hinge.servo.voltage; } "
+"""Channels that the amplifier keeps within 24 V, and an expression that it keeps within -24 V and 72 V."""
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (VOLTS + "require volts <= 24 V;", "missed: `volts` is never above 24 by `hinge.servo.v_max`"),
+        (VOLTS + "require volts < 24 V;", ""),
+        (VOLTS + "require volts > 24 V;", "met: `volts` is never above 24 by `hinge.servo.v_max`"),
+        (VOLTS + "require volts >= 24 V;", ""),
+        (VOLTS + "require volts >= 0 V;", "missed: a metric `peak` is never below 0"),
+        (VOLTS + "require low > -30 V;", "missed: `low` is never below -24 by `hinge.servo.v_max`"),
+        (VOLTS + "require low < -30 V;", "met: `low` is never below -24 by `hinge.servo.v_max`"),
+        (OFF + "require off < 73 V;", "missed: `off` is never above 72 by `hinge.servo.v_max`"),
+        (OFF + "require off < 72 V;", ""),
+        ("metric room = max { of = hinge.servo.voltage * hinge.qd; } require room < 1e9 V*rad/s;", ""),
+        ("require always(abs(hinge.servo.voltage) < 25 V);", "missed: "),
+    ],
+)
+def test_a_limit_beyond_what_a_servo_can_give(tmp_path: Path, text: str, said: str) -> None:
+    found = check(tmp_path, ARM, SERVO, requiring(text)).diagnostics
+    assert [each.code for each in found] == ["D340"] * bool(said)
+    assert all(f" cannot be {said}" in each.message for each in found)
+
+
+def test_a_limit_on_a_joint_that_is_locked(tmp_path: Path) -> None:
+    locked = "servo drive { model = locked; }\n"
+    start = (
+        "[q];\n",
+        "[q];\n    initial { hinge.q = 0.2 rad; } metric way = peak { of = hinge.q; }\n    require way < 1 rad;\n",
+    )
+    [found] = check(tmp_path, ARM, locked, changed(RUN, start)).diagnostics
+    assert found.message == "`require way < 1 rad` cannot be missed: `way` is never above 0.2 by `hinge.servo`"
+    freed = locked.replace("locked;", "locked; release = 0.5 s;")
+    assert codes(tmp_path, ARM, freed, changed(RUN, start)) == []
+
+
+def test_a_requirement_beside_a_tighter_one(tmp_path: Path) -> None:
+    """What was found: a run `like` another loosened a limit, and the old one still held."""
+    run = requiring("require end < 1 rad/s;")
+    loose = "run loose like hold { require end < 2 rad/s; }\n"
+    assert (
+        shown(tmp_path, ARM, SERVO, run, loose)
+        == """\
+warning[D340]: `require end < 2 rad/s` decides nothing: `require end < 1 rad/s` is tighter
+  --> deck.ic:23:23
+   |
+23 | run loose like hold { require end < 2 rad/s; }
+   |                       ^^^^^^^
+  ::: deck.ic:21:5  the tighter one
+   = help: leave one of them out
+   = help: one with a name, `require NAME: ...;`, is replaced by one of the same name in a run `like` this
+"""
+    )
+    named = (("require end", "require bound: end"),)
+    assert codes(tmp_path, ARM, SERVO, changed(run, *named), changed(loose, *named), select="all") == []
+    grades = "require end < 1 rad/s; require grade: end < 2 rad/s; require end < 0.5 rad/s in 90 % of cases;"
+    assert codes(tmp_path, ARM, SERVO, requiring(grades)) == []
+
+
 def test_a_metric_that_begins_on_its_target(tmp_path: Path) -> None:
     run = changed(requiring("require over < 2 %;"), ("duration", "initial { hinge.qd = 0.1 rad/s; }\n    duration"))
     assert (
