@@ -51,10 +51,12 @@ def _checked(made: ArmEntries) -> ArmEntries:
     Problem where they do not make an arm."""
     try:
         _check(made)
-    except Problem:
+    except Problem as problem:
         if made.base is None:
             raise
-        made = replace(made, base=None)
+        first = problem.diagnostics[0]
+        why = first.at.text if first.at is not None and first.at.text else first.message
+        made = replace(made, base=None, no_body=why)
         _check(made)
     return made
 

@@ -53,8 +53,9 @@ class RobotEntry:
 class ArmEntries:
     """A robot's arm: its entries, links and then joints, in the file's order, with the names in decks.
 
-    base   the link `base`, as a base that moves has it; None where the file's root has no inertia
-    notes  on places whose text is not the number that entries have from there: how this came about
+    base     the link `base`, as a base that moves has it; None where the file's root has no inertia
+    notes    on places whose text is not the number that entries have from there: how this came about
+    no_body  why the root's inertia is left out, where no body has it; else empty
     """
 
     robot: Robot
@@ -63,6 +64,7 @@ class ArmEntries:
     links: tuple[RobotEntry, ...]
     joints: tuple[RobotEntry, ...]
     notes: Mapping[Place, str]
+    no_body: str = ""
 
     @property
     def entries(self) -> tuple[Entry, ...]:

@@ -1,10 +1,11 @@
-"""Warnings about a URDF file's arm: omitted parts, a line for each kind; and changed names."""
+"""Warnings about a URDF file's arm: omitted parts, a line for each kind; angles in degrees; and changed names."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
 from ic.robots.attributes import shown
+from ic.robots.doubts import in_degrees
 from ic.robots.entries import ArmEntries
 from ic.robots.robot import MOVING, Joint
 from met.diagnostic import Diagnostic, Label, Place
@@ -23,6 +24,16 @@ def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
             Label(named),
             tuple(labels),
             ("`met import` makes a deck of such a file, with friction beside each joint",),
+            "warning",
+        )
+    turned = tuple(in_degrees(body.robot))
+    if turned:
+        yield Diagnostic(
+            "D218",
+            f"{_count(len(turned), 'angle')} of `{body.robot.file}` {'is' if len(turned) == 1 else 'are'} several turns",
+            Label(named),
+            turned[:MOST_NAMED],
+            ("URDF has angles in radians: correct the file",),
             "warning",
         )
     changed = body.names.changed

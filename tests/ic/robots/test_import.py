@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import ic
-from ic.driver.import_robot import import_robot
+from ic.driver.import_robot import import_robot, import_with_remarks
 from ic.robots.entries import rotation
 from ic.robots.following import without_mimics
 from ic.robots.urdf import read
 from met import cli, run
 from met.diagnostic import Problem
-from tests.ic.robots.two import TWO, changed, refused
+from tests.ic.robots.two import DECK, TWO, changed, refused
 
 # ruff: noqa: E501 - messages are as wide as they are
 
@@ -117,7 +117,8 @@ def test_the_deck_is_printed_to_be_read(capsys: pytest.CaptureFixture[str]) -> N
     assert cli.main(["import", "arm.urdf", "--mimic", "fixed"]) == 0
     out, err = capsys.readouterr()
     first = out.partition("\n")[0]
-    assert out == PRINTED.replace("HASH", first.rpartition(" ")[2].removesuffix("...")) and err == ""
+    assert out == PRINTED.replace("HASH", first.rpartition(" ")[2].removesuffix("..."))
+    assert err == "note: the inertia of link `hand` has no `ixy`, `ixz`, `iyz`: taken as 0\n"
 
 
 @pytest.mark.slow
@@ -281,6 +282,29 @@ def test_the_root_is_a_base_with_its_mass_unless_no_body_is_so() -> None:
     text = import_robot("two.urdf")
     assert "`base` is the file's link `ground`. Its inertia is left out: no body has it." in text
     assert "link base" not in text
+    told = import_with_remarks("two.urdf")[1]
+    assert told[0] == "the inertia of link `ground` has no `ixy`, `ixz`, `iyz`: taken as 0"
+    assert told[1].startswith("the inertia of `ground`, the base, is not in the deck: ")
+
+
+ANGLES = [
+    ('lower="-90" upper="1"', "0 0 3", "0 0 0", ["`lower` of joint `hinge` is -90 rad, 14.3 turns: is it in degrees?"]),
+    ('lower="0" upper="720"', "0 0 0", "0 0 0", ["`upper` of joint `hinge` is 720 rad, 114.6 turns: is it in degrees?"]),
+    ('lower="-1e16" upper="12.5"', "0 -6.28318 0", "0 4.72 0", []),
+    ("", "0 0 180", "0 0 0", ["`rpy` of joint `hinge` is 180 rad, 28.6 turns: is it in degrees?"]),
+    ("", "0 0 0", "1 -90 0", ["`rpy` of the inertia of link `bar` is -90 rad, 14.3 turns: is it in degrees?"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("limit", "turned", "inertia", "told"), ANGLES)
+def test_angles_that_look_like_degrees_are_told(limit: str, turned: str, inertia: str, told: list[str]) -> None:
+    joint = f'<origin rpy="{turned}"/> <limit {limit} effort="1" velocity="1"/> <axis'
+    text = changed(TWO, ("<axis", joint), ('rpy="0 0 0"/>\n      <mass', f'rpy="{inertia}"/>\n      <mass'))
+    Path("two.urdf").write_text(text, encoding="utf-8")
+    assert list(import_with_remarks("two.urdf")[1]) == told
+    Path("two.ic").write_text(DECK, encoding="utf-8")
+    warned = [each for each in ic.check("two.ic").diagnostics if each.code == "D218"]
+    assert [label.text for each in warned for label in each.also] == told
 
 
 def test_a_file_that_is_there_is_left_alone_unless_forced(capsys: pytest.CaptureFixture[str]) -> None:
@@ -395,9 +419,8 @@ def test_a_follower_that_is_held_beyond_its_limits_is_told(capsys: pytest.Captur
     Path("led.urdf").write_text(text, encoding="utf-8")
     assert cli.main(["import", "led.urdf", "--mimic", "fixed", "-o", "led.ic"]) == cli.YES
     out, err = capsys.readouterr()
-    assert out == "wrote led.ic\n" and err.startswith(
-        "note: joint `two` is held at 8.4, beyond its limits, -1.5 to 1.5\n"
-    )
+    assert out == "wrote led.ic\n"
+    assert "note: joint `two` is held at 8.4, beyond its limits, -1.5 to 1.5\n" in err and "degrees" not in err
     assert "here it is held at 8.4, beyond its limits, -1.5 to 1.5" in Path("led.ic").read_text()
     assert cli.main(["import", "led.urdf", "--mimic", "fixed", "-o", "led.ic", "--force", "-q"]) == cli.YES
     assert capsys.readouterr() == ("", "")

@@ -1,0 +1,51 @@
+"""What a URDF file says that is hardly meant: angles that look like degrees, and inertia with a product left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from ic.robots.attributes import shown
+from ic.robots.entries import spelled
+from ic.robots.robot import Numbers, Robot
+from ic.robots.urdf import MOMENTS
+from met.diagnostic import Label
+
+MOST_TURNS = 2  # of an end of a joint's range: cables allow hardly more
+MOST_DEGREES = 720.0  # the same in degrees; what is above, such as 1e16, is written for no limit
+
+
+def in_degrees(robot: Robot) -> Iterator[Label]:
+    """Each angle that is several turns if it is in radians, and none if it is in degrees, in words that stand alone."""
+    for link in robot.links:
+        if link.inertial is not None:
+            yield from _turned(link.inertial.rpy, f"the inertia of link `{shown(link.name.text)}`")
+    for joint in robot.joints:
+        name = f"joint `{shown(joint.name.text)}`"
+        if not joint.held:  # which is in the `rpy` of a follower that is fixed
+            yield from _turned(joint.rpy, name)
+        for end in ("lower", "upper") if joint.type.text == "revolute" else ():
+            limit = joint.limits.get(end)
+            if limit is not None and MOST_TURNS * 2.0 * math.pi < abs(limit.values[0]) <= MOST_DEGREES:
+                yield _degrees(limit, limit.values[0], f"`{end}` of {name}")
+
+
+def _turned(rpy: Numbers | None, of: str) -> Iterator[Label]:
+    largest = max(rpy.values, key=abs) if rpy is not None else 0.0
+    if rpy is not None and abs(largest) > 2.0 * math.pi + 0.01:
+        yield _degrees(rpy, largest, f"`rpy` of {of}")
+
+
+def _degrees(found: Numbers, value: float, what: str) -> Label:
+    turns = f"{abs(value) / (2.0 * math.pi):.1f} turns"
+    return Label(found.place, f"{what} is {spelled(value)} rad, {turns}: is it in degrees?")
+
+
+def incomplete(robot: Robot) -> Iterator[str]:
+    """A line on each inertia that leaves numbers out."""
+    for link in robot.links:
+        if link.inertial is not None:
+            found = link.inertial.moments
+            missing = [f"`{each}`" for each, at in zip(MOMENTS, found.each, strict=True) if at == found.place]
+            if missing:
+                yield f"the inertia of link `{shown(link.name.text)}` has no {', '.join(missing)}: taken as 0"
