@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +32,7 @@ from ic.text.limits import (
     without_collection,
 )
 from ic.text.macros import Macros
+from ic.text.naming import VALUES, Named, names_in
 from ic.text.source import SourceFile
 from ic.text.strays import complain_of_stray, complain_of_unseen
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, meant, nearest, write
@@ -43,8 +43,6 @@ DIRECTIVES = (*CONDITIONALS, "define", "undef", "include", "pragma", "error", "w
 _LONG_LINE = re.compile(rf"^[^\n]{{{LONGEST_LINE + 1}}}", re.MULTILINE)
 _INCLUDES = 'write `#include "beside.ic"` or `#include <servos/rigid_gearbox.ic>`'
 TRUTH = "TRUTH"  # the kind of a condition's value
-NAMING = ("let", "param", "arm", "link", "joint", "servo", "run", "sweep", "search", "tune")
-"""Words before a name that the deck defines, which no condition can see."""
 
 
 @frozen
@@ -189,30 +187,28 @@ class _Preprocessor(Macros):
 
     def warn_of_names(self) -> None:
         """Warn about names in conditions that are not macros, and macros on the command line that nothing uses."""
-        named: dict[str, tuple[int, str, Token]] = {}
-        for n, (word, token) in enumerate(pairwise(self.output)):
-            if token.kind == NAME and word.text in NAMING:
-                named.setdefault(token.text, (n, word.text, token))
-        lets = [name for name, (_, kind, _) in named.items() if kind in ("let", "param")]
+        asked = (*self._zeros, *(token.text for token, *_ in self._not_defined))
+        named = names_in(self.output, (*asked, *(token.text for token in self.not_undefined)))
+        lets = [name for name, each in named.items() if each.word in VALUES]
         for name, place in self._zeros.items():
             message = f"`{name}` is no macro, so it counts as 0 in this condition"
             if name in named:
-                self._warn_of_definition(message, place, *named[name][1:])
+                self._warn_of_definition(message, place, named[name])
             else:
                 help = f"ask `defined({name})`, or define it before: `#define {name} 1`, `-D {name}=1`"
                 self.findings.warn("D036", message, place, help=[*did_you_mean(name, self.macros), help])
         for token, before, end in self._not_defined:
             if token.text not in named:
                 continue
-            at, kind, name_token = named[token.text]
-            behind = end is not None and _stands_before(end, name_token) and kind in ("let", "param")
-            if at < before or _stands_before(name_token, token) or behind:
+            found = named[token.text]
+            behind = end is not None and _stands_before(end, found.token) and found.word in VALUES
+            if found.at <= before or _stands_before(found.token, token) or behind:
                 message = f"`{token.text}` is no macro, so it counts as not defined in this condition"
-                self._warn_of_definition(message, token.place, *named.pop(token.text)[1:])
+                self._warn_of_definition(message, token.place, named.pop(token.text))
         for token in self.not_undefined:
             if token.text in lets and token.text in named:
                 message = f"`{token.text}` is no macro, so this `#undef` changes nothing"
-                self._warn_of_definition(message, token.place, *named.pop(token.text)[1:])
+                self._warn_of_definition(message, token.place, named.pop(token.text))
         for name, token in self.given.items():
             if name not in self.asked:
                 near = did_you_mean(name, [*self.asked, *self._zeros])
@@ -225,10 +221,9 @@ class _Preprocessor(Macros):
                     help=[*near, *values],
                 )
 
-    def _warn_of_definition(self, message: str, at: Place, word: str, name: Token) -> None:
+    def _warn_of_definition(self, message: str, at: Place, named: Named) -> None:
         """Warn about a condition that asks for the macro of a name which the deck defines otherwise."""
-        what = f"this `{word}` is a value" if word in ("let", "param") else f"this is the name of a `{word}`"
-        label = Label(name.place, f"{what}; a condition sees macros alone")
+        label = Label(named.token.place, f"{named.what}; a condition sees macros alone")
         help = "define a macro for it, `#define NAME ...`, and ask that"
         self.findings.warn("D036", message, at, also=(label,), help=help)
 
