@@ -23,14 +23,18 @@ class StandardStream(io.FileIO):
     """The file of standard output or of standard errors, 1 or 2. Its first refusal is kept; what comes after it is
     dropped."""
 
-    def __init__(self, number: int) -> None:
+    def __init__(self, number: int, *, closed: bool = False) -> None:
+        """closed: whether the shell has closed it, as in `met ... >&-`; it then refuses all"""
         super().__init__(number, "w", closefd=False)
         self.refusal: OSError | None = None
+        self._closed = closed
 
     def write(self, data: Any) -> int:
         """Write some of the data. Raises OutputLost, once, where standard output refuses it."""
         while self.refusal is None:
             try:
+                if self._closed:
+                    raise OSError("it is closed")
                 wrote = super().write(data)
             except OSError as reason:
                 self.refusal = reason
@@ -48,23 +52,23 @@ def standard_streams() -> Iterator[StandardStream | None]:
     """A block whose output and errors go through a StandardStream; gives that of the output, or None where Python's
     own is replaced already, as by tests."""
     _open_closed()
-    guarded = {name: StandardStream(number) for name, number in (("stdout", 1), ("stderr", 2))}
     before = sys.stdout, sys.stderr
-    own = sys.stdout is sys.__stdout__
-    with contextlib.ExitStack() as opened:
-        for name, file in guarded.items():
-            stream = getattr(sys, name)
-            if stream is None:  # closed by the shell, as in `met ... >&-`: output is discarded
-                setattr(sys, name, opened.enter_context(open(os.devnull, "w", encoding="utf-8")))
-            elif stream is getattr(sys, f"__{name}__"):
-                setattr(sys, name, _over(file, stream))
-        try:
-            yield guarded["stdout"] if own else None
-        finally:
-            with contextlib.suppress(OutputLost):
-                sys.stdout.flush()
-            sys.stderr.flush()
-            sys.stdout, sys.stderr = before
+    guarded = {
+        name: StandardStream(number, closed=getattr(sys, name) is None)
+        for name, number in (("stdout", 1), ("stderr", 2))
+    }
+    own = sys.stdout is None or sys.stdout is sys.__stdout__
+    for name, file in guarded.items():
+        stream = getattr(sys, name)
+        if stream is None or stream is getattr(sys, f"__{name}__"):
+            setattr(sys, name, _over(file, stream))
+    try:
+        yield guarded["stdout"] if own else None
+    finally:
+        with contextlib.suppress(OutputLost):
+            sys.stdout.flush()
+        sys.stderr.flush()
+        sys.stdout, sys.stderr = before
 
 
 @contextlib.contextmanager
@@ -77,7 +81,9 @@ def kept(words: str) -> Iterator[None]:
 
 
 def _over(raw: StandardStream, stream: Any) -> io.TextIOWrapper:
-    """Text into this file, as the given stream of Python's writes it."""
+    """Text into this file, as the given stream of Python's writes it; in UTF-8 where it is closed."""
+    if stream is None:
+        return io.TextIOWrapper(io.BufferedWriter(raw), encoding="utf-8", errors="backslashreplace")
     return io.TextIOWrapper(
         io.BufferedWriter(raw),
         encoding=stream.encoding,

@@ -201,12 +201,26 @@ def test_a_file_that_cannot_be_read_is_the_users_to_mend_not_a_defect(
     assert capsys.readouterr().err == "error[E338]: `/no/such/file`: No such file or directory\n\n1 error\n"
 
 
+CLOSED = "error[E338]: cannot write the standard output: it is closed\n"
+
+
 @pytest.mark.release
-@pytest.mark.parametrize("closed", ["stdout", "stderr"])
-def test_a_stream_that_the_shell_has_closed_is_no_defect(closed: str) -> None:
+@pytest.mark.parametrize(("closed", "status", "said"), [("stdout", 2, CLOSED), ("stderr", 0, "")])
+def test_a_stream_that_the_shell_has_closed_is_no_defect(closed: str, status: int, said: str) -> None:
     program = f"import sys; sys.{closed} = None; from met.cli import main; sys.exit(main(['check', 'two_link.ic']))"
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
-    assert (done.returncode, getattr(done, closed)) == (0, "")
+    assert (done.returncode, getattr(done, closed)) == (status, "") and done.stderr.startswith(said)
+
+
+@pytest.mark.parametrize(("printed", "status", "said"), [("answer\n", 2, CLOSED), ("", 0, "")])
+def test_what_a_closed_output_loses_is_told(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], printed: str, status: int, said: str
+) -> None:
+    offer(monkeypatch, do=command(lambda: cli.say(printed, end="") if printed else None))
+    monkeypatch.setattr("sys.stdout", None)
+    assert cli.main(["do"]) == status
+    err = capsys.readouterr().err
+    assert err.startswith(said) and bool(err) == bool(said)
 
 
 @contextlib.contextmanager
@@ -318,7 +332,7 @@ def test_no_file_of_a_command_gets_the_number_of_a_closed_stream(closed: str, tm
         f"import os, sys; [os.close(int(each)) for each in {closed.split()!r}];"
         f"{''.join(f'sys.std{name} = None;' for n, name in enumerate(('in', 'out', 'err')) if str(n) in closed)}"
         "from met.cli import main; status = main(['plan', 'two_link.ic', '-o', sys.argv[1]]);"
-        "sys.exit(status or os.open(sys.argv[1], os.O_RDONLY) < 3)"
+        f"sys.exit(status != {2 if '1' in closed else 0} or os.open(sys.argv[1], os.O_RDONLY) < 3)"
     )
     done = subprocess.run([sys.executable, "-c", program, tmp_path / "p.json"], cwd=ROOT, capture_output=True)
     assert done.returncode == 0
