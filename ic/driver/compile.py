@@ -15,6 +15,7 @@ from ic.grammar.syntax import Deck, Setting
 from ic.language import EXPERIMENTS
 from ic.meaning.checks.degrees import remark_degrees
 from ic.meaning.control.servos import check_servo_definition
+from ic.meaning.control.unused_servos import check_on_a_joint, servos_in_use
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.definitions.row_tables import is_row_table
 from ic.meaning.definitions.unused_params import misspelt_params
@@ -153,9 +154,13 @@ def compile_deck(
         loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
         for arm in definitions.of_kind("arm").values():  # with a payload its joints may move a mass
             (resolve_arm if loaded else check_arm)(Scope(definitions, complaints), arm)
+        used = servos_in_use(definitions)
         for name in definitions.of_kind("servo"):
             with complaints.gather():
+                before = complaints.error_count
                 check_servo_definition(Scope(definitions, complaints), name)
+                if name not in used and not settings and complaints.error_count == before:
+                    check_on_a_joint(Scope(definitions, complaints), name)
     except RecursionError:
         complaints.add(TOO_DEEP)
     except Problem as problem:

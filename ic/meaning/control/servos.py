@@ -172,7 +172,7 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
         return None
     sensed, block = list(block.of_kind("sensor")), without_sensors(block)
     parameters = use_model(scope, owner, servo.parameters, block, NOT_PARAMETERS)
-    command = _command(scope, owner, servo, block.get("command"), place)
+    command = use_command(scope, owner, servo, block.get("command"), place)
     if command is not None:
         _check_needed(scope, owner, servo, command, block, place)
     rate = None
@@ -387,7 +387,7 @@ def fixed_rate(
     return Rate(label, hz, place) if hz is not None and SLOWEST <= hz <= FASTEST else None
 
 
-def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Place) -> Command | None:
+def use_command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Place) -> Command | None:
     known = ", ".join(f"{kind}(...)" for kind in servo.commands)
     if item is None:
         if servo.commands:
@@ -493,7 +493,7 @@ def _check_known(scope: Scope, inner: Name) -> None:
     )
 
 
-def _is_guide(scope: Scope, inner: Expression) -> bool:
+def is_guide(scope: Scope, inner: Expression) -> bool:
     """Return True if this expression names a guide of one of the deck's runs, or may name one of those to come: a used
     deck's servos come without its runs."""
     if isinstance(inner, Name) and inner.roof and len(inner.path) == 1 and not scope.names.is_value(inner):
@@ -503,7 +503,7 @@ def _is_guide(scope: Scope, inner: Expression) -> bool:
 
 
 def check_servo_definition(scope: Scope, name: str) -> None:
-    """Check a servo definition that no run uses, as far as possible: its model and its keys."""
+    """Check a servo definition as far as that is possible without a joint: its model and its keys."""
     definition = scope.definitions.of_kind("servo")[name]
     block = scope.definitions.block(definition)
     if block is None:
@@ -529,7 +529,7 @@ def check_servo_definition(scope: Scope, name: str) -> None:
                 and command.value.name.text in COMMAND_UNIT
             ):
                 inner = _asked(scope, command.value)
-                if not isinstance(inner, Call) and not _is_guide(scope, inner):
+                if not isinstance(inner, Call) and not is_guide(scope, inner):
                     scope.names.evaluate(inner)
             words = {p.name: p for p in servo.parameters if p.shape == "word"}
             for entry in filter(None, map(block.get, ("rate", "command"))):

@@ -205,3 +205,31 @@ def test_a_value_of_a_wrong_unit_is_told_of_the_servo_that_writes_it(tmp_path: P
     (of_other, of_drive) = sorted(each.message for each in check(tmp_path, ARM, drive, like, run).diagnostics)
     assert of_other.startswith("`ki` of servo `other` is in V/rad")
     assert of_drive.startswith("`v_max` of servo `drive` is in V")
+
+
+NO_RUNS = [
+    ("command = position(sine(1 rad, 1 Hz));", ["D153"]),
+    ("command = rate(table(times = [0, 1, 1] s, values = [0, 1, 2] rad/s));", ["D156"]),
+    ("command = rate(table(times = [0, 1] s, values = [0, 1, 2] rad/s));", ["D154"]),
+    ("command = position(trapezoid(to = 10 deg));", ["D075", "D075"]),
+    ("command = position(10 kg);", ["D061"]),
+    ("command = position(step(to = 1 m, at = 1 s));", ["D061"]),
+    ("tau_max = 3 kg;", ["D061"]),
+    ("kp = 3;", ["D060"]),
+    ("ratio = 3 rad/m; command = rate(1 m/s);", []),  # of a slide
+    ("remove kp; remove command; remove ratio;", []),  # which may be written where it is used
+    ("command = position(some_guide);", ["D065"]),
+    ('command = position(trajectory(file = "no.csv"));', []),  # which is read by the joint's name
+]
+
+
+@pytest.mark.parametrize(("changes", "told"), NO_RUNS)
+def test_a_servo_that_no_run_uses_is_checked_but_for_what_it_lacks(
+    changes: str, told: list[str], tmp_path: Path
+) -> None:
+    assert codes(tmp_path, ARM, SERVO, RUN, f"servo other like drive {{ {changes} }}\n", select="all") == told
+
+
+@pytest.mark.parametrize("wrong", ["rate(trapezoid(to = 10 deg/s, max_rate = 1 rad/s^2))", "rate(sine(1 rad/s, 1 Hz))"])
+def test_what_is_wrong_with_a_servo_that_a_run_uses_is_told_once(wrong: str, tmp_path: Path) -> None:
+    assert len(codes(tmp_path, ARM, changed(SERVO, ("rate(0.1 rad/s)", wrong)), RUN, select="all")) == 1

@@ -1,0 +1,89 @@
+"""Servo definitions that no run uses: each is tried on a joint, so that its mistakes are told before it is used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from ic.grammar.syntax import Call, Entry, Expression, List, Setting
+from ic.language import OF_A_RUN
+from ic.meaning.control.sensors import without_sensors
+from ic.meaning.control.servos import NOT_PARAMETERS, is_guide, use_command
+from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.definitions.resolve import Definitions
+from ic.meaning.parameters.models import use_model, word_of
+from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.scope import Scope
+from ic.text.complaints import Complaints
+from met import models
+from met.diagnostic import Diagnostic
+from met.plan import JointKind
+
+KINDS: tuple[JointKind, ...] = ("revolute", "prismatic")
+
+
+def servos_in_use(definitions: Definitions) -> frozenset[str]:
+    """The servo definitions that a run has, or a sweep chooses, and those that these are like."""
+    servos = definitions.of_kind("servo")
+    values = [each.value for block in _runs(definitions) if (own := block.get("servos")) for each in _within(own)]
+    for kind in OF_A_RUN:
+        for definition in definitions.of_kind(kind).values():
+            values += _values(definition.group.body)
+    used = [
+        servos[name] for value in values if (name := definitions.definition_named(value) or word_of(value)) in servos
+    ]
+    return frozenset(home for each in used for home in definitions.homes(each))
+
+
+def _runs(definitions: Definitions) -> Iterator[MergedBlock]:
+    blocks = (definitions.block(run) for run in definitions.of_kind("run").values())
+    return (block for block in blocks if block is not None)
+
+
+def _within(item: Item) -> Iterable[Item]:
+    return item.body.items.values() if item.body is not None else ()
+
+
+def _values(entries: Iterable[Entry]) -> Iterator[Expression]:
+    """What entries choose among, such as `vary hinge.servo = [first, second];`, through blocks."""
+    for entry in entries:
+        value = getattr(entry, "value", None)
+        yield from value.items if isinstance(value, List) else ()
+        yield from _values(getattr(entry, "body", None) or ())
+
+
+def check_on_a_joint(scope: Scope, name: str) -> None:
+    """Report what is wrong with a servo definition on a joint of either kind, except for what it lacks: that may be
+    written where it is used."""
+    definition = scope.definitions.of_kind("servo")[name]
+    block = scope.definitions.block(definition)
+    model = block.get("model") if block is not None else None
+    if block is None or model is None or word_of(model.value) not in models.available("servo"):
+        return  # already reported, or to be written where it is used
+    servo, block = models.find("servo", word_of(model.value), definition.place), without_sensors(block)
+    command = block.get("command")
+    inner = command.value.positional[:1] if command is not None and isinstance(command.value, Call) else ()
+    told: list[tuple[Diagnostic, ...]] = []
+    for joint in KINDS:
+        complaints = Complaints()
+        lacking = (*NOT_PARAMETERS, *(each.name for each in servo.parameters))
+        complaints.known_missing |= {(definition.place, each) for each in lacking}
+        here = Scope(scope.definitions.reporting_to(complaints), complaints)
+        homes = scope.definitions.homes(definition)
+        owner = Owner(f"servo `{definition.name}`", definition.place, "a.servo", homes, "", joint)
+        with complaints.gather():
+            use_model(here, owner, servo.parameters, block, NOT_PARAMETERS)
+        with complaints.gather():
+            if not any(is_guide(scope, each) or _is_of_a_file(each) for each in inner):
+                use_command(here, owner, servo, command, definition.place)
+        if not complaints.errors:
+            return
+        told.append(complaints.errors)
+    scope.complaints.add(*min(told, key=len))
+
+
+def _is_of_a_file(inner: Expression) -> bool:
+    """Return True for a course from a file, which is read by the joint's name."""
+    body = inner.body or () if isinstance(inner, Call) else ()
+    given = [word for word, _ in inner.named] if isinstance(inner, Call) else []
+    given += [each.path[-1] for each in body if isinstance(each, Setting)]
+    return any(word.text == "file" for word in given)
