@@ -28,9 +28,10 @@ def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
         )
     turned = tuple(in_degrees(body.robot))
     if turned:
+        angles = f"{_count(len(turned), 'angle')} of `{body.robot.file}`"
         yield Diagnostic(
             "D218",
-            f"{_count(len(turned), 'angle')} of `{body.robot.file}` {'is' if len(turned) == 1 else 'are'} several turns",
+            f"{angles} {'is' if len(turned) == 1 else 'are'} several turns",
             Label(named),
             turned[:MOST_NAMED],
             ("URDF has angles in radians: correct the file",),

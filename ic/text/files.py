@@ -197,7 +197,7 @@ def add_include(file: str, place: Place, what: str = "it") -> Help:
     """The help that says to include a standard deck, in the file of the place."""
     head = Place(place.file, 1, 1, 0)
     text = f"a standard deck defines {what}: add `#include <{file}>`"
-    return write(f"#include <{file}>\n", text, at=head, where="before")
+    return write(f"#include <{file}>", text, at=head, where="head")
 
 
 def folders_by_slash(name: str, quoted: str) -> tuple[Help, ...]:

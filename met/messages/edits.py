@@ -83,6 +83,8 @@ def _stretch(
     """
     if change.where == "before":
         return first, first, change.new
+    if change.where == "head":
+        return _at_the_head(text, change.new)
     if change.where == "inside":
         return _at_its_end(text, last, change.new)
     if change.where == "entry":
@@ -134,6 +136,20 @@ def _is_whole_value(text: str, first: int, last: int) -> bool:
         if depth < 0:
             return False
     return depth == 0 and _ENDS_A_VALUE.match(text, last) is not None
+
+
+_EDITION = re.compile(r"(?:\s+|//[^\n]*|/\*(?s:.*?)\*/)*deck\s+\d+\s*;")
+_REST = re.compile(r"[ \t\r]*(?://[^\n]*)?\n")
+
+
+def _at_the_head(text: str, new: str) -> tuple[int, int, str]:
+    """The edit that writes a file's first line, behind its `deck 2;`, which has to stand before all else."""
+    edition = _EDITION.match(text)
+    if edition is None:
+        return 0, 0, f"{new}\n"
+    rest = _REST.match(text, edition.end())
+    at, line = (rest.end(), f"{new}\n") if rest is not None else (edition.end(), f"\n{new}\n")
+    return at, at, line
 
 
 # Entries of blocks. Their kind does not matter here: brackets and semicolons part them, outside of texts.

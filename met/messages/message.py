@@ -8,7 +8,7 @@ from typing import Literal
 from met.frozen import frozen
 
 Severity = Literal["error", "warning", "note"]
-Where = Literal["instead", "value", "before", "behind", "inside", "entry"]
+Where = Literal["instead", "value", "before", "behind", "inside", "entry", "head"]
 
 
 @frozen
@@ -98,6 +98,7 @@ class TextChange:
            "behind"   behind it, which is a whole value
            "inside"   at the beginning of the block of what is defined there
            "entry"    in place of the whole entry of a block that it stands in
+           "head"     as the first line of its file, behind the one that says the edition
     """
 
     new: str

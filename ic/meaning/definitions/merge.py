@@ -166,18 +166,15 @@ class _Merger:
         if key in self.written:
             raise Problem(defined_twice(kind, name, entry.place, self.written[key]))
         if kind and earlier and kind != WITH:
-            raise Problem(
-                error(
-                    "D053",
-                    f"{kind} `{name}` is in {self.base_name or 'the base'} already",
-                    entry.place,
-                    also=[Label(earlier.place, "here")],
-                    help=[
-                        write("", f"leave out the word `{kind}` to change it", old=f"{kind} "),
-                        f"`remove {name};` first, to put another in its place",
-                    ],
-                )
-            )
+            helps = [f"`remove {name};` first, to put another in its place"]
+            details = [word.text for word in detail]
+            if not details:
+                helps.insert(0, write("", f"leave out the word `{kind}` to change it", old=f"{kind} "))
+            elif details == [word.text for word in earlier.detail]:
+                old, words = " ".join((kind, name, *details)), " and ".join(f"`{each}`" for each in (kind, *details))
+                helps.insert(0, write(name, f"leave out the words {words} to change it", old=old))
+            what = f"{kind} `{name}` is in {self.base_name or 'the base'} already"
+            raise Problem(error("D053", what, entry.place, also=[Label(earlier.place, "here")], help=helps))
         self.written[key] = entry.place
         self.names.setdefault(name, []).append(key) if earlier is None else None
         self.items[key] = self._made(entry, kind, name, detail, earlier)
@@ -426,8 +423,8 @@ def defined_twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnos
     named = kind not in ("", WITH, REQUIREMENT)
     helps: list[str] = [leave_out("remove one of the two"), *(["or give one of the two another name"] if named else [])]
     if (place.file, place.line, place.column) == (earlier.file, earlier.line, earlier.column):
-        once = "its file is included twice: begin that file with `#pragma once`"
-        helps = [write("#pragma once\n", once, at=Place(place.file, 1, 1, 0), where="before")]
+        once = "its file is included twice: add `#pragma once` to that file"
+        helps = [write("#pragma once", once, at=Place(place.file, 1, 1, 0), where="head")]
         if place.iterations != earlier.iterations:
             index = place.iterations[0].macro
             stem = name.removesuffix(index) if name.endswith(f"_{index}") else f"{name}_"  # its braces were forgotten

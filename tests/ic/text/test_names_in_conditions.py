@@ -31,7 +31,8 @@ warning[D036]: `heavy` is no macro, so it counts as not defined in this conditio
     "#if 0\n#elif defined(x)", "#define ASK defined(x)\n#if ASK",
 ])  # fmt: skip
 @pytest.mark.parametrize("before", [
-    "let x = 1;", "run x { }", "run x{ }", 'use "b.ic" as x;', "use <b.ic> as x;", "unit x = 2 kg;", "#define LET(name) let name = 1;\nLET(x)", '#include "b.ic"',
+    "let x = 1;", "run x { }", "run x{ }", 'use "b.ic" as x;', "use <b.ic> as x;", "unit x = 2 kg;",
+    "#define LET(name) let name = 1;\nLET(x)", '#include "b.ic"',
 ])  # fmt: skip
 def test_each_way_to_ask_and_each_definition_before_it_gets_this_warning_once(desk: Desk, condition: str, before: str):
     desk.write("let x = 1;\n", "b.ic")

@@ -98,6 +98,18 @@ def test_text_is_put_before_a_place_and_behind_one():
     assert edited(error("D1", "no", place, help=write(" s", where="behind"))) == [DECK.replace("= 2", "= 2 s")]
 
 
+def test_a_line_at_the_head_of_a_file_stands_behind_its_edition():
+    found = error("D1", "no", at(1, 1, 1), help=write("#pragma once", at=at(1, 1, 0), where="head"))
+    for before, rest in (
+        ("", "run x { }\n"),
+        ("deck 2;\n", "run x { }\n"),
+        ("// of me\n\n/* deck 1; */ deck 2 ;  // says it\n", "run x { }\n"),
+    ):
+        assert edited(found, before + rest) == [f"{before}#pragma once\n{rest}"]
+    assert edited(found, "deck 2; run x { }\n") == ["deck 2;\n#pragma once\n run x { }\n"]
+    assert edited(found, "deck 2;") == ["deck 2;\n#pragma once\n"]
+
+
 def test_no_edit_is_offered_in_a_macro_or_in_a_deck_of_mets_own_or_where_no_text_is():
     use = at(1, 5, 1)
     made = error("D1", "no", at(2, 16, 1, expansions=(Expansion("M", at(3, 5, 7)),)), help=write("2 s"))
