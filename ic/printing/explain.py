@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -309,8 +310,17 @@ def _shown(experiment: Experiment, found: Quantity) -> str:
                 return f"{number(low)} to {quantity(high, found.unit)}, varies with the case"
             return f"{decimals([low], found.unit)[0]} to {written(high, found.unit)}, varies with the case"
         case float() | int():
-            return quantity(found.value, found.unit) if computed else written(found.value, found.unit)
+            return quantity(found.value, found.unit) if computed else _written(found.value, found.unit)
     raise AssertionError(found)
+
+
+def _written(value: float, unit: str) -> str:
+    """A value of a deck, which someone may write again; in 15 digits where arithmetic left more, as in `70 g + 3 g`,
+    which is 0.07300000000000001 kg."""
+    text = written(value, unit)
+    number, blank, of = text.partition(" ")
+    digits = re.sub(r"e.*|\D", "", number).strip("0")
+    return text if len(digits) <= 15 else f"{float(number):.15g}{blank}{of}"
 
 
 def _varied_by(experiment: Experiment, name: str) -> list[Coordinate]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 from ic.language import ANYWHERE, BLOCKS, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
 from ic.meaning.mechanics import dh, shapes
-from ic.printing.glossary import meaning
+from ic.printing.glossary import entries, meaning
 from ic.printing.language import in_block
 from ic.printing.models import KINDS
 from ic.printing.subjects import channels, in_si, unit_table
@@ -18,6 +19,8 @@ from met import models
 
 Row = tuple[str, str, str]
 """What a deck writes, where, and what it means."""
+
+MOST_MEANINGS = 4  # that have a word in passing: one of more says little of any
 
 _CONDITIONAL = ("what follows, up to the next `#elif`, `#else` or `#endif`, is read only where {}", "a line of its own")
 
@@ -42,6 +45,8 @@ SYNTAX: Mapping[str, tuple[str, str, str]] = MappingProxyType({
     "cases": ("require METRIC < LIMIT in 99 % of cases;", "a requirement", "how many cases of a sweep must meet it"),
     "confidence": ("require METRIC < LIMIT in 99 % of cases with 90 % confidence;", "a requirement",
                    "how sure that is to be, for a sweep with random values"),
+    "percentile": ("require percentile(METRIC, 99 %) < LIMIT with 90 % confidence;", "a requirement",
+                   "what that share of a sweep's cases stay below; also without the confidence"),
     "free": ("base = free;", "a run", "the arm's base moves as its mass and the forces on it have it"),
     "prescribed": ("base = prescribed { ... }", "a run", "the arm's base moves as its courses say"),
     "links": ("links.NAME.mass", "a path", "a number of a link; also a channel, as in `links.NAME.position`"),
@@ -72,8 +77,9 @@ SYNTAX: Mapping[str, tuple[str, str, str]] = MappingProxyType({
 
 def print_word(word: str) -> Iterator[str]:
     """Every meaning of a word, for a terminal; empty where there is none. The glossary's comes first."""
+    word = word.removeprefix("#")
     yield from meaning(word)
-    for written, where, doc in dict.fromkeys(_rows(word)):
+    for written, where, doc in dict.fromkeys(_rows(word)) or _that_use(word):
         yield f"{written}  in {where}" if where else written
         yield from described([(line,) for line in doc.split("\n")], width=terminal_width(), indent="    ")
 
@@ -82,6 +88,19 @@ def _rows(word: str) -> Iterator[Row]:
     yield from (row for name, row in _of_blocks() if name == word)
     yield from _of_models(word)
     yield from (row for name, row in _of_values() if name == word)
+
+
+def _that_use(word: str) -> Sequence[Row]:
+    """Entries of blocks and values that are written with this word, such as `choose PATH = between(LOW, HIGH) UNIT;`;
+    else those whose meaning has it, and else such words of the glossary, where they are few."""
+    whole = re.compile(rf"(?<![\w.]){re.escape(word)}(?!\w)", re.IGNORECASE)
+    rows = [row for _, row in (*_of_blocks(), *_of_values())] if word else []
+    glossary = [(words, "", meaning) for words, meaning in entries().values()] if word else []
+    for among, at, most in ((rows, 0, len(rows)), (rows, 2, MOST_MEANINGS), (glossary, 2, MOST_MEANINGS)):
+        found = [*dict.fromkeys(row for row in among if whole.search(row[at]))]
+        if 0 < len(found) <= most:
+            return found
+    return []
 
 
 def _of_blocks() -> Iterator[tuple[str, Row]]:
@@ -102,6 +121,8 @@ def _of_values() -> Iterator[tuple[str, Row]]:
     for name, shape in shapes.SHAPES.items():
         for word in (name, *(each.name for each in shape.parameters)):
             yield word, (f"shape = {name}(...)", "a link or payload", "`met doc shapes` shows it")
+    for convention in dh.CONVENTIONS:
+        yield convention, (f"dh = {convention}(...)", "a joint", "`met doc dh` shows its numbers")
     for number in dh.NUMBERS:
         yield number.name, (f"dh = classic({number.name} = ...)", "a joint", number.doc)
     for unit in unit_table():

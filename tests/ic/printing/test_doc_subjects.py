@@ -245,6 +245,22 @@ def test_met_doc_knows_every_word_of_the_language_and_of_the_glossary() -> None:
     assert [word for word in unknown if word not in names] == []
 
 
+@pytest.mark.parametrize(("word", "told"), [
+    ("between", "choose PATH = between(LOW, HIGH) UNIT;"), ("until_shown", "random(until_shown, at_most = n)"),
+    ("percentile", "require percentile(METRIC, 99 %)"), ("classic", "dh = classic("), ("craig", "dh = craig("),
+    ("roof", "use <FILE> as ROOF;"), ("edition", "deck 2;"), ("urdf", 'from urdf("FILE")'), ("drive", "servo"),
+    ("continuous", "rate = 500 Hz;"), ("limits", "limits.margin"), ("#include", '#include "FILE"'),
+    ("bench", "bench: the parts"), ("verdict", "verdict: what the cases"),
+])  # fmt: skip
+def test_a_word_that_others_are_written_with_is_found_with_them(word: str, told: str) -> None:
+    assert next(print_word(word)).startswith(told) or told in next(print_word(word))
+
+
+@pytest.mark.parametrize("word", ["the", "", "#", "kpp", "is", "mas"])
+def test_a_word_that_says_nothing_is_not_found(word: str) -> None:
+    assert not list(print_word(word))
+
+
 def test_met_doc_shows_every_meaning_of_a_word(capsys: pytest.CaptureFixture[str]) -> None:
     out = printed(capsys, "tau_max")
     assert [line for line in out.splitlines() if not line.startswith(" ")] == [

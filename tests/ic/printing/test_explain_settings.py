@@ -169,3 +169,9 @@ def test_a_unit_is_no_parameter_and_has_a_size(capsys: pytest.CaptureFixture[str
         assert cli.main(["explain", "own.ic", path]) == 2
         said = f"error[D170]: `{path}` is {what}, and no parameter\n = help: {size}\n\n1 error\n"
         assert capsys.readouterr() == ("", said)
+
+
+def test_a_value_of_a_sum_is_without_the_noise_of_its_rounding(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("sum.ic").write_text(changed(ARM, ("2 kg", "70 g + 3 g")) + SERVO + RUN, encoding="utf-8")
+    assert cli.main(["explain", "sum.ic", "links.bar.mass"]) == 0
+    assert capsys.readouterr().out.startswith("links.bar.mass = 0.073 kg\n")
