@@ -18,7 +18,7 @@ from met.diagnostic import Label, Place
 TURN = 2.0 * math.pi
 _LEAST = 0.75 * TURN  # a smaller jump is not that of a log whose rows are dense enough for its motion
 _SLACK = 0.01  # rad by which rounding may take a wrapped log beyond one turn
-_FEWEST = 3  # other rows that say how fast the joint is
+_FEWEST = 2  # other rows that say how fast the joint is
 _FASTER = 4.0  # times the fastest other row: a jump of less may be a motion
 _GOES_ON = 2.0  # times the fastest other row: with a turn added, a wrapped row is no faster
 _LONGER = 2.0  # times the usual time between rows: a longer one is a move between points, not a row of a log

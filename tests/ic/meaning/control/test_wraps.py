@@ -45,6 +45,7 @@ wrapped
     ((4.0, 5.0, 6.0, 0.5, 1.0), [3]),
     ((0.0, 3.0, -3.0, 3.0, 0.0), []),  # as fast everywhere
     ((-3.0, -3.0, -3.0, 3.0, 3.0, 3.0), []),  # at rest before and after: a move to another place
+    ((2.0, 3.0, -3.0, -2.0), [2]),  # of two rows beside the wrap
     ((0.0, 6.0), []),
     ((0.0, 1.0, 2.0, 3.0, 10.0, 11.0), []),  # beyond one turn: not wrapped
 ])  # fmt: skip
