@@ -65,7 +65,15 @@ class Expressions(Quantities):
         self.advance()
         last = self.expression()
         if self.token.text != "by":
-            self.fail("D220", "a range has no step", dots, help="write `first .. last by step`")
+            self.fail(
+                "D220",
+                "a range has no step",
+                dots,
+                help=[
+                    "write `first .. last by step`",
+                    "a `tune` and a `search` take all between: `between(first, last)`",
+                ],
+            )
         self.advance()
         return Range(first, last, self.expression(), dots.place)
 

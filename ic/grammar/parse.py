@@ -48,6 +48,7 @@ from met.units import Measure
 
 NO_UNITS: Mapping[str, Measure] = MappingProxyType({})
 COMPARE = ("require", "exclude")
+DEFINED_IN_PARTS = ("arm", "link", "joint", "servo", "run", "substitute")  # by a block in a block
 PARAM = "param"
 LETS = ("let", PARAM)
 _OVER_CASES = "write `require METRIC < LIMIT in 99 % of cases with 90 % confidence;`"
@@ -376,7 +377,10 @@ class _Parser(Uses):
         operator = self.advance()
         words, path = names[:-1], [names[-1], *tail]
         if words and words[0].text in COMPARE and operator.text == "=":
-            self.fail("D023", "`=` sets a value", operator, help=write("==", "to compare, write `==`"))
+            helps = [write("==", "to compare, write `==`")]
+            if words[0].text == "require":
+                helps = [write(sign, f"a requirement is a limit: write `{sign}`") for sign in ("<=", ">=")]
+            self.fail("D023", "`=` sets a value", operator, help=helps)
         if len(words) > 1:
             self.unopened.append(self.behind(words[-1]))
         value = self.value()
@@ -391,7 +395,7 @@ class _Parser(Uses):
                 "D020",
                 "a block's name has no points",
                 span(names[-1], tail[-1]),
-                help=f"write `{names[-1].text} {{ {tail[0].text} {{ ... }} }}`",
+                help=_without_points(names, tail),
             )
         like = of = None
         words = names
@@ -583,3 +587,11 @@ def _words_before_value(names: Sequence[Token], dotted: bool, following: Token) 
     if texts[-1] == "when" or following.kind in (*NUMBERS, STRING) or following.text == "[":
         return len(names)
     return len(names) - 1
+
+
+def _without_points(names: list[Token], tail: list[Token]) -> str:
+    """The remedy for `linear shoulder.servo { }`, whose name may be any, and for `shoulder.servo { }`."""
+    if len(names) > 1 and names[0].text not in DEFINED_IN_PARTS:
+        name = "_".join(each.text for each in (names[-1], *tail))
+        return write(name, f"give it a name without points, such as `{name}`")
+    return f"write `{names[-1].text} {{ {tail[0].text} {{ ... }} }}`"

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ic.meaning.parameters.scope import Scope
 from ic.sweeps.axes import Sweep
 from ic.sweeps.choices import ONE_OF_TWO
 from ic.text.complaints import Complaints, known_words
 from met import units
 from met.analysis.memo import AnalysisMemo
-from met.diagnostic import Label, did_you_mean, leave_out
+from met.diagnostic import Label, leave_out, meant, write
 from met.plan import REPEAT, Coordinate, Experiment
 from met.plan.columns import CaseValues
 
@@ -27,8 +29,10 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
         place = varied.place
         if path in scope.not_sweepable:
             why = scope.not_sweepable[path]
+            of_run = path.partition(".")[2] if path.partition(".")[0] in scope.definitions.of_kind("run") else ""
+            own = of_run if of_run in scope.not_sweepable else path  # which a sweep chooses without the run's name
             scope.complaints.error(
-                "D122", f"`{path}` cannot vary{' like this' if why.is_choice else ''}", place, help=why.to_vary(path)
+                "D122", f"`{path}` cannot vary{' like this' if why.is_choice else ''}", place, help=why.to_vary(own)
             )
             continue
         first, *words = scope.definitions.split(path)
@@ -61,11 +65,22 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
                 place,
                 help=scope.definitions.stays_away(path)
                 or no_scale(path)
-                or did_you_mean(path, (*scope.known, *scope.not_sweepable, *scope.definitions.lets))
+                or _probably_meant(scope, path)
                 or parameters_nearby(scope, path)
                 or paths_ending_in(scope, path)
                 or first_words(scope),
             )
+
+
+def _probably_meant(scope: Scope, path: str) -> Sequence[str]:
+    """The remedy that names the path without a first word too many, else a similar one; and what of it varies."""
+    known = (*scope.known, *scope.not_sweepable, *scope.definitions.lets)
+    rest = path.partition(".")[2]
+    near = rest if "." in rest and rest in known else meant(path, known)
+    why = scope.not_sweepable.get(near or "")
+    if near is not None and why is not None and not why.is_choice:
+        return [f"did you mean `{near}`? {why.to_vary(near)}"]
+    return (write(near, f"did you mean `{near}`?", old=path),) if near is not None else ()
 
 
 def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:

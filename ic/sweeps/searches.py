@@ -15,7 +15,7 @@ from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Call, List, Name, Setting, Statement, WithUnit
 from ic.language import BLOCKS
-from ic.language.runs import MARGIN
+from ic.language.runs import MARGIN, RUN
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.evaluate import PURE, evaluate_number
@@ -321,6 +321,9 @@ class _SearchReader:
             if isinstance(call, Call) and call.name.text in RANGES:
                 usage = f"{f'{CHOOSE} ' * self.tunes}{path} = {spell(value)};"
                 raise Problem(error("D360", f"in a {kind} this is written otherwise", place, help=f"write `{usage}`"))
+            if "." not in path and path not in self.definitions.lets and path not in RUN.keys:
+                helps = [*did_you_mean(path, known), known_words(f"a {kind} has", known)]
+                raise Problem(error("D360", f"no `{' '.join([*words, path])}` in a {kind}", place, help=helps))
             where = f"set it in a run `like {base.text if base is not None else 'RUN'}`"
             raise Problem(
                 error("D360", f"`{' '.join([*words, path])} = ...` in a {kind}", place,

@@ -55,10 +55,15 @@ def rate_of(scope: Scope, each: Ticking, shared: Rate | None) -> Rate | None:
 def check_instants(scope: Scope, each: Ticking, divisor: int, dynamics: int, rate: Rate, step: Rate) -> None:
     """Check that it ticks at instants of the dynamics, since it sees the arm there."""
     if divisor % dynamics:
-        scope.complaints.error(
-            each.code,
-            f"{each.label} {each.verb} at {rate.hz:g} Hz, between the steps of the dynamics",
-            rate.place,
-            also=[Label(step.place, f"{step.hz:g} Hz")],
-            help=f"give the {each.kind} a `rate` that divides {step.hz:g} Hz, or quicken the dynamics",
-        )
+        report_between_steps(scope, each, rate, step)
+
+
+def report_between_steps(scope: Scope, each: Ticking, rate: Rate, step: Rate) -> None:
+    """Report one whose rate does not divide that of the dynamics."""
+    scope.complaints.error(
+        each.code,
+        f"{each.label} {each.verb} at {rate.hz:g} Hz, between the steps of the dynamics",
+        rate.place,
+        also=[Label(step.place, f"{step.hz:g} Hz")],
+        help=f"give the {each.kind} a `rate` that divides {step.hz:g} Hz, or quicken the dynamics",
+    )

@@ -28,9 +28,8 @@ def servos_in_use(definitions: Definitions) -> frozenset[str]:
     for kind in OF_A_RUN:
         for definition in definitions.of_kind(kind).values():
             values += _values(definition.group.body)
-    used = [
-        servos[name] for value in values if (name := definitions.definition_named(value) or word_of(value)) in servos
-    ]
+    names = (definitions.definition_named(value) or word_of(value) for value in values)
+    used = [servos[name] for name in names if name is not None and name in servos]
     return frozenset(home for each in used for home in definitions.homes(each))
 
 
@@ -56,10 +55,10 @@ def check_on_a_joint(scope: Scope, name: str) -> None:
     written where it is used."""
     definition = scope.definitions.of_kind("servo")[name]
     block = scope.definitions.block(definition)
-    model = block.get("model") if block is not None else None
-    if block is None or model is None or word_of(model.value) not in models.available("servo"):
+    model = word_of(item.value) if block is not None and (item := block.get("model")) is not None else None
+    if block is None or model not in models.available("servo"):
         return  # already reported, or to be written where it is used
-    servo, block = models.find("servo", word_of(model.value), definition.place), without_sensors(block)
+    servo, block = models.find("servo", model, definition.place), without_sensors(block)
     command = block.get("command")
     inner = command.value.positional[:1] if command is not None and isinstance(command.value, Call) else ()
     told: list[tuple[Diagnostic, ...]] = []

@@ -153,6 +153,12 @@ class _Merger:
                         help="write the whole block, without it; a macro (`#define`) holds what blocks have in common",
                     )
                 )
+            if [word.text for word in entry.words[1:2]] == ["like"] and len(entry.words) == 3:  # `hinge like drive { }`
+                joint, _, servo = (word.text for word in entry.words)
+                made = write(f"{joint} = {servo}", f"write `{joint} = {servo} {{ ... }};`", old=f"{joint} like {servo}")
+                raise Problem(
+                    error("D052", "`like` belongs to definitions, not to the blocks inside", entry.place, help=[made])
+                )
             words, name = entry.words[:-1][:1], entry.words[min(1, len(entry.words) - 1)].text
         detail = entry.words[2:]
         if isinstance(entry, Setting) and len(words) > 1:  # `metric top fast = ...`: named as a block would be
@@ -171,8 +177,8 @@ class _Merger:
             if not details:
                 helps.insert(0, write("", f"leave out the word `{kind}` to change it", old=f"{kind} "))
             elif details == [word.text for word in earlier.detail]:
-                old, words = " ".join((kind, name, *details)), " and ".join(f"`{each}`" for each in (kind, *details))
-                helps.insert(0, write(name, f"leave out the words {words} to change it", old=old))
+                old, out = " ".join((kind, name, *details)), " and ".join(f"`{each}`" for each in (kind, *details))
+                helps.insert(0, write(name, f"leave out the words {out} to change it", old=old))
             what = f"{kind} `{name}` is in {self.base_name or 'the base'} already"
             raise Problem(error("D053", what, entry.place, also=[Label(earlier.place, "here")], help=helps))
         self.written[key] = entry.place

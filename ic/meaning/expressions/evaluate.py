@@ -41,6 +41,7 @@ from ic.meaning.expressions.whole import ceiling, nearest_whole
 from ic.text.complaints import known_words
 from met import units
 from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error, write
+from met.plan.drawing import ARGUMENTS
 from met.trace import (
     Real,
     Scalar,
@@ -85,6 +86,11 @@ FUNCTIONS = (
     "round",
     "sign",
 )
+
+_SAMPLED = "a value is drawn in a sample: `sample lhs(200) {{ PATH = {}(...); }}`, in a sweep"
+_CHOSEN = "a range is chosen from in a `tune` or a `search`; a sweep has `linspace(FROM, TO, COUNT)`"
+DRAWN = {**{name: _SAMPLED.format(name) for name in ARGUMENTS}, **dict.fromkeys(("between", "logbetween"), _CHOSEN)}
+"""The remedies for words that draw or choose a value, and are no functions."""
 
 CONSTANTS = {"pi": math.pi}
 
@@ -364,7 +370,9 @@ def _call(call: Call, lookup: Lookup) -> Value | ValueList:
                 "D069",
                 f"no function `{name}`",
                 call.name.place,
-                help=[*did_you_mean(name, FUNCTIONS), known_words("functions", FUNCTIONS)],
+                help=[DRAWN[name]]
+                if name in DRAWN
+                else [*did_you_mean(name, FUNCTIONS), known_words("functions", FUNCTIONS)],
             )
         )
     if call.named or call.body is not None:

@@ -14,10 +14,12 @@ from ic.meaning.expressions.quantity import Value, ValueList
 from ic.text.complaints import MOST_DIAGNOSTICS, known_words
 from ic.text.lexer import COMMAND_LINE
 from met import units
-from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error
+from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error, write
 from met.frozen import frozen
 from met.messages import other_units
 from met.trace import Real
+
+AXES = {"x": "[1, 0, 0]", "y": "[0, 1, 0]", "z": "[0, 0, 1]"}
 
 DEEPEST = 64  # depth of lets that need lets: far more than in decks, far less than Python's recursion limit
 
@@ -247,6 +249,9 @@ class Names:
             helps = [f"`{first}` is a unit: it follows a number, or closing brackets"]
         elif not helps and rest:
             helps = ["a value names a `let`, or what a servo's definition writes, such as `SERVO.kp`"]
+        elif not helps and first in AXES:
+            helps = [write(AXES[first], f"where the axis is meant, write `{AXES[first]}`", where="value"),
+                     f"else define it: `let {first} = ...;`"]  # fmt: skip
         elif first.lower() in ("nan", "inf", "infinity"):
             helps = ["every number of a deck is finite: leave the entry out where its default is endless, or write one"]
         elif not helps and name.place.file == COMMAND_LINE and not name.place.expansions:

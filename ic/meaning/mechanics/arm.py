@@ -416,8 +416,16 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping
             if ground
             else did_you_mean(name, known)
         )
+        arm = scope.definitions.of_kind("arm").get(item.homes[-1] if item.homes else "")
+        block = scope.definitions.block(arm) if arm is not None else None
+        gone = [each for each in block.removed if each.key == f"link {name}"] if block is not None else []
+        helps = [f"remove joint `{owner.path}` too, or hang it elsewhere"] if gone else near
         scope.complaints.error(
-            "D094", f"no link `{name}` in this arm", value_place(item), help=[*near, known_words("links", known)]
+            "D094",
+            f"no link `{name}` in this arm",
+            value_place(item),
+            also=[Label(each.place, "removed here") for each in gone],
+            help=[*helps, known_words("links", known)],
         )
     return None
 

@@ -17,6 +17,10 @@ def in_run(definitions: Definitions, block: MergedBlock, item: Item, rates: tupl
 
     block the run's; rates: the names of a run's rates
     """
+    return _in_its_block(block, item, _of_path(definitions, block, item, rates))
+
+
+def _of_path(definitions: Definitions, block: MergedBlock, item: Item, rates: tuple[str, ...]) -> list[str]:
     joints, links, arm = _of_arm(definitions, block)
     value = spell(item.value) if item.value is not None else "..."
     match item.name.split("."):
@@ -52,6 +56,19 @@ def in_arm(item: Item, known: list[str]) -> list[str]:
     if len(words) == 2 and words[0] in known and item.body is None:
         return [_write(item, f"{words[0]} {{ {words[1]} = {value}; }}")]
     return []
+
+
+def _in_its_block(block: MergedBlock, item: Item, helps: list[str]) -> list[str]:
+    """The help that says to write `servos { ... }`, or, where the same text has that block already, what to write in
+    it."""
+    for help in helps:
+        head, _, inner = help.removeprefix("write `").partition(" { ")
+        there = block.get(head) if inner else None
+        if there is not None and there.body is not None and there.homes == item.homes:
+            inner = inner.removesuffix(" }`")
+            instead = ", in place of what is there" if there.body.get(inner.split()[0]) is not None else ""
+            return [f"write `{inner}` in the run's `{head} {{ ... }}`{instead}"]
+    return helps
 
 
 def _write(item: Item, entry: str) -> Help:

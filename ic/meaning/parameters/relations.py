@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ def check_relations(
             other = wanted.less_than
             scope.checks.require(
                 (value, values[other]),
-                _not_less,
+                partial(_not_less, owner.unit(wanted)[0]),
                 code="D241",
                 message=f"{owner.what(wanted)} must be less than `{other}`",
                 place=place if body.get(wanted.name) is not None else _place(owner, body, other),
@@ -111,9 +112,10 @@ def no_direction(parts: np.ndarray) -> tuple[np.ndarray, list[str]]:
     return ~((length > 0.0) & (length < np.inf)), []
 
 
-def _not_less(pairs: np.ndarray) -> tuple[np.ndarray, list[str]]:
+def _not_less(unit: str, pairs: np.ndarray) -> tuple[np.ndarray, list[str]]:
     bad = ~(pairs[:, 0] < pairs[:, 1])
-    return bad, [f"{low:g} is not less than {high:g}" for low, high in pairs[bad][:1]]
+    unit = "" if unit == "1" else f" {unit}"
+    return bad, [f"{low:g}{unit} is not less than {high:g}{unit}" for low, high in pairs[bad][:1]]
 
 
 def _check_list(

@@ -252,8 +252,9 @@ class ValueChecks:
         shown, per_cent = units.ONE.decimal(number), f"{parse_unit('%').decimal(number)} %"
         helps: list[str] = [
             write(f"{shown} %", f"if per cent are meant, write `{shown} %`", where="value"),
-            write(per_cent, f"if that is meant, write `{per_cent}`", where="value"),
         ]
+        if all(bound is None or abs(number) < bound for bound in (wanted.below, wanted.at_most)):
+            helps.append(write(per_cent, f"if that is meant, write `{per_cent}`", where="value"))
         if isinstance(value.number, Scalar):
             helps = [
                 "if per cent are meant, write `%` behind the values",

@@ -191,6 +191,9 @@ def _metric(
         if not names:
             opened = places[0] if places else "JOINT.servo.voltage"
             helps = [write(f"linear {named or 'NAME'} {{ open = {opened}; }}", where="inside")]
+            if "." in named:  # which is what to open
+                name = named.replace(".", "_")
+                helps = [f"write `linear {name} {{ open = {opened}; }}` in the run, and `of = {name};` here"]
         scope.complaints.error("D376", message, _place(item, of), help=helps)
         return None
     use = next((each for each in answers if each.name == of.value.text), None)

@@ -8,9 +8,9 @@ from ic.grammar.places import place_of
 from ic.grammar.syntax import Name
 from ic.language.runs import RATES
 from ic.meaning.control.guides import Guiding, check_period
-from ic.meaning.control.schedule import CONTINUOUS, Rate, Ticks, base_rate, divisor, make_schedule
+from ic.meaning.control.schedule import CONTINUOUS, Rate, Ticks, base_rate, divisor, exact, make_schedule
 from ic.meaning.control.servos import Use, fixed_rate
-from ic.meaning.control.ticking import Ticking, check_instants, rate_of
+from ic.meaning.control.ticking import Ticking, check_instants, rate_of, report_between_steps
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import body_of
 from ic.meaning.parameters.owner import Owner
@@ -143,6 +143,9 @@ def resolve_schedule(
     for each in (each for each in ticking if each.ticks):
         rate_of_own = rate_of(scope, each, shared)
         if rate_of_own is not None:
+            if (exact(dynamics.hz) / exact(rate_of_own.hz)).denominator > 1:
+                report_between_steps(scope, each, rate_of_own, dynamics)
+                continue
             own_ticks[each.path] = divisor(scope.complaints, rate_of_own, base, everyone, written=written)
             check_instants(scope, each, own_ticks[each.path], schedule.dynamics, rate_of_own, dynamics)
             if isinstance(each, Guiding):

@@ -121,7 +121,13 @@ def nearest_channels(name: Name, known: dict[str, tuple[Recorded, ...]], structu
     why = _why_none([word.text for word in name.path], structure)
     if why:
         return [why]
-    first = name.path[0].text
+    first, *others = (word.text for word in name.path)
+    turned = ".".join((*others, first))
+    ending = [each for each in known if each.endswith(f".{name.text}")]
+    if turned in known and others:
+        return [_did_you_mean(name, turned)]
+    if len(ending) == 1:
+        return [_did_you_mean(name, ending[0])]
     if first == "sensors" and structure.sensors:
         sensors = [each for each in known if each.startswith("sensors.")]
         return [*did_you_mean(name.text, sensors), known_words("sensors of links", sensors)]

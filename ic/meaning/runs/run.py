@@ -19,7 +19,7 @@ from ic.meaning.definitions.merge import WITH, Item, MergedBlock, with_meant_nam
 from ic.meaning.definitions.resolve import Definition
 from ic.meaning.mechanics.arm import ResolvedArm, resolve_arm
 from ic.meaning.mechanics.payloads import resolve_payloads
-from ic.meaning.parameters.addresses import in_run
+from ic.meaning.parameters.addresses import OF_JOINT, in_run
 from ic.meaning.parameters.models import body_of, find_bare_model, overriding_place, refuse_statements, word_of
 from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
@@ -206,6 +206,10 @@ def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> 
             holder = next((key for key in BLOCKS if item.name in _inside(block, key)), None)
             if holder is not None:
                 adds = f"write `{holder} {{ {item.name} {{ ... }} }}`: it is there that `{item.name}` stands"
+            if holder == "servos" and not {*OF_JOINT}.difference(["tau_max"]).isdisjoint(item.body.items):
+                adds = f"it is the arm's: `arm OTHER like ARM {{ {item.name} {{ ... }} }}`, and `arm = OTHER;` here"
+            if item.name in RUN.named:
+                adds = f"write `{RUN[item.name].written}`"
             if not {"bed", "law"}.isdisjoint(item.body.items):
                 adds = f"`substitute {item.name} {{ ... }}` would put this joint's motor on a bed"
             if not {"on", "mass", "grapple", "release"}.isdisjoint(item.body.items):

@@ -620,7 +620,7 @@ error[D109]: a run has no `rates.base`
    |
 15 |     rates.base = 2 kHz;
    |     ^^^^^^^^^^
-   = help: write `rates { base = 2 kHz; }`
+   = help: write `base = 2 kHz;` in the run's `rates { ... }`
 """
     )
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from met.messages.edits import apply, edits
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes
 
 BESIDE = changed(  # a run that names the joint and the link in every way there is
@@ -68,6 +69,79 @@ def test_a_mistake_is_told_with_what_to_write(
         changed(RUN, *([run] if run else [])),
     )
     assert only_help(tmp_path, *parts)[1] == (help,)
+
+
+OWN = changed(
+    RUN, ("record = [q];", "record = [q];\n    metric top = max { of = hinge.qd; }\n    signal s = hinge.qd;")
+)
+
+APPLIED = [
+    ("D147", 1, "deck 2; // this\n" + ARM + SERVO + changed(RUN, ("= drive", "= rigid_gearbox { command = rate(1 rad/s); }"))),
+    ("D147", 1, ARM + SERVO + changed(RUN, ("= drive", "= rigid_gearbox { command = rate(1 rad/s); }"))),
+    ("D053", 1, ARM + SERVO + RUN + "arm b like swing { joint hinge revolute { axis = y; } }\n"),
+    ("D053", 1, ARM + SERVO + RUN + "arm b like swing { link bar { mass = 3 kg; } }\n"),
+    ("D053", 0, ARM + SERVO + RUN + "arm b like swing { joint hinge prismatic { axis = y; } }\n"),
+    ("D023", 2, ARM + SERVO + changed(OWN, ("\n}", "\n    require top = 1 rad/s;\n}"))),
+    ("D020", 1, ARM + SERVO + changed(OWN, ("\n}", "\n    linear hinge.servo { open = hinge.servo.voltage; }\n}"))),
+    ("D125", 1, ARM + SERVO + changed(OWN, ("[q]", "[q, reaction.hinge]"))),
+    ("D125", 1, ARM + SERVO + changed(OWN, ("[q]", "[q, s]"))),
+    ("D128", 1, ARM + SERVO + RUN + "sweep it of hold { vary joints.hinge.servo.kp = [1, 2] V*s/rad; }\n"),
+    ("D128", 0, ARM + SERVO + RUN + "sweep it of hold { vary swing.hinge.at = [1, 2] m; }\n"),
+    ("D052", 1, ARM + SERVO + changed(OWN, ("= drive;", "like drive { kp = 2 V*s/rad; }"))),
+    ("D307", 1, ARM + SERVO + changed(OWN, ("\n}", "\n    require percentile(top, 99) < 9 rad/s;\n}"))),
+]  # fmt: skip
+
+
+TOLD = [
+    (changed(OWN, ("\n}", "\n    hinge { q_max = 1 rad; }\n}")),
+     "it is the arm's: `arm OTHER like ARM { hinge { ... } }`, and `arm = OTHER;` here"),
+    (changed(OWN, ("\n}", "\n    linear { open = hinge.servo.voltage; }\n}")), "write `linear NAME { ... }`"),
+    (changed(OWN, ("\n}", "\n    servos.hinge = drive;\n}")),
+     "write `hinge = drive;` in the run's `servos { ... }`, in place of what is there"),
+    (changed(OWN, ("\n}", "\n    rates.base = 2 kHz;\n}")), "write `base = 2 kHz;` in the run's `rates { ... }`"),
+    (OWN + "run two like hold { servos.hinge = drive; }\n", "write `servos { hinge = drive; }`"),
+    (OWN + "sweep it of hold { vary hold.duration = [1, 2] s; }\n",
+     "it decides the program: write `vary duration = [...];`"),
+    (changed(OWN, ("\n}", "\n    sensor s = gyroscope { link = bar; along = z; rate = 300 Hz; }\n}")),
+     "where the axis is meant, write `[0, 0, 1]`"),
+    (changed(OWN, ("\n}", "\n    sensor s = gyroscope { link = bar; along = [0, 0, 1]; rate = 300 Hz; }\n}")),
+     "give the sensor a `rate` that divides 1000 Hz, or quicken the dynamics"),
+    (OWN + "sweep it of hold { vary drive.kp = normal(1, 2) V*s/rad; }\n",
+     "a value is drawn in a sample: `sample lhs(200) { PATH = normal(...); }`, in a sweep"),
+    (OWN + "sweep it of hold { vary drive.kp = between(1, 2) V*s/rad; }\n",
+     "a range is chosen from in a `tune` or a `search`; a sweep has `linspace(FROM, TO, COUNT)`"),
+    (OWN + "arm b like swing { remove bar; }\n", "remove joint `hinge` too, or hang it elsewhere"),
+    (changed(OWN, ("\n}", "\n    metric m = gain_margin { of = hinge.servo.voltage; }\n}")),
+     "write `linear hinge_servo_voltage { open = hinge.servo.voltage; }` in the run, and `of = hinge_servo_voltage;` "
+     "here"),
+    (OWN + "tune t of hold { choose drive.kp = between(0.1, 1) V*s/rad; goal = top; }\n",
+     "a tune has: choose, against, minimise, maximise, margin, least_margin, gradients, at_most, seed, allow"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("rest", "help"), TOLD)
+def test_what_stands_in_another_block_or_word_is_told_as_that(tmp_path: Path, rest: str, help: str) -> None:
+    found = check(tmp_path, ARM, SERVO, rest, select="all").diagnostics
+    assert help in [each.help[0] for each in found if each.help]
+
+
+@pytest.mark.parametrize(("code", "count", "text"), APPLIED)
+def test_what_a_help_writes_into_the_text_is_sound(tmp_path: Path, code: str, count: int, text: str) -> None:
+    found = next(each for each in check(tmp_path, text, select="all").diagnostics if each.code == code)
+    made = [apply(edit, text) for _, edit in edits(found, {str(tmp_path / "deck.ic"): text})]
+    assert len(made) == count, found.help
+    for mended in made:
+        assert "error" not in {each.severity for each in check(tmp_path, mended, select="all").diagnostics}, mended
+
+
+def test_a_file_that_is_included_twice_is_mended_behind_its_edition(tmp_path: Path) -> None:
+    beside = tmp_path / "beside.ic"
+    beside.write_text("deck 2;\nlet reach = 1 m;\n", encoding="utf-8")
+    both = '#include "beside.ic"\n#include "beside.ic"\n'
+    (found,) = check(tmp_path, both).diagnostics
+    ((_, edit),) = edits(found, {str(beside): beside.read_text("utf-8")})
+    beside.write_text(apply(edit, beside.read_text("utf-8")), encoding="utf-8")
+    assert "D040" not in codes(tmp_path, both) and "D391" not in codes(tmp_path, both)
 
 
 def test_one_initial_value_for_joints_that_move_differently_is_told_once(tmp_path: Path) -> None:

@@ -349,7 +349,7 @@ error[D241]: `q_min` of joint `hinge` must be less than `q_max`
   --> two.urdf:13:19
    |
 13 |     <limit lower="1" upper="-1" effort="-5" velocity="2"/> <axis xyz="0 0 1"/>
-   |                   ^ 1 is not less than -1
+   |                   ^ 1 rad is not less than -1 rad
    = help: swap them, or leave both out: a range has two ends
    = help: in the arm's block: `hinge { remove q_min;  remove q_max; }`, or write both there
 

@@ -150,7 +150,7 @@ error[D241]: `lower` of environment `end` must be less than `upper`
  --> deck.ic:8:51
   |
 8 |         end = joint_stop { joint = slide; lower = 0.2 m; upper = 0.1 m; stiffness = 800 N/m; dissipation = 0.5 s/m; }
-  |                                                   ^^^^^ 0.2 is not less than 0.1
+  |                                                   ^^^^^ 0.2 m is not less than 0.1 m
   = help: swap them, or leave one out (position of the lower stop; by default there is none)
 
 1 error

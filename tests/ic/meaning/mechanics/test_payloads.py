@@ -491,7 +491,8 @@ error[D128]: no parameter `payloads.box.size` in this run
    |
 23 | sweep many of it { vary payloads.box.size = [1, 2] m; }
    |                         ^^^^^^^^^^^^^^^^^
-   = help: did you mean `payloads.box.shape.size`?
+   = help: did you mean `payloads.box.shape.size`? it is made of 3 numbers; vary one of them: \
+`payloads.box.shape.size.x`, `payloads.box.shape.size.y`, `payloads.box.shape.size.z`
 
 1 error
 """,
