@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -41,6 +42,7 @@ class SampledContent:
     declared  its parameters;  content: what it brings (`Profile.content`, `Environment.content`)
     interval  s between instants;  by: what they are, in words, as in "its servo ticks"
     integral  whether the integral of its pulses counts, as of a rate or a torque, else their peaks
+    recorded  s between rows of the histories; 0 where none are kept
     """
 
     label: str
@@ -51,12 +53,15 @@ class SampledContent:
     by: str
     place: Place | None
     integral: bool = True
+    recorded: float = 0.0
 
 
 def check_sampling(scope: Scope, structure: Structure) -> None:
     """Warn about changes that begin after the run's end, and swings and pulses between the sampling instants."""
+    schedule = structure.schedule
+    recorded = schedule.record / schedule.base_hz if structure.record else 0.0
     for sampled in _all_sampled(structure):
-        _observe(scope, sampled, structure.schedule)
+        _observe(scope, replace(sampled, recorded=recorded), schedule)
 
 
 def _all_sampled(structure: Structure) -> Iterator[SampledContent]:
@@ -147,24 +152,28 @@ def _remark(scope: Scope, sampled: SampledContent, found: list[Content], schedul
         return _remark_late(scope, sampled, first.begins, schedule, place, " in this run")
     hz = 1.0 / sampled.interval
     fastest = min(max(each.frequency for each in found), sys.float_info.max)
-    if 2.0 * fastest >= hz * (1.0 - ROUNDING):
-        seen = abs(math.remainder(fastest, hz))
-        enough = _fitting(ENOUGH * fastest, base)
-        rate = [f"or give what sees it {enough:.6g} Hz, {ENOUGH} instants a swing or more"] if enough < math.inf else []
-        scope.complaints.remark(
-            "D335",
-            f"{sampled.label} swings at {fastest:.6g} Hz, and {sampled.by} at {hz:.6g} Hz: "
-            f"what is seen of it swings at {seen:.6g} Hz",
-            place,
-            help="; ".join([f"let it swing slower than {0.5 * hz:.6g} Hz", *rate]),
-        )
+    for interval, by in ((sampled.interval, sampled.by), (sampled.recorded, "it is recorded")):
+        if interval > 0.0 and 2.0 * fastest * interval >= 1.0 - ROUNDING:
+            seen = abs(math.remainder(fastest, 1.0 / interval))
+            enough = _fitting(ENOUGH * fastest, base, schedule.ticks if by == "it is recorded" else 0)
+            rate = [f"or give what sees it {_written(enough, base)}, {ENOUGH} instants a swing or more"] * (
+                enough < math.inf
+            )
+            scope.complaints.remark(
+                "D335",
+                f"{sampled.label} swings at {fastest:.6g} Hz, and {by} at {1.0 / interval:.6g} Hz: "
+                f"what is seen of it swings at {seen:.6g} Hz",
+                place,
+                help="; ".join([f"let it swing slower than {0.5 / interval:.6g} Hz", *rate]),
+            )
+            break
     lost = [pulse for each in found for pulse in _lost(each.pulses, sampled.interval, duration)]
     if lost:
         begins, ends = min(lost, key=lambda pulse: pulse[1] - pulse[0])
         before = math.floor(begins * hz)
         times = f"{before * sampled.interval:.9g} s and {(before + 1) * sampled.interval:.9g} s"
         enough = _fitting(1.0 / (ends - begins), base) if ends > begins else math.inf
-        rate = [f"or give what sees it {enough:.6g} Hz"] if enough < math.inf else []
+        rate = [f"or give what sees it {_written(enough, base)}"] if enough < math.inf else []
         others = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
         scope.complaints.remark(
             "D336",
@@ -204,19 +213,25 @@ def _rates_that_carry(
     for times in range(2, MOST_TIMES):
         hz = _fitting(times / sampled.interval, base)
         if not uncarried(points, 1.0 / hz, duration, integral=sampled.integral):
-            return [f"or give what sees it {hz:.6g} Hz"]
+            return [f"or give what sees it {_written(hz, base)}"]
     return []
 
 
-def _fitting(wanted: float, base: float) -> float:
+def _fitting(wanted: float, base: float, ticks: int = 0) -> float:
     """The slowest rate from `wanted` Hz on that divides the base rate, or that the base rate divides, Hz.
 
-    Infinite where it is beyond all numbers.
+    Infinite where it is beyond all numbers. ticks: of the run, which a rate of rows divides; 0: any rate will do
     """
     if wanted <= base:
-        return base / math.floor(base / wanted * (1.0 + ROUNDING))
+        n = math.floor(base / wanted * (1.0 + ROUNDING))
+        return base / next(each for each in range(n, 0, -1) if ticks % each == 0)
     times = wanted / base * (1.0 - ROUNDING)
     return base * math.ceil(times) if times < math.inf else math.inf
+
+
+def _written(rate: float, base: float) -> str:
+    """A rate as a deck is to have it: a share of the base rate where six digits are not exact."""
+    return f"{rate:.6g} Hz" if rate >= base or float(f"{rate:.6g}") == rate else f"({base:.9g}/{base / rate:.0f}) Hz"
 
 
 def _lost(pulses: Iterable[tuple[float, float]], interval: float, duration: float) -> Iterator[tuple[float, float]]:

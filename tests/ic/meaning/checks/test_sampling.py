@@ -50,6 +50,29 @@ def test_of_a_swing_that_no_rate_would_see_no_rate_is_told(tmp_path: Path, ticks
     assert " = help: let it swing slower than " in said and "give what sees it" not in said
 
 
+def test_a_swing_that_the_histories_would_not_show_is_told_with_a_rate_that_fits(tmp_path: Path) -> None:
+    """What was found: 10 Hz that were taken for a standstill in the picture, and a rate that fits no base rate."""
+    servo = under("rate(sine(amplitude = 0.1 rad/s, frequency = 9.5 Hz))")
+    slow = ("record = 100 Hz", "record = 10 Hz")
+    said = shown(tmp_path, ARM, servo, changed(RUN, slow))
+    assert "warning[D335]: the command of servo `drive` swings at 9.5 Hz, and it is recorded at 10 Hz: " in said
+    assert "what is seen of it swings at 0.5 Hz" in said
+    assert "let it swing slower than 5 Hz; or give what sees it 100 Hz, 10 instants a swing or more" in said
+    odd = changed(RUN, slow, ("dynamics = 1 kHz; servos = 1 kHz", "dynamics = 1050 Hz; servos = 1050 Hz"))
+    assert "or give what sees it 105 Hz, 10 instants " in shown(tmp_path, ARM, servo, odd)  # rows end with the run
+    assert codes(tmp_path, ARM, servo, changed(odd, ("record = 10 Hz", "record = 105 Hz"))) == []
+    assert codes(tmp_path, ARM, servo, changed(RUN, slow, ("record = [q]", "record = []"))) == []
+
+
+def test_a_rate_that_six_digits_do_not_give_is_told_as_a_share_of_the_base_rate(tmp_path: Path) -> None:
+    servo = under("rate(sine(amplitude = 0.1 rad/s, frequency = 9.5 Hz))")
+    run = changed(
+        RUN, ("dynamics = 1 kHz; servos = 1 kHz; record = 100 Hz", "dynamics = 1050 Hz; servos = 10 Hz; record = 50 Hz")
+    )
+    assert "or give what sees it (1050/11) Hz, 10 instants " in shown(tmp_path, ARM, servo, run)
+    assert codes(tmp_path, ARM, servo, changed(run, ("servos = 10 Hz", "servos = (1050/11) Hz"))) == []
+
+
 def test_a_pulse_between_ticks_is_told_with_the_ticks_that_would_see_it(tmp_path: Path) -> None:
     servo = under("rate(table(times = [0.502, 0.503, 0.506, 0.507] s, values = [0, 1, 1, 0] rad/s))")
     assert (
