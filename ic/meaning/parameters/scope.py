@@ -55,8 +55,7 @@ class Scope:
     joint_kinds     servo definition -> kinds of the joints it moves
     failed_servos   joints whose servo failed: nothing can be said of its channels
     failed_parts    joints and links that failed: nothing can be said of paths that begin with them
-    guides          the run's guides, by name: what commands may follow
-    sensors         names of the run's sensors on links
+    guides, sensors the run's guides, by name: what commands may follow; names of its sensors on links
     removed         path of a parameter -> where `remove` took it away
     settings        path -> a number set by the run, or on the command line
     rate_place      where the rate of the dynamics is written; None where it is not, or wrong
