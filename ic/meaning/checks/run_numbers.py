@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from graphlib import TopologicalSorter
 from types import SimpleNamespace
@@ -33,6 +34,9 @@ class RunNumbers:
         self, structure: Structure, uses: Iterable[Use], settled: Mapping[str, Settled], numbers: Mapping[str, float]
     ) -> None:
         self.structure, self.uses, self.settled, self.numbers = structure, tuple(uses), settled, numbers
+        self.by_unit = defaultdict[str, list[tuple[str, Settled]]](list)
+        for path, each in settled.items():
+            self.by_unit[each.unit].append((path, each))
         self.moved = {link.name for link in structure.links} - {BASE, *structure.ground}
         """The links that move against the base."""
         self.kinds = {joint.name: joint.kind for joint in structure.moving}
@@ -53,8 +57,8 @@ class RunNumbers:
     def largest(self, head: str, unit: str) -> dict[str, float]:
         """The parameters in this unit at this path or below it: the number, or of a list the one farthest from 0."""
         found = {}
-        for path, settled in self.settled.items():
-            if settled.unit == unit and (path == head or path.startswith(f"{head}.")):
+        for path, settled in self.by_unit[unit]:
+            if path == head or path.startswith(f"{head}."):
                 value = self.numbers.get(path, settled.value)
                 if isinstance(value, tuple):
                     found[path] = max(value, key=abs, default=0.0)

@@ -140,6 +140,7 @@ def test_of_a_sweep_the_worst_case_is_told(tmp_path: Path) -> None:
     assert said.startswith("`initial.elbow.q` is 90 rad in case #1, 14.32 times a turn; ")
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize("seed", range(6))
 def test_loads_of_gravity_are_those_of_pinocchio(tmp_path: Path, seed: int) -> None:
     path = tmp_path / "deck.ic"
