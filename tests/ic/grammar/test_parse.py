@@ -360,7 +360,7 @@ error[D026]: `m` is the unit metre, so it cannot name a value
 @pytest.mark.parametrize(
     ("text", "line", "help"),
     [
-        ("require q = 3;", "error[D023]: `=` sets a value", "to compare, write `==`"),
+        ("require q = 3;", "error[D023]: `=` sets a value", "a requirement is a limit: write `<=`"),
         ("exclude when a > 1 and b = 3;", "error[D020]: expected `;` or an operator, found `=`", "write `==`"),
         ("x == 3;", "error[D023]: `==` compares", "to set a value, write `=`"),
         ("x: 3;", "error[D020]: expected `=`, found `:`", "a deck writes `name = value;`"),
