@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,11 +12,15 @@ from ic.meaning.control.servos import differ_beyond_rounding, unit_written
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters.models import value_place
+from ic.meaning.parameters.owner import Settled
 from ic.meaning.parameters.scope import Scope
 from met import models
-from met.diagnostic import Label, leave_out
-from met.plan import EnvironmentUse
-from met.trace import Scalar
+from met.diagnostic import Label, Place, leave_out
+from met.plan import EnvironmentUse, Joint
+from met.trace import Real, Scalar
+
+ENDS = ("q_min", "q_max")
+"""The ends of a joint's range, which an arm gives it."""
 
 
 def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str, Any], duration: float) -> bool:
@@ -55,55 +59,50 @@ def remark_kinds(scope: Scope, environment: Any, item: Item, arm: ResolvedArm) -
             )
 
 
-def remark_beginnings(scope: Scope, uses: tuple[EnvironmentUse, ...]) -> None:
-    """Report a joint that begins outside of the ends between which a model keeps it. To be called after the initial
-    state."""
+def remark_beginnings(scope: Scope, joints: Iterable[Joint], uses: Iterable[EnvironmentUse]) -> None:
+    """Report joints that begin outside of their range, or of the ends between which a model keeps them. To be called
+    after the initial state."""
+    for joint in joints:
+        ends = [scope.parameters.get(f"{joint.name}.{end}", scope.auxiliary.get(f"{joint.name}.{end}")) for end in ENDS]
+        help = "begin within it, or move the end: the range of a joint holds nothing, and is only watched"
+        _observe_beginning(scope, joint.name, ends, f"joint:{joint.name}", "its range", joint.place, help)
     for use in uses:
         model = models.find("environment", use.model)
-        found = {name: scope.parameters.get(f"environment.{use.name}.{name}") for name in model.initial_range}
-        joint = next(
-            (
-                str(settled.value)
-                for each in model.parameters
-                if each.names == "joint" and (settled := scope.parameters.get(f"environment.{use.name}.{each.name}"))
-            ),
-            None,
-        )
-        begins = scope.parameters.get(f"initial.{joint}.q")
-        if begins is None or use.place is None or len(found) != 2 or None in found.values():
-            continue
-        ends = [each for each in found.values() if each is not None]
-        place = begins.origin.place or next((each.origin.place for each in ends if each.origin.place), use.place)
-        also, shown = [Label(use.place, "this one")], unit_written([begins, *ends], begins.unit)
+        of = [each.name for each in model.parameters if each.names == "joint"]
+        named = [settled for each in of if (settled := scope.parameters.get(f"environment.{use.name}.{each}"))]
+        if named and len(model.initial_range) == 2:
+            ends = [scope.parameters.get(f"environment.{use.name}.{each}") for each in model.initial_range]
+            help = "the run begins with what drives it back: begin within, or move the end"
+            needs = f"environment.{use.name}"
+            _observe_beginning(scope, str(named[0].value), ends, needs, f"an end of `{use.name}`", use.place, help)
 
-        def warn(
-            values: np.ndarray,
-            use: EnvironmentUse = use,
-            joint: str | None = joint,
-            place: Any = place,
-            also: list[Label] = also,
-            shown: tuple[str, float] = shown,
-        ) -> None:
-            q, lower, upper = values.T
-            below, above = (
-                (q < lower) & differ_beyond_rounding(q, lower),
-                (q > upper) & differ_beyond_rounding(q, upper),
+
+def _observe_beginning(
+    scope: Scope, joint: str, ends: Sequence[Settled | None], needs: str, of: str, at: Place | None, help: str
+) -> None:
+    """Report a joint that begins beyond one of two ends. of: whose they are, in words;  at: place of the same"""
+    begins = scope.parameters.get(f"initial.{joint}.q")
+    known = [each for each in (begins, *ends) if each is not None]
+    if begins is None or at is None or len(known) < 3:
+        return
+    place = next((each.origin.place for each in known if each.origin.place), at)
+    unit, scale = unit_written(known, begins.unit)
+
+    def warn(values: np.ndarray) -> None:
+        q, lower, upper = values.T
+        below = (q < lower) & differ_beyond_rounding(q, lower)
+        above = (q > upper) & differ_beyond_rounding(q, upper)
+        beyond = np.flatnonzero(below | above)
+        if beyond.size:
+            q, lower, upper = values[beyond[0]] / scale
+            which = f"below {lower:g} {unit}" if q < lower else f"above {upper:g} {unit}"
+            scope.complaints.remark(
+                "D294",
+                f"joint `{joint}` begins at {q:g} {unit}, beyond {of}: {which}",
+                place,
+                also=[Label(at, "this one")],
+                help=help,
             )
-            beyond = np.flatnonzero(below | above)
-            if beyond.size:
-                (q, lower, upper), unit = values[beyond[0]] / shown[1], shown[0]
-                which = f"below {lower:g} {unit}" if q < lower else f"above {upper:g} {unit}"
-                scope.complaints.remark(
-                    "D294",
-                    f"joint `{joint}` begins at {q:g} {unit}, beyond an end of `{use.name}`: {which}",
-                    place,
-                    also=also,
-                    help="the run begins with what drives it back: begin within, or move the end",
-                )
 
-        scope.checks.observe(
-            (begins.value, *(each.value for each in ends)),  # type: ignore[arg-type]
-            warn,
-            place,
-            needs=(f"initial.{joint}.q", f"environment.{use.name}"),
-        )
+    values: tuple[Real, ...] = tuple(each.value for each in known)  # type: ignore[misc]  # they are numbers
+    scope.checks.observe(values, warn, place, needs=(f"initial.{joint}.q", needs))

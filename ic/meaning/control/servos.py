@@ -316,11 +316,20 @@ def commands_of(scope: Scope) -> dict[str, dict[str, Settled]]:
     return found
 
 
+STEPS = ("constant", "step", "pulse")
+"""Commands that jump, so that a jump at the start is no surprise."""
+
+FAR = 0.02
+"""Distance between a joint and the beginning of its command that a servo with a motor makes up unnoticed, rad (m)."""
+
+
 def check_start(scope: Scope, use: Use, asked: Mapping[str, Settled]) -> None:
-    """Warn where a joint whose servo follows regardless of the arm does not begin at its command. asked: the command's
-    parameters by name"""
+    """Warn where a joint does not begin at its command: one whose servo follows regardless of the arm, and any other
+    whose command is a motion and not a step. asked: the command's parameters by name"""
     command = use.command
-    if not use.servo.follows or command is None or command.kind != "position" or scope.complaints.errors:
+    if command is None or command.kind != "position" or scope.complaints.errors:
+        return
+    if not use.servo.follows and command.model in STEPS:
         return
     begins = scope.parameters.get(f"initial.{use.joint}.q")
     profile = models.find_own("command").get(command.model)  # another package's is called only to be recorded
@@ -331,7 +340,8 @@ def check_start(scope: Scope, use: Use, asked: Mapping[str, Settled]) -> None:
         return  # a sweep varies one of them
     unit, scale = unit_written([*asked.values(), begins], begins.unit)
     value, _ = profile.course(SimpleNamespace(**{name: each.value for name, each in asked.items()}), 0.0)
-    if differ_beyond_rounding(value, begins.value):
+    far = use.servo.follows or abs(value - begins.value) > FAR
+    if far and differ_beyond_rounding(value, begins.value):
         places = [each.origin.place for each in asked.values() if each.origin.place is not None]
         also = [] if begins.origin.place is None else [Label(begins.origin.place, "the joint begins here")]
         scope.complaints.remark(

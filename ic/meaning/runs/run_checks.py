@@ -88,7 +88,7 @@ def _all_is_sound(run: RunParts) -> bool:
 def _check_beginnings(run: RunParts) -> None:
     initial = body_of(run.scope, run.block.get("initial"))
     check_balanced(run.scope, initial.get("servos"), run.uses, run.structure.balanced)
-    remark_beginnings(run.scope, run.structure.environment)
+    remark_beginnings(run.scope, run.structure.moving, run.structure.environment)
     commands = commands_of(run.scope)
     for use in run.uses:
         check_rest(run.scope, use)

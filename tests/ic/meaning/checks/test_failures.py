@@ -187,3 +187,13 @@ warning[D294]: joint `hinge` begins at 0.5 rad, beyond an end of `end`: above 0.
         assert codes(tmp_path, ARM, SERVO, changed(run, ("0.5 rad", within))) == []
     sweep = "sweep starts of hold { vary initial.hinge.q = [0, -30] deg; }\n"
     assert codes(tmp_path, ARM, SERVO, changed(run, ("0.5 rad", "0 rad")), sweep, select=["starts"]) == ["D294"]
+
+
+def test_a_joint_that_begins_outside_of_its_range_is_told(tmp_path: Path) -> None:
+    """What was found: it was said only after the run."""
+    arm = changed(ARM, ("axis = z;", "axis = z; q_min = -1 rad; q_max = 1 rad;"))
+    begins = changed(RUN, ("duration", "initial { hinge.q = 2 rad; }\n    duration"))
+    [found] = check(tmp_path, arm, SERVO, begins).diagnostics
+    assert found.code == "D294"
+    assert found.message == "joint `hinge` begins at 2 rad, beyond its range: above 1 rad"
+    assert codes(tmp_path, arm, SERVO, changed(begins, ("2 rad", "1 rad"))) == []

@@ -8,7 +8,7 @@ import pytest
 
 from met.diagnostic import Problem
 from met.plan import file as plan_file
-from tests.ic.small_decks import ARM, RUN, changed, check, codes, messages
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, messages
 
 IDEAL = "servo drive { model = ideal; bandwidth = 2 1/s; command = position(0 rad); }\n"
 PUSHED = changed(RUN, ("duration", "environment { push = wrench { link = bar; force = [1, 0, 0] N; }; }\n    duration"))
@@ -147,6 +147,24 @@ def test_a_course_jumps_where_its_value_at_the_start_is_not_the_joints(
 def test_what_is_the_same_place_to_rounding_is_no_jump(tmp_path: Path, asked: str, begins: str, jumps: bool) -> None:
     run = changed(RUN, ("duration", f"initial {{ hinge.q = {begins}; }}\n    duration"))
     assert codes(tmp_path, ARM, changed(IDEAL, ("0 rad", asked)), run) == ["D169"] * jumps
+
+
+@pytest.mark.parametrize(
+    ("course", "jumps"),
+    [
+        ("trapezoid(start = 0.5 rad, to = 1 rad, max_rate = 1 rad/s, max_acceleration = 1 rad/s^2)", True),
+        ("trapezoid(start = 0.01 rad, to = 1 rad, max_rate = 1 rad/s, max_acceleration = 1 rad/s^2)", False),
+        ("sine(offset = 0.1 rad, amplitude = 0.1 rad, frequency = 0.1 Hz)", True),
+        ("step(start = 0.5 rad, to = 1 rad, at = 0.1 s)", False),
+        ("constant(value = 0.5 rad)", False),
+    ],
+)
+def test_a_motion_that_begins_away_from_a_motor_is_told_and_a_step_is_not(
+    tmp_path: Path, course: str, jumps: bool
+) -> None:
+    servo = changed(SERVO, ("rate(0.1 rad/s)", f"position({course})"), ("kp =", "k_position = 1 1/s; kp ="))
+    found = check(tmp_path, ARM, servo, RUN).diagnostics
+    assert [each.code for each in found if each.code == "D169"] == ["D169"] * jumps
 
 
 def test_of_what_a_sweep_varies_and_of_a_real_servo_nothing_is_said(tmp_path: Path) -> None:
