@@ -34,6 +34,7 @@ class RunNumbers:
         self, structure: Structure, uses: Iterable[Use], settled: Mapping[str, Settled], numbers: Mapping[str, float]
     ) -> None:
         self.structure, self.uses, self.settled, self.numbers = structure, tuple(uses), settled, numbers
+        self.duration = structure.schedule.duration
         self.by_unit = defaultdict[str, list[tuple[str, Settled]]](list)
         for path, each in settled.items():
             self.by_unit[each.unit].append((path, each))
@@ -79,6 +80,21 @@ class RunNumbers:
         """The largest size of a body's shape, m; 0 of one without."""
         sizes = [self.numbers.get(f"{head}.shape.{size}", 0.0) for size in ("length", "radius")]
         return max(*sizes, self.length(f"{head}.shape.size"))
+
+    def beside_shape(self, head: str, point: np.ndarray) -> float | None:
+        """The distance of a point of a body's frame from its shape, m; None of a body without one."""
+        along = self.settled.get(f"{head}.shape.along")
+        radius = self.numbers.get(f"{head}.shape.radius", 0.0)
+        if not self.extent(head) > 0.0:
+            return None
+        half, centre = np.full(3, radius), np.zeros(3)
+        if along is not None:  # else a sphere about the origin
+            axis = XYZ.index(str(along.value))
+            size = self.vector(f"{head}.shape.size")
+            half = 0.5 * size if size.any() else half
+            half[axis] = 0.5 * (size[axis] if size.any() else self.numbers[f"{head}.shape.length"])
+            centre[axis] = half[axis]
+        return float(np.linalg.norm(np.maximum(np.abs(point - centre) - half, 0.0)))
 
     @property
     def reach(self) -> float:
@@ -194,7 +210,7 @@ class RunNumbers:
             if value is None:
                 return None
             setattr(p, each.name, value)
-        t = np.linspace(0.0, self.structure.schedule.duration, INSTANTS)
+        t = np.linspace(0.0, self.duration, INSTANTS)
         with np.errstate(all="ignore"):  # of a swing at 1e308 Hz there are no numbers
             values, slopes = (np.broadcast_to(np.asarray(each, float), t.shape) for each in profile.course(p, t))
         return values, slopes

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 import numpy as np
 
 from ic.meaning.checks.magnitudes import LENGTHS, MASSES, MEANT, SMALLEST_GYRATION
-from ic.meaning.checks.run_numbers import RunNumbers
+from ic.meaning.checks.run_numbers import BEARING_NOTHING, RunNumbers
 from ic.meaning.control.servos import Use
 from ic.meaning.parameters.scope import Scope
 from met import models
@@ -135,6 +135,19 @@ def _offsets(run: RunNumbers) -> Iterator[Scale]:
             yield Scale("place of a joint", path, far, "m", rest, other, 0.0, 60.0, usual, meant="m")
 
 
+def _touches(run: RunNumbers) -> Iterator[Scale]:
+    """Joints and payloads beside the shape of the link that carries them."""
+    usual = "a joint and a payload are usually on their link, or in it"
+    carried = [(f"{joint.name}.at", joint.parent) for joint in run.structure.joints]
+    carried += [(f"payloads.{payload.name}.at", payload.link) for payload in run.structure.payloads]
+    for path, link in carried:
+        head = f"links.{link}"
+        far, verb = run.beside_shape(head, run.vector(path)), f"is beside the shape of `{link}` by"
+        if far is not None and link != BASE and run.reach > 0.0:
+            other = run.reach_words
+            yield Scale("place beside a shape", path, far, "m", run.reach, other, 0.0, 0.25, usual, verb=verb)
+
+
 def _gyrations(run: RunNumbers) -> Iterator[Scale]:
     """Radii of gyration of bodies whose inertia is written; small ones only beside a body of a usual one, and up to 2 m
     none on a short arm, whose links may be test bodies."""
@@ -225,6 +238,32 @@ def _loads(run: RunNumbers) -> Iterator[Scale]:
             yield Scale("load at the start", path, load, unit, most, other, 0.0, 1.0, usual, verb="meets a load of")
 
 
+def _brakes(run: RunNumbers) -> Iterator[Scale]:
+    """Brakes that are on during a whole run in which their joint is to move."""
+    usual = "a motor that cannot turn its brake moves nothing"
+    for load in run.structure.environment:
+        head = f"environment.{load.name}"
+        whole = run.numbers.get(f"{head}.from", 0.0) <= 0.0 and run.numbers.get(f"{head}.until", 0.0) >= run.duration
+        for use in run.uses if load.model == "brake" and whole else ():
+            ratio, limit, course = run.of_motor(use, RATIO.name), run.largest_torque(use), run.course(use)
+            named = run.settled[f"{head}.joint"].value == use.joint
+            if named and ratio is not None and limit is not None and course is not None and np.ptp(course[0]) > 0.0:
+                unit = "N*m" if run.kinds[use.joint] == "revolute" else "N"
+                most = ratio * limit[1]
+                path, other = f"{head}.torque", f"the motor's largest at the joint, {most:.4g} {unit}"
+                yield Scale("torque of a brake", path, run.numbers[path], unit, most, other, 0.0, 1.0, usual)
+
+
+def _falls(run: RunNumbers) -> Iterator[Scale]:
+    """The fall of a free base under gravity with nothing else that acts on it."""
+    base, bearing = run.structure.base, [use for use in run.structure.environment if use.model not in BEARING_NOTHING]
+    for use in run.structure.environment:
+        if use.model == "gravity" and base is not None and base.kind == "free" and not bearing and run.reach > 0.0:
+            path, usual = f"environment.{use.name}.g", "what floats falls with its orbit, which is no gravity to it"
+            fall, verb = 0.5 * run.length(path) * run.duration**2, "lets the base fall freely by"
+            yield Scale("free fall", path, fall, "m", run.reach, run.reach_words, 0.0, 10.0, usual, verb=verb)
+
+
 def _plays(run: RunNumbers) -> Iterator[Scale]:
     usual = "within its play a gear drives nothing"
     for use in run.uses:
@@ -301,12 +340,15 @@ SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
     _turns,
     _centres,
     _offsets,
+    _touches,
     _gyrations,
     _levers,
     _gears,
     _speeds,
     _frictions,
     _loads,
+    _brakes,
+    _falls,
     _plays,
     _sensors,
     _bands,

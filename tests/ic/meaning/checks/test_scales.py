@@ -134,6 +134,46 @@ def test_what_only_gears_and_sensors_do_is_told(tmp_path: Path) -> None:
     )
 
 
+def test_a_brake_that_is_on_throughout_a_motion_is_told(tmp_path: Path) -> None:
+    brake = "hold = brake { joint = elbow; torque = 150 N*m; }"
+    [(said, _)] = remarks(tmp_path, (PUSH, brake))
+    assert said.startswith(
+        "`environment.hold.torque` is 150 N*m, 1.5 times the motor's largest at the joint, 100 N*m; "
+    )
+    assert remarks(tmp_path, (PUSH, brake.replace("150", "90"))) == []
+    assert remarks(tmp_path, (PUSH, brake.replace("150 N*m;", "150 N*m; until = 1 s;"))) == []
+
+
+def test_a_joint_and_a_payload_far_from_the_shape_that_carries_them_are_told(tmp_path: Path) -> None:
+    """What was found: a rod along z under a joint that sits along x."""
+    body = "com = [0.3, 0, 0] m; inertia = [0.01, 0.12, 0.12] kg*m^2;"
+    rod = (body, "shape = rod(length = 0.6 m, along = x);")
+    assert remarks(tmp_path, rod) == []
+    for shape in (
+        "rod(length = 0.6 m, along = z)",
+        "box(size = [0.02, 0.6, 0.02] m, along = y)",
+        "sphere(radius = 0.02 m)",
+    ):
+        [(said, _)] = remarks(tmp_path, (body, f"shape = {shape};"))
+        assert said.startswith("`elbow.at` is beside the shape of `upper` by 0.")
+    moved = ("tool { on = fore; at = [0.4, 0, 0] m", "tool { on = upper; at = [0, 0.9, 0] m")
+    [(said, _)] = remarks(tmp_path, rod, moved)
+    assert said.startswith(
+        "`payloads.tool.at` is beside the shape of `upper` by 0.9 m, 1.5 times the arm's reach, 0.6 m; "
+    )
+
+
+def test_a_free_base_that_falls_under_gravity_is_told(tmp_path: Path) -> None:
+    flight = ("    arm = two;", "    arm = two; base = free;")
+    body = ("arm two {", "arm two {\n    link base { mass = 50 kg; shape = box(size = [0.5, 0.5, 0.5] m); }")
+    said = [each for each, _ in remarks(tmp_path, (PUSH, ""), flight, body)]
+    assert said == [
+        "`environment.gravity.g` lets the base fall freely by 44.15 m, 50.97 times the arm's reach, 0.866 m; what floats "
+        "falls with its orbit, which is no gravity to it"
+    ]
+    assert remarks(tmp_path, flight, body) == []  # where something pushes it, it may fly
+
+
 def test_of_a_sweep_the_worst_case_is_told(tmp_path: Path) -> None:
     sweep = "sweep s of lift { vary initial.elbow.q = [10, 90, 20] rad; }\n"
     [(said, _)] = remarks(tmp_path, text=TWO_LINKS + sweep)
