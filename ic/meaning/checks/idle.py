@@ -22,6 +22,9 @@ from met.trace import Real, Scalar
 ENDS = ("q_min", "q_max")
 """The ends of a joint's range, which an arm gives it."""
 
+UNLOADING = ("joint_damping", "dead_sensor", "free_swinging", "runaway")
+"""Models of the environment that put no load on an arm at rest."""
+
 
 def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str, Any], duration: float) -> bool:
     """Return True, with a warning, if a model has no effect in the whole run by its written constants.

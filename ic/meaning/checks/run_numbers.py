@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from ic.meaning.checks.idle import UNLOADING
 from ic.meaning.control.servos import Use
 from ic.meaning.parameters.owner import XYZ, Settled
 from met import models
@@ -20,7 +21,7 @@ from met.vectors import rotation_about, rotation_rpy
 INSTANTS = 1000
 """Number of instants of a run at which a command is looked at."""
 
-BEARING_NOTHING = ("gravity", "gravity_gradient", "joint_damping", "dead_sensor", "free_swinging", "runaway")
+BEARING_NOTHING = ("gravity", "gravity_gradient", *UNLOADING)
 """Models of the environment that bear no load of an arm at rest."""
 
 

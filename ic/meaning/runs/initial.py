@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ic.language.runs import INITIAL
+from ic.meaning.checks.idle import UNLOADING
 from ic.meaning.control.servos import Use
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.quantity import Value, ValueList
@@ -15,9 +16,9 @@ from ic.meaning.runs.base import INITIAL_OF_BASE
 from ic.meaning.runs.from_command import is_from_command, report_others, value_of_command
 from ic.text.complaints import known_words
 from met import models, units
-from met.diagnostic import did_you_mean
+from met.diagnostic import did_you_mean, leave_out
 from met.parameter import Parameter
-from met.plan import BASE
+from met.plan import BASE, Structure
 from met.units import PURE
 
 
@@ -87,15 +88,25 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
             scope.number(owner, wanted, written, value=value)
 
 
-def check_balanced(scope: Scope, item: Item | None, uses: Sequence[Use], balanced: bool) -> None:
-    """Warn where servos should begin balanced and none of them can. item: the entry that asks for it"""
-    if balanced and item is not None and not any(use.servo.balance for use in uses):
+def check_balanced(scope: Scope, item: Item | None, uses: Sequence[Use], structure: Structure) -> None:
+    """Warn where servos should begin balanced and none of them can, or there is no load. item: the entry that asks for
+    it"""
+    if not structure.balanced or item is None:
+        return
+    if not any(use.servo.balance for use in uses):
         able = [name for name, model in models.available("servo").items() if model.balance]
         scope.complaints.remark(
             "D248",
             "no servo of this run can begin balanced: this changes nothing",
             item.place,
             help=known_words("models that can", able),
+        )
+    elif structure.base is None and all(use.model in UNLOADING for use in structure.environment):
+        scope.complaints.remark(
+            "D248",
+            "the servos begin balanced, and there is no load: no gravity and nothing else acts on the arm",
+            item.place,
+            help=["on the ground write `environment { gravity = [0, 0, -9.81] m/s^2; }`", leave_out("or leave it out")],
         )
 
 

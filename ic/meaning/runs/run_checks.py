@@ -87,7 +87,7 @@ def _all_is_sound(run: RunParts) -> bool:
 
 def _check_beginnings(run: RunParts) -> None:
     initial = body_of(run.scope, run.block.get("initial"))
-    check_balanced(run.scope, initial.get("servos"), run.uses, run.structure.balanced)
+    check_balanced(run.scope, initial.get("servos"), run.uses, run.structure)
     remark_beginnings(run.scope, run.structure.moving, run.structure.environment)
     commands = commands_of(run.scope)
     for use in run.uses:
