@@ -18,7 +18,7 @@ import numpy as np
 
 from ic.meaning.checks.magnitudes import LENGTHS, MASSES, MEANT, SMALLEST_GYRATION
 from ic.meaning.checks.run_numbers import BEARING_NOTHING, RunNumbers
-from ic.meaning.control.servos import Use
+from ic.meaning.control.servos import Use, unit_written
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.frozen import frozen
@@ -111,7 +111,8 @@ def _turns(run: RunNumbers) -> Iterator[Scale]:
             if run.is_placed(joint.name):
                 angles |= run.largest(f"{joint.name}.servo.command", "rad")
             for path, angle in angles.items():
-                high = max(3.0, own / TURN)
+                in_rad = unit_written([run.settled[path]], "rad")[1] == 1.0  # else it was not meant in degrees
+                high = max(3.0 if in_rad else 1e4, own / TURN)
                 yield Scale("angle of a joint", path, abs(angle), "rad", TURN, "a turn", 0.0, high, usual, meant="rad")
 
 
@@ -120,8 +121,9 @@ def _centres(run: RunNumbers) -> Iterator[Scale]:
     for link in run.structure.links:
         path = f"links.{link.name}.com"
         if link.name in run.moved and not link.lumped and run.reach > 0.0 and run.is_written(path):
-            far, other = run.length(path), run.reach_words
-            yield Scale("centre of mass", path, far, "m", run.reach, other, 0.0, 2.0, usual, meant="m")
+            far, large = run.length(path), 4.0 * run.gyration(f"links.{link.name}")
+            other = run.reach_words if run.reach > large else f"4 times its radius of gyration, {large:.4g} m"
+            yield Scale("centre of mass", path, far, "m", max(run.reach, large), other, 0.0, 2.0, usual, meant="m")
 
 
 def _offsets(run: RunNumbers) -> Iterator[Scale]:
@@ -318,7 +320,7 @@ def _bands(run: RunNumbers) -> Iterator[Scale]:
 def _payloads(run: RunNumbers) -> Iterator[Scale]:
     arm = sum(run.numbers.get(f"links.{link}.mass", 0.0) for link in run.moved)
     weights = [run.length(f"environment.{use.name}.g") for use in run.structure.environment if use.model == "gravity"]
-    high, usual = 20.0, "industrial robots lift a tenth to a third of their mass"
+    high, usual = 200.0, "industrial robots lift a tenth to a third of their mass"
     if not any(weights):
         high, usual = 1e4, "the arm of the Space Station is made for 116 t, some 70 times its mass"
     for payload in run.structure.payloads:

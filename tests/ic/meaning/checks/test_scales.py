@@ -66,6 +66,7 @@ PUSH = "push = wrench { link = fore; point = [0.4, 0, 0] m; force = [0, 0, 1] N;
          "`shoulder.servo.command.to` is 60 rad, 9.549 times a turn; 1 more is so; joints of published arms turn by at "
          "most 1.6 turns", ("in deg it would be 0.167 times a turn: is the unit another?", "at most 18.8 rad is usual")),
         (("com = [0.2, 0, 0] m", "com = [20, 0, 0] cm"), "", ()),
+        (("to = 60 deg, max_rate", "to = 30 cycle, max_rate"), "", ()),  # a drum
         (("com = [0.2, 0, 0] m", "com = [20, 0, 0] m"),
          "`links.fore.com` is 20 m, 33.33 times the arm's reach, 0.6 m; of 470 links of published robots none is above 0.73", ("in cm it would be 0.333 times, in mm it would be 0.0333 times the arm's reach, 0.6 m: is the unit another?",
           "at most 1.2 m is usual")),
@@ -96,9 +97,9 @@ PUSH = "push = wrench { link = fore; point = [0.4, 0, 0] m; force = [0, 0, 1] N;
         (("step = 0.0001 rad", "step = 0.1 rad"),
          "`elbow.servo.sensor.q.step` is 0.1 rad, 4.775 times the band of metric `late`, 0.02094 rad; a servo knows its "
          "joint no better than its sensor", ("at most 0.0419 rad is usual",)),
-        (("mass = 1 kg", "mass = 150 kg"),
-         "`payloads.tool.mass` is 150 kg, 25 times the mass of the moved links, 6 kg; industrial robots lift a tenth to a "
-         "third of their mass", ("at most 120 kg is usual",)),
+        (("mass = 1 kg", "mass = 1500 kg"),
+         "`payloads.tool.mass` is 1500 kg, 250 times the mass of the moved links, 6 kg; industrial robots lift a tenth to a "
+         "third of their mass", ("at most 1.2e+03 kg is usual",)),
         (("-9.81", "-981"),
          "`environment.gravity.g` is 981 m/s^2, 100 times that on the Earth; the Moon has 0.17 of it, Jupiter 2.5, the Sun "
          "28", ("in cm/s^2 it would be 1 times that on the Earth: is the unit another?", "at most 294 m/s^2 is usual")),
