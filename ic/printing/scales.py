@@ -18,7 +18,7 @@ def print_scales(compiled: Compiled) -> list[str]:
         by_kind: dict[str, list[Scale]] = {}
         for scale in scope.scales:
             by_kind.setdefault(scale.what, []).append(scale)
-        rows = [("", "", "", "", "times", "of", "usual"), *map(_row, by_kind.values())]
+        rows = [("", "", "", "number", "times", "of", "usual"), *map(_row, by_kind.values())]
         lines += [*([""] if lines else []), experiment.name, *columns(rows, right=(4,))]
     return lines
 
@@ -26,12 +26,13 @@ def print_scales(compiled: Compiled) -> list[str]:
 def _row(scales: list[Scale]) -> tuple[str, ...]:
     scale = max(scales, key=lambda each: each.nearness)
     usual = f"up to {scale.high:g}" if scale.low == 0.0 else f"{scale.low:g} to {scale.high:g}"
+    verb = "" if scale.verb == "is" else f"{scale.verb} "
     return (
         scale.what,
-        f"most of {len(scales)}:" if len(scales) > 1 else "",
+        f"nearest of {len(scales)}:" if len(scales) > 1 else "",
         scale.path,
-        f"{scale.size:.4g} {scale.unit}".rstrip(),
-        f"{scale.multiple:.3g}",
+        f"{verb}{scale.size:.4g} {scale.unit}".rstrip(),
+        f"{scale.multiple:.3g}" if scale.other else "",
         scale.other,
         usual + ("  OUTSIDE" if scale.nearness > 1.0 else ""),
     )

@@ -31,8 +31,8 @@ class Named:
 
 
 def names_in(tokens: Sequence[Token], asked: Iterable[str]) -> dict[str, Named]:
-    """What is defined by name in a deck, first of all. Of the names that a loop makes, such as `let w{i}`, those that
-    are asked for."""
+    """The names that a deck defines, each where it is defined first. Of the names that a loop makes, such as
+    `let w{i}`, those that are asked for."""
     named: dict[str, Named] = {}
     looped: list[tuple[re.Pattern[str], Named]] = []
     for n in range(1, len(tokens)):

@@ -83,24 +83,24 @@ class RunNumbers:
         return max(*sizes, self.length(f"{head}.shape.size"))
 
     def beside_shape(self, head: str, point: np.ndarray) -> float | None:
-        """The distance of a point of a body's frame from its shape, m; None of a body without one."""
+        """The distance of a point of a body's frame from its rod, box or cylinder, m; None of a body without one."""
         along = self.settled.get(f"{head}.shape.along")
-        radius = self.numbers.get(f"{head}.shape.radius", 0.0)
-        if not self.extent(head) > 0.0:
+        if along is None:
             return None
-        half, centre = np.full(3, radius), np.zeros(3)
-        if along is not None:  # else a sphere about the origin
-            axis = XYZ.index(str(along.value))
-            size = self.vector(f"{head}.shape.size")
-            half = 0.5 * size if size.any() else half
-            half[axis] = 0.5 * (size[axis] if size.any() else self.numbers[f"{head}.shape.length"])
-            centre[axis] = half[axis]
+        axis, size = XYZ.index(str(along.value)), self.vector(f"{head}.shape.size")
+        half = 0.5 * size if size.any() else np.full(3, self.numbers.get(f"{head}.shape.radius", 0.0))
+        half[axis] = 0.5 * (size[axis] or self.numbers.get(f"{head}.shape.length", 0.0))
+        centre = np.zeros(3)
+        centre[axis] = half[axis]
         return float(np.linalg.norm(np.maximum(np.abs(point - centre) - half, 0.0)))
 
     @property
     def reach(self) -> float:
-        """The longest way from the base over joints to the end of a shape, m; else to the farthest centre of mass."""
-        return self.beyond.get(BASE, 0.0) or max(self.length(f"links.{link.name}.com") for link in self.structure.links)
+        """The longest way from a joint on the base over joints to the end of a shape, m; where it is 0 the distance of
+        the farthest centre of mass."""
+        chains = [self.beyond.get(joint.child, 0.0) for joint in self.structure.joints if joint.parent == BASE]
+        coms = [self.length(f"links.{link.name}.com") for link in self.structure.links]
+        return max(chains, default=0.0) or max(coms, default=0.0)
 
     @property
     def reach_words(self) -> str:
@@ -178,9 +178,10 @@ class RunNumbers:
         return {joint.name: found[joint.name] for joint in self.structure.moving}
 
     def is_helped(self, joint: str) -> bool:
-        """True where a model of the environment may bear a joint's load: one that is not of BEARING_NOTHING, nor of
-        another joint alone."""
-        others = [use.name for use in self.structure.environment if use.model not in BEARING_NOTHING]
+        """True where a model of the environment may bear a joint's load at the start: one that is not of
+        BEARING_NOTHING, nor of another joint alone, and does not begin later."""
+        models = [use.name for use in self.structure.environment if use.model not in BEARING_NOTHING]
+        others = [name for name in models if not self.numbers.get(f"environment.{name}.from", 0.0) > 0.0]
         joints = [self.settled.get(f"environment.{name}.joint") for name in others]
         return any(each is None or each.value == joint for each in joints)
 

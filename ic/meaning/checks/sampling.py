@@ -56,6 +56,35 @@ class SampledContent:
     recorded: float = 0.0
 
 
+@frozen
+class Swing:
+    """The fastest swing of something that is sampled, Hz.  label: whose it is, in words"""
+
+    label: str
+    frequency: float
+    place: Place
+
+    def remark(self, scope: Scope, base: float, interval: float, by: str, seen: str, cure: str, ticks: int = 0) -> bool:
+        """Return True, with a warning, if instants at this interval, s, take it for a slower one.
+
+        base  rate, Hz;  by: what the instants are, in words, `seen`: what they make of it, `cure`: before a rate
+        ticks that the rate is to divide (`_fitting`)
+        """
+        if 2.0 * self.frequency * interval < 1.0 - ROUNDING:
+            return False
+        hz = 1.0 / interval
+        enough = _fitting(ENOUGH * self.frequency, base, ticks)
+        rate = f"; or {cure} {_written(enough, base)}, {ENOUGH} instants a swing or more" if enough < math.inf else ""
+        scope.complaints.remark(
+            "D335",
+            f"{self.label} swings at {self.frequency:.6g} Hz, and {by} at {hz:.6g} Hz: "
+            f"{seen} swings at {abs(math.remainder(self.frequency, hz)):.6g} Hz",
+            self.place,
+            help=f"let it swing slower than {0.5 * hz:.6g} Hz{rate}",
+        )
+        return True
+
+
 def check_sampling(scope: Scope, structure: Structure) -> None:
     """Warn about changes that begin after the run's end, and swings and pulses between the sampling instants."""
     schedule = structure.schedule
@@ -152,21 +181,10 @@ def _remark(scope: Scope, sampled: SampledContent, found: list[Content], schedul
         return _remark_late(scope, sampled, first.begins, schedule, place, " in this run")
     hz = 1.0 / sampled.interval
     fastest = min(max(each.frequency for each in found), sys.float_info.max)
-    for interval, by in ((sampled.interval, sampled.by), (sampled.recorded, "it is recorded")):
-        if interval > 0.0 and 2.0 * fastest * interval >= 1.0 - ROUNDING:
-            seen = abs(math.remainder(fastest, 1.0 / interval))
-            enough = _fitting(ENOUGH * fastest, base, schedule.ticks if by == "it is recorded" else 0)
-            rate = [f"or give what sees it {_written(enough, base)}, {ENOUGH} instants a swing or more"] * (
-                enough < math.inf
-            )
-            scope.complaints.remark(
-                "D335",
-                f"{sampled.label} swings at {fastest:.6g} Hz, and {by} at {1.0 / interval:.6g} Hz: "
-                f"what is seen of it swings at {seen:.6g} Hz",
-                place,
-                help="; ".join([f"let it swing slower than {0.5 / interval:.6g} Hz", *rate]),
-            )
-            break
+    swing = Swing(sampled.label, fastest, place)
+    if not swing.remark(scope, base, sampled.interval, sampled.by, "what is seen of it", "give what sees it"):
+        rows, shown = "the histories have rows", "what they show of it, and of what follows it,"
+        swing.remark(scope, base, sampled.recorded, rows, shown, "record at", schedule.ticks)
     lost = [pulse for each in found for pulse in _lost(each.pulses, sampled.interval, duration)]
     if lost:
         begins, ends = min(lost, key=lambda pulse: pulse[1] - pulse[0])

@@ -71,7 +71,7 @@ class Scale:
         return max(multiple / self.high, self.low / multiple) if multiple != 0.0 and math.isfinite(multiple) else 0.0
 
     def sentence(self, case: str, others: int) -> str:
-        """What a warning says. case: words for the case; others: number of further paths that are so"""
+        """The warning in words. case: words for the case; others: number of further paths that are so"""
         times = f", {self.multiple:.4g} times {self.other}" if self.other else ""
         more = f"; {others} more {'is' if others == 1 else 'are'} so" if others else ""
         return f"`{self.path}` {self.verb} {self.size:.4g} {self.unit}".rstrip() + f"{case}{times}{more}; {self.usual}"
@@ -117,7 +117,7 @@ def _turns(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _centres(run: RunNumbers) -> Iterator[Scale]:
-    usual = "of 470 links of published robots none is above 0.73"
+    usual = "of 470 links of published robots none is above 0.42"
     for link in run.structure.links:
         path = f"links.{link.name}.com"
         if link.name in run.moved and not link.lumped and run.reach > 0.0 and run.is_written(path):
@@ -138,22 +138,19 @@ def _offsets(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _touches(run: RunNumbers) -> Iterator[Scale]:
-    """Joints and payloads beside the shape of the link that carries them."""
-    usual = "a joint and a payload are usually on their link, or in it"
-    carried = [(f"{joint.name}.at", joint.parent) for joint in run.structure.joints]
-    carried += [(f"payloads.{payload.name}.at", payload.link) for payload in run.structure.payloads]
-    for path, link in carried:
-        head = f"links.{link}"
-        far, verb = run.beside_shape(head, run.vector(path)), f"is beside the shape of `{link}` by"
-        if far is not None and link != BASE and run.reach > 0.0:
-            other = run.reach_words
-            yield Scale("place beside a shape", path, far, "m", run.reach, other, 0.0, 0.25, usual, verb=verb)
+    """Joints beside the rod, box or cylinder of the link that carries them; payloads may hang, and a ball is a mass."""
+    usual = "a joint is usually on its link, or in it"
+    for joint in run.structure.joints:
+        path, far = f"{joint.name}.at", run.beside_shape(f"links.{joint.parent}", run.vector(f"{joint.name}.at"))
+        if far is not None and joint.parent != BASE and run.reach > 0.0:
+            verb = f"is beside the shape of `{joint.parent}` by"
+            yield Scale("place beside a shape", path, far, "m", run.reach, run.reach_words, 0.0, 0.25, usual, verb=verb)
 
 
 def _gyrations(run: RunNumbers) -> Iterator[Scale]:
     """Radii of gyration of bodies whose inertia is written; small ones only beside a body of a usual one, and up to 2 m
     none on a short arm, whose links may be test bodies."""
-    usual = "of 624 links of published robots all have 0.00018 to 1.3 times their robot's reach"
+    usual = "of 620 links of published robots all have 0.00018 to 1.3 times their robot's reach"
     heads = [f"links.{link.name}" for link in run.structure.links if link.name in run.moved and not link.lumped]
     heads += [
         f"payloads.{payload.name}" for payload in run.structure.payloads if run.extent(f"payloads.{payload.name}")
@@ -296,7 +293,7 @@ def _sensors(run: RunNumbers) -> Iterator[Scale]:
                 if run.numbers.get(path, 0.0) > 0.0 and motion > 0.0:
                     unit = run.settled[path].unit
                     size, other = run.numbers[path], f"what is commanded, {motion:.4g} {unit}"
-                    yield Scale("what a sensor sees", path, size, unit, motion, other, 0.0, 1.0, usual)
+                    yield Scale("noise or step of a sensor", path, size, unit, motion, other, 0.0, 1.0, usual)
 
 
 def _bands(run: RunNumbers) -> Iterator[Scale]:
@@ -314,7 +311,7 @@ def _bands(run: RunNumbers) -> Iterator[Scale]:
             if run.numbers.get(path, 0.0) > 0.0 and band > 0.0:
                 step, unit = run.numbers[path], run.settled[path].unit
                 other = f"the band of metric `{metric.name}`, {band:.4g} {unit}"
-                yield Scale("step of a sensor", path, step, unit, band, other, 0.0, 2.0, usual)
+                yield Scale("step beside a band", path, step, unit, band, other, 0.0, 2.0, usual)
 
 
 def _payloads(run: RunNumbers) -> Iterator[Scale]:

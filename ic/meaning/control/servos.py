@@ -342,7 +342,10 @@ def check_start(scope: Scope, use: Use, asked: Mapping[str, Settled]) -> None:
     value, _ = profile.course(SimpleNamespace(**{name: each.value for name, each in asked.items()}), 0.0)
     far = use.servo.follows or abs(value - begins.value) > FAR
     if far and differ_beyond_rounding(value, begins.value):
-        places = [each.origin.place for each in asked.values() if each.origin.place is not None]
+        by_use = sorted(
+            asked.values(), key=lambda each: each.unit == "s"
+        )  # of a table its values before their instants
+        places = [each.origin.place for each in by_use if each.origin.place is not None]
         also = [] if begins.origin.place is None else [Label(begins.origin.place, "the joint begins here")]
         scope.complaints.remark(
             "D169",

@@ -55,11 +55,13 @@ def test_a_swing_that_the_histories_would_not_show_is_told_with_a_rate_that_fits
     servo = under("rate(sine(amplitude = 0.1 rad/s, frequency = 9.5 Hz))")
     slow = ("record = 100 Hz", "record = 10 Hz")
     said = shown(tmp_path, ARM, servo, changed(RUN, slow))
-    assert "warning[D335]: the command of servo `drive` swings at 9.5 Hz, and it is recorded at 10 Hz: " in said
-    assert "what is seen of it swings at 0.5 Hz" in said
-    assert "let it swing slower than 5 Hz; or give what sees it 100 Hz, 10 instants a swing or more" in said
+    assert (
+        "warning[D335]: the command of servo `drive` swings at 9.5 Hz, and the histories have rows at 10 Hz: " in said
+    )
+    assert "what they show of it, and of what follows it, swings at 0.5 Hz" in said
+    assert "let it swing slower than 5 Hz; or record at 100 Hz, 10 instants a swing or more" in said
     odd = changed(RUN, slow, ("dynamics = 1 kHz; servos = 1 kHz", "dynamics = 1050 Hz; servos = 1050 Hz"))
-    assert "or give what sees it 105 Hz, 10 instants " in shown(tmp_path, ARM, servo, odd)  # rows end with the run
+    assert "or record at 105 Hz, 10 instants " in shown(tmp_path, ARM, servo, odd)  # rows end with the run
     assert codes(tmp_path, ARM, servo, changed(odd, ("record = 10 Hz", "record = 105 Hz"))) == []
     assert codes(tmp_path, ARM, servo, changed(RUN, slow, ("record = [q]", "record = []"))) == []
 

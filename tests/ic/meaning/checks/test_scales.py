@@ -68,16 +68,16 @@ PUSH = "push = wrench { link = fore; point = [0.4, 0, 0] m; force = [0, 0, 1] N;
         (("com = [0.2, 0, 0] m", "com = [20, 0, 0] cm"), "", ()),
         (("to = 60 deg, max_rate", "to = 30 cycle, max_rate"), "", ()),  # a drum
         (("com = [0.2, 0, 0] m", "com = [20, 0, 0] m"),
-         "`links.fore.com` is 20 m, 33.33 times the arm's reach, 0.6 m; of 470 links of published robots none is above 0.73", ("in cm it would be 0.333 times, in mm it would be 0.0333 times the arm's reach, 0.6 m: is the unit another?",
+         "`links.fore.com` is 20 m, 33.33 times the arm's reach, 0.6 m; of 470 links of published robots none is above 0.42", ("in cm it would be 0.333 times, in mm it would be 0.0333 times the arm's reach, 0.6 m: is the unit another?",
           "at most 1.2 m is usual")),
         (("at = [0.6, 0, 0] m", "at = [60, 0, 0] m"),
          "`elbow.at` is 60 m, 200 times the rest of its chain, 0.3 m; of 718 joints of published robots none is above 21.4", ("in cm it would be 2 times the rest of its chain, 0.3 m: is the unit another?",
           "at most 18 m is usual")),
         (("[0.004, 0.03, 0.03] kg*m^2", "[40, 300, 300] kg*m^2"),
-         "`links.fore.inertia` has a radius of gyration of 12.25 m, 20.41 times the arm's reach, 0.6 m; of 624 links of published robots all have 0.00018 to 1.3 times their robot's reach",
+         "`links.fore.inertia` has a radius of gyration of 12.25 m, 20.41 times the arm's reach, 0.6 m; of 620 links of published robots all have 0.00018 to 1.3 times their robot's reach",
          ("in kg*cm^2 it would be 0.204 times the arm's reach, 0.6 m: is the unit another?", "at most 2.4 m is usual")),
         (("[0.004, 0.03, 0.03] kg*m^2", "[4e-10, 3e-9, 3e-9] kg*m^2"),
-         "`links.fore.inertia` has a radius of gyration of 3.873e-05 m, 6.455e-05 times the arm's reach, 0.6 m; of 624 links of published robots all have 0.00018 to 1.3 times their robot's reach",
+         "`links.fore.inertia` has a radius of gyration of 3.873e-05 m, 6.455e-05 times the arm's reach, 0.6 m; of 620 links of published robots all have 0.00018 to 1.3 times their robot's reach",
          ("at least 6e-05 m is usual",)),
         (("point = [0.4, 0, 0] m", "point = [400, 0, 0] m"),
          "`environment.push.point` is 400 m, 666.7 times the arm's reach, 0.6 m; what acts on an arm acts on it, or on "
@@ -145,23 +145,17 @@ def test_a_brake_that_is_on_throughout_a_motion_is_told(tmp_path: Path) -> None:
     assert remarks(tmp_path, (PUSH, brake.replace("150 N*m;", "150 N*m; until = 1 s;"))) == []
 
 
-def test_a_joint_and_a_payload_far_from_the_shape_that_carries_them_are_told(tmp_path: Path) -> None:
+def test_a_joint_far_from_the_shape_that_carries_it_is_told(tmp_path: Path) -> None:
     """What was found: a rod along z under a joint that sits along x."""
     body = "com = [0.3, 0, 0] m; inertia = [0.01, 0.12, 0.12] kg*m^2;"
     rod = (body, "shape = rod(length = 0.6 m, along = x);")
     assert remarks(tmp_path, rod) == []
-    for shape in (
-        "rod(length = 0.6 m, along = z)",
-        "box(size = [0.02, 0.6, 0.02] m, along = y)",
-        "sphere(radius = 0.02 m)",
-    ):
+    for shape in ("rod(length = 0.6 m, along = z)", "box(size = [0.02, 0.6, 0.02] m, along = y)"):
         [(said, _)] = remarks(tmp_path, (body, f"shape = {shape};"))
         assert said.startswith("`elbow.at` is beside the shape of `upper` by 0.")
-    moved = ("tool { on = fore; at = [0.4, 0, 0] m", "tool { on = upper; at = [0, 0.9, 0] m")
-    [(said, _)] = remarks(tmp_path, rod, moved)
-    assert said.startswith(
-        "`payloads.tool.at` is beside the shape of `upper` by 0.9 m, 1.5 times the arm's reach, 0.6 m; "
-    )
+    hangs = ("tool { on = fore; at = [0.4, 0, 0] m", "tool { on = fore; at = [0.4, 0, -2] m")
+    assert remarks(tmp_path, rod, hangs) == []
+    assert remarks(tmp_path, (body, "shape = sphere(radius = 0.02 m);")) == []
 
 
 def test_a_free_base_that_falls_under_gravity_is_told(tmp_path: Path) -> None:
@@ -169,7 +163,7 @@ def test_a_free_base_that_falls_under_gravity_is_told(tmp_path: Path) -> None:
     body = ("arm two {", "arm two {\n    link base { mass = 50 kg; shape = box(size = [0.5, 0.5, 0.5] m); }")
     said = [each for each, _ in remarks(tmp_path, (PUSH, ""), flight, body)]
     assert said == [
-        "`environment.gravity.g` lets the base fall freely by 44.15 m, 50.97 times the arm's reach, 0.866 m; what floats "
+        "`environment.gravity.g` lets the base fall freely by 44.15 m, 73.58 times the arm's reach, 0.6 m; what floats "
         "falls with its orbit, which is no gravity to it"
     ]
     assert remarks(tmp_path, flight, body) == []  # where something pushes it, it may fly

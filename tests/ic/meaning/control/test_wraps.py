@@ -12,7 +12,7 @@ import pytest
 from ic.meaning.control.wraps import wrapped_rows
 from tests.ic.meaning.control.trajectories import shown
 
-WRAPPED = (1.0, 2.0, 3.0, 3.1, -3.1, -3.0, -2.0)
+WRAPPED = (0.0, 1.0, 2.0, 3.1, -3.1, -3.0, -2.0)
 
 
 def followed(angles: Sequence[float]) -> str:
