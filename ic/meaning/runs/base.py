@@ -83,6 +83,8 @@ def check_base(
             also=[Label(item.place, f"{what}")],
             help=leave_out("leave `velocity_products = off` out"),
         )
+    if item is None:
+        _remark_held(scope, structure)
     if base is None or base.kind != "free" or item is None:
         return
     loads, passing = carried_loads(scope, structure.payloads)
@@ -105,6 +107,21 @@ def check_base(
             "or write the mass of a link that is fixed to the base",
             *(word for name in structure.ground for word in passing.get(name, ())),
         ),
+    )
+
+
+def _remark_held(scope: Scope, structure: Structure) -> None:
+    """Warn about a base that this file makes a body where nothing weighs, and that is held since no run says `base`."""
+    own = next((link for link in structure.links if link.name == BASE), None)
+    runs = [scope.definitions.block(each) for each in scope.definitions.of_kind("run").values()]
+    weighs = any(load.model == "gravity" for load in structure.environment)
+    if own is None or own.place is None or own.place.included or weighs or any(run and run.get(BASE) for run in runs):
+        return
+    scope.complaints.remark(
+        "D257",
+        f"link `{BASE}` has no effect: the base is held, and nothing weighs",
+        own.place,
+        help=f"write `base = free;` in the run, for an arm that floats; `base = fixed;` if link `{BASE}` is the ground",
     )
 
 
