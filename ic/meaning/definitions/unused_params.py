@@ -1,5 +1,5 @@
-"""Warnings about a `param` that nothing uses, and that was meant for one of another file: `param raech = 0.9 m;` above
-an include."""
+"""Warnings about what nothing uses: a `param` that was meant for one of another file, `param raech = 0.9 m;` above an
+include; the first of a list, `for i in 1 .. 2` over `lengths[i]`."""
 
 from __future__ import annotations
 
@@ -38,14 +38,16 @@ def _is_included(let: Let, by: str) -> bool:
 
 def _named(entries: Iterable[Entry]) -> set[str]:
     """The first words of all paths that a deck's entries name or set."""
-    found: set[str] = set()
+    return {part.path[0].text for part in parts(entries) if isinstance(part, Name | Setting) and part.path}
+
+
+def parts(entries: Iterable[Entry]) -> Iterator[Any]:
+    """All parts of these entries, of every depth."""
     waiting: list[Any] = list(entries)
     while waiting:
         part = waiting.pop()
-        if isinstance(part, Name | Setting) and part.path:
-            found.add(part.path[0].text)
+        yield part
         if isinstance(part, list | tuple):
             waiting += part
         elif is_dataclass(part):
             waiting += (getattr(part, field.name) for field in fields(part))
-    return found

@@ -44,3 +44,22 @@ def test_a_param_of_another_dimension_is_one_error(tmp_path: Path) -> None:
     part = PART.replace("arm ", "let twice = reach + 1 m;\narm ", 1)
     other = "run other like hold { with reach = 0.9 m; }"
     assert codes(tmp_path, before="param reach = 0.7 s;", behind=other, part=part) == ["D061"]
+
+
+@pytest.mark.parametrize(
+    ("lets", "expected"),
+    [
+        ("for i in 1 .. 2 { let x_{i} = spans[i]; }", ["D388"]),
+        ("for i in 2 .. 3 { let x_{i} = 2 * spans[i - 1]; }", ["D388"]),
+        ("for i in 0 .. 1 { let x_{i} = spans[i]; }", []),  # more may be for another count
+        ("for i in 1 .. 2 { let x_{i} = spans[i]; }\nlet last = spans[2];", []),
+        ("for i in 1 .. 2 { let x_{i} = spans[i]; }\nlet all = 2 * spans;", []),
+        ("for i in 1 .. 2 { let x_{i} = spans[2]; }", []),
+        ("let one = spans[1];\nlet two = spans[2];", []),
+    ],
+)
+def test_the_first_element_of_a_list_that_loops_pass_over_is_told(
+    tmp_path: Path, lets: str, expected: list[str]
+) -> None:
+    assert codes(tmp_path, before="let spans = [0.5, 0.4, 0.3] m;", behind=lets) == expected
+    assert codes(tmp_path, before="let spans = [0, 0.4, 0.3] m;", behind=lets) == []
