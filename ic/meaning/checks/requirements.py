@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
-
-import numpy as np
+from collections.abc import Iterable, Sequence
 
 from ic.meaning.checks.bounds import Bounds, channel_bounds
 from ic.meaning.checks.constants import constant_values
@@ -18,12 +15,6 @@ from met.metrics.window import ROUNDING
 from met.plan import Structure
 from met.plan.judged import MetricUse, Requirement
 from met.plan.linear_uses import FIGURES
-
-NEAR = 0.02
-"""Share of its way within which a command counts as being at its target: as with a settling time's default band."""
-
-FOLLOWED = {"q": "position", "qd": "rate"}
-"""The kind of command that a joint's channel should follow."""
 
 
 def check_requirements(
@@ -48,7 +39,6 @@ def check_requirements(
                 or _remark_bound(scope, requirement, _bounds(scope, structure, use, metric), metric.name, place)
                 or _remark_begin(scope, requirement, use, metric, place)
                 or (metric.times and duration < requirement.limit < math.inf)  # only the run shows whether it is seen
-                or _remark_target(scope, requirement, use, metric, structure, place)
                 or _remark_window(scope, requirement, use, metric, duration, place)
             )
     _remark_contradictions(scope, requirements)
@@ -154,39 +144,3 @@ def _remark_begin(scope: Scope, requirement: Requirement, use: MetricUse, metric
             help=f"let `{use.of}` begin elsewhere, or choose another metric",
         )
     return bool(why)
-
-
-def _remark_target(
-    scope: Scope, requirement: Requirement, use: MetricUse, metric: Metric, structure: Structure, place: Place
-) -> bool:
-    """Return True, with a warning, for a target that the joint's command reaches after the run's end."""
-    joint, _, quantity = use.of.rpartition(".")
-    servo = next((each for each in structure.servos if each.joint == joint), None)
-    command = servo.command if servo is not None else None
-    if not metric.target or command is None or not command.model or command.kind != FOLLOWED.get(quantity):
-        return False
-    profile = models.find("command", command.model)
-    p = constant_values(scope, f"metrics.{use.name}", metric.parameters)
-    course = constant_values(scope, f"{joint}.servo.command", profile.parameters)
-    if profile.content is None or p is None or course is None:
-        return False
-    duration, target = structure.schedule.duration, getattr(p, metric.target)
-    ends = profile.content(course, duration).ends
-    if not duration < ends < math.inf:
-        return False
-    begin, now, last = (_value_at(profile.course, course, t) for t in (0.0, duration, ends))
-    way = abs(target - begin)
-    late = abs(last - target) <= NEAR * way < abs(now - target)
-    if late:
-        scope.complaints.remark(
-            "D341",
-            f"`require {requirement.text}` cannot be told from this run: the command of joint `{joint}` comes to the "
-            f"target of `{use.name}` at {ends:.6g} s, and the run ends at {duration:.9g} s",
-            place,
-            help="let the run last longer, or the command come there earlier",
-        )
-    return late
-
-
-def _value_at(course: Callable[[Any, float], tuple[Any, Any]], p: Any, t: float) -> float:
-    return float(np.asarray(course(p, t)[0]))

@@ -27,6 +27,9 @@ MOST_ROWS = 1000
 ROUNDING = 1e-9
 """Share of an interval by which an instant may miss its time."""
 
+NEAR = 0.02
+"""Share of a run by which a command may go on after it without a word."""
+
 MOST_TIMES = 40
 """Factor over the present rate up to which a sufficient one is searched for."""
 
@@ -43,6 +46,7 @@ class SampledContent:
     interval  s between instants;  by: what they are, in words, as in "its servo ticks"
     integral  whether the integral of its pulses counts, as of a rate or a torque, else their peaks
     recorded  s between rows of the histories; 0 where none are kept
+    finishes  whether it should end within the run: a command that is no log from a file
     """
 
     label: str
@@ -54,6 +58,7 @@ class SampledContent:
     place: Place | None
     integral: bool = True
     recorded: float = 0.0
+    finishes: bool = False
 
 
 @frozen
@@ -101,7 +106,9 @@ def _all_sampled(structure: Structure) -> Iterator[SampledContent]:
     ) -> Iterator[SampledContent]:
         profile = models.find("command", model, place)
         if profile.content is not None:
-            yield SampledContent(label, path, profile.parameters, profile.content, interval, by, place, integral)
+            finishes = path.endswith(".servo.command") and not profile.from_file
+            content = profile.content
+            yield SampledContent(label, path, profile.parameters, content, interval, by, place, integral, 0.0, finishes)
 
     steps = "the dynamics steps"
     for use in structure.servos:
@@ -133,11 +140,8 @@ def _observe(scope: Scope, sampled: SampledContent, schedule: Schedule) -> None:
         return  # what it has no number for is already reported
     fixed = {name: value for name, value in known.items() if isinstance(value, str | tuple)}
     numbers: dict[str, Real] = {name: value for name, value in known.items() if name not in fixed}  # type: ignore[misc]
-    timed = ("s", "Hz")
-    place = next(
-        (each.origin.place for each in settled.values() if each and each.unit in timed and each.origin.place),
-        sampled.place,
-    )
+    by_use = sorted((each for each in settled.values() if each), key=lambda each: each.unit not in ("s", "Hz"))
+    place = next((each.origin.place for each in by_use if each.origin.place), sampled.place)
     if place is None:
         return
 
@@ -179,6 +183,16 @@ def _remark(scope: Scope, sampled: SampledContent, found: list[Content], schedul
     first = min(found, key=lambda each: each.begins)
     if duration <= first.begins < math.inf:
         return _remark_late(scope, sampled, first.begins, schedule, place, " in this run")
+    last = max(found, key=lambda each: each.ends)
+    if duration * (1.0 + NEAR) < last.ends < math.inf and sampled.finishes:
+        scope.complaints.remark(
+            "D349",
+            f"{sampled.label} goes on after the run: it changes until {last.ends:.6g} s, and the run ends at "
+            f"{duration:.6g} s",
+            place,
+            help=f"let the run last longer, `duration = {math.ceil(10.0 * last.ends - 1e-6) / 10.0:.9g} s;`, or let it "
+            "end earlier",
+        )
     hz = 1.0 / sampled.interval
     fastest = min(max(each.frequency for each in found), sys.float_info.max)
     swing = Swing(sampled.label, fastest, place)

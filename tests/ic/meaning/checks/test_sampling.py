@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,27 @@ what is seen of it swings at 0 Hz
   = help: let it swing slower than 50 Hz; or give what sees it 1000 Hz, 10 instants a swing or more
 """
     )
+
+
+@pytest.mark.parametrize(
+    ("command", "until"),
+    [
+        ("ramp(to = 0.1 rad/s, over = 3 s)", "3 s"),
+        ("table(times = [0, 0.5, 1.25, 9] s, values = [0, 0.1, 0.2, 0.2] rad/s)", "1.25 s"),
+        ("ramp(to = 0.1 rad/s, over = 1.01 s)", None),  # there, or within two hundredths of the run
+        ("table(times = [0, 0.5, 9] s, values = [0, 0.1, 0.1] rad/s)", None),
+        ("sine(amplitude = 0.1 rad/s, frequency = 1 Hz)", None),
+    ],
+)
+def test_a_command_that_goes_on_after_the_run_is_told_and_its_remedy_works(
+    tmp_path: Path, command: str, until: str | None
+) -> None:
+    said = shown(tmp_path, ARM, under(f"rate({command})"), RUN)
+    assert said.count("D349") == (until is not None)
+    if until is not None:
+        assert f"goes on after the run: it changes until {until}, and the run ends at 1 s\n" in said
+        (remedy,) = re.findall("`(duration = .*;)`", said)
+        assert shown(tmp_path, ARM, under(f"rate({command})"), changed(RUN, ("duration = 1 s;", remedy))) == "\n"
 
 
 @pytest.mark.parametrize("ticks", ["100 Hz", "0.5 Hz"])
@@ -101,7 +123,7 @@ to 0.5065 s, and its servo ticks at 0.5 s and 0.51 s
         "rate(ramp(to = 1 rad/s, begin = 2 s, over = 1 s))",
         "rate(table(times = [0, 2, 3] s, values = [1, 1, 2] rad/s))",
         "rate(chirp(amplitude = 1 rad/s, f0 = 1 Hz, f1 = 2 Hz, over = 1 s, begin = 1.5 s))",
-        "rate(trapezoid(to = 1 rad/s, max_rate = 1 rad/s^2, max_acceleration = 1 rad/s^3, begin = 9 s))",
+        "rate(trapezoid(to = 1 rad/s, max_rate = 4 rad/s^2, max_acceleration = 16 rad/s^3, begin = 9 s))",
     ],
 )
 def test_a_command_that_changes_after_the_end_is_told(tmp_path: Path, command: str) -> None:
@@ -125,7 +147,9 @@ def test_a_command_that_changes_after_the_end_is_told(tmp_path: Path, command: s
     ],
 )
 def test_what_the_ticks_carry_is_not_told(tmp_path: Path, command: str) -> None:
-    assert codes(tmp_path, ARM, under(command), changed(RUN, TICKS)) in ([], ["D334"] * ("1.502" in command))
+    assert codes(tmp_path, ARM, under(command), changed(RUN, TICKS)) in (
+        [["D334"]] if "1.502" in command else [["D349"]] if "over = 2 s" in command else [[]]
+    )
 
 
 def test_a_sweep_is_told_of_a_command_that_no_case_sees_change_and_of_the_fastest_swing(tmp_path: Path) -> None:

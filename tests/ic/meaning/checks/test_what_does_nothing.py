@@ -118,10 +118,10 @@ def test_where_the_two_begin_is_in_the_unit_that_the_deck_wrote(tmp_path: Path) 
 
 
 @pytest.mark.parametrize(("course", "jumps"), [
-    ("trapezoid(start = 1 rad, to = 2 rad, max_rate = 1 rad/s, max_acceleration = 1 rad/s^2)", True),
+    ("trapezoid(start = 1 rad, to = 2 rad, max_rate = 9 rad/s, max_acceleration = 9 rad/s^2)", True),
     ("chirp(amplitude = 1 rad, f0 = 1 Hz, f1 = 2 Hz, over = 1 s, phase = 90 deg)", True),
     ("table(times = [0, 1] s, values = [1, 2] rad)", True),
-    ("trapezoid(to = 2 rad, max_rate = 1 rad/s, max_acceleration = 1 rad/s^2)", False),
+    ("trapezoid(to = 2 rad, max_rate = 9 rad/s, max_acceleration = 9 rad/s^2)", False),
     ("chirp(amplitude = 1 rad, f0 = 1 Hz, f1 = 2 Hz, over = 1 s)", False),
     ("step(to = 1 rad, at = 0.5 s)", False),
     ("5e-10 rad", False),
