@@ -245,6 +245,7 @@ def cases(
 @click.argument("path", required=False)
 @click.option("--run", "name", metavar="NAME", help="The run or sweep to look in, if it is not the default one.")
 @click.option("--scales", is_flag=True, help="Show numbers of the run as multiples of others, with what is usual.")
+@click.option("--assumptions", is_flag=True, help="Show what the run leaves out or holds, and how much that is.")
 @deck_options
 @format_option
 @loudness_options
@@ -253,6 +254,7 @@ def explain(
     path: str | None,
     name: str | None,
     scales: bool,
+    assumptions: bool,
     defines: tuple[str, ...],
     include_dirs: tuple[str, ...],
     settings: tuple[str, ...],
@@ -263,23 +265,25 @@ def explain(
     """Show where a value comes from: the line that wrote it, and the values that it replaced.
 
     PATH is a parameter (elbow.servo.kt), the beginning of several (elbow.servo), one of a definition (gearbox.kp), or a
-    setting of the run (rates.dynamics). Without PATH, `--scales` shows what the run's numbers are beside one another.
+    setting of the run (rates.dynamics). Without PATH, `--scales` shows what the run's numbers are beside one another,
+    and `--assumptions` what it leaves out.
     """
+    from ic.printing.assumptions import assumptions_json, print_assumptions
     from ic.printing.explaining import Sources, explained_json, print_explained
     from ic.printing.scales import print_scales, scales_json
 
     check_options(deck, defines=defines, include_dirs=include_dirs, settings=settings)
-    if (path is None) != scales:
-        raise click.UsageError("write a PATH, or `--scales` without one")
+    if [path is not None, scales, assumptions].count(True) != 1:
+        raise click.UsageError("write a PATH, or one of `--scales` and `--assumptions` without one")
     names = (name,) if name else ()
     if path is None:
         if deck.endswith(".json"):
-            raise click.UsageError("the scales are those of a deck, which a plan does not have any more")
+            raise click.UsageError("`--scales` and `--assumptions` are of a deck; this is a plan")
         compiled = _compiled(deck, include_dirs, defines, settings, names or None)
         if form == "json":
-            _print_json(scales_json(compiled))
+            _print_json(scales_json(compiled) if scales else assumptions_json(compiled))
         else:
-            _print(print_scales(compiled))
+            _print(print_scales(compiled) if scales else print_assumptions(compiled))
         return
     if deck.endswith(".json"):
         sources: Sources = [lambda: (_plan_in_file(deck, names), None)]

@@ -213,8 +213,8 @@ GRAVITY = ["gravity", "environment.gravity.g", "9.81", "m/s^2", "1", "that", "on
 def test_a_path_or_scales_must_be_asked_for_and_a_plan_has_none(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    for words, said in (([], "write a PATH, or `--scales` without one"), (["q", "--scales"], "write a PATH, or")):
+    for words, said in (([], "write a PATH, or one of `--scales` and"), (["q", "--scales"], "write a PATH, or one")):
         assert main(["explain", "deck.ic", *words]) == 2
         assert said in capfd.readouterr().err
     assert main(["explain", "plan.json", "--scales"]) == 2
-    assert "the scales are those of a deck" in capfd.readouterr().err
+    assert "are of a deck; this is a plan" in capfd.readouterr().err
