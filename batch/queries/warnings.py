@@ -1,5 +1,5 @@
-"""Warnings about an archive's finished cases: errors due to the step, limits of machines and joints, grapples, and
-times beyond the run's end."""
+"""Warnings about an archive's finished cases: errors due to the step, limits of machines and joints, grapples,
+times beyond the run's end, and axes of sweeps without an effect."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from batch.queries import at_limits, grapples, undecided
+from batch.queries import at_limits, grapples, no_effect, undecided
 from batch.queries.step_errors import warning as step_errors
 from batch.queries.streamed import summed_up
 from ic.printing.columns import count as counted
@@ -41,5 +41,5 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
     experiment  of the plan, for places
     """
     # found from counts; rows beside a summary are few, and say nothing about all cases
-    about = (step_errors,) if summed_up(group) is not None else (step_errors, at_limits, grapples, undecided)
+    about = (step_errors,) if summed_up(group) is not None else (step_errors, at_limits, grapples, undecided, no_effect)
     return [warning for each in about for warning in each.warnings(group, experiment)]
