@@ -1,5 +1,4 @@
-"""Requirements on a time whose limit is after a run's end, in cases that have not reached it by then: neither met nor
-missed."""
+"""Requirements on a time that a run does not show: it comes after the run's end, or there was nothing to wait for."""
 
 from __future__ import annotations
 
@@ -8,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from batch.queries.requirements import group_requirements
+from batch.queries.requirements import GroupRequirement, group_requirements
 from met import models
 from met.diagnostic import Diagnostic, Label, Problem
 
@@ -18,21 +17,38 @@ if TYPE_CHECKING:
 
 
 def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
-    """The warning about times that a run is too short to show, if there is one: about the first requirement, with the
-    others by name.
+    """The warnings about times that a run is too short to show, and about times that are 0 in all cases: of each kind
+    about the first requirement, with the others by name.
 
     experiment  of the plan, for places
     """
-    duration, found = float(group.attributes["duration_s"]), []
-    for each in group_requirements(group):
-        unseen = int(np.isposinf(group.values(each.metric)).sum())
-        if (
-            duration < each.limit < math.inf
-            and unseen
-            and _is_time(str(group.variables[each.metric].attributes.get("model")))
-        ):
+    duration, found, none = float(group.attributes["duration_s"]), [], []
+    for each in () if group.allows("D341") else group_requirements(group):
+        times = group.values(each.metric)
+        if not _is_time(str(group.variables[each.metric].attributes.get("model"))):
+            continue
+        unseen = int(np.isposinf(times).sum())
+        if duration < each.limit < math.inf and unseen:
             found.append((each, unseen))
-    if not found or group.allows("D341"):
+        elif len(times) and not times.any() and each.comparison.startswith("<"):
+            none.append(each)
+    return [*_unseen(group, experiment, duration, found), *_nothing(experiment, none)]
+
+
+def _nothing(experiment: Experiment | None, found: list[GroupRequirement]) -> list[Diagnostic]:
+    if not found:
+        return []
+    first, *others = found
+    name = first.metric.rpartition(".")[2]
+    message = f"`require {first.text}` is met by what never moved: `{name}` is 0 s, since it left its band at no time"
+    helps = ["is its signal the one that the command moves? that it stays is told by `peak`, or by `always(...)`"]
+    return _told(experiment, first, others, message, helps)
+
+
+def _unseen(
+    group: ArchiveGroup, experiment: Experiment | None, duration: float, found: list[tuple[GroupRequirement, int]]
+) -> list[Diagnostic]:
+    if not found:
         return []
     (first, unseen), *others = found
     many = f" in {unseen:,} of {group.count:,} cases" if group.count > 1 else ""
@@ -42,8 +58,18 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
         f"then{many}, and it may yet come"
     )
     helps = ["let the run last longer, or write an earlier limit"]
+    return _told(experiment, first, [each for each, _ in others], message, helps)
+
+
+def _told(
+    experiment: Experiment | None,
+    first: GroupRequirement,
+    others: list[GroupRequirement],
+    message: str,
+    helps: list[str],
+) -> list[Diagnostic]:
     if others:
-        helps.append(f"the same of {', '.join(f'`require {each.text}`' for each, _ in others)}")
+        helps.append(f"the same of {', '.join(f'`require {each.text}`' for each in others)}")
     place = None if experiment is None else experiment.requirements[first.place].place
     return [Diagnostic("D341", message, None if place is None else Label(place), (), tuple(helps), "warning")]
 

@@ -29,7 +29,10 @@ run other like go {
     require far < 4 s;
     require near < 1 s;
 }
+run still like go { settle { within = 3 rad; } }
+run meant like still { allow D341 because "it shall stay"; }
 run allowed like other { allow D341 because "seen elsewhere"; }
+sweep stays of still { vary j.servo.command.to = [1, 2] rad; }
 sweep ways of go { vary j.servo.command.to = [1, 2, 3] rad; }
 """
 
@@ -64,3 +67,15 @@ def test_what_has_not_come_by_the_end_is_warned_of_unless_that_is_late_enough(tm
 def test_of_a_sweep_the_cases_in_which_it_has_not_come_are_counted(tmp_path: Path) -> None:
     [found] = warned(tmp_path, "ways")
     assert "`settle` is not seen by then in 2 of 3 cases, and it may yet come" in found.message
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "told"), [("still", True), ("stays", True), ("meant", False)])
+def test_what_settles_without_having_left_its_band_is_told(tmp_path: Path, name: str, told: bool) -> None:
+    found = [each for each in warned(tmp_path, name) if each.code != "D329"]
+    assert [each.code for each in found] == ["D341"] * told
+    if told:
+        assert found[0].message == (
+            "`require settle < 5 s` is met by what never moved: `settle` is 0 s, since it left its band at no time"
+        )
+        assert found[0].at is not None and found[0].at.place.line == 7
