@@ -15,6 +15,17 @@ from met.diagnostic import Problem, error
 from met.host.files import settle_folder
 
 
+def path_of(output: str | os.PathLike[str]) -> Path:
+    """The path of a file to write. Raises Problem E305 for a name that ends in `/` where there is no such folder:
+    a path keeps no slash, and the file would take the folder's name."""
+    name = os.fspath(output)
+    if name.endswith("/") and not os.path.isdir(name):
+        file = name.rstrip("/")
+        helps = (f"for a file: `-o {quoted(file)}`", f"for a folder, make it first: `mkdir -p {quoted(file)}`")
+        raise Problem(error("E305", f"cannot write {name}: there is no such folder", help=helps))
+    return Path(output)
+
+
 def check_place(output: Path, *, code: str, inside: Path | None = None) -> None:
     """Refuse a path at which no file can be written: a folder, a pipe, a path in a folder that is not there.
 

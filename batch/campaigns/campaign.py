@@ -30,6 +30,7 @@ from met import run as engine
 from met.diagnostic import Problem, error
 from met.distinct import distinct
 from met.frozen import frozen
+from met.outputs import path_of
 from met.plan import Experiment, Plan
 from met.plan.columns import CaseValues, are_among, places_among
 
@@ -201,7 +202,7 @@ def prepare(
     if not selected:
         raise Problem(error("E311", "there is no case to run", help="`met cases DECK` lists them"))
     named = [experiment for experiment, _ in selected]
-    target = Path(output) if output is not None else default_output(plan, experiments, selected, all_of)
+    target = path_of(output) if output is not None else default_output(plan, experiments, selected, all_of)
     chosen_rows = kept_rows(rows, named)
     if not chosen_rows.all:
         histories = _histories_of_a_summary(rows, histories, verify)

@@ -39,11 +39,12 @@ def compile(
 
     from batch.portable import files
     from ic.printing.columns import size
+    from met.outputs import path_of
 
     names = (name,) if name is not None else ()
     check_options(source, names, **options)
     if output is not None:
-        files.check(Path(output))
+        files.check(path_of(output))
     experiment = files.experiment_of(source, names, **options, quiet=quiet or form == "json")
     target = Path(f"{experiment.name}{files.ENDING}" if output is None else output)
     if output is None:

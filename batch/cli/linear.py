@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
@@ -70,6 +69,7 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
     from batch.terminal.linear import as_data, linear_lines
     from batch.terminal.linear_cases import answered, case_lines
     from met.analysis.linear.answers import Linearized, question_of
+    from met.outputs import path_of
 
     if options["of"] is not None:
         for option, key in (("--at", "at"), ("--input", "inputs"), ("--output", "outputs"), ("--open", "opened")):
@@ -82,7 +82,7 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
     names = (name,) if name is not None else ()
     given = {key: options[key] for key in ("defines", "include_dirs", "settings")}
     check_options(source, names, **given)
-    output, drawn = (None if options[key] is None else Path(options[key]) for key in ("output", "picture"))
+    output, drawn = (None if options[key] is None else path_of(options[key]) for key in ("output", "picture"))
     if output is not None:
         files.check(output)
     if drawn is not None:

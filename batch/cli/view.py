@@ -88,9 +88,9 @@ def _write(
     from batch.portable import files
     from batch.portable.page import view as page
     from ic.printing.columns import size
-    from met.outputs import quoted
+    from met.outputs import path_of, quoted
 
-    target = Path(archive).with_suffix(".view.html") if output is None else Path(output)
+    target = Path(archive).with_suffix(".view.html") if output is None else path_of(output)
     files.check_page(target)
     said: list[str] = []
     text = page(archive, () if name is None else (name,), against, numbers, include_dirs, said.append)

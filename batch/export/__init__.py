@@ -27,6 +27,7 @@ from batch.export.formats import ExportRequest, Rows, find
 from batch.formats import FORMATS, endings, format_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen
+from met.outputs import path_of
 
 if TYPE_CHECKING:
     from batch.archive.read import ArchiveFile
@@ -134,7 +135,7 @@ def format_and_target(
     if output is None:
         form = form or next(iter(FORMATS))
         return form, Path(archive).with_suffix(f".{form}")
-    target = Path(output)
+    target = path_of(output)
     form = form or format_of(target)
     if form not in FORMATS:
         helps = (f"formats are known by their endings: {endings()}", "`--to csv` says it for any other name")

@@ -11,12 +11,12 @@ from batch.export.formats import ExportRequest, find
 from batch.export.output import check as check_place
 from batch.formats import format_of
 from met.diagnostic import Problem, error
-from met.outputs import quoted
+from met.outputs import path_of, quoted
 
 
 def archive_and_export(output: str | os.PathLike[str] | None) -> tuple[Path | None, Path | None]:
     """The archive and the export that an output names; None for the one that it does not name."""
-    target = None if output is None else Path(output)
+    target = None if output is None else path_of(output)
     if target is None or format_of(target) is None:
         return target, None
     return target.with_suffix(".h5"), target

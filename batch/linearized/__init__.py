@@ -8,6 +8,7 @@ from typing import Any
 from batch.linearized import data
 from met.analysis.linear.answers import Linearized
 from met.frozen import frozen
+from met.outputs import path_of
 
 
 @frozen
@@ -29,7 +30,7 @@ class LinearAnswer:
         """Writes A, B, C, D with names into a new file: .npz, .h5 or .csv. Raises Problem E305, E326."""
         from batch.linearized import files
 
-        files.check(Path(output))
+        files.check(path_of(output))
         files.write(self.found, Path(output))
 
     def draw(self, output: Path | str) -> None:
@@ -37,5 +38,5 @@ class LinearAnswer:
         from batch.linearized import picture
         from batch.plotting import output as places
 
-        places.check(Path(output))
+        places.check(path_of(output))
         picture.draw(self.found, Path(output))

@@ -15,6 +15,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from met.outputs import path_of
+
 if TYPE_CHECKING:
     from batch.archive.read import ArchiveFile, ArchiveGroup
     from batch.plotting.sheet import PictureSheet
@@ -59,7 +61,7 @@ def plot(
     with contextlib.ExitStack() as files:
         archive = files.enter_context(ArchiveFile(Path(path)))
         other = None if against is None else files.enter_context(ArchiveFile(Path(against)))
-        target = Path(output) if output is not None else archive.path.with_suffix(".png")
+        target = path_of(output) if output is not None else archive.path.with_suffix(".png")
         if arm:
             return draw_arm(archive, target, run=run, case=cases[0] if cases else "", at=at, sheet=on)
         return draw(archive, target, names, run=run, cases=cases, over=over, against=other, sheet=on)
@@ -88,7 +90,7 @@ def draw(
     from batch.queries.groups import groups_named
     from batch.queries.pool import pools
 
-    target, sheet = Path(output), sheet or PictureSheet()
+    target, sheet = path_of(output), sheet or PictureSheet()
     groups = groups_named(archive, (run,) if run else ())
     group = _with_case(groups, cases[0]) if cases else groups[0]
     place.check(target)
@@ -124,7 +126,7 @@ def draw_arm(
     from batch.plotting.sheet import PictureSheet
     from batch.queries.groups import groups_named
 
-    target, sheet = Path(output), sheet or PictureSheet()
+    target, sheet = path_of(output), sheet or PictureSheet()
     archive.need_every_row("a picture of an arm")
     groups = groups_named(archive, (run,) if run else ())
     group = _with_case(groups, case) if case else groups[0]

@@ -12,6 +12,8 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from met.outputs import path_of
+
 
 def report(
     path: str | os.PathLike[str],
@@ -48,7 +50,7 @@ def report(
     if tolerances and against is None:
         raise ValueError("tolerances are for a comparison: against which archive?")
     archive = Path(path)
-    target = default(archive) if output is None else Path(output)
+    target = default(archive) if output is None else path_of(output)
     with ExitStack() as stack:
         file = stack.enter_context(ArchiveFile(archive))
         file.need_every_row("a report")

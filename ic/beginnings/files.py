@@ -15,7 +15,7 @@ from ic.language import HEADS
 from met import models, units
 from met.diagnostic import Problem, error
 from met.host.files import new_file
-from met.outputs import refusal_text
+from met.outputs import path_of, quoted, refusal_text
 
 PARTS = [each.name for each in dataclasses.fields(Beginning)]
 
@@ -68,6 +68,8 @@ def _meaning(what: str, name: str) -> str:
 
 def write(texts: Mapping[str, str], *, force: bool) -> None:
     """Write the files, by path. Raises Problem E344, and writes none, where one exists and `force` is not given."""
+    for path in texts:
+        _check_place(path)
     there = [path for path in texts if os.path.lexists(path)]
     if there and not force:
         raise Problem(error("E344", _there(there), help="--force writes over it; -o writes to another place"))
@@ -81,8 +83,7 @@ def put(path: str, text: str) -> None:
     """Write a new file in place of one of the same name; a link there is not followed. Raises Problem E338 where the
     system refuses; then no new file is left."""
     there = os.path.lexists(path)
-    if os.path.exists(path) and not os.path.isfile(path):
-        raise Problem(error("E338", f"cannot write `{path}`: it is not a regular file"))
+    _check_place(path)
     try:
         with new_file(path) as stream:
             stream.write(text.encode())
@@ -91,6 +92,20 @@ def put(path: str, text: str) -> None:
             os.unlink(path)
         helps = "nothing was kept; -o names another place"
         raise Problem(error("E338", f"cannot write `{path}`: {refusal_text(reason)}", help=helps)) from None
+
+
+def _check_place(path: str) -> None:
+    """Raise Problem where no file can be written in any case: E305, or E338 in place of a folder or a pipe, or in a
+    file."""
+    target, folder = path_of(path), os.path.dirname(path)
+    helps = "-o names another place"
+    if target.is_dir():
+        inside = quoted(os.path.join(path, "arm.ic"))
+        raise Problem(error("E338", f"cannot write `{path}`: it is a folder", help=f"name a file in it: `-o {inside}`"))
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise Problem(error("E338", f"cannot write `{path}`: it is not a regular file", help=helps))
+    if os.path.exists(folder) and not os.path.isdir(folder):
+        raise Problem(error("E338", f"cannot write `{path}`: `{folder}` is a file, not a folder", help=helps))
 
 
 def _there(paths: Sequence[str]) -> str:

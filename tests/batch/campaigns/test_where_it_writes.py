@@ -50,6 +50,16 @@ class TestRefusedBeforeAnythingRuns:
         said = f"error[E305]: cannot write {Path(output)}: it is a folder\n = help: name a file in it: "
         assert self.run(output).startswith(said)
 
+    @pytest.mark.parametrize("output", ["no/", "no/such.h5/", "no/moves.csv//"])
+    def test_a_folder_that_is_not_there_is_not_made_a_file(self, here: Path, output: str) -> None:
+        name = output.rstrip("/")
+        assert self.run(output) == (
+            f"error[E305]: cannot write {output}: there is no such folder\n"
+            f" = help: for a file: `-o {name}`\n"
+            f" = help: for a folder, make it first: `mkdir -p {name}`\n"
+            "\n1 error\n"
+        )
+
     def test_what_another_run_is_writing(self, here: Path) -> None:
         from batch.archive.sink import Sink, temporary_of
 

@@ -101,6 +101,16 @@ def test_a_pipe_where_something_is_to_be_written(output: str, archive: Path, her
     assert f"cannot write {output}: it is not a regular file" in said.text
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("words", ["export -o a.csv/", "report -o a.html/", "plot -o a.png/", "view -o a.html/"])
+def test_a_name_that_ends_as_a_folders_is_no_files(words: str, archive: Path, here: Path) -> None:
+    command, option, output = words.split()
+    said = met(command, str(archive), option, output)
+    assert said.status == 2
+    assert f"error[E305]: cannot write {output}: there is no such folder\n" in said.text
+    assert os.listdir(here) == []
+
+
 def test_a_pipe_in_the_place_of_a_deck_an_include_a_table_and_a_robot(here: Path) -> None:
     os.mkfifo("pipe")
     os.mkfifo("a.ic")

@@ -225,6 +225,7 @@ def test_what_is_no_file_is_not_written_into_and_a_link_is_not_followed(capsys: 
         "",
         """\
 error[E338]: cannot write `pipe.ic`: it is not a regular file
+ = help: -o names another place
 
 1 error
 """,
@@ -233,6 +234,24 @@ error[E338]: cannot write `pipe.ic`: it is not a regular file
     Path("my_arm.ic").symlink_to("mine")
     assert new(capsys, "deck", "my_arm", "--force", "-q") == (0, "", "")
     assert not Path("my_arm.ic").is_symlink() and Path("mine").read_text() == "mine"
+
+
+@pytest.mark.parametrize(("words", "said"), [
+    (("deck", "a", "-o", "there"), "error[E338]: cannot write `there`: it is a folder\n"
+     " = help: name a file in it: `-o there/arm.ic`\n"),
+    (("deck", "a", "-o", "no/"), "error[E305]: cannot write no/: there is no such folder\n"
+     " = help: for a file: `-o no`\n = help: for a folder, make it first: `mkdir -p no`\n"),
+    (("servo", "a", "-o", "mine"), "error[E338]: cannot write `mine/a_for_met.py`: `mine` is a file, not a folder\n"
+     " = help: -o names another place\n"),
+])  # fmt: skip
+@pytest.mark.parametrize("force", [(), ("--force",)])
+def test_a_place_where_nothing_can_be_written_is_refused_and_nothing_is_made(
+    words: tuple[str, ...], said: str, force: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("there").mkdir()
+    Path("mine").write_text("mine")
+    assert new(capsys, *words, *force) == (2, "", f"{said}\n1 error\n")
+    assert sorted(os.listdir()) == ["mine", "there"]
 
 
 def test_of_a_model_nothing_is_written_where_one_file_is_there(capsys: pytest.CaptureFixture[str]) -> None:
