@@ -39,6 +39,14 @@ Unsaved = Mapping[str, str]
 NOTHING_UNSAVED: Unsaved = MappingProxyType({})
 
 _XML = re.compile(r"\s*<[?!A-Za-z]")
+_WIDE = (
+    (re.compile(rb"\xff\xfe\0\0|\0\0\xfe\xff"), "utf-32"),
+    (re.compile(rb"\xff\xfe|\xfe\xff"), "utf-16"),
+    (re.compile(rb"(?:[\t\n\r -~]\0){4}"), "utf-16-le"),
+    (re.compile(rb"(?:\0[\t\n\r -~]){4}"), "utf-16-be"),
+)
+"""How texts in other encodings begin: with a byte order mark, or with ASCII in twos of bytes."""
+
 _NOT_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
 
@@ -265,9 +273,10 @@ def size_text(n: int) -> str:
 def decode(data: bytes, name: str, kind: str) -> tuple[str, Diagnostic | None]:
     """The text, with its errors; with errors, it is good enough to show the line."""
     complaint = None
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        complaint = error("D002", f"`{name}` is UTF-16, but {kind}s are UTF-8", help="save it as UTF-8")
-        return data.decode("utf-16", errors="replace"), complaint
+    wide = next((encoding for begins, encoding in _WIDE if begins.match(data)), None)
+    if wide is not None:
+        complaint = error("D002", f"`{name}` is {wide[:6].upper()}, but {kind}s are UTF-8", help="save it as UTF-8")
+        return data.decode(wide, errors="replace"), complaint
     found = _NOT_TEXT.search(data)
     if found is not None:
         place = _place_of_byte(data, found.start(), name)

@@ -79,7 +79,7 @@ def read_regular(path: str | os.PathLike[str], most: int | None = None) -> bytes
         large = os.fstat(file.fileno()).st_size > limit  # a sparse file may be larger than any disk
         data = b"" if large else file.read() if most is None else file.read(most + 1)
     if large or len(data) > limit:
-        raise OSError(errno.EFBIG, f"it has more than {limit >> 20} MiB", os.fspath(path))
+        raise OSError(errno.EFBIG, f"it has more than {limit:,} bytes", os.fspath(path))
     return data
 
 

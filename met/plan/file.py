@@ -17,6 +17,7 @@ an older one, parameters that were added to its models since take their defaults
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 import io
 import json
@@ -300,7 +301,7 @@ def _plan_there(path: Path) -> str:
             check_regular(path, code="E300")
         with open_regular(path) as file:
             begins = file.read(1)
-            text = (begins + file.read()).decode("utf-8") if begins == b"{" else ""
+            text = (begins + file.read()).decode("utf-8-sig") if begins in (b"{", codecs.BOM_UTF8[:1]) else ""
         document = json.loads(text) if begins else {"schema": SCHEMA}
     except FileNotFoundError:
         return ""

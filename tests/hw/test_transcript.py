@@ -13,12 +13,13 @@ from pathlib import Path
 import pytest
 
 from hw.bed import BedSample, BedState
-from hw.beds.replay import ReplayBed
+from hw.beds.can_deck import bench_at
+from hw.beds.replay import ReplayBed, is_transcript
 from hw.beds.serial_line import SerialBed
 from hw.lines import transcript
 from hw.lines.transcript import TranscriptFile, TranscriptRecord, TranscriptWriter
 from met.diagnostic import Problem
-from tests.hw.conftest import LineBed, said
+from tests.hw.conftest import LineBed, refusal, said
 from tests.hw.device import Device
 from tests.hw.relay import VirtualLine
 
@@ -242,3 +243,20 @@ def test_a_disk_that_is_full_is_told_once_and_the_bed_is_stopped() -> None:
     assert device.voltage == pytest.approx(1.0, abs=0.01)
     assert bed.stop()
     assert device.voltage == 0.0
+
+
+def test_a_port_that_gives_nothing_is_no_transcript_and_a_bench_is_no_large_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As /proc/kmsg, which says that it is a regular file."""
+    path = tmp_path / "a"
+    path.write_bytes(bytes(1 << 17))
+    assert refusal(lambda: bench_at(str(path))) == (
+        f"error[E446]: {path} cannot be read: it has more than 65,536 bytes\n = help: `can:` takes a bench's file"
+    )
+
+    def nothing(_: object) -> None:
+        raise BlockingIOError(11, "it has nothing to give, and no end")
+
+    monkeypatch.setattr("hw.beds.replay.open_regular", nothing)
+    assert not is_transcript(str(path))

@@ -540,7 +540,10 @@ def test_a_broken_directive_is_one_error_on_its_line_and_nothing_else(desk: Desk
         (b"x = 1;\ny = \xff;\n", "error[D002]: `a.ic` is not UTF-8: byte 0xff\n --> a.ic:2:5\n"),
         (b"x = 1;\n\x00\x00\x00", "error[D002]: `a.ic` is not text: it holds the byte 0x00\n --> a.ic:2:1\n"),
         (b"\x7fELF\x02\x01", "error[D002]: `a.ic` is not text: it holds the byte 0x7f\n --> a.ic:1:1\n"),
-        ("x = 1;".encode("utf-16"), "error[D002]: `a.ic` is UTF-16, but decks are UTF-8\n"),
+        *(
+            ("x = 1;".encode(coded), f"error[D002]: `a.ic` is {coded[:6].upper()}, but decks are UTF-8\n")
+            for coded in ("utf-16", "utf-16-le", "utf-16-be", "utf-32")
+        ),
         (b"x = \x1b[31m;", "error[D002]: `a.ic` is not text: it holds the byte 0x1b\n --> a.ic:1:5\n"),
     ],
 )

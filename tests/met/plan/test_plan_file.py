@@ -1,5 +1,6 @@
 """Plans as files: what is written comes back to the bit, and what cannot be read is refused in words."""
 
+import codecs
 import json
 import math
 from dataclasses import replace
@@ -238,6 +239,15 @@ def test_a_plan_is_written_over_by_the_next_and_so_are_its_tables(tmp_path: Path
     for cases in (10_001, 10_002, 3):
         plan_file.write(plans.plan(plans.gains(cases)), tmp_path / "p.json")
         assert plan_file.read(tmp_path / "p.json").experiments[0].cases.count == cases
+
+
+def test_a_plan_with_a_byte_order_mark_is_written_over(tmp_path: Path) -> None:
+    path = tmp_path / "p.json"
+    plan_file.write(plans.plan(plans.gains(3)), path)
+    path.write_bytes(codecs.BOM_UTF8 + path.read_bytes())
+    assert plan_file.read(path).experiments[0].cases.count == 3
+    plan_file.write(plans.plan(plans.gains(4)), path)
+    assert plan_file.read(path).experiments[0].cases.count == 4
 
 
 @pytest.mark.parametrize(
