@@ -72,7 +72,8 @@ class DeckServer(LanguageServer):
         self._refreshes_lenses = bool(drawn and drawn.code_lens and drawn.code_lens.refresh_support)
         self._take_options(parameters.initialization_options)
         self.process.start()
-        self._worker = asyncio.create_task(self.checks.work())
+        if self._worker is None:  # an editor may begin twice: two workers would wait for each other's checks
+            self._worker = asyncio.create_task(self.checks.work())
 
     def _take_options(self, given: Any) -> None:
         options = given if isinstance(given, dict) else {}

@@ -264,6 +264,18 @@ def test_a_checker_that_dies_is_told_in_the_log_and_started_again(tmp_path: Path
     assert editor.of(deck) == []
 
 
+@pytest.mark.slow
+def test_a_server_that_is_begun_twice_goes_on_checking(tmp_path: Path) -> None:
+    decks = [tmp_path / "a.ic", tmp_path / "b.ic"]
+    with Editor(tmp_path) as editor:
+        editor.open(decks[0], GOOD)
+        editor.ask("initialize", {"processId": None, "rootUri": None, "capabilities": {}})
+        for deck in decks:
+            editor.open(deck, BAD)
+            assert len(editor.of(deck)) == 1
+        assert editor.end() == 0
+
+
 @pytest.mark.release
 def test_a_crash_in_a_check_is_told_in_the_log_and_the_server_lives_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
