@@ -19,6 +19,7 @@ from met.content import Content
 from met.diagnostic import Place
 from met.frozen import frozen
 from met.plan import BASE, Schedule, Structure
+from met.plan.judged import Requirement
 from met.trace import Real
 
 MOST_ROWS = 1000
@@ -46,7 +47,7 @@ class SampledContent:
     interval  s between instants;  by: what they are, in words, as in "its servo ticks"
     integral  whether the integral of its pulses counts, as of a rate or a torque, else their peaks
     recorded  s between rows of the histories; 0 where none are kept
-    finishes  whether it should end within the run: a command that is no log from a file
+    finishes  whether it should end within the run: a command of what a requirement judges
     """
 
     label: str
@@ -90,12 +91,15 @@ class Swing:
         return True
 
 
-def check_sampling(scope: Scope, structure: Structure) -> None:
-    """Warn about changes that begin after the run's end, and swings and pulses between the sampling instants."""
-    schedule = structure.schedule
+def check_sampling(scope: Scope, structure: Structure, requirements: Iterable[Requirement] = ()) -> None:
+    """Warn about changes that begin or go on after the run's end, and swings and pulses between the sampling
+    instants."""
+    schedule, named = structure.schedule, {each.metric for each in requirements}
+    judged = {use.of for use in structure.metrics if use.name in named}
+    finishing = {f"{of.rpartition('.')[0]}.servo.command" for of in judged if of.endswith((".q", ".qd"))}
     recorded = schedule.record / schedule.base_hz if structure.record else 0.0
     for sampled in _all_sampled(structure):
-        _observe(scope, replace(sampled, recorded=recorded), schedule)
+        _observe(scope, replace(sampled, recorded=recorded, finishes=sampled.path in finishing), schedule)
 
 
 def _all_sampled(structure: Structure) -> Iterator[SampledContent]:
@@ -106,9 +110,7 @@ def _all_sampled(structure: Structure) -> Iterator[SampledContent]:
     ) -> Iterator[SampledContent]:
         profile = models.find("command", model, place)
         if profile.content is not None:
-            finishes = path.endswith(".servo.command") and not profile.from_file
-            content = profile.content
-            yield SampledContent(label, path, profile.parameters, content, interval, by, place, integral, 0.0, finishes)
+            yield SampledContent(label, path, profile.parameters, profile.content, interval, by, place, integral)
 
     steps = "the dynamics steps"
     for use in structure.servos:
@@ -184,7 +186,7 @@ def _remark(scope: Scope, sampled: SampledContent, found: list[Content], schedul
     if duration <= first.begins < math.inf:
         return _remark_late(scope, sampled, first.begins, schedule, place, " in this run")
     last = max(found, key=lambda each: each.ends)
-    if duration * (1.0 + NEAR) < last.ends < math.inf and sampled.finishes:
+    if duration * (1.0 + NEAR) < last.ends < math.inf and sampled.finishes and not last.frequency:
         scope.complaints.remark(
             "D349",
             f"{sampled.label} goes on after the run: it changes until {last.ends:.6g} s, and the run ends at "

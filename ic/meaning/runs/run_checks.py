@@ -158,7 +158,7 @@ RUN_CHECKS = (
     RunCheck(lambda run: check_spins(run.scope, run.block, run.structure), _step_is_known),
     RunCheck(lambda run: check_guides(run.scope, run.guides, run.structure)),
     RunCheck(lambda run: remark_unread(run.scope, run.uses, run.structure)),
-    RunCheck(lambda run: check_sampling(run.scope, run.structure), _all_is_sound),
+    RunCheck(lambda run: check_sampling(run.scope, run.structure, run.requirements), _all_is_sound),
     RunCheck(lambda run: check_together(run.scope, run.uses, run.structure)),
     RunCheck(lambda run: check_reach(run.scope, run.block, run.structure), _all_is_sound),
     RunCheck(lambda run: check_magnitudes(run.scope, run.structure), _all_is_sound),
