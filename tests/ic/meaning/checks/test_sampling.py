@@ -42,6 +42,7 @@ what is seen of it swings at 0 Hz
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "until"),
     [

@@ -59,6 +59,7 @@ PUSH = "push = wrench { link = fore; point = [0.4, 0, 0] m; force = [0, 0, 1] N;
 """A load on the arm, without which the motors alone hold it."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said", "help"),
     [
