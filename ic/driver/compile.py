@@ -15,6 +15,7 @@ from ic.grammar.syntax import Deck, Setting
 from ic.language import EXPERIMENTS
 from ic.meaning.checks.degrees import remark_degrees
 from ic.meaning.checks.lists import skipped_elements
+from ic.meaning.checks.macros import macros_taken_apart
 from ic.meaning.control.servos import check_servo_definition
 from ic.meaning.control.unused_servos import check_on_a_joint, servos_in_use
 from ic.meaning.definitions.resolve import Definition, Definitions
@@ -172,7 +173,8 @@ def compile_deck(
     if not complaints.errors:
         complaints.admit_remarks()
         silence_of_all([each.allowances for each in experiments], complaints)
-        complaints.add(*misspelt_params(deck.entries), *skipped_elements(deck.entries))
+        for look in (misspelt_params, skipped_elements, macros_taken_apart):
+            complaints.add(*look(deck.entries))
         if select == "all":
             _remark_unused_rows(definitions, scopes, complaints)
         if not settings and not defines:  # which make another deck of it

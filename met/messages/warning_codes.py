@@ -14,7 +14,7 @@ WARNINGS = WHILE_RUNNING | {
     "D210", "D211", "D218", "D228", "D248", "D249", "D252", "D256", "D257", "D267", "D268", "D287", "D290", "D293",
     "D294", "D295", "D296", "D297", "D298", "D300", "D301", "D305", "D306", "D307",
     "D334", "D335", "D336", "D337", "D338", "D339", "D340", "D341", "D342", "D349", "D352", "D366", "D385", "D386",
-    "D387", "D388", "D392",
+    "D387", "D388", "D389", "D392",
 }  # fmt: skip
 """Every code of a warning about a run or its deck, except that of an `allow` that silences nothing. Some are also codes
 of errors. tests/met/messages/test_warning_codes.py checks the list against the source."""

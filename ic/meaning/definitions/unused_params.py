@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from ic.grammar.syntax import Entry, Let, Name, Setting
-from met.diagnostic import Diagnostic, Label, write
+from met.diagnostic import Diagnostic, Label, Place, write
 from met.messages.alike import meant
 from met.messages.message import shown_place
 
@@ -49,5 +49,5 @@ def parts(entries: Iterable[Entry]) -> Iterator[Any]:
         yield part
         if isinstance(part, list | tuple):
             waiting += part
-        elif is_dataclass(part):
+        elif is_dataclass(part) and not isinstance(part, Place):
             waiting += (getattr(part, field.name) for field in fields(part))

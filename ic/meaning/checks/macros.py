@@ -1,0 +1,39 @@
+"""Warnings about macros that the text around their uses takes apart: with `#define STAGE 1 + 4`, `STAGE * 2` is 9."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from ic.grammar.syntax import Binary, Entry, Expression, Unary
+from ic.meaning.definitions.unused_params import parts
+from met.diagnostic import Diagnostic, Expansion, Help, Label
+
+ALIKE = {("+", "+"), ("+", "-"), ("*", "*"), ("*", "/"), ("-", "*"), ("-", "/")}
+"""An operator before a macro's use, and one of its own, that give the same in either order; `-` is then a sign."""
+
+
+def macros_taken_apart(entries: Sequence[Entry]) -> Iterator[Diagnostic]:
+    """Warn about each macro of whose operators one takes an operand that reaches beyond the macro (D389)."""
+    found: dict[str, Diagnostic] = {}
+    for node in parts(entries):  # the last come first
+        for expansion in node.place.expansions if isinstance(node, Binary) and node.operator in "+-*/" else ():
+            by, name = _beyond(node, expansion), expansion.macro
+            if by and not expansion.iteration:
+                message = f"`{by}` takes a part of macro `{name}` alone: it binds before the `{node.operator}` in it"
+                helps = Help(f"put its value in brackets: `#define {name} (...)`")
+                found[name] = Diagnostic("D389", message, Label(expansion.use), (), (helps,), severity="warning")
+    yield from found.values()
+
+
+def _beyond(node: Binary, expansion: Expansion) -> str:
+    """The operator outside of an expansion that an operand of one inside has taken; "" where there is none, or where
+    it makes no difference."""
+    left, right = (_outside(operand, expansion) for operand in (node.left, node.right))
+    return right or ("" if (left, node.operator) in ALIKE else left)
+
+
+def _outside(operand: Expression, expansion: Expansion) -> str:
+    """The operator of an operation that is written outside of an expansion; "" of anything else."""
+    if isinstance(operand, Binary | Unary) and expansion not in operand.place.expansions:
+        return operand.operator
+    return ""

@@ -1,0 +1,56 @@
+"""Macros that the text around their uses takes apart are told of, and those that are not give the same value."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import ic
+from tests.ic.small_decks import ARM, RUN, SERVO
+
+MACROS = "#define SUM 1 + 4\n#define LESS 5 - 3\n#define TIMES 2 * 3\n#define OF(x) x + 1\n#define SAFE (1 + 4)\n"
+
+
+def told(folder: Path, value: str, macros: str = MACROS) -> list[str]:
+    (folder / "deck.ic").write_text(f"deck 2;\n{macros}let x = {value};\n{ARM}{SERVO}{RUN}")
+    return [each.code for each in ic.check(folder / "deck.ic").diagnostics]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "value",
+    [
+        "2 * SUM",
+        "SUM * 2",
+        "SUM / 2",
+        "10 - SUM",
+        "-SUM",
+        "SUM * SUM",
+        "3 - LESS",
+        "2 / TIMES",
+        "3 * OF(2)",
+        "OF(2) ^ 2",
+    ],
+)
+def test_a_macro_that_is_taken_apart_is_told_and_brackets_mend_it(tmp_path: Path, value: str) -> None:
+    assert told(tmp_path, value) == ["D389"]
+    mended = MACROS.replace("1 + 4", "(1 + 4)").replace("5 - 3", "(5 - 3)").replace("2 * 3", "(2 * 3)")
+    assert told(tmp_path, value, mended.replace("x + 1", "(x + 1)")) == []
+
+
+def test_a_macro_that_means_the_same_as_with_brackets_is_not_told(tmp_path: Path) -> None:
+    same = [
+        "SUM",
+        "SUM + 2",
+        "2 + SUM",
+        "SUM - 2",
+        "2 + LESS",
+        "2 * TIMES",
+        "-TIMES",
+        "2 - TIMES",
+        "OF(3 - 1)",
+        "2 * SAFE",
+    ]
+    assert told(tmp_path, f"[{', '.join(same)}]") == []
+    assert told(tmp_path, f"[{', '.join(same)}, 2 * SUM]") == ["D389"]
