@@ -40,8 +40,13 @@ def _nothing(experiment: Experiment | None, found: list[GroupRequirement]) -> li
         return []
     first, *others = found
     name = first.metric.rpartition(".")[2]
-    message = f"`require {first.text}` is met by what never moved: `{name}` is 0 s, since it left its band at no time"
-    helps = ["is its signal the one that the command moves? that it stays is told by `peak`, or by `always(...)`"]
+    message = (
+        f"`require {first.text}` is met from the start: `{name}` is 0 s, since its signal left the band at no time"
+    )
+    helps = [
+        "is it the signal that the command moves, and the band less than the motion? where it is to stay there, "
+        "`peak` or `always(...)` says so"
+    ]
     return _told(experiment, first, others, message, helps)
 
 

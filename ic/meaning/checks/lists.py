@@ -34,7 +34,7 @@ def skipped_elements(entries: Sequence[Entry]) -> Iterator[Diagnostic]:
         if not (isinstance(first, Number) and first.value == 0.0):  # a filler, so that counts begin at 1
             message = f"nothing takes `{name}[0]`, the first element of a list that loops take element by element"
             also = Label(found[0].place, "taken here")
-            helps = f"the last is `{name}[{len(items.items) - 1}]`: let the loop begin at 0, or leave the first one out"
+            helps = f"elements count from 0: is the index to be one less, as in `{name}[i - 1]`?"
             yield Diagnostic("D388", message, Label(place_of(first)), (also,), (Help(helps),), severity="warning")
 
 

@@ -189,7 +189,7 @@ def _remark(scope: Scope, sampled: SampledContent, found: list[Content], schedul
     if duration * (1.0 + NEAR) < last.ends < math.inf and sampled.finishes and not last.frequency:
         scope.complaints.remark(
             "D349",
-            f"{sampled.label} goes on after the run: it changes until {last.ends:.6g} s, and the run ends at "
+            f"{sampled.label} goes on after the run: its last change ends at {last.ends:.6g} s, and the run at "
             f"{duration:.6g} s",
             place,
             help=f"let the run last longer, `duration = {math.ceil(10.0 * last.ends - 1e-6) / 10.0:.9g} s;`, or let it "

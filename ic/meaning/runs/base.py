@@ -115,7 +115,15 @@ def _remark_held(scope: Scope, structure: Structure) -> None:
     own = next((link for link in structure.links if link.name == BASE), None)
     runs = [scope.definitions.block(each) for each in scope.definitions.of_kind("run").values()]
     weighs = any(load.model == "gravity" for load in structure.environment)
-    if own is None or own.place is None or own.place.included or weighs or any(run and run.get(BASE) for run in runs):
+    mass = scope.parameters.get(f"links.{BASE}.mass")
+    if (
+        own is None
+        or (mass is not None and isinstance(mass.value, float) and mass.value == 0.0)
+        or own.place is None
+        or own.place.included
+        or weighs
+        or any(run and run.get(BASE) for run in runs)
+    ):
         return
     scope.complaints.remark(
         "D257",

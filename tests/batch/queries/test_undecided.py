@@ -76,6 +76,6 @@ def test_what_settles_without_having_left_its_band_is_told(tmp_path: Path, name:
     assert [each.code for each in found] == ["D341"] * told
     if told:
         assert found[0].message == (
-            "`require settle < 5 s` is met by what never moved: `settle` is 0 s, since it left its band at no time"
+            "`require settle < 5 s` is met from the start: `settle` is 0 s, since its signal left the band at no time"
         )
         assert found[0].at is not None and found[0].at.place.line == 7

@@ -63,7 +63,7 @@ def test_a_command_that_goes_on_after_the_run_is_told_and_its_remedy_works(
     said = shown(tmp_path, ARM, servo, run)
     assert said.count("D349") == (until is not None)
     if until is not None:
-        assert f"goes on after the run: it changes until {until}, and the run ends at 1 s\n" in said
+        assert f"goes on after the run: its last change ends at {until}, and the run at 1 s\n" in said
         (remedy,) = re.findall("`(duration = .*;)`", said)
         assert shown(tmp_path, ARM, servo, changed(run, ("duration = 1 s;", remedy))) == "\n"
 

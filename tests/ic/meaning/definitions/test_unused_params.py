@@ -51,6 +51,7 @@ def test_a_param_of_another_dimension_is_one_error(tmp_path: Path) -> None:
     [
         ("for i in 1 .. 2 { let x_{i} = spans[i]; }", ["D388"]),
         ("for i in 2 .. 3 { let x_{i} = 2 * spans[i - 1]; }", ["D388"]),
+        ("for i in 1 .. 2 { let x_{i} = spans[i - 1]; }", []),  # the remedy
         ("for i in 0 .. 1 { let x_{i} = spans[i]; }", []),  # more may be for another count
         ("for i in 1 .. 2 { let x_{i} = spans[i]; }\nlet last = spans[2];", []),
         ("for i in 1 .. 2 { let x_{i} = spans[i]; }\nlet all = 2 * spans;", []),

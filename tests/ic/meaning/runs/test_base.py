@@ -392,6 +392,7 @@ error[D250]: `yaw` of the base is told its positions, and `rate` is a kind of co
     [
         ([("base = free;", "")], ["D257"]),
         ([("base = free;", "base = fixed;")], []),
+        ([("base = free;", ""), ("mass = 50 kg", "mass = 0 kg")], []),  # there for the picture alone
         ([("base = free;", ""), ("environment {}", "environment { gravity = [0, 0, -9.81] m/s^2; }")], []),
         ([("base = free;", ""), ("run ", "run other like RUN { base = free; }\nrun ")], []),
     ],
@@ -400,5 +401,5 @@ def test_a_body_of_a_base_that_is_held_where_nothing_weighs_is_told(
     tmp_path: Path, changes: list[tuple[str, str]], expected: list[str]
 ) -> None:
     name = RUN.split()[1]
-    run = changed(RUN, *((old, new.replace("RUN", name)) for old, new in changes))
-    assert [each.code for each in check(tmp_path, ARM, run, select="all").diagnostics] == expected
+    text = changed(ARM + RUN, *((old, new.replace("RUN", name)) for old, new in changes))
+    assert [each.code for each in check(tmp_path, text, select="all").diagnostics] == expected
