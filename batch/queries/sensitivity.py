@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -178,6 +179,8 @@ def _explained(
         rows = np.flatnonzero(finite)
         names, values, output = [each.name for each in inputs], [each.values[rows] for each in inputs], output[rows]
         found = shares(values, output) if len(rows) >= FEWEST else None
+    together = () if found is None or made else tuple((names[i], names[j], size) for i, j, size in dependent(values))
+    overlapping = {name for one, other, _ in together for name in (one, other)}
     return Sensitivity(
         name=name,
         unit=unit,
@@ -186,9 +189,14 @@ def _explained(
         cases=len(rows),
         left=len(positions) - len(rows),
         inputs=tuple(names),
-        shares=found.inputs if found is not None else (),
+        shares=tuple(
+            share.without_intervals() if name in overlapping else share
+            for name, share in zip(names, found.inputs, strict=True)
+        )
+        if found is not None
+        else (),
         rest=None if found is None else found.rest,
-        together=() if found is None or made else tuple((names[i], names[j], size) for i, j, size in dependent(values)),
+        together=together,
         mean=float(output.mean()) if len(rows) else float("nan"),
         design="saltelli" if made else "",
         why=why,
@@ -196,8 +204,15 @@ def _explained(
 
 
 def share_text(share: float, by: float) -> str:
-    """A share and half the width of its interval: `0.94 ± 0.01`."""
-    return f"{share:.2f} ± {max(by, 0.005):.2f}"
+    """A share and half the width of its interval: `0.94 ± 0.01`; without one, `0.94`."""
+    return f"{share:.2f} ± {max(by, 0.005):.2f}" if math.isfinite(by) else f"{share:.2f}"
+
+
+def total_text(share: InputShare) -> str:
+    """The ends of the interval of a share with others, outward: `0.93 .. 0.96`; without one, the share; "" of none."""
+    if share.total is None or not math.isfinite(share.total_low):
+        return "" if share.total is None else f"{share.total:.2f}"
+    return f"{math.floor(share.total_low * 100) / 100:.2f} .. {math.ceil(share.total_high * 100) / 100:.2f}"
 
 
 def notes_of(found: Sensitivity) -> list[str]:
@@ -209,12 +224,16 @@ def notes_of(found: Sensitivity) -> list[str]:
         notes.append(f"{found.why}: estimated as from any cases")
     if found.rest is not None and found.rest > UNCLEAR:
         notes.append(
-            f"{found.rest:.2f} of the variance is of three inputs or more together, of noise, or of too few cases"
+            f"{found.rest:.2f} of the variance is of three inputs or more together, of noise, or of too few cases: "
+            "any input may have part in it"
         )
-    if max(max(each.first_by, each.total_by) for each in found.shares) > UNCLEAR:
-        notes.append("not enough cases for narrow intervals: four times as many halve them")
+    widest = max((share.first_by for share in found.shares if math.isfinite(share.first_by)), default=0.0)
+    if widest > UNCLEAR:
+        cases = float(f"{found.cases * (widest / UNCLEAR) ** 2:.1g}")
+        notes.append(f"few cases: it takes about {cases:,.0f} for shares alone within ± {UNCLEAR}")
     for one, other, size in found.together:
         notes.append(
-            f"{one} and {other} do not vary independently (rank correlation {size:+.2f}): their shares overlap"
+            f"{one} and {other} do not vary independently (rank correlation {size:+.2f}): their shares overlap, and "
+            "have no interval"
         )
     return notes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from batch.queries.sensitivity import FAILURE, Sensitivity, notes_of, share_text
+from batch.queries.sensitivity import FAILURE, Sensitivity, notes_of, share_text, total_text
 from batch.queries.signals import number_text
 from batch.queries.summary import finite
 from ic.printing.columns import columns
@@ -47,7 +47,7 @@ def sensitivity_lines(found: Sensitivity) -> list[str]:
                 f"  {found.inputs[i]}",
                 "█" * round(BAR * share.first) or "·",
                 share_text(share.first, share.first_by),
-                share_text(share.total, share.total_by) if share.total is not None else "",
+                total_text(share),
                 f"{low} .. {high} {found.unit}".rstrip(" 1")
                 if found.unit == "1"
                 else f"{low} .. {high} {found.unit}".rstrip(),

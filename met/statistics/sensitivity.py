@@ -5,19 +5,24 @@ sample, a Latin hypercube. An input is cut into cells of about equally many case
 
 - A first-order index is the share of the variance that lies between the means of an input's cells, once an additive
   model has taken out the others: the correlation ratio (K. Pearson, 1905), less the share that as many cells explain
-  by chance (T. L. Kelley, PNAS 21 (1935) 554-559).
+  by chance (T. L. Kelley, PNAS 21 (1935) 554-559). The model is fitted to other cases than those it is taken from
+  (cross-fitting: V. Chernozhukov et al., The Econometrics Journal 21 (2018) C1-C68). Fitted to the same, it would leave
+  an input without effect more than chance does.
 - The index of a pair is the same for cells in two inputs, of the variance that single inputs leave unexplained. It is
   extrapolated from cells of two widths.
 - A total index is an input's own with those of its pairs (I. M. Sobol, 1993; A. Saltelli et al., Global Sensitivity
-  Analysis: The Primer, 2008). Effects of three inputs and more together are in no index; with noise and chance they
-  make up the rest.
-- Intervals are by the jackknife, leaving out each of `GROUPS` parts of the cases in turn. Those of totals include the
-  extrapolation.
+  Analysis: The Primer, 2008). Effects of three inputs and more together are in no pair; with noise and chance they
+  make up the rest. Any part of the rest may belong to any input, so that a total is a range: from what the input and
+  its pairs explain to what all others leave.
+- Intervals are by the jackknife, leaving out each of `GROUPS` parts of the cases in turn. To it come the variance that
+  a step within one cell may hide, and for totals the extrapolation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -49,24 +54,33 @@ PAIR_CASES = 1 << 18
 SWEEPS = 3
 """Number of times that each input's effect is fitted to the residuals of the others."""
 
+FOLDS = 5
+"""Number of parts of the cases, each of which is compared with an additive model of the others."""
+
 
 @frozen
 class InputShare:
     """The share of an output's variance that one input explains.
 
-    first, total          alone, and with its pairs; total is None where there are too many inputs for pairs
-    first_by, total_by    half the width of a 95 % interval
-    rank                  Spearman's correlation of input and output, -1 to 1
-    low, high             the mean output in the input's lowest and its highest cell
+    first, total             alone, and with its pairs; total is None where there are too many inputs for pairs
+    first_by                 half the width of a 95 % interval
+    total_low, total_high    ends of a 95 % interval of what the input explains with any number of others
+    rank                     Spearman's correlation of input and output, -1 to 1
+    low, high                the mean output in the input's lowest and its highest cell
     """
 
     first: float
     first_by: float
     total: float | None
-    total_by: float
+    total_low: float
+    total_high: float
     rank: float
     low: float
     high: float
+
+    def without_intervals(self) -> InputShare:
+        """The same shares, with intervals that are not numbers."""
+        return replace(self, first_by=math.nan, total_low=math.nan, total_high=math.nan)
 
 
 @frozen
@@ -104,16 +118,18 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
     y = (output - mean) / deviation
     part = (np.random.default_rng(0).permutation(cases) % GROUPS).astype(np.uint8)
     whole = _Variance(y, part)
-    alone = [cells(values, max(4, min(CELLS, cases // 16))) for values in inputs]
-    means = [_means(cell, y) for cell in alone]
-    effects, left = _additive(alone, y)
-    first = []
-    for cell, effect in zip(alone, effects, strict=True):
-        own = _Variance(left + effect[cell], part)
-        first.append(own.between(*own.sums(cell, _count(cell))) / whole.spread)
+    alone = [cells(values, max(4, min(CELLS, cases // 8))) for values in inputs]
+    first, hidden = [], []
+    for values, cell, own in zip(inputs, alone, _less_others(alone, y, part % FOLDS), strict=True):
+        variance, count = _Variance(own, part), _count(cell)
+        sizes, totals = variance.sums(cell, count)
+        first.append(variance.between(sizes, totals) / whole.spread)
+        is_divided = len(np.unique(values)) > count
+        hidden.append(_hidden(sizes[:, 0], totals[:, 0], own) / whole.spread[0] if is_divided else 0.0)
+    _, left = _additive(alone, y)
     total: list[np.ndarray] | None = None
     cut = np.zeros(len(inputs))
-    rest = None
+    unexplained = rest = None
     if len(inputs) <= MOST_INPUTS:
         some = slice(None, None, -(-cases // PAIR_CASES))
         left = left[some]
@@ -141,20 +157,28 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
                 total[each] += together
                 cut[each] += abs(fine[0] - wide[0]) / 3.0
             explained = explained + together
-        rest = float(np.clip(1.0 - explained[0], 0.0, 1.0))
+        unexplained = 1.0 - explained
+        rest = float(np.clip(unexplained[0], 0.0, 1.0))
     ranks = _ranks(output)
     found = []
     for number, values in enumerate(inputs):
-        of_total = None if total is None else total[number]
+        least, low, high = None, 0.0, 1.0
+        if total is not None and unexplained is not None:
+            most = total[number] + unexplained
+            least = max(_share(total[number]), _share(first[number]))
+            low = max(0.0, float(total[number][0]) - interval(total[number]) - cut[number])
+            high = min(1.0, max(least, float(most[0])) + interval(most) + cut[number] + hidden[number])
+        from_low, to_high = means_of_ends(values, output)
         found.append(
             InputShare(
                 first=_share(first[number]),
-                first_by=interval(first[number]),
-                total=None if of_total is None else max(_share(of_total), _share(first[number])),
-                total_by=0.0 if of_total is None else interval(of_total) + cut[number],
+                first_by=interval(first[number]) + hidden[number],
+                total=least,
+                total_low=low,
+                total_high=high,
                 rank=_correlation(_ranks(values), ranks),
-                low=mean + deviation * float(means[number][0]),
-                high=mean + deviation * float(means[number][-1]),
+                low=from_low,
+                high=to_high,
             )
         )
     return Shares(tuple(found), rest)
@@ -172,16 +196,44 @@ def dependent(inputs: Sequence[np.ndarray]) -> list[tuple[int, int, float]]:
     return found
 
 
-def _additive(alone: Sequence[np.ndarray], y: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+def _additive(
+    alone: Sequence[np.ndarray], y: np.ndarray, counts: Sequence[int] = ()
+) -> tuple[list[np.ndarray], np.ndarray]:
     """The effect of each input's cells, and the residual that no input explains alone: an additive model, fitted in
-    turns (backfitting), so that chance dependence between inputs is not counted twice."""
-    left, effects = y.copy(), [np.zeros(_count(cell)) for cell in alone]
+    turns (backfitting), so that chance dependence between inputs is not counted twice. counts: of cells, where some may
+    be empty"""
+    left, effects = y.copy(), [np.zeros(count) for count in counts or map(_count, alone)]
     for _ in range(SWEEPS):
         for cell, effect in zip(alone, effects, strict=True):
-            more = _means(cell, left)
+            more = _means(cell, left, len(effect))
             effect += more
             left -= more[cell]
     return effects, left
+
+
+def _less_others(alone: Sequence[np.ndarray], y: np.ndarray, fold: np.ndarray) -> Iterator[np.ndarray]:
+    """For one input after the other, the output less the effects of all other inputs, each case's by an additive model
+    of the other folds. alone: the cells of each input, [case] each"""
+    fits = []
+    for number in range(FOLDS):
+        others = fold != number
+        fits.append(_additive([cell[others] for cell in alone], y[others], [_count(cell) for cell in alone])[0])
+    effects = [np.stack([fit[place] for fit in fits]) for place in range(len(alone))]
+    left = y - sum(effect[fold, cell] for effect, cell in zip(effects, alone, strict=True))
+    for effect, cell in zip(effects, alone, strict=True):
+        yield left + effect[fold, cell]
+
+
+def _hidden(n: np.ndarray, sums: np.ndarray, own: np.ndarray) -> float:
+    """The largest sum of squares within an input's cells that a step of its effect may hide, one step between the
+    middles of the cells at either side; less what chance makes of it. n, sums: of each cell's cases"""
+    if len(n) < 3:
+        return 0.0
+    means = sums / np.maximum(1.0, n)
+    within = max(0.0, float(own @ own - (sums * means).sum())) / max(1.0, len(own) - len(n))
+    step = np.pad(np.abs(means[2:] - means[:-2]), 1, mode="edge")
+    chance = np.pad(within / np.maximum(1.0, n[2:]) + within / np.maximum(1.0, n[:-2]), 1, mode="edge")
+    return float(max(0.0, (n * (step**2 - chance)).sum()) / 4.0)
 
 
 class _Variance:
@@ -240,9 +292,9 @@ def _count(cell: np.ndarray) -> int:
     return int(cell.max(initial=0)) + 1
 
 
-def _means(cell: np.ndarray, y: np.ndarray) -> np.ndarray:
-    count = np.bincount(cell)
-    return np.asarray(np.bincount(cell, y) / np.maximum(1, count))
+def _means(cell: np.ndarray, y: np.ndarray, cells: int = 0) -> np.ndarray:
+    count = np.bincount(cell, minlength=cells)
+    return np.asarray(np.bincount(cell, y, minlength=cells) / np.maximum(1, count))
 
 
 def _share(found: np.ndarray) -> float:

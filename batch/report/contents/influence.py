@@ -6,7 +6,7 @@ from batch.archive.read import ArchiveGroup
 from batch.archive.searched import is_search
 from batch.queries.pool import Pool, page_number
 from batch.queries.requirements import group_requirements
-from batch.queries.sensitivity import Sensitivity, notes_of, sensitivities, share_text
+from batch.queries.sensitivity import Sensitivity, notes_of, sensitivities, share_text, total_text
 from batch.report.contents.parts import InfluencePart, InfluenceRow
 from met.diagnostic import Problem
 from met.statistics.sensitivity import FEWEST
@@ -55,7 +55,7 @@ def _part(found: Sensitivity) -> InfluencePart:
             InfluenceRow(
                 path=found.inputs[place],
                 alone=share_text(share.first, share.first_by),
-                together="" if share.total is None else share_text(share.total, share.total_by),
+                together=total_text(share),
                 low=low,
                 high=high,
                 ends=f"{page_number(low)} … {page_number(high)} {found.unit}".rstrip(),

@@ -4,8 +4,8 @@
 
 Six shipped decks vary four parameters each, once in 10,000 random cases and once in 2,048 x 6 of `sample saltelli`. Of
 each metric it prints the largest difference of the shares alone and of those with others, each with the widest interval
-of the design's, and what the estimators for any cases leave to three parameters together. docs/sensitivity.md has the
-figures.
+of the design's. Then come what the estimators for any cases leave to three parameters together, and the number of
+parameters whose two intervals of shares with others lie apart. docs/sensitivity.md has the figures.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def found(folder: Path, deck: str, design: str) -> list[Sensitivity]:
 
 
 def main(decks: list[str]) -> None:
-    print(f"{'deck':<14}{'metric':<10}{'alone':>8}{'±':>7}{'with others':>14}{'±':>7}{'rest':>7}")
+    print(f"{'deck':<14}{'metric':<10}{'alone':>8}{'±':>7}{'with others':>14}{'±':>7}{'rest':>7}{'apart':>7}")
     for deck in decks or DECKS:
         with TemporaryDirectory() as folder:
             given, made = (
@@ -72,9 +72,10 @@ def main(decks: list[str]) -> None:
                 continue
             alone = max(abs(a.first - b.first) for a, b in pairs)
             total = max(abs((a.total or 0.0) - (b.total or 0.0)) for a, b in pairs)
-            widths = (max(b.first_by for _, b in pairs), max(b.total_by for _, b in pairs))
+            widths = (max(b.first_by for _, b in pairs), max(0.5 * (b.total_high - b.total_low) for _, b in pairs))
+            apart = sum(a.total_low > b.total_high or b.total_low > a.total_high for a, b in pairs)
             print(
-                f"{deck:<14}{name:<10}{alone:8.3f}{widths[0]:7.3f}{total:14.3f}{widths[1]:7.3f}{one.rest:7.2f}",
+                f"{deck:<14}{name:<10}{alone:8.3f}{widths[0]:7.3f}{total:14.3f}{widths[1]:7.3f}{one.rest:7.2f}{apart:7}",
                 flush=True,
             )
 

@@ -58,6 +58,34 @@ def test_parameters_that_are_zipped_are_one_input(tmp_path: Path) -> None:
     assert sum(each.first for each in settle.shares) > 0.9
 
 
+DEPENDENT = """
+#include <two_link.ic>
+run brief like nominal { rates { dynamics = 100 Hz; servos = 100 Hz; record = 20 Hz; } duration = 5 s; record = []; }
+sweep many of brief {
+    vary links.upper.mass = linspace(40, 60, 8) kg;
+    vary links.lower.mass = linspace(20, 30, 8) kg;
+    vary gearbox.kp = linspace(0.02, 0.03, 3) V*s/rad;
+    exclude when links.upper.mass + 2 * links.lower.mass > 100 kg;
+}
+"""
+
+
+@pytest.mark.slow
+def test_parameters_that_depend_on_each_other_have_no_intervals(tmp_path: Path) -> None:
+    (tmp_path / "dependent.ic").write_text(DEPENDENT)
+    plan = ic.compile(tmp_path / "dependent.ic", select=["many"])
+    with ArchiveFile(batch.run(plan, output=tmp_path / "a.h5", histories="none").path) as file:
+        [settle, *_] = sensitivities(file.groups[0], ["settle"])
+    by_name = dict(zip(settle.inputs, settle.shares, strict=True))
+    assert np.isnan(by_name["links.upper.mass"].first_by) and np.isnan(by_name["links.lower.mass"].total_high)
+    assert by_name["gearbox.kp"].first_by > 0.0
+    lines = sensitivity_lines(settle)
+    [mass] = [line for line in lines if "links.upper.mass  " in line]
+    assert "±" not in mass
+    assert any("their shares overlap, and have no interval" in line for line in lines)
+    assert as_data(settle)["inputs"][0]["first_by"] is None
+
+
 def test_a_metric_that_is_not_there_is_told(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with ArchiveFile(archive) as file, pytest.raises(Problem) as caught:
         sensitivities(file.groups[0], ["vols"])

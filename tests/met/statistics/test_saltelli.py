@@ -40,7 +40,7 @@ def test_ishigami_within_the_intervals(seed: int) -> None:
     for share, (first, total) in zip(found(x, ishigami(x)).inputs, ISHIGAMI, strict=True):
         assert share.total is not None
         assert abs(share.first - first) <= share.first_by < 0.1
-        assert abs(share.total - total) <= share.total_by < 0.1
+        assert share.total_low <= total <= share.total_high < share.total_low + 0.2
 
 
 def test_sobols_g_whose_many_inputs_act_together() -> None:
@@ -52,7 +52,7 @@ def test_sobols_g_whose_many_inputs_act_together() -> None:
     for share, first, total in zip(found(x, sobols_g(x, a)).inputs, alone / whole, totals, strict=True):
         assert share.total is not None
         assert abs(share.first - first) <= share.first_by < 0.1
-        assert abs(share.total - total) <= share.total_by < 0.1
+        assert share.total_low <= total <= share.total_high < share.total_low + 0.2
 
 
 def test_what_three_inputs_do_together_is_in_each_total() -> None:
@@ -68,7 +68,7 @@ def test_intervals_hold_what_is_true_as_often_as_they_say() -> None:
         x = cases(3, 256, 1000 + seed)
         for share, truth in zip(found(x, ishigami(x)).inputs, ISHIGAMI, strict=True):
             assert share.total is not None
-            held += [abs(share.first - truth[0]) <= share.first_by, abs(share.total - truth[1]) <= share.total_by]
+            held += [abs(share.first - truth[0]) <= share.first_by, share.total_low <= truth[1] <= share.total_high]
     # 95 % is said and more is held, as the points are even; 360 numbers have a standard error of 1.1 %
     assert np.mean(held) > 0.93
 
