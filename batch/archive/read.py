@@ -24,6 +24,7 @@ from batch.archive.stored import Stored, Unlike
 from met.diagnostic import Problem, error
 from met.distinct import distinct
 from met.host.files import open_regular
+from met.host.sources import ARCHIVES
 from met.plan import Plan
 from met.plan.columns import are_among
 from met.plan.swept import blocks
@@ -374,8 +375,12 @@ def check_signature(path: Path) -> None:
     except OSError as reason:
         why = (reason.strerror or str(reason)).lower()
         deck = f"`met run {path}` writes one" if path.suffix == ".ic" else WRITTEN
-        irregular = reason.errno == errno.EINVAL
-        helps = deck if isinstance(reason, FileNotFoundError) else IN_A_FILE if irregular else ()
+        helps: str | tuple[()] = IN_A_FILE if reason.errno == errno.EINVAL else ()
+        if isinstance(reason, FileNotFoundError):
+            helps = deck
+        elif isinstance(reason, IsADirectoryError):
+            inside = sorted(each.name for each in path.iterdir() if each.suffix in ARCHIVES and each.name.isprintable())
+            helps = f"archives in it: {', '.join(inside[:8])}" if inside else "there is no archive in it"
         raise Problem(error("E301", f"cannot read the archive {path}: {why}", help=helps)) from reason
     if begins != SIGNATURE:
         helps = f"`met run {path}` runs a deck into one" if path.suffix == ".ic" else WRITTEN

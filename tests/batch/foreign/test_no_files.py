@@ -57,6 +57,17 @@ def test_a_socket_in_the_place_of_an_archive(here: Path) -> None:
     )
 
 
+def test_a_folder_in_the_place_of_an_archive(archive: Path, here: Path) -> None:
+    Path("results").mkdir()
+    empty = (
+        "error[E301]: cannot read the archive results: is a directory\n = help: there is no archive in it\n\n1 error\n"
+    )
+    assert met("show", "results").text == empty
+    shutil.copy(archive, "results/b.h5")
+    shutil.copy(archive, "results/a.h5")
+    assert "\n = help: archives in it: a.h5, b.h5\n" in met("show", "results").text
+
+
 def test_a_pipe_in_the_place_of_a_plan_and_of_its_table(here: Path) -> None:
     os.mkfifo("plan.json")
     assert met("run", "plan.json").text == (
