@@ -211,9 +211,9 @@ def read_csv(path: str) -> CsvTable:
 
 def _table(file: str, text: str, declared: Collection[str] = ()) -> CsvTable:
     """A file's table. declared: the units of the deck's own."""
-    lines = text.split("\n")
-    rows = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
-    if not rows:
+    lines = _lines_with_cells(text)
+    head = next(lines, None)
+    if head is None:
         raise Problem(
             error(
                 "D191",
@@ -222,9 +222,9 @@ def _table(file: str, text: str, declared: Collection[str] = ()) -> CsvTable:
                 help="its first line names the columns, as in `time [s], shoulder [deg]`",
             )
         )
-    head = rows.pop(0)
     columns = tuple(_columns(file, *head, declared))
-    for line, row in rows:
+    rows = []
+    for line, row in lines:
         count = len(_cells(row))
         if count != len(columns):
             raise Problem(
@@ -237,7 +237,24 @@ def _table(file: str, text: str, declared: Collection[str] = ()) -> CsvTable:
                     help="commas part the cells, and a number has a decimal point",
                 )
             )
+        rows.append((line, row))
     return CsvTable(file, columns, tuple(rows))
+
+
+def _lines_with_cells(text: str) -> Iterator[tuple[int, str]]:
+    """Lines that are neither empty nor a remark, with their numbers from 1.
+
+    They are cut one by one, so that a mistake in the first lines of a long file is found at once.
+    """
+    start = 0
+    for number in itertools.count(1):
+        end = text.find("\n", start)
+        line = text[start:] if end < 0 else text[start:end]
+        if line.strip() and not line.lstrip().startswith("#"):
+            yield number, line
+        if end < 0:
+            return
+        start = end + 1
 
 
 def _columns(file: str, line: int, row: str, declared: Collection[str]) -> Iterator[CsvColumn]:
