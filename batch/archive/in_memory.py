@@ -18,7 +18,7 @@ from batch.archive import layout as archive_layout
 from batch.archive.layout import Layout
 from batch.archive.read import ArchiveGroup
 from batch.archive.stored import Stored
-from batch.archive.values import KINDS, values_of_cases, values_of_dimensions
+from batch.archive.values import KINDS, times_of, values_of_cases, values_of_dimensions
 from met.frozen import frozen
 from met.plan import Experiment, keys
 from met.run import Prepared, Run
@@ -77,7 +77,8 @@ class DatasetMaker:
         variables = [each for each in layout.variables if each.name not in left_out]
         used = {dim for each in variables if each.role != "dimension" for dim in each.dims}
         variables = [each for each in variables if each.role != "dimension" or each.name in used]
-        fixed = {**values_of_dimensions(experiment), "case": np.arange(count), "recorded_case": np.arange(count)}
+        fixed = values_of_dimensions(experiment) | {"case": np.arange(count), "recorded_case": np.arange(count)}
+        fixed["time"] = times_of(experiment)
         coordinates, laid = {}, {}
         for each in variables:
             attributes = _as_opened(each.written_attributes | each.code_key(prepared.result_keys))
@@ -108,7 +109,7 @@ class GroupInMemory(ArchiveGroup):
     """
 
     def __init__(self, experiment: Experiment, count: int, values: Mapping[str, Any]) -> None:
-        self._layout = archive_layout.layout(experiment, count, 0)
+        self._experiment, self._layout = experiment, archive_layout.layout(experiment, count, 0)
         self._values = {**values_of_dimensions(experiment), **values}
         self.path = Path(experiment.name)
         self.attributes = _as_read({**self._layout.attributes, "cases_in_table": experiment.cases.count})
@@ -143,7 +144,7 @@ class GroupInMemory(ArchiveGroup):
         return str(self.values(name).dtype.str)
 
     def values(self, name: str) -> np.ndarray:
-        return np.asarray(self._values[name])
+        return times_of(self._experiment) if name == "time" else np.asarray(self._values[name])
 
     def at(self, name: str, positions: Sequence[int] | np.ndarray) -> np.ndarray:
         return self.values(name)[np.asarray(positions, np.int64)]

@@ -58,10 +58,14 @@ def values_of_cases(experiment: Experiment, layout: Layout, run: Run, id_head: b
 
 
 def values_of_dimensions(experiment: Experiment) -> dict[str, Any]:
-    """The values of dimensions that do not depend on the cases that are run."""
-    schedule = experiment.structure.schedule
+    """The values of dimensions that do not depend on the cases that are run, but for `time`."""
     values: dict[str, Any] = {"requirement": np.array([r.text for r in experiment.requirements], dtype=object)}
-    values["time"] = np.arange(schedule.rows) * schedule.record / schedule.base_hz
     for dimensions in (archive_layout.joint_dimensions, archive_layout.component_dimensions):
         values |= {dim: np.array(names, dtype=object) for names, dim in dimensions(experiment).items()}
     return values
+
+
+def times_of(experiment: Experiment) -> np.ndarray:
+    """The values of the dimension `time`: the instants of a history's rows, s."""
+    schedule = experiment.structure.schedule
+    return np.arange(schedule.rows) * schedule.record / schedule.base_hz

@@ -21,7 +21,7 @@ from batch.archive.hdf5 import LIBVER, h5py, put_attributes
 from batch.archive.layout import Layout, Variable
 from batch.archive.provenance import Revision, version
 from batch.archive.sink import Sink
-from batch.archive.values import KINDS, values_of_cases, values_of_dimensions
+from batch.archive.values import KINDS, times_of, values_of_cases, values_of_dimensions
 from met import backends
 from met.frozen import frozen
 from met.plan import Experiment, Plan, recipes
@@ -263,6 +263,7 @@ def _write_rest(group: OpenGroup) -> None:
     part, layout = group.part, group.layout
     values: dict[str, Any] = {variable.name: group.gathered[variable.source] for variable in layout.role("recorded")}
     values |= values_of_dimensions(part.experiment)
+    values["time"] = times_of(part.experiment)
     values["recorded_case"] = part.experiment.cases.table[part.rows[part.kept]]
     for variable in layout.variables:
         if variable.role != "signal" and variable.dims[0] != "case":

@@ -14,7 +14,7 @@ import numpy as np
 from batch.archive.layout import layout
 from batch.archive.read import ArchiveGroup
 from batch.archive.stored import Stored
-from batch.archive.values import values_of_dimensions
+from batch.archive.values import times_of, values_of_dimensions
 from batch.arms.drawn import drawn_arm
 from batch.modules.description import described
 from batch.queries.pool import Pool
@@ -136,7 +136,7 @@ class ComputedGroup(ArchiveGroup):
     def __init__(self, group: ArchiveGroup, experiment: Experiment) -> None:
         self.__dict__.update(group.__dict__)
         laid = layout(experiment, 1, 1).variables
-        self._dimensions = values_of_dimensions(experiment)
+        self._dimensions = values_of_dimensions(experiment) | {"time": times_of(experiment)}
         self.__dict__["variables"] = {
             each.name: Stored(
                 each.name,
