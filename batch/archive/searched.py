@@ -9,6 +9,7 @@
     search_least_margin    disk margin below which a tuning does not advise a design;  search_steers: 1 where it was
                            also steered by that, else 0
     search_judged  the designs whose stability was judged, as JSON: the fields of `met.plan.searches.JudgedDesign`
+    search_starts  where a tuning began, and what it came to, as JSON: the fields of `met.plan.searches.TuningStart`
     search_along_slopes    of a tuning that goes by slopes: how many of its cases were tried along them
     search_without_slopes  of such a one: why its metrics had none where they had none last; empty where they had
 
@@ -27,13 +28,24 @@ import numpy as np
 
 from batch.archive.stored import Stored, StoredGroup
 from met.plan.codec import Damaged, decode, encode
-from met.plan.searches import MOST_PLANTS, MOST_SEARCHED, SHORTEST, JudgedDesign, Search, SearchedParameter
+from met.plan.searches import (
+    MOST_PLANTS,
+    MOST_SEARCHED,
+    SHORTEST,
+    JudgedDesign,
+    Search,
+    SearchedParameter,
+    TuningStart,
+    are_starts,
+)
 
 GENERATION = "generation"
 """The variable that says which generation asked for each case."""
 
-WORDS = ("search", "search_of", "search_goal", "search_against", "search_without_slopes", "search_judged")
+LISTS = ("search_judged", "search_starts")
+WORDS = ("search", "search_of", "search_goal", "search_against", "search_without_slopes", *LISTS)
 Judged = tuple[JudgedDesign, ...]
+Starts = tuple[TuningStart, ...]
 GOALS = {"maximise": True, "minimise": False}
 STEPS = {"equal": False, "ratios": True}
 
@@ -50,6 +62,7 @@ def attributes(search: Search, metric: str) -> dict[str, Any]:
     if search.kind == "tune":
         told |= {"search_margin": search.margin, "search_least_margin": search.least_margin}
         told["search_steers"] = int(search.steers)
+        told["search_starts"] = json.dumps(encode(Starts, search.starts))
         if search.judged:
             told["search_judged"] = json.dumps(encode(Judged, search.judged))
         if search.gradients:
@@ -101,12 +114,14 @@ def why_unsound(group: StoredGroup) -> str:
     least_margin = told.get("search_least_margin", 0.0)
     if not isinstance(least_margin, float) or not 0.0 <= least_margin < 2.0:
         return "attribute `search_least_margin` is no disk margin"
+    cases = told["cases_in_table"]
     try:
-        wrong = any(not 0 <= each.case < told["cases_in_table"] for each in _judged(told))
-    except (ValueError, RecursionError, Damaged):
-        wrong = True
-    if wrong:
-        return "attribute `search_judged` is no list of judged designs"
+        if not all(0 <= each.case < cases for each in _decoded(told, "search_judged", Judged)):
+            return "attribute `search_judged` is no list of judged designs"
+        if not are_starts(_decoded(told, "search_starts", Starts), cases):
+            return "attribute `search_starts` is not of its cases"
+    except (ValueError, RecursionError, Damaged) as reason:
+        return f"an attribute of its search is no list of what it should be: {reason}"
     coordinates = list(group.role("coordinate"))
     chosen = [each for each in coordinates if "low" in each.attributes]
     if not chosen or not all(map(_is_range, chosen)) or coordinates[: len(chosen)] != chosen:
@@ -122,12 +137,11 @@ def why_unsound(group: StoredGroup) -> str:
     )
 
 
-def _judged(attributes: Mapping[str, Any]) -> Judged:
-    """The designs whose stability was judged; raises ValueError, RecursionError or Damaged for a text that is none of
-    them."""
-    text = attributes.get("search_judged", "")
-    found: Judged = decode(Judged, json.loads(text), "") if text else ()
-    return found
+def _decoded(attributes: Mapping[str, Any], name: str, kind: Any) -> Any:
+    """The list of this kind that an attribute holds as JSON, empty where there is no attribute; raises ValueError,
+    RecursionError or Damaged for a text that is none."""
+    text = attributes.get(name, "")
+    return decode(kind, json.loads(text), name) if text else ()
 
 
 def _why_not_against(told: Mapping[str, Any], *, more: int) -> str:
@@ -135,7 +149,7 @@ def _why_not_against(told: Mapping[str, Any], *, more: int) -> str:
     against, plants, tunes = told.get("search_against", ""), told.get("search_plants", 0), told["search"] == "tune"
     if not bool(against) == bool(plants) == (more > 0):
         return "attribute `search_plants` is not of its coordinates"
-    of_tunings = ("search_along_slopes", "search_least_margin", "search_steers", "search_judged")
+    of_tunings = ("search_along_slopes", "search_least_margin", "search_steers", *LISTS)
     if not tunes and (plants or told.get("search_margin", 0.0) or not told.keys().isdisjoint(of_tunings)):
         return "a tuning alone is held against something"
     least = max(plants + SHORTEST if tunes else 1, told["cases_in_table"])
@@ -208,7 +222,8 @@ def search_of(group: StoredGroup) -> Search | None:
         margin=told.get("search_margin", 0.0),
         least_margin=told.get("search_least_margin", 0.0),
         steers=told.get("search_steers", 0) == 1,
-        judged=_judged(told),
+        judged=_decoded(told, "search_judged", Judged),
+        starts=_decoded(told, "search_starts", Starts),
         gradients="search_along_slopes" in told,
         along_slopes=told.get("search_along_slopes", 0),
         without_slopes=told.get("search_without_slopes", ""),

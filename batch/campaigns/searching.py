@@ -26,7 +26,7 @@ from met.frozen import frozen
 from met.plan import Experiment
 from met.plan.searches import Search
 from met.run import DONE, Run
-from met.searches import search_method, steps_of
+from met.searches import search_method, starts_of, steps_of
 from met.searches.answer import Answer, answer, designs_that_stand
 from met.searches.values import MET, MetricLimit, hurt, served
 
@@ -146,6 +146,7 @@ class CampaignSearch:
     def _complete(self) -> None:
         prepared = self.section.prepared
         search = replace(self.search, generations=tuple(self._generations), **steps_of(self._method))
+        search = replace(search, starts=starts_of(self._method, search, self._table, self.worth))
         if search.kind == "tune" and search.least_margin:
             designs = designs_that_stand(search, self._table, self.worth)
             search = replace(search, judged=judged_designs(prepared, search, designs))

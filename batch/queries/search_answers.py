@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import textwrap
 from collections.abc import Sequence
@@ -26,6 +27,9 @@ from met.searches.answer import Answer, answer
 
 OVER_CASES = re.compile(r" in [^<>]* of cases\b[^<>]*$")
 """The words by which a requirement is one over a share of cases."""
+
+NEAR_BEST = 0.02
+"""Share of a goal by which two starts of a tuning may differ, and are taken to have come to the same optimum."""
 
 NEAREST = 1
 """Number of requirements that are named as nearest to their limits."""
@@ -125,7 +129,8 @@ class SearchAnswer:
     def lines(self) -> list[str]:
         """The answer in lines, without the commands for further steps."""
         found, search = self.found, self.search
-        out = [*self._tuned(), *self._by_slopes()] if search.kind == "tune" else self._worst()
+        sureness = self._sureness() if found.stands else []
+        out = [*self._tuned(), *self._by_slopes(), *sureness] if search.kind == "tune" else self._worst()
         if found.missed:
             out.append(f"  misses {', '.join(found.missed)}")
         elif found.rooms and not found.failed:
@@ -142,6 +147,29 @@ class SearchAnswer:
         if why_not and search.gradients:
             out += wrapped(f"no slopes {'at some candidates' if count else 'to go by'}: {why_not}")
         return out
+
+    @cached_property
+    def starts(self) -> list[float]:
+        """The goal that each start of a tuning came to with all plants, SI, not-a-number where none did; none where the
+        archive was made before MET kept its starts."""
+        goal = self._given[2][self.search.metric]
+        return [float(goal[start.best]) if start.best >= 0 else math.nan for start in self.search.starts]
+
+    def _sureness(self) -> list[str]:
+        """Lines about how sure it is that a tuning's optimum is the best: the goals that its starts came to."""
+        reached, words = np.array(self.starts), "another `seed` or a larger `at_most` may find better"
+        if len(reached) == 1:
+            return wrapped(f"not sure that it is the best: there was one start alone; {words}")
+        if not np.isfinite(reached).any():
+            return []
+        best = np.nanmax(reached) if self.search.largest else np.nanmin(reached)
+        near = np.abs(reached - best) <= NEAR_BEST * abs(best)
+        if near.sum() > 1:
+            share = f"{100.0 * NEAR_BEST:g} %"
+            return wrapped(f"{near.sum()} of its {len(reached)} starts came to within {share} of one another")
+        others = [self.goal(value) if np.isfinite(value) else "none that meets all" for value in reached[~near]]
+        count = f"{len(reached)} starts one alone came to {self.goal(float(best))}, the other{'s' * (len(others) > 1)}"
+        return wrapped(f"not sure that it is the best: of {count} to {', '.join(others)}; {words}")
 
     def _border(self) -> list[str]:
         """The nearest tried candidate that does not meet the requirements, in lines."""
@@ -247,6 +275,7 @@ class SearchAnswer:
             "missed": list(found.missed),
             "nearest": [{"requirement": room.text, "inside": room.share} for room in found.rooms],
             "at_ends": [{"path": path, "end": end} for path, end in found.ends],
+            "starts": self.starts if self.search.kind == "tune" else None,
             "along_slopes": self.search.along_slopes if self.search.gradients else None,
             "without_slopes": self.search.without_slopes or None,
             "nearest_miss": None

@@ -177,7 +177,7 @@ def result_lines(
             for each, answer in zip(summaries, answers, strict=True)
         ]
         tuned = [
-            f"`{answer.name}` found nothing that meets all"
+            f"`{answer.name}` found nothing that {'it may advise' if answer.data['stability'] else 'meets all'}"
             for answer in answers
             if answer and answer.tunes and not answer.ok
         ]

@@ -6,7 +6,7 @@ import math
 
 from met.plan import Experiment
 from met.plan.codec import Damaged
-from met.plan.searches import MOST_PLANTS, MOST_SEARCHED, SHORTEST, Search
+from met.plan.searches import MOST_PLANTS, MOST_SEARCHED, SHORTEST, Search, are_starts
 from met.plan.structure import check_whole
 from met.unit_parser import parse_unit
 
@@ -29,6 +29,10 @@ def check_search(experiment: Experiment, search: Search, where: str) -> None:
         raise Damaged(f"{where}.judged", "a tuning alone that has run has judged designs")
     for index, design in enumerate(search.judged):
         check_whole(design.case, 0, experiment.cases.count - 1, f"{where}.judged[{index}].case")
+    if search.starts and not (search.kind == "tune" and search.complete):
+        raise Damaged(f"{where}.starts", "a tuning alone that has run has starts")
+    if not are_starts(search.starts, experiment.cases.count):
+        raise Damaged(f"{where}.starts", "they should rise, and lie among the cases")
     check_whole(search.along_slopes, 0, search.at_most, f"{where}.along_slopes")
     if search.gradients and search.kind != "tune":
         raise Damaged(f"{where}.gradients", "a tuning alone goes by slopes")

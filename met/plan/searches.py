@@ -98,6 +98,28 @@ class JudgedDesign:
 
 
 @frozen
+class TuningStart:
+    """A start of a tuning, and what it came to.
+
+    first  position in the case table of its first case
+    best   position of the worst case of its best design that meets all requirements with all plants; -1 for none
+    """
+
+    first: int
+    best: int
+
+
+def are_starts(starts: tuple[TuningStart, ...], cases: int) -> bool:
+    """True if a tuning of so many cases can have had these starts."""
+    ends = [start.first for start in starts[1:]] + [cases]
+    return not starts or (
+        starts[0].first == 0
+        and all(start.first < end for start, end in zip(starts, ends, strict=True))
+        and all(start.best == -1 or start.first <= start.best < end for start, end in zip(starts, ends, strict=True))
+    )
+
+
+@frozen
 class Search:
     """A search or a tuning: its goal, and the bounds of the chosen parameters.
 
@@ -116,6 +138,7 @@ class Search:
     generations  numbers of cases that each generation added to the case table; none before it has run
     along_slopes  how many of its cases were tried along slopes, and `without_slopes`: why there were none where there
                  were none last, in words, empty where there were; as found when it has run
+    starts       of a tuning that has run: where it began, and what it came to from there
     judged       the designs whose stability was judged when it had run, the best by its goal first, until one keeps the
                  least margin; none of a search, or of one that was run before MET judged it
     """
@@ -135,6 +158,7 @@ class Search:
     gradients: bool = False
     along_slopes: int = 0
     without_slopes: str = ""
+    starts: tuple[TuningStart, ...] = ()
     least_margin: float = LEAST_MARGIN
     steers: bool = False
     judged: tuple[JudgedDesign, ...] = ()

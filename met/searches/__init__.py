@@ -12,7 +12,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from met.plan.searches import Search
+from met.plan.searches import Search, TuningStart
+from met.searches.answer import designs_that_stand
 from met.searches.hardest import HardestCase
 from met.searches.robust import RobustTuning
 from met.searches.slopes import SlopeSource
@@ -44,4 +45,15 @@ def steps_of(method: SearchMethod) -> dict[str, Any]:
     return {} if steps is None else {"along_slopes": steps.cases, "without_slopes": steps.why_not}
 
 
-__all__ = ["SearchMethod", "search_method", "steps_of"]
+def starts_of(method: SearchMethod, search: Search, table: np.ndarray, worth: np.ndarray) -> tuple[TuningStart, ...]:
+    """The starts of a tuning that has ended; none of a search. table: of its cases, [case, coordinate]; worth: [case],
+    as the tuning took it"""
+    starts = []
+    beginnings = (0, *method.beginnings) if isinstance(method, RobustTuning) else ()
+    for first, last in zip(beginnings, (*beginnings[1:], len(table)), strict=True) if beginnings else ():
+        designs = designs_that_stand(search, table[first:last], worth[first:last])
+        starts.append(TuningStart(first, first + int(designs[0][0]) if designs else -1))
+    return tuple(starts)
+
+
+__all__ = ["SearchMethod", "search_method", "starts_of", "steps_of"]

@@ -45,7 +45,8 @@ Candidate = bytes
 class RobustTuning:
     """Method of a tuning (`SearchMethod`). Without plants the candidates themselves are the cases.
 
-    source  of slopes; None: there are none
+    source      of slopes; None: there are none
+    beginnings  numbers of the cases that were asked for before each fresh beginning
 
     A turn ends when the optimiser does, or when its share of the cases that are left is spent, and then the steps along
     slopes have ended. A plant that becomes active where these have settled takes steps alone. The tuning ends when no
@@ -70,6 +71,8 @@ class RobustTuning:
         self._since_beginning: dict[Candidate, None] = {}
         self._best_before: float | None = None
         self._fruitless = 0
+        self.beginnings: list[int] = []
+        self._begins_afresh = False
         self._begin_turn(None)
 
     def ask(self) -> np.ndarray:
@@ -77,6 +80,9 @@ class RobustTuning:
         while not self._confirmed:
             self._wanted = self._next()
             if self._wanted:
+                if self._begins_afresh:
+                    self.beginnings.append(self._search.at_most - self._left)
+                    self._begins_afresh = False
                 self._left -= len(self._wanted)
                 return np.array([[*np.frombuffer(each), *self._plants[plant]] for each, plant in self._wanted])
             if not self._confirmed:
@@ -105,6 +111,7 @@ class RobustTuning:
         known = self._known[best]
         self._active = [max(known, key=lambda each: known[each])]
         self._since_beginning, self._borne, self._idle = {}, None, 0
+        self._begins_afresh = True
         self._begin_turn(1.0 - self._points[best] if self._fruitless else None)
 
     def _begin_turn(self, start: np.ndarray | None) -> None:

@@ -4,7 +4,8 @@
 
 The crane is that of docs/search.md, arms are shipped decks. The optimum of `spring` is known in closed form, and that
 of others is the best of all tunings here and of one with four times the cases a seed. Steps are counted as cases; their
-slopes are told apart.
+slopes are told apart. The last two columns are of the tunings with slopes: the median number of cases along them, and
+how many of the seeds had two starts with goals within 2 % of one another.
 """
 
 from __future__ import annotations
@@ -21,9 +22,10 @@ import numpy as np
 import ic
 from batch.campaigns.points import with_cases
 from batch.campaigns.slopes import TuningSlopes
+from batch.queries.search_answers import NEAR_BEST
 from met import run as engine
 from met.plan import Experiment
-from met.searches import search_method, steps_of
+from met.searches import search_method, starts_of, steps_of
 from met.searches.values import served
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -160,8 +162,12 @@ tune t of fine {{
 }  # fmt: skip
 
 
-def tuned(experiment: Experiment, prepared: engine.Prepared, slopes: TuningSlopes) -> tuple[int, int, float, float]:
-    """Cases, those along slopes, the goal in the worst plant of the best candidate, and seconds of CPU."""
+Tuned = tuple[int, int, float, float, bool]
+
+
+def tuned(experiment: Experiment, prepared: engine.Prepared, slopes: TuningSlopes) -> Tuned:
+    """Cases, those along slopes, the goal in the worst plant of the best candidate, seconds of CPU, and whether two
+    starts agree."""
     search = experiment.search
     assert search is not None
     begun, method = time.process_time(), search_method(search, slopes)
@@ -177,11 +183,14 @@ def tuned(experiment: Experiment, prepared: engine.Prepared, slopes: TuningSlope
         worths.append(worth)
     seconds, table = time.process_time() - begun, np.concatenate(cases)
     _, of, tried = np.unique(table[:, : len(search.parameters)], axis=0, return_inverse=True, return_counts=True)
-    worst = np.full(len(tried), -np.inf)
-    np.maximum.at(worst, of.ravel(), np.concatenate(worths))
+    worst, worth = np.full(len(tried), -np.inf), np.concatenate(worths)
+    np.maximum.at(worst, of.ravel(), worth)
     best = float(worst[tried == max(1, len(search.plants))].min())
     goal_there = best / (1.0 - abs(best)) if abs(best) < 1.0 else np.inf
-    return len(table), steps_of(method).get("along_slopes", 0), goal_there, seconds
+    reached = np.sort([worth[start.best] for start in starts_of(method, search, table, worth) if start.best >= 0])
+    goals = (reached / (1.0 - np.abs(reached)))[:2]
+    agree = len(goals) == 2 and bool(goals[1] - goals[0] <= NEAR_BEST * abs(goals[0]))
+    return len(table), steps_of(method).get("along_slopes", 0), goal_there, seconds, agree
 
 
 def _run(program: engine.Prepared) -> engine.Run:
@@ -204,7 +213,7 @@ def compare(name: str, seeds: int) -> None:
     prepared.kernel  # noqa: B018  # compiled before time is taken
     first = np.array([np.asarray(each.values)[:1] for each in experiment.cases.coordinates]).T
     slopes.slopes(first)
-    found: dict[str, list[tuple[int, int, float, float]]] = {"off": [], "on": [], "long": []}
+    found: dict[str, list[Tuned]] = {"off": [], "on": [], "long": []}
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
         for way, gradients, times in (("off", False, 1), ("on", True, 1), ("long", False, 4)):
             one = replace(search, seed=seed, gradients=gradients, at_most=times * search.at_most)
@@ -215,8 +224,8 @@ def compare(name: str, seeds: int) -> None:
         off = [100.0 * (each[2] / best - 1.0) for each in found[way]]
         cases, seconds = (median(each[n] for each in found[way]) for n in (0, 3))
         row += [f"{cases:,.0f}", f"{_share(median(off))} ({_share(max(off))})", f"{seconds:.2g} s"]
-    along = median(each[1] for each in found["on"])
-    print(f"| {name} | {row[0]} | " + " | ".join(row[1:]) + f" | {along:.0f} |", flush=True)
+    along, agree = median(each[1] for each in found["on"]), sum(each[4] for each in found["on"])
+    print(f"| {name} | {row[0]} | " + " | ".join(row[1:]) + f" | {along:.0f} | {agree} |", flush=True)
 
 
 def _share(percent: float) -> str:

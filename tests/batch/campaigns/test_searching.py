@@ -7,10 +7,12 @@ import json
 import math
 import random
 import shlex
+import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
@@ -178,6 +180,51 @@ def test_a_tuning_says_how_far_it_went_along_slopes_and_comes_nearer_than_withou
 
 
 @pytest.mark.slow
+def test_a_tuning_says_how_many_of_its_starts_came_to_its_answer(place: Path, here: Path) -> None:
+    def answer(file: ArchiveFile) -> SearchAnswer:
+        found = SearchAnswer.of(next(group for group in file.groups if group.name == "still"))
+        assert found is not None
+        return found
+
+    def with_starts(text: str) -> list[str]:
+        shutil.copy(place / "undisturbed.h5", here / "other.h5")
+        with h5py.File(here / "other.h5", "r+") as data:
+            data["still"].attrs["search_starts"] = text
+        with ArchiveFile(here / "other.h5") as file:
+            return answer(file).lines()
+
+    with ArchiveFile(place / "undisturbed.h5") as file:
+        first, second, third = answer(file).search.starts
+        near, again, none = answer(file).starts
+        assert near == answer(file).found.value and near < again < 1.02 * near and math.isnan(none)
+        assert "  2 of its 3 starts came to within 2 % of one another" in answer(file).lines()
+        assert first.first == 0 and third.best == -1
+    assert "not sure that it is the best: there was one start alone" in "\n".join(
+        with_starts(json.dumps([{"first": 0, "best": first.best}]))
+    )
+    worse = with_starts(json.dumps([{"first": 0, "best": first.best}, {"first": second.first, "best": second.first}]))
+    assert "not sure that it is the best: of 2 starts one alone came to " in "\n".join(worse)
+    assert not [line for line in with_starts("[]") if "start" in line], "made before starts were kept"
+
+
+@pytest.mark.parametrize("text", [
+    '[{"first": 1, "best": 2}]',
+    '[{"first": 0, "best": 5}, {"first": 3, "best": 4}]',
+    '[{"first": 0, "best": 1000000000}]',
+    '[{"first": 0, "best": 0}, {"first": 0, "best": 1}]',
+    "{",
+    '["a"]',
+])  # fmt: skip
+@pytest.mark.slow
+def test_starts_that_cannot_be_are_refused(text: str, place: Path, here: Path) -> None:
+    shutil.copy(place / "undisturbed.h5", here / "odd.h5")
+    with h5py.File(here / "odd.h5", "r+") as data:
+        data["still"].attrs["search_starts"] = text
+    with pytest.raises(Problem, match="search"), ArchiveFile(here / "odd.h5"):
+        pass
+
+
+@pytest.mark.slow
 def test_a_tuning_of_what_has_no_slopes_says_why(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A share of samples moves in steps alone."""
     metric = "metric off = share_of_time { of = slide.q < 0 m; }"
@@ -338,6 +385,7 @@ def test_generations_stand_beside_the_cases(place: Path) -> None:
         "search": "tune", "search_of": "swing", "search_goal": "minimise off", "search_at_most": TUNED,
         "search_seed": 0, "search_margin": 0.05, "search_against": "loads", "search_plants": 5, "search_drawn_with": 0,
         "search_along_slopes": 34, "search_without_slopes": "", "search_least_margin": 0.3, "search_steers": 0,
+        "search_starts": '[{"first": 0, "best": 123}, {"first": 189, "best": 278}, {"first": 283, "best": -1}]',
         "search_judged": '[{"case": 121, "margins": null, "why_not": "no law closes a loop over the arm"}]',
     }  # fmt: skip
     assert "search_along_slopes" not in data["back"].attrs
