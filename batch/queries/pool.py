@@ -148,10 +148,19 @@ class Pool:
 
     @cached_property
     def ranking(self) -> Ranking:
-        """The cases: failed ones, then those that miss most requirements, then by the amount relative to the limit; as
-        `batch.queries.ordering.ranking` for one group."""
-        varied = [column.values for column in self.columns if column.role in ("choice", "parameter")]
-        return requirements.ranking(self.status, self.outcomes, self._far(), lambda at: [each[at] for each in varied])
+        """The cases: failed ones, then those that miss most requirements, then by how far they miss
+        (`requirements.ranking`).
+
+        The amount is relative to the limit (to the largest value where the limit is 0). Of equal ones those that are
+        far from one another in what is varied come first.
+        """
+        return requirements.ranking(self.status, self.outcomes, self._far(), self._varied)
+
+    def _varied(self, places: np.ndarray) -> list[np.ndarray]:
+        """The choices, as numbers, and the varied parameters in the cases at some places, an array each."""
+        choices = [self._choice(variable).values for variable in self.variables("choice")]
+        numbers = [self.gathered(variable.name) for variable in self.variables("coordinate")]
+        return [values[places] for values in (*choices, *numbers)]
 
     @property
     def worst_first(self) -> np.ndarray:
@@ -159,6 +168,7 @@ class Pool:
         return self.ranking.order
 
     def _far(self) -> np.ndarray:
+        """The distance of each case beyond the limit that it misses most, relative to that limit."""
         worst = np.full(self.count, -np.inf)
         for metric, limits in self.limits.items():
             values = self.gathered(metric)
