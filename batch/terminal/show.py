@@ -94,12 +94,13 @@ def show(
             shown = [each for each in shown if each[0].name not in hidden]
     if by is not None:
         for pool in pools([group for group, _ in shown]):
-            if len(pool.groups) > 1:
+            order = ordering.order_of(pool.groups, by)
+            if len(pool.groups) > 1 and order is not None:
                 most = None if all_cases else cases.SHOWN_CASES
                 among = None if some.everything else some.places(pool)
                 said = [] if among is None else [some.words(len(among), pool.count)]
-                table = cases.table_across(pool, by, most, among=among) if among is None or len(among) else []
-                out += ["", f"{pool.name}, {by.title}", *said, *table]
+                table = cases.table_across(pool, order, most, among=among) if among is None or len(among) else []
+                out += ["", f"{pool.name}, {order.title}", *said, *table]
                 shown = [each for each in shown if signals or each[0] not in pool.groups]
     for group, position in shown:
         out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, by, some, width), ""]
