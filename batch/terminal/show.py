@@ -22,6 +22,7 @@ from batch.queries.groups import cases_named, groups_named
 from batch.queries.ordering import CaseOrder
 from batch.queries.pool import Pool, pools
 from batch.queries.search_answers import SearchAnswer
+from batch.queries.search_result import search_result
 from batch.queries.selection import CaseSelection
 from batch.queries.signals import case_text, history, number_text, number_texts, panels, pretty_unit
 from batch.queries.step_errors.words import NONE, about, error_text
@@ -39,7 +40,6 @@ from batch.queries.summary import (
 )
 from batch.terminal.evidence import evidence_lines
 from batch.terminal.evidence_table import evidence_table_lines
-from batch.terminal.search import search_result
 from ic.printing.columns import columns, count
 from ic.printing.columns import size as size_text
 from met.distinct import distinct

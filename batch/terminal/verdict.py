@@ -12,9 +12,9 @@ from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, CampaignPart
 from batch.campaigns.status import duration
 from batch.queries.failures import failure_lines
+from batch.queries.search_result import SearchResult
 from batch.queries.step_errors.words import HINT
 from batch.queries.summary import Summary, as_json, finite
-from batch.terminal.search import SearchResult
 from batch.terminal.show import verdict, warning_lines
 from ic.printing.columns import size as size_text
 from ic.sweeps.confidences import OF_CASES

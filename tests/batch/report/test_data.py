@@ -12,6 +12,7 @@ import batch
 from batch.archive.read import ArchiveFile
 from batch.queries import cases
 from batch.queries.best import Designs
+from batch.queries.best_answer import BestAnswer
 from batch.queries.grids import column_levels
 from batch.queries.pool import ENDED, CaseColumn, Pool, pools
 from batch.report.contents import histories, overview, stability
@@ -23,7 +24,6 @@ from batch.report.contents.maps import ruler
 from batch.report.contents.parts import OutcomeCount, Report
 from batch.report.contents.thinning import thin, thin_clock
 from batch.report.html.payload import _column
-from batch.terminal.best import BestAnswer
 from met.analysis.margin import margins
 from tests.batch import plans
 from tests.batch.report import archives
