@@ -15,8 +15,8 @@ from batch.campaigns.campaign import Campaign, Wires, prepare
 from batch.campaigns.output import sidecar_path
 from batch.campaigns.performing import perform
 from batch.campaigns.plans import read_plan
+from batch.queries.bed_margins import in_words
 from batch.queries.summary import summarise
-from batch.terminal.margin import in_words
 from batch.terminal.running import first_picture
 from batch.terminal.verdict import announcement, result_lines, worst_cases, writing
 from hw.drivers import check_model, in_lock_step, kind_of, ports_in_words

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from batch.queries.bed_margins import stable_head
 from batch.report.contents.parts import (
     EvidencePart,
     InfluencePart,
@@ -16,7 +17,6 @@ from batch.report.contents.parts import (
 )
 from batch.report.html.blocks import Anchors, case_link, mark, scrolling, spot_link
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
-from batch.terminal.margin import stable_head
 
 SHOWN_CASES = 8
 """Number of visible rows of the best and of the worst cases; the others are folded away."""
