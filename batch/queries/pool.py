@@ -13,6 +13,7 @@ from batch.archive.stored import Stored
 from batch.queries import requirements
 from batch.queries.failures import STATUS, FailureGroup, failures
 from batch.queries.grids import METRIC_SPAN, is_log, levels, spans
+from batch.queries.groups import by_run
 from batch.queries.requirements import Ranking
 from batch.queries.signals import deck_unit, number_text
 from met.distinct import distinct
@@ -242,5 +243,4 @@ def page_number(value: float) -> str:
 
 def pools(groups: Sequence[ArchiveGroup]) -> list[Pool]:
     """A pool for each run or sweep among the groups."""
-    names = list(dict.fromkeys(group.sweep or group.name for group in groups))
-    return [Pool(name, [g for g in groups if (g.sweep or g.name) == name]) for name in names]
+    return [Pool(name, own) for name, own in by_run(groups).items()]
