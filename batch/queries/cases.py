@@ -91,8 +91,7 @@ def table_across(
         written = number_texts(values) if column.role == "parameter" else map(number_text, values)
         texts = ["" if np.isnan(value) else text for value, text in zip(values, written, strict=True)]
         if column.limits:
-            judged = [pool.requirements.index(limit.text) for limit in column.limits]
-            missed = (pool.outcomes[places][:, judged] == 0).any(axis=1)
+            missed = pool.missed(column)[places]
             texts = [f"{text} {MISSES if miss else ' '}" for text, miss in zip(texts, missed, strict=True)]
             name, unit = f"{name}  ", f"{unit}  "
         cells.append([name, unit, *texts])

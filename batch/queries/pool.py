@@ -117,6 +117,11 @@ class Pool:
                     out[here, self.requirements.index(text)] = found[:, column]
         return out
 
+    def missed(self, column: CaseColumn) -> np.ndarray:
+        """[case] whether a metric misses one of its requirements."""
+        places = [self.requirements.index(limit.text) for limit in column.limits]
+        return np.asarray((self.outcomes[:, places] == 0).any(axis=1))
+
     @cached_property
     def ended(self) -> np.ndarray:
         """[case] its outcome, as its place in `ENDED`."""
