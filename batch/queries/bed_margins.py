@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from met.analysis.margin import Margin
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from met.analysis.margin import Margin
 
 
 def stable_head(spans: bool) -> str:
