@@ -15,10 +15,10 @@ from batch.campaigns.campaign import Campaign, Wires, prepare
 from batch.campaigns.output import sidecar_path
 from batch.campaigns.performing import perform
 from batch.campaigns.plans import read_plan
+from batch.queries.bed_margins import in_words
 from batch.queries.summary import summarise
-from batch.terminal.margin import in_words
 from batch.terminal.running import first_picture
-from batch.terminal.verdict import announcement, result_lines, worst_cases, writing
+from batch.terminal.verdict import RunResult, announcement, result_lines, worst_cases, writing
 from hw.drivers import check_model, in_lock_step, kind_of, ports_in_words
 from hw.driving.case import check, pace_of
 from met.analysis.margin import margins, remedy
@@ -149,13 +149,12 @@ def run_and_tell(
             executor.check(*beds_before(campaign.output), f"{campaign.output} holds this campaign")
             say(f"nothing is missing: {campaign.output} has all of it (`--fresh` drives it again)")
         with ArchiveFile(campaign.output) as file:
-            summaries, worst = summarise(file), worst_cases(file)
-            picture, excuse = (None, "") if no_picture else first_picture(file)
+            drawn = (None, "") if no_picture else first_picture(file)
+            result = RunResult(summarise(file), worst_cases(file), *drawn)
         for line in timing_lines(executor):
             say(line)
-        ok = all(summary.ok for summary in summaries)
-        say("\n".join(result_lines(campaign, summaries, worst, picture, excuse, None, performed.seconds, ok, ())))
-    return ok
+        say("\n".join(result_lines(campaign, result, None, performed)))
+    return result.ok
 
 
 def beds_before(archive: Path) -> tuple[dict[str, str], dict[str, Any]]:

@@ -8,7 +8,7 @@ from textwrap import wrap
 
 from batch.beds.bed_size import BedSize
 from batch.beds.sizing import UNITS, Extreme, MotorFigures, PartCheck, PartVerdict
-from batch.terminal.margin import in_words
+from batch.queries.bed_margins import in_words
 from ic.printing.columns import columns, count
 from met.analysis.margin import remedy
 

@@ -88,14 +88,14 @@ def best(
 
     from batch.archive.read import ArchiveFile
     from batch.archive.searched import search_of
+    from batch.campaigns.judging_best import judged_best
     from batch.queries.best import Designs
+    from batch.queries.best_answer import BestAnswer, context
     from batch.queries.groups import groups_named
     from batch.queries.pool import pools
+    from batch.queries.search_result import search_result
     from batch.queries.summary import finite
-    from batch.terminal.best import BestAnswer, context
-    from batch.terminal.best_stability import judged_best
     from batch.terminal.chosen_deck import chosen_deck
-    from batch.terminal.search import search_result
     from met.diagnostic import Problem, error
     from met.outputs import quoted
 

@@ -12,7 +12,7 @@ from batch.archive.stored import Stored
 from batch.export.picking import rank
 from batch.queries import requirements
 from batch.queries.failures import STATUS
-from batch.queries.groups import cases_named, groups_named
+from batch.queries.groups import by_run, cases_named, groups_named
 from met.frozen import frozen
 from met.unit_parser import decimals
 
@@ -98,13 +98,12 @@ def table(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], *, deck:
         ranks = np.array([rank(names, group) for group in groups])[group_of]
         order = np.lexsort((numbers, ranks))
         group_of, positions = group_of[order], positions[order]
-    asked = tuple(dict.fromkeys(group.sweep or group.name for group in groups))
-    return CaseTable(asked, groups, (group_of, positions), tuple(_fields(groups, deck=deck)))
+    return CaseTable(tuple(by_run(groups)), groups, (group_of, positions), tuple(_fields(groups, deck=deck)))
 
 
 def _fields(groups: Sequence[ArchiveGroup], *, deck: bool) -> Iterator[TableColumn]:
     """The columns: the case, its varied values, its end, metrics, requirements."""
-    if len({group.sweep or group.name for group in groups}) > 1:
+    if len(by_run(groups)) > 1:
         yield TableColumn("run", "", "run or sweep", "str")
     yield TableColumn("case", "1", "position in the case table", "int", "case")
     yield TableColumn("case_id", "", "name of the case", "str", "case_id")

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from batch.archive.read import ArchiveFile
 from batch.export.case_table import NumberOfUnit, TableColumn
 from batch.queries.evidence_table import RequirementEvidence, requirement_evidence
-from batch.queries.groups import groups_named
+from batch.queries.groups import by_run, groups_named
 from met.frozen import frozen
 from met.unit_parser import decimals
 
@@ -75,10 +75,8 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
 def evidence_columns(file: ArchiveFile, runs: Sequence[str], *, deck: bool = False) -> EvidenceColumns:
     """The table of evidence of these runs and sweeps, of all if none is named. Raises Problem E325."""
     groups = groups_named(file, tuple(runs))
-    several = len({each.sweep or each.name for each in file.groups}) > 1
-    rows = requirement_evidence(groups, file.path.name, several=several)
-    names = tuple(dict.fromkeys(group.sweep or group.name for group in groups))
+    rows = requirement_evidence(groups, file.path.name, several=len(by_run(file.groups)) > 1)
     fields = tuple(
         TableColumn(name, "" if kind == "str" or name in IN_UNIT else "1", about, kind) for name, kind, about in COLUMNS
     )
-    return EvidenceColumns(names, tuple(rows), fields, deck)
+    return EvidenceColumns(tuple(by_run(groups)), tuple(rows), fields, deck)

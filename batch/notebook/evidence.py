@@ -12,6 +12,7 @@ import xarray
 from batch.notebook.source import archive
 from batch.notebook.table import cases_of, name_of
 from batch.queries.evidence_table import FIELDS, as_data, requirement_evidence
+from batch.queries.groups import by_run
 from met.diagnostic import Problem, error
 
 
@@ -25,8 +26,8 @@ def table(path: Path, parts: Mapping[str, xarray.Dataset]) -> Any:
             if names[group.name] != group.count:
                 message = f"evidence is of all cases, and here are {names[group.name]:,} of {group.count:,}"
                 raise Problem(error("E388", message, help="ask the data as they were opened: `batch.open(FILE).met`"))
-        several = len({each.sweep or each.name for each in file.groups}) > 1
-        rows = [as_data(row) for row in requirement_evidence(groups, path.name, several=several)]
+        found = requirement_evidence(groups, path.name, several=len(by_run(file.groups)) > 1)
+        rows = [as_data(row) for row in found]
     held = {name: ("row", _column([row[name] for row in rows])) for name in FIELDS}
     return xarray.Dataset(held, coords={"row": range(len(rows))}).to_dataframe()
 

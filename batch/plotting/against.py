@@ -10,6 +10,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.differences import matching
+from batch.queries.groups import by_run
 from batch.queries.signals import Panel, pretty_unit
 from met.diagnostic import Problem, error
 from met.messages.visible import line
@@ -97,9 +98,8 @@ def beside(archive: ArchiveFile, groups: Sequence[ArchiveGroup], other: ArchiveF
     found = [OtherGroup(group, pairs[id(group)], names) if id(group) in pairs else None for group in groups]
     if not any(found):
         asked = groups[0].sweep or groups[0].name
-        known = dict.fromkeys(group.sweep or group.name for group in other.groups)
         message = f"no run or sweep `{asked}` in {names[1]} to draw against"
-        raise Problem(error("E393", message, help=f"in it: {', '.join(known)}"))
+        raise Problem(error("E393", message, help=f"in it: {', '.join(by_run(other.groups))}"))
     if not any((each.places >= 0).any() for each in found if each is not None):
         message = f"no case of `{groups[0].sweep or groups[0].name}` is in both {names[0]} and {names[1]}"
         helps = ("cases are the same where what is varied has the same values", _differ(archive.path, other.path))

@@ -67,11 +67,10 @@ def map_metrics(pool: Pool, names: Sequence[str], others: Mapping[int, OtherGrou
     for column in pool.metrics():
         name = column.key.partition(":")[2]
         if not names or name in names:
-            missed = np.zeros(pool.count, bool)
-            for limit in column.limits:
-                missed |= pool.outcomes[:, pool.requirements.index(limit.text)] == 0
             theirs, theirs_missed = _theirs(pool, name, others, bool(names))
-            out.append(MapMetric(column, drawable(column.values), missed, failed, theirs, theirs_missed, both))
+            out.append(
+                MapMetric(column, drawable(column.values), pool.missed(column), failed, theirs, theirs_missed, both)
+            )
     return sorted(out, key=lambda each: _place(names, each.column.key.partition(":")[2]))
 
 

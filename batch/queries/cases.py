@@ -76,7 +76,7 @@ def table_across(
     structures. among: places, None for all"""
     from ic.printing.columns import columns
 
-    places = _among(ordering.positions_in_pool(pool, by), among)
+    places = _among(ordering.places(pool, by), among)
     left = 0 if most is None else max(0, len(places) - most)
     places = places[: len(places) - left]
     cells = [["", "", *(f"#{case}" for case in pool.cases[places])]]
@@ -91,8 +91,7 @@ def table_across(
         written = number_texts(values) if column.role == "parameter" else map(number_text, values)
         texts = ["" if np.isnan(value) else text for value, text in zip(values, written, strict=True)]
         if column.limits:
-            judged = [pool.requirements.index(limit.text) for limit in column.limits]
-            missed = (pool.outcomes[places][:, judged] == 0).any(axis=1)
+            missed = pool.missed(column)[places]
             texts = [f"{text} {MISSES if miss else ' '}" for text, miss in zip(texts, missed, strict=True)]
             name, unit = f"{name}  ", f"{unit}  "
         cells.append([name, unit, *texts])
@@ -128,7 +127,7 @@ def _listed(group: ArchiveGroup, by: CaseOrder | None, among: np.ndarray | None,
     ):
         named = distinct(np.concatenate([summed.values[name] for name in CASES]))
         return np.array([group.position_of(int(case)) for case in named[named >= 0][:MOST_STANDING_OUT]], np.int64)
-    return _among(ordering.positions(group, by), among)
+    return _among(ordering.places(Pool(group.name, [group]), by), among)
 
 
 CASES = ("judged_worst_case", "least_case", "most_case", "cause_first")
@@ -139,12 +138,14 @@ MOST_STANDING_OUT = 100
 
 
 def _title(group: ArchiveGroup, most: int | None, by: CaseOrder | None) -> str:
-    if (found := ordering.order_of_group(group, by)) is not None:
+    if (found := ordering.order_of([group], by)) is not None:
         return found.title
     outcomes = requirements.outcomes(group)
     number = f"{min(most, group.count)} " if most is not None else ""
     failed = bool((group.values("status") != 0).any())
-    equal = ordering.ranking(group).equal(SHOWN_CASES if most is None else most) if failed or outcomes.shape[1] else 0
+    equal = 0
+    if failed or outcomes.shape[1]:
+        equal = Pool(group.name, [group]).ranking.equal(SHOWN_CASES if most is None else most)
     if failed or (outcomes != 1).any():
         many = f" ({equal:,} are equally bad)" if equal else ""
         return f"the {number}worst cases{many}:" if number else f"cases, worst first{many}:"

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from met.diagnostic import Problem, error
 
 
+def by_run(groups: Iterable[ArchiveGroup]) -> dict[str, list[ArchiveGroup]]:
+    """The groups of each run or sweep, under its name."""
+    found: dict[str, list[ArchiveGroup]] = {}
+    for group in groups:
+        found.setdefault(group.sweep or group.name, []).append(group)
+    return found
+
+
 def groups_named(archive: ArchiveFile, names: Sequence[str]) -> tuple[ArchiveGroup, ...]:
     """The experiments of these names, or all where none is given."""
-    known = [*dict.fromkeys(group.sweep or group.name for group in archive.groups)]
     for name in names:
         if all(name not in (group.name, group.sweep) for group in archive.groups):
-            helps = f"in it: {', '.join(known)}"
+            helps = f"in it: {', '.join(by_run(archive.groups))}"
             raise Problem(error("E325", f"no run or sweep `{name}` in {archive.path}", help=helps))
     found = [group for name in names for group in archive.groups if name in (group.name, group.sweep)]
     return tuple(dict.fromkeys(found)) if names else archive.groups

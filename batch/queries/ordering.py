@@ -7,15 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from batch.archive.read import ArchiveGroup
-from batch.queries import requirements
-from batch.queries.pool import Pool, Role, pools
+from batch.queries.pool import Pool, pools
 from met.diagnostic import Problem, did_you_mean, error
 from met.frozen import frozen
 
 REPEAT = "repeat"
-ROLES: tuple[Role, ...] = ("metric", "parameter", "repeat")
-"""Roles of variables by which cases may be listed."""
-
 
 WAYS = {"smallest": False, "largest": True}
 """Words after a name, `settle:largest`; True where the largest comes first."""
@@ -65,7 +61,7 @@ def check(groups: Sequence[ArchiveGroup], by: CaseOrder | None) -> None:
     """Raise Problem E329 where no group has the quantity of the order, or each has only one case."""
     if by is None:
         return
-    known = list(dict.fromkeys(name for group in groups for name in _names(group)))
+    known = list(_names(groups))
     for key in by.keys:
         if key.name not in known:
             parts = [part.strip() for part in key.name.split(",")]
@@ -84,68 +80,27 @@ def check(groups: Sequence[ArchiveGroup], by: CaseOrder | None) -> None:
         )
 
 
-def positions(group: ArchiveGroup, by: CaseOrder | None = None) -> np.ndarray:
-    """Positions of the cases in this order, equal ones in the order of the case table and cases without a value last;
-    worst first where there is no order, or the group lacks the quantity."""
-    by = order_of_group(group, by)
+def places(pool: Pool, by: CaseOrder | None = None) -> np.ndarray:
+    """Places of the cases in this order, equal ones in the order of the case table and cases without a value last;
+    worst first where there is no order, or no case has the quantity."""
+    by = order_of(pool.groups, by)
     if by is None:
-        return worst_first(group)
-    names = _names(group)
-    return _order(by, [np.asarray(group.values(names[key.name]), np.float64) for key in by.keys])
-
-
-def positions_in_pool(pool: Pool, by: CaseOrder) -> np.ndarray:
-    """The order of the cases of all structures of a sweep, of which some have the quantity: those of others are
-    last."""
-    columns = {column.label: column for column in pool.columns if column.role in ROLES}
-    return _order(by, [columns[key.name].values for key in by.keys])
-
-
-def _order(by: CaseOrder, values: Sequence[np.ndarray]) -> np.ndarray:
-    """Places ordered by the first of the values, equal ones by the next; not-a-number last in each."""
-    keys = [-each if key.largest else each for key, each in zip(by.keys, values, strict=True)]
+        return pool.worst_first
+    names = _names(pool.groups)
+    keys = [-values if key.largest else values for key in by.keys for values in [pool.gathered(names[key.name])]]
     return np.lexsort(keys[::-1])
 
 
-def order_of_group(group: ArchiveGroup, by: CaseOrder | None) -> CaseOrder | None:
-    """The part of an order whose names the group has; None where it has none of them."""
-    names = _names(group) if by is not None else {}
+def order_of(groups: Sequence[ArchiveGroup], by: CaseOrder | None) -> CaseOrder | None:
+    """The part of an order whose names these groups have; None where they have none of them."""
+    names = _names(groups) if by is not None else {}
     return _joined([key for key in by.keys if key.name in names]) if by is not None else None
 
 
-def worst_first(group: ArchiveGroup) -> np.ndarray:
-    """Positions of the cases, worst first (`ranking`)."""
-    return ranking(group).order
-
-
-def ranking(group: ArchiveGroup) -> requirements.Ranking:
-    """The cases: failed ones, then those that miss most requirements, then by how far they miss.
-
-    The amount is relative to the limit (to the largest value where the limit is 0); a case that meets all requirements
-    stands by how close it comes to one. Without requirements the order is the case table's. Of equal ones those that
-    are far from one another in what is varied come first.
-    """
-    names = [variable.name for variable in group.role("coordinate")]
-    return requirements.ranking(
-        group.values("status"),
-        requirements.outcomes(group),
-        _far(group),
-        lambda at: [group.values(name)[at] for name in names],
-    )
-
-
-def _far(group: ArchiveGroup) -> np.ndarray:
-    """The distance of each case beyond the limit that it misses most, relative to that limit."""
-    worst = np.full(group.count, -np.inf)
-    for each in requirements.group_requirements(group):
-        far = requirements.beyond(group.values(each.metric), each.comparison, each.limit)
-        worst = np.maximum(worst, far)
-    return worst
-
-
-def _names(group: ArchiveGroup) -> dict[str, str]:
+def _names(groups: Sequence[ArchiveGroup]) -> dict[str, str]:
     """Names by which cases may be listed, in users' notation, with the variable of each."""
-    found = {variable.path: variable.name for variable in (*group.role("metric"), *group.role("coordinate"))}
-    if REPEAT in group.variables and group.values(REPEAT).any():
+    variables = [variable for group in groups for variable in (*group.role("metric"), *group.role("coordinate"))]
+    found = {variable.path: variable.name for variable in variables}
+    if any(REPEAT in group.variables and group.values(REPEAT).any() for group in groups):
         found.setdefault(REPEAT, REPEAT)
     return found

@@ -13,6 +13,7 @@ from batch.archive.stored import Stored
 from batch.queries import requirements
 from batch.queries.failures import STATUS, FailureGroup, failures
 from batch.queries.grids import METRIC_SPAN, is_log, levels, spans
+from batch.queries.groups import by_run
 from batch.queries.requirements import Ranking
 from batch.queries.signals import deck_unit, number_text
 from met.distinct import distinct
@@ -116,6 +117,11 @@ class Pool:
                     out[here, self.requirements.index(text)] = found[:, column]
         return out
 
+    def missed(self, column: CaseColumn) -> np.ndarray:
+        """[case] whether a metric misses one of its requirements."""
+        places = [self.requirements.index(limit.text) for limit in column.limits]
+        return np.asarray((self.outcomes[:, places] == 0).any(axis=1))
+
     @cached_property
     def ended(self) -> np.ndarray:
         """[case] its outcome, as its place in `ENDED`."""
@@ -148,10 +154,19 @@ class Pool:
 
     @cached_property
     def ranking(self) -> Ranking:
-        """The cases: failed ones, then those that miss most requirements, then by the amount relative to the limit; as
-        `batch.queries.ordering.ranking` for one group."""
-        varied = [column.values for column in self.columns if column.role in ("choice", "parameter")]
-        return requirements.ranking(self.status, self.outcomes, self._far(), lambda at: [each[at] for each in varied])
+        """The cases: failed ones, then those that miss most requirements, then by how far they miss
+        (`requirements.ranking`).
+
+        The amount is relative to the limit (to the largest value where the limit is 0). Of equal ones those that are
+        far from one another in what is varied come first.
+        """
+        return requirements.ranking(self.status, self.outcomes, self._far(), self._varied)
+
+    def _varied(self, places: np.ndarray) -> list[np.ndarray]:
+        """The choices, as numbers, and the varied parameters in the cases at some places, an array each."""
+        choices = [self._choice(variable).values for variable in self.variables("choice")]
+        numbers = [self.gathered(variable.name) for variable in self.variables("coordinate")]
+        return [values[places] for values in (*choices, *numbers)]
 
     @property
     def worst_first(self) -> np.ndarray:
@@ -159,6 +174,7 @@ class Pool:
         return self.ranking.order
 
     def _far(self) -> np.ndarray:
+        """The distance of each case beyond the limit that it misses most, relative to that limit."""
         worst = np.full(self.count, -np.inf)
         for metric, limits in self.limits.items():
             values = self.gathered(metric)
@@ -232,5 +248,4 @@ def page_number(value: float) -> str:
 
 def pools(groups: Sequence[ArchiveGroup]) -> list[Pool]:
     """A pool for each run or sweep among the groups."""
-    names = list(dict.fromkeys(group.sweep or group.name for group in groups))
-    return [Pool(name, [g for g in groups if (g.sweep or g.name) == name]) for name in names]
+    return [Pool(name, own) for name, own in by_run(groups).items()]

@@ -21,14 +21,22 @@ from batch.executors.choose import choose
 from batch.executors.threads import Threads
 from batch.export import Exported
 from batch.export.from_run import archive_and_export, check, export_command, export_run
+from batch.queries.search_result import search_result
 from batch.queries.streamed import MANY
 from batch.queries.structures import structures
 from batch.queries.summary import RequirementSummary, Summary, summarise
 from batch.queries.warnings import campaign_warnings
 from batch.terminal.progress import Bar
-from batch.terminal.search import SearchResult, search_result
-from batch.terminal.verdict import WorstCaseLines, announcement, result_lines, verdict_json, worst_cases, writing
-from met.diagnostic import Diagnostic, Problem, error
+from batch.terminal.verdict import (
+    RunResult,
+    WorstCaseLines,
+    announcement,
+    result_lines,
+    verdict_json,
+    worst_cases,
+    writing,
+)
+from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.sources import names_archive, names_plan
 from met.host.streams import OutputLost, kept
@@ -47,32 +55,6 @@ class RunRequest:
     defines: tuple[str, ...]
     include_dirs: tuple[str, ...]
     settings: tuple[str, ...]
-
-
-@frozen
-class RunResult:
-    """The results that an archive has of the cases that were run, and the picture of it.
-
-    worst    the worst cases of each summary
-    tables   of sweeps of several structures
-    picture  its file; None where there is none
-    excuse   why there can be none, in words
-    answers  of searches, by summary; None of what is none
-    warned   what errors by the step, the steps themselves and limits of machines call in question, with their places
-    """
-
-    summaries: tuple[Summary, ...]
-    worst: tuple[WorstCaseLines, ...]
-    tables: Sequence[Sequence[str]]
-    picture: Path | None
-    excuse: str
-    warned: tuple[Diagnostic, ...]
-    answers: tuple[SearchResult | None, ...]
-
-    @property
-    def ok(self) -> bool:
-        """True if every case reached its end and met its requirements; for a tuning, if those of its answer did."""
-        return all(summary.ok for summary in self.summaries)
 
 
 def run_and_tell(
@@ -133,9 +115,9 @@ def run_and_tell(
         missing = target is not None and exported is None
         ok = result.ok and not unlike and not missing
         if json:
-            print(_json(campaign, result, exported, performed, [*compared, *refused], ok), flush=True)
+            print(verdict_json(campaign, result, exported, performed, [*compared, *refused], ok), flush=True)
             return ok
-        say("\n".join(_lines(campaign, result, exported, performed)))
+        say("\n".join(result_lines(campaign, result, exported, performed)))
         if result.warned and not quiet:
             _complain(Problem(result.warned, {each.name: each.text for each in campaign.plan.sources}), json)
         for line in compared:
@@ -225,7 +207,7 @@ def _result(campaign: Campaign, performed: Performed, no_picture: bool, say: Cal
         except KeyboardInterrupt as interrupt:
             say(f"{campaign.output} is whole; its picture is missing: `met plot {quoted(campaign.output)}`")
             raise type(interrupt) from None
-    return RunResult(summaries, worst, tables, picture, excuse, tuple(warned), answers)
+    return RunResult(summaries, worst, picture, excuse, tables, tuple(warned), answers)
 
 
 MOST_READ = MANY
@@ -266,8 +248,7 @@ def _counted_result(campaign: Campaign, performed: Performed) -> RunResult:
             )
         )
     none = (WorstCaseLines(),) * len(summaries)
-    excuse = NOT_DRAWN.format(MOST_READ)
-    return RunResult(tuple(summaries), none, (), None, excuse, performed.warned, (None,) * len(summaries))
+    return RunResult(tuple(summaries), none, None, NOT_DRAWN.format(MOST_READ), warned=performed.warned)
 
 
 def _exported(
@@ -286,37 +267,6 @@ def _exported(
         command = export_command(campaign, target, histories=histories)
         say(f"{campaign.output} is whole; {target} is missing: `{command}`")
         raise type(interrupt) from None
-
-
-def _json(
-    campaign: Campaign,
-    result: RunResult,
-    exported: Exported | None,
-    performed: Performed,
-    notes: Sequence[str],
-    ok: bool,
-) -> str:
-    """The verdict for programs. notes: besides those of the run itself."""
-    seconds, notes = performed.seconds, [*performed.notes, *notes]
-    return verdict_json(
-        campaign, result.summaries, result.worst, result.picture, exported, seconds, notes, ok, result.answers
-    )
-
-
-def _lines(campaign: Campaign, result: RunResult, exported: Exported | None, performed: Performed) -> list[str]:
-    """The verdict for people."""
-    return result_lines(
-        campaign,
-        result.summaries,
-        result.worst,
-        result.picture,
-        result.excuse,
-        exported,
-        performed.seconds,
-        result.ok,
-        result.tables,
-        result.answers,
-    )
 
 
 def submit_and_tell(

@@ -18,10 +18,11 @@ from batch.queries.evidence_table import RequirementEvidence, requirement_eviden
 from batch.queries.evidence_table import as_data as evidence_data
 from batch.queries.failures import failure_lines
 from batch.queries.given import given
-from batch.queries.groups import cases_named, groups_named
+from batch.queries.groups import by_run, cases_named, groups_named
 from batch.queries.ordering import CaseOrder
 from batch.queries.pool import Pool, pools
 from batch.queries.search_answers import SearchAnswer
+from batch.queries.search_result import search_result
 from batch.queries.selection import CaseSelection
 from batch.queries.signals import case_text, history, number_text, number_texts, panels, pretty_unit
 from batch.queries.step_errors.words import NONE, about, error_text
@@ -39,7 +40,6 @@ from batch.queries.summary import (
 )
 from batch.terminal.evidence import evidence_lines
 from batch.terminal.evidence_table import evidence_table_lines
-from batch.terminal.search import search_result
 from ic.printing.columns import columns, count
 from ic.printing.columns import size as size_text
 from met.distinct import distinct
@@ -94,12 +94,13 @@ def show(
             shown = [each for each in shown if each[0].name not in hidden]
     if by is not None:
         for pool in pools([group for group, _ in shown]):
-            if len(pool.groups) > 1:
+            order = ordering.order_of(pool.groups, by)
+            if len(pool.groups) > 1 and order is not None:
                 most = None if all_cases else cases.SHOWN_CASES
                 among = None if some.everything else some.places(pool)
                 said = [] if among is None else [some.words(len(among), pool.count)]
-                table = cases.table_across(pool, by, most, among=among) if among is None or len(among) else []
-                out += ["", f"{pool.name}, {by.title}", *said, *table]
+                table = cases.table_across(pool, order, most, among=among) if among is None or len(among) else []
+                out += ["", f"{pool.name}, {order.title}", *said, *table]
                 shown = [each for each in shown if signals or each[0] not in pool.groups]
     for group, position in shown:
         out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, by, some, width), ""]
@@ -117,9 +118,7 @@ def check_asked(archive: ArchiveFile, by: CaseOrder | None, some: CaseSelection)
 def show_evidence(archive: ArchiveFile, experiments: Sequence[str] = (), *, width: int = 100) -> str:
     """The table of evidence of each run and sweep, or of these: the requirements with their evidence."""
     out = [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
-    named = groups_named(archive, tuple(experiments))
-    for name in dict.fromkeys(group.sweep or group.name for group in named):
-        groups = [group for group in named if (group.sweep or group.name) == name]
+    for name, groups in by_run(groups_named(archive, tuple(experiments))).items():
         cases = sum(group.run for group in groups)
         answer = SearchAnswer.of(groups[0])
         of = "" if answer is None else f"its answer, {count(len(answer.found.cases), 'case')} of "
@@ -130,8 +129,7 @@ def show_evidence(archive: ArchiveFile, experiments: Sequence[str] = (), *, widt
 
 def _evidence(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> list[RequirementEvidence]:
     """The rows of the table of evidence of these groups."""
-    several = len({each.sweep or each.name for each in archive.groups}) > 1
-    return requirement_evidence(groups, str(archive.path), several=several)
+    return requirement_evidence(groups, str(archive.path), several=len(by_run(archive.groups)) > 1)
 
 
 def _about(
@@ -167,10 +165,9 @@ def _about(
 def _positions(archive: ArchiveFile, group: ArchiveGroup, some: CaseSelection) -> np.ndarray:
     """Positions in a group of the selected cases among those of all structures of its sweep."""
     name = group.sweep or group.name
-    pool = Pool(name, [each for each in archive.groups if (each.sweep or each.name) == name])
+    pool = Pool(name, by_run(archive.groups)[name])
     places = some.places(pool)
-    mine = next(number for number, each in enumerate(pool.groups) if each.name == group.name)
-    return pool.position_of[places[pool.group_of[places] == mine]]
+    return pool.position_of[places[pool.group_of[places] == pool.groups.index(group)]]
 
 
 def as_json(

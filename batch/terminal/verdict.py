@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import json as json_module
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, CampaignPart
+from batch.campaigns.performing import Performed
 from batch.campaigns.status import duration
 from batch.queries.failures import failure_lines
+from batch.queries.search_result import SearchResult
 from batch.queries.step_errors.words import HINT
 from batch.queries.summary import Summary, as_json, finite
-from batch.terminal.search import SearchResult
 from batch.terminal.show import verdict, warning_lines
 from ic.printing.columns import size as size_text
 from ic.sweeps.confidences import OF_CASES
+from met.diagnostic import Diagnostic
 from met.frozen import frozen
 from met.outputs import quoted
 
@@ -120,21 +122,36 @@ def worst_cases(archive: ArchiveFile) -> tuple[WorstCaseLines, ...]:
     return tuple(out)
 
 
-def result_lines(
-    campaign: Campaign,
-    summaries: tuple[Summary, ...],
-    worst: tuple[WorstCaseLines, ...],
-    picture: Path | None,
-    excuse: str,
-    exported: Exported | None,
-    seconds: Mapping[str, float],
-    ok: bool,
-    tables: Sequence[Sequence[str]],
-    answers: Sequence[SearchResult | None] = (),
-) -> list[str]:
-    """The verdict, and the places of everything. seconds: by experiment; tables: of sweeps of several structures;
-    answers: of searches, by summary"""
-    answers = answers or (None,) * len(summaries)
+@frozen
+class RunResult:
+    """The results that an archive has of the cases that were run, and the picture of it.
+
+    worst    the worst cases of each summary
+    picture  its file; None where there is none
+    excuse   why there can be none, in words
+    tables   of sweeps of several structures
+    answers  of searches, by summary; None of what is none; empty where nothing is a search
+    warned   what errors by the step, the steps themselves and limits of machines call in question, with their places
+    """
+
+    summaries: tuple[Summary, ...]
+    worst: tuple[WorstCaseLines, ...]
+    picture: Path | None
+    excuse: str
+    tables: Sequence[Sequence[str]] = ()
+    warned: tuple[Diagnostic, ...] = ()
+    answers: tuple[SearchResult | None, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """True if every case reached its end and met its requirements; for a tuning, if those of its answer did."""
+        return all(summary.ok for summary in self.summaries)
+
+
+def result_lines(campaign: Campaign, result: RunResult, exported: Exported | None, performed: Performed) -> list[str]:
+    """The verdict, and the places of everything."""
+    summaries, worst, seconds = result.summaries, result.worst, performed.seconds
+    answers = result.answers or (None,) * len(summaries)
     out: list[str] = []
     many = {s.sweep for s in summaries if sum(s.sweep == other.sweep for other in summaries) > MOST_GROUPS} - {""}
     for summary, cases, answer in zip(summaries, worst, answers, strict=True):
@@ -150,16 +167,16 @@ def result_lines(
             out.append(f"  {HINT}")
         out += ["", *cases.lines] if cases.lines and (answer is None or not answer.tunes) else []
         out += ["", *answer.lines] if answer is not None else []
-    out += [line for table in tables for line in ("", *table)]
+    out += [line for table in result.tables for line in ("", *table)]
     path = campaign.output
     out += ["", f"archive  {path}  ({size_text(path.stat().st_size)})"]
-    if picture is not None:
+    if result.picture is not None:
         names = list(dict.fromkeys(summary.sweep or summary.name for summary in summaries))
-        out.append(f"picture  {picture}")
+        out.append(f"picture  {result.picture}")
         if len(names) > 1:
             out[-1] += f", of {names[0]} alone: `met plot {quoted(path)} --run {quoted(names[1])}` draws another"
-    elif excuse:
-        out.append(f"picture  none: {excuse}")
+    elif result.excuse:
+        out.append(f"picture  none: {result.excuse}")
     if exported is not None:
         out.append(f"export   {exported.path}  ({size_text(exported.path.stat().st_size)})")
     out.append(f"next     met show {quoted(path)}")
@@ -171,7 +188,7 @@ def result_lines(
         part, name = campaign.parts[0], f" {quoted(summaries[0].name)}" if len(summaries) > 1 else ""
         first = worst[0].first if worst[0].rows else f"#{part.experiment.cases.table[part.rows[0]]}"
         out.append(f"         met run {quoted(path)}{name} --case '{first}'")
-    if not ok:
+    if not result.ok:
         judged = [  # cases that a tuning tried on its way may fail and miss requirements
             each if answer is None or not answer.tunes else replace(each, failed=0, requirements=())
             for each, answer in zip(summaries, answers, strict=True)
@@ -215,30 +232,28 @@ def short_result_lines(path: Path, summaries: tuple[Summary, ...]) -> list[str]:
 
 def verdict_json(
     campaign: Campaign,
-    summaries: tuple[Summary, ...],
-    worst: tuple[WorstCaseLines, ...],
-    picture: Path | None,
+    result: RunResult,
     exported: Exported | None,
-    seconds: Mapping[str, float],
+    performed: Performed,
     notes: Sequence[str],
     ok: bool,
-    answers: Sequence[SearchResult | None],
 ) -> str:
-    """The verdict for programs."""
+    """The verdict for programs. notes: besides those of the run; ok: whether export and comparison went well too"""
+    answers = result.answers or (None,) * len(result.summaries)
     data = {
         "ok": ok,
         "archive": str(campaign.output),
-        "picture": None if picture is None else str(picture),
+        "picture": None if result.picture is None else str(result.picture),
         "export": None if exported is None else str(exported.path),
-        "notes": [*campaign.notes, *notes],
+        "notes": [*campaign.notes, *performed.notes, *notes],
         "experiments": [
             {
                 **as_json(summary),
                 "worst": list(cases.rows),
-                "seconds": seconds.get(summary.name),
+                "seconds": performed.seconds.get(summary.name),
                 **({} if answer is None else {"answer": finite(answer.data)}),
             }
-            for summary, cases, answer in zip(summaries, worst, answers, strict=True)
+            for summary, cases, answer in zip(result.summaries, result.worst, answers, strict=True)
         ],
     }
     return json_module.dumps(data, indent=1)

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from batch.terminal.margin import as_data, in_words, margin_lines, remedy, verdict
-from met.analysis.margin import HEAVIEST, LIGHTEST, Margin, margins
+from batch.queries.bed_margins import in_words, verdict
+from batch.terminal.margin import as_data, margin_lines
+from met.analysis.margin import HEAVIEST, LIGHTEST, Margin, margins, remedy
 from met.cli import main
 from met.plan import Experiment
 from tests.substitution.hybrid import compiled, deck, ran

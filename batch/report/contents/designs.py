@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from batch.archive.read import ArchiveFile
+from batch.campaigns.judging_best import judged_best
 from batch.queries.best import DesignAxis, Designs
+from batch.queries.best_answer import BestAnswer, context
 from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import number_text
 from batch.report.contents.parts import DesignAnswer, DesignMap, TextTable
 from batch.report.contents.searches import search_answer
-from batch.terminal.best import BestAnswer, context
-from batch.terminal.best_stability import judged_best
 from met.diagnostic import Problem
 from met.plan.searches import LEAST_MARGIN
 

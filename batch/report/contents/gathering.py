@@ -10,7 +10,7 @@ from typing import Any
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.deck_units import DeckUnits, written_plan
-from batch.queries.groups import groups_named
+from batch.queries.groups import by_run, groups_named
 from batch.queries.pool import Pool, pools
 from batch.queries.step_errors.figures import figures, together
 from batch.queries.step_errors.words import about as about_errors
@@ -60,7 +60,7 @@ def gather(
     """
     groups = groups_named(archive, names)
     found = pools(groups)
-    several = len({group.sweep or group.name for group in archive.groups}) > 1
+    several = len(by_run(archive.groups)) > 1
     experiments, trouble = _experiments(archive)
     if against is not None and names:
         against = replace(against, found=of_groups(against.found, groups))

@@ -43,10 +43,8 @@ def _map(pool: Pool, x: CaseColumn, y: CaseColumn, metrics: Sequence[CaseColumn]
         limits = [limit.value for limit in column.limits]
         reaches[column.key] = reach(values[column.key], limits, parting=column.role == "change")
         cases[column.key] = np.where(has, pool.cases[chosen], -1).reshape(shape)
-        out = np.zeros(pool.count, bool)
-        for limit in column.limits:
-            out |= pool.outcomes[:, pool.requirements.index(limit.text)] == 0
-        missed[column.key] = np.bincount(cells[there & out], minlength=shape[0] * shape[1]).reshape(shape)
+        bad = cells[there & pool.missed(column)]
+        missed[column.key] = np.bincount(bad, minlength=shape[0] * shape[1]).reshape(shape)
     counts, failed = (
         np.bincount(cells[which], minlength=shape[0] * shape[1]).reshape(shape) for which in (there, there & ~done)
     )

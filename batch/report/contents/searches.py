@@ -6,10 +6,10 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.search_answers import SearchAnswer
+from batch.queries.search_result import search_result
 from batch.queries.signals import deck_unit
 from batch.queries.stability_words import unwrapped
 from batch.report.contents.parts import DesignAnswer, TextTable
-from batch.terminal.search import search_result
 
 MOST_LOOKS, MOST_ROWS = 200, 24
 """Largest number of generations after which a report examines the best, spread over all; and of rows for those that

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from batch.queries.bed_margins import stable_at, verdict
 from batch.queries.failures import ranges
 from batch.queries.pool import CaseColumn, Pool
 from batch.report.contents.parts import BedStability, Stability
-from batch.terminal.margin import stable_at, verdict
 from met.analysis.margin import Margin, margins
 from met.distinct import distinct
 from met.plan import Experiment

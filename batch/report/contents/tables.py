@@ -51,13 +51,14 @@ def worst(pool: Pool, archive: str, only: str, before: EarlierCases | None = Non
 def _case_table(pool: Pool, places: np.ndarray, archive: str, only: str, before: EarlierCases | None) -> NotableCases:
     """The cases at these places, a row each, with all their columns."""
     columns = pool.columns
+    missed = [pool.missed(column) for column in columns]
     rows, marked = [], set()
     ids = pool.texts("case_id", places)
     for number, place in enumerate(places.tolist()):
         cells = [f"#{pool.cases[place]}", ids[number][:8]]
         for at, column in enumerate(columns):
             text = cell_text(column, place)
-            if _misses(pool, column, place):
+            if missed[at][place]:
                 marked.add((number, at + 2))
                 text = f"{text} {MISSES}"
             cells.append(text)
@@ -87,11 +88,6 @@ def cell_text(column: CaseColumn, place: int) -> str:
     if column.words:
         return column.words[int(value)] if np.isfinite(value) else ""
     return page_number(value)
-
-
-def _misses(pool: Pool, column: CaseColumn, place: int) -> bool:
-    """True if a metric misses a requirement in this case."""
-    return any(pool.outcomes[place, pool.requirements.index(limit.text)] == 0 for limit in column.limits)
 
 
 def _title(pool: Pool, shown: int) -> str:

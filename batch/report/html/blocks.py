@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 
 from batch.queries.pool import page_number
 from batch.queries.summary import SPREAD_COLUMNS
@@ -160,12 +160,9 @@ def _comparison(found: Verdict) -> Html:
         cls="answer",
     )
     parts = [(*SHARES.get(part.word, ("other", part.word)), part.count) for part in found.parts]
-    words = [(cls, f"{count:,} {word}") for cls, word, count in parts]
-    legend = el("ul", [el("li", el("span", cls=f"key {cls}"), text) for cls, text in words], cls="legend")
-    bars = bar([(cls, count) for cls, _, count in parts], "; ".join(text for _, text in words))
     moves = [*found.flows, *([found.ends] if found.ends is not None else [])]
     apart = [_moves(moves, better=better) for better in (True, False)] if moves else []
-    evidence = [join([bars, legend]) if found.cases > 1 else None, _flows(found.flows), apart]
+    evidence = [_bar_of(parts) if found.cases > 1 else None, _flows(found.flows), apart]
     return el("div", answer, el("div", evidence, cls="evidence"), cls="verdict against")
 
 
@@ -176,8 +173,7 @@ def _flows(found: Sequence[RequirementFlow]) -> Html | None:
         el("tr", el("th", el("code", breaking(each.text)), scope="row"), el("td", each.met, cls="words"))
         for each in found
     ]
-    head = el("tr", [el("th", head, scope="col") for head in ("requirement", "cases in both")])
-    return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "Requirements, before and now")
+    return rows_under(headings(("requirement", "cases in both")), rows, "Requirements, before and now")
 
 
 def _moves(found: Sequence[RequirementFlow], *, better: bool) -> Html:
@@ -204,19 +200,22 @@ def _moves(found: Sequence[RequirementFlow], *, better: bool) -> Html:
     if not rows:
         return join([el("h4", name), el("p", "None of what is required.", cls="said")])
     crossed, moved_head = ("met now, and not before", "better in") if better else ("no longer met", "worse in")
-    heads = (("requirement", None), (crossed, None), (moved_head, "right"), ("furthest", None))
-    head = el("tr", [el("th", text, scope="col", cls=cls) for text, cls in heads])
-    return join([el("h4", name), scrolling(el("table", el("thead", head), el("tbody", lines(rows))), name)])
+    heads = headings(("requirement", crossed, moved_head, "furthest"), right={2})
+    return join([el("h4", name), rows_under(heads, rows, name)])
 
 
 def _parts(found: Verdict) -> Html:
     order = {"met": "good", "done": "good", "missed": "bad", "unknown": "open"}
-    parts = [(order.get(part.word, "lost"), part.count) for part in found.parts]
-    words = [
-        (order.get(part.word, "lost"), f"{part.count:,} {WORDS.get(part.word, part.word)}") for part in found.parts
-    ]
+    return _bar_of(
+        [(order.get(part.word, "lost"), WORDS.get(part.word, part.word), part.count) for part in found.parts]
+    )
+
+
+def _bar_of(parts: Sequence[tuple[str, str, int]]) -> Html:
+    """Numbers of cases as a bar over its legend: class, word and count of each part."""
+    words = [(cls, f"{count:,} {word}") for cls, word, count in parts]
     legend = el("ul", [el("li", el("span", cls=f"key {cls}"), text) for cls, text in words], cls="legend")
-    return join([bar(parts, "; ".join(text for _, text in words)), legend])
+    return join([bar([(cls, count) for cls, _, count in parts], "; ".join(text for _, text in words)), legend])
 
 
 def _demands(found: Verdict) -> Html | None:
@@ -236,13 +235,9 @@ def _demands(found: Verdict) -> Html | None:
         *(["not known"] if unknown else []),
         "value" if single else "worst value",
     ]
-    right = [head not in ("requirement", "outcome", "verdict") for head in heads]
     rows = [el("tr", _demand(each, single, shares, missed, unknown)) for each in found.demands]
-    head = el(
-        "tr",
-        [el("th", name, scope="col", cls="right" if flush else None) for name, flush in zip(heads, right, strict=True)],
-    )
-    return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "Requirements")
+    right = {n for n, head in enumerate(heads) if head not in ("requirement", "outcome", "verdict")}
+    return rows_under(headings(heads, right), rows, "Requirements")
 
 
 def _answered(found: Sequence[RequirementCounts]) -> Html:
@@ -256,9 +251,8 @@ def _answered(found: Sequence[RequirementCounts]) -> Html:
         )
         for each in found
     ]
-    heads = (("requirement", None), ("outcome", None), ("worst value of the answer", "right"))
-    head = el("tr", [el("th", name, scope="col", cls=cls) for name, cls in heads])
-    return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "Requirements")
+    heads = headings(("requirement", "outcome", "worst value of the answer"), right={2})
+    return rows_under(heads, rows, "Requirements")
 
 
 def _demand(each: RequirementCounts, single: bool, shares: bool, missed: bool, unknown: bool) -> list[Html | None]:
@@ -341,8 +335,7 @@ def varied(found: Sequence[VariedParameter], anchors: Anchors) -> Html | None:
         for each in found
     ]
     heads = ("varied", "values", "unit", *(["decides"] if decides else []), "written in")
-    head = el("tr", [el("th", head, scope="col") for head in heads])
-    return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "What was varied")
+    return rows_under(headings(heads), rows, "What was varied")
 
 
 def _sets(paths: Sequence[str]) -> list[Child]:
@@ -363,20 +356,15 @@ def metrics(section: ReportSection) -> Html | None:
     heads = ["metric", *values, "unit"]
     heads += [] if section.single else ["how often"]
     remarks = any(each.remark for each in section.metrics)
+    heads += [""] if remarks else []
     rows = [el("tr", _metric(each, section.single, remarks, compared, verified)) for each in section.metrics]
-    numbers = range(1, len(values) + 1)
-    head = el(
-        "tr",
-        [
-            el("th", name, scope="col", cls="right" if n in numbers else None)
-            for n, name in enumerate([*heads, *([""] if remarks else [])])
-        ],
+    made = rows_under(
+        headings(heads, range(1, len(values) + 1)), rows, "Metrics", cls="few" if section.single else None
     )
-    made = el("table", el("thead", head), el("tbody", lines(rows)), cls="few" if section.single else None)
     outline = any(each.bars_before for each in section.metrics)
     said = el("p", "Bars: how often now. Outline: before.", cls="said") if outline else None
     by_step = el("p", f"{section.by_step}.", cls="said") if section.by_step else None
-    return join([scrolling(made, "Metrics"), said, by_step])
+    return join([made, said, by_step])
 
 
 def _metric(each: MetricRow, single: bool, remarks: bool, compared: bool, verified: bool) -> list[Html]:
@@ -422,6 +410,16 @@ def histogram(each: MetricRow) -> Html | None:
     words = f"{each.name} from {low} to {high} {each.unit}, median {middle}"
     floor = el("line", x1=0, x2=160, y1=26.5, y2=26.5, cls="floor")
     return el("svg", bars, floor, outline, limits, cls="histogram", viewBox="-1 0 162 28", role="img", aria_label=words)
+
+
+def headings(names: Iterable[Child], right: Container[int] = ()) -> list[Html]:
+    """The headings of a table's columns. right: the columns of numbers, which are flush right"""
+    return [el("th", name, scope="col", cls="right" if n in right else None) for n, name in enumerate(names)]
+
+
+def rows_under(heads: Sequence[Html], rows: Sequence[Html], label: str, cls: str | None = None) -> Html:
+    """A table of rows under its headings. label: of the table, for those who do not see it"""
+    return scrolling(el("table", el("thead", el("tr", heads)), el("tbody", lines(rows)), cls=cls), label)
 
 
 def scrolling(table: Html, label: str) -> Html:

@@ -20,7 +20,7 @@ from batch.differences.words import (
 from batch.queries.pool import page_number
 from batch.report.contents.changes import ArchiveChanges, DeckTextChange, OtherOrigin, RunChanges
 from batch.report.contents.parts import TextTable
-from batch.report.html.blocks import case_link, likeness, scrolling
+from batch.report.html.blocks import case_link, headings, likeness, rows_under
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
 from batch.report.html.tables import command, table
 
@@ -110,10 +110,9 @@ def _signals(found: Sequence[SignalRow]) -> Html | None:
     if not found:
         return None
     used = signal_columns(found)
-    heads = [el("th", each.page_head, scope="col", cls="right" if each.kind == "number" else None) for each in used]
+    numbers = {n for n, each in enumerate(used) if each.kind == "number"}
     rows = [el("tr", [_cell(row, column) for column in used]) for row in found]
-    made = el("table", el("thead", el("tr", heads)), el("tbody", lines(rows)))
-    return scrolling(made, "Signals and metrics, before and now")
+    return rows_under(headings((each.page_head for each in used), numbers), rows, "Signals and metrics, before and now")
 
 
 def _cell(row: SignalRow, column: DiffColumn) -> Html:
@@ -167,15 +166,8 @@ def _worst(found: RunChanges) -> Html | None:
 
 
 def _cases(found: Sequence[WorstCase]) -> Html:
-    heads = ("case", "id", "what changed most", "before", "now", "unit", "run it again, before and now")
-    right = {0, 3, 4}
-    head = el(
-        "tr",
-        [
-            el("th", name, scope="col", cls="right" if n in right else "command" if n == 6 else None)
-            for n, name in enumerate(heads)
-        ],
-    )
+    heads = headings(("case", "id", "what changed most", "before", "now", "unit"), right={0, 3, 4})
+    heads.append(el("th", "run it again, before and now", scope="col", cls="command"))
     rows = [
         el(
             "tr",
@@ -190,4 +182,4 @@ def _cases(found: Sequence[WorstCase]) -> Html:
         )
         for each in found
     ]
-    return scrolling(el("table", el("thead", head), el("tbody", lines(rows)), cls="cases"), "Cases that changed most")
+    return rows_under(heads, rows, "Cases that changed most", cls="cases")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from batch.queries.bed_margins import stable_head
 from batch.report.contents.parts import (
     EvidencePart,
     InfluencePart,
@@ -14,9 +15,8 @@ from batch.report.contents.parts import (
     Stability,
     TextTable,
 )
-from batch.report.html.blocks import Anchors, case_link, mark, scrolling, spot_link
+from batch.report.html.blocks import Anchors, case_link, headings, mark, rows_under, scrolling, spot_link
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
-from batch.terminal.margin import stable_head
 
 SHOWN_CASES = 8
 """Number of visible rows of the best and of the worst cases; the others are folded away."""
@@ -24,18 +24,7 @@ SHOWN_CASES = 8
 
 def table(found: TextTable, label: str, cells: Sequence[Sequence[Child]] = (), more: Sequence[str] = ()) -> Html:
     """A table of texts. cells, more: further cells of each row, and their heads."""
-    units = any(found.units)
-    heads = [
-        el(
-            "th",
-            el("span", breaking(head)),
-            el("span", unit, cls="unit") if units else None,
-            scope="col",
-            cls="right" if n in found.right else None,
-        )
-        for n, (head, unit) in enumerate(zip(found.heads, found.units, strict=True))
-    ]
-    heads += [el("th", head, scope="col") for head in more]
+    heads = [*_headings(found), *headings(more)]
     rows = []
     for number, row in enumerate(found.rows):
         own = [
@@ -50,7 +39,14 @@ def table(found: TextTable, label: str, cells: Sequence[Sequence[Child]] = (), m
             for n, text in enumerate(row)
         ]
         rows.append(el("tr", own, [el("td", cell) for cell in (cells[number] if cells else ())]))
-    return scrolling(el("table", el("thead", el("tr", heads)), el("tbody", lines(rows))), label)
+    return rows_under(heads, rows, label)
+
+
+def _headings(found: TextTable) -> list[Html]:
+    """The headings of the columns, each with its unit where one has one."""
+    units = [el("span", unit, cls="unit") if any(found.units) else None for unit in found.units]
+    names = [el("span", breaking(head)) for head in found.heads]
+    return headings(zip(names, units, strict=True), found.right)
 
 
 def cases(found: NotableCases) -> Html:
@@ -68,26 +64,12 @@ def cases(found: NotableCases) -> Html:
             own.append(el("td", el("code", text) if n == 1 else text, cls=" ".join(classes) or None))
         own.append(el("td", command(found.commands[number]), cls="command"))
         rows.append(el("tr", own, data_case=found.cases[number]))
-    heads = [
-        el(
-            "th",
-            el("span", breaking(head)),
-            el("span", unit, cls="unit") if any(columns.units) else None,
-            scope="col",
-            cls="right" if n in columns.right else None,
-        )
-        for n, (head, unit) in enumerate(zip(columns.heads, columns.units, strict=True))
-    ]
-    heads.append(el("th", "run it again, to the same bits", scope="col", cls="command"))
-
-    def part(own: Sequence[Html]) -> Html:
-        made = el("table", el("thead", el("tr", heads)), el("tbody", lines(own)), cls="cases")
-        return scrolling(made, found.title)
-
-    folded = rows[SHOWN_CASES:]
-    more = el("details", el("summary", f"{len(folded)} more of them"), part(folded)) if folded else None
+    heads = [*_headings(columns), el("th", "run it again, to the same bits", scope="col", cls="command")]
+    first, folded = (rows_under(heads, part, found.title, "cases") for part in (rows[:SHOWN_CASES], rows[SHOWN_CASES:]))
+    left = len(rows) - SHOWN_CASES
+    more = el("details", el("summary", f"{left} more of them"), folded) if left > 0 else None
     again = el("p", el("code", found.commands[0]), " runs the first again, to the same bits.", cls="said printed")
-    return join([part(rows[:SHOWN_CASES]), more, el("p", found.more, cls="said") if found.more else None, again])
+    return join([first, more, el("p", found.more, cls="said") if found.more else None, again])
 
 
 EVIDENCE_HEADS = ("verdict", "missed", "of all cases", "percentile", "worst", "margin", "± step")
@@ -121,7 +103,7 @@ def evidence(found: EvidencePart) -> Html:
         ]
         head = el("tr", el("th", name, again, scope="rowgroup", colspan=len(EVIDENCE_HEADS)), cls="head")
         rows.append(el("tbody", head, el("tr", numbers)))
-    heads = [el("th", head, scope="col", cls="right" if n else None) for n, head in enumerate(EVIDENCE_HEADS)]
+    heads = headings(EVIDENCE_HEADS, range(1, len(EVIDENCE_HEADS)))
     made = scrolling(el("table", el("thead", el("tr", heads)), lines(rows), cls="judged"), "Evidence")
     said = "Each command runs the worst case of its row again, to the same bits."
     return join([made, [el("p", each, cls="said") for each in (said, *found.notes)]])
@@ -148,8 +130,7 @@ def influence(found: InfluencePart) -> Html:
         for row in found.rows
     ]
     heads = ["parameter", "", "alone", *(["with others"] if together else []), "mean, from low to high", "rank"]
-    top = el("tr", [el("th", name, scope="col", cls="right" if n > 1 else None) for n, name in enumerate(heads)])
-    made = scrolling(el("table", el("thead", top), el("tbody", lines(rows))), f"What explains {found.metric}")
+    made = rows_under(headings(heads, range(2, len(heads))), rows, f"What explains {found.metric}")
     return join([el("h4", head), made, [el("p", each, cls="said") for each in found.notes]])
 
 
@@ -203,8 +184,7 @@ def parameters(found: Sequence[ParameterRow], anchors: Anchors) -> Html:
         )
         for row in found
     ]
-    head = el("tr", [el("th", name, scope="col", cls="right" if n == 1 else None) for n, name in enumerate(heads)])
-    return scrolling(el("table", el("thead", head), el("tbody", lines(rows)), cls="parameters"), "Parameters")
+    return rows_under(headings(heads, right={1}), rows, "Parameters", cls="parameters")
 
 
 def _overrides(row: ParameterRow, anchors: Anchors) -> Html | None:

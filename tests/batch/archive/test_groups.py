@@ -259,3 +259,19 @@ def test_by_a_metric_the_cases_of_all_structures_are_in_one_table(
     assert main(["show", "deck.it.h5", "hinge.q", "--sort", "end", "--run", "it.brisk"]) == 0
     told = capsys.readouterr().out
     assert "\ncases by end, smallest first:\n" in told and "hinge.q" in told
+
+
+@pytest.mark.slow
+def test_by_a_metric_that_one_of_two_sweeps_lacks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    brief = "run brief like hold { metric soon = max { of = hinge.q; } }\n"
+    other = "sweep both of brief { vary links.bar.mass = [1, 2] kg; vary hinge.servo = [drive, brisk]; }\n"
+    compiled(tmp_path, TIMED, STRUCTURES, brief, other)
+    monkeypatch.chdir(tmp_path)
+    main(["run", "deck.ic", "it", "both", "-q", "--no-picture", "-o", "two.h5"])
+    capsys.readouterr()
+    assert main(["show", "two.h5", "--sort", "soon"]) == 0
+    told = capsys.readouterr().out
+    assert "both, cases by soon, smallest first:\n" in told and "it, cases by" not in told
+    assert told.count("cases, closest to a limit first:\n") + told.count("cases, worst first:\n") == 2

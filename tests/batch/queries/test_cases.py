@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import batch
-from batch.archive.read import ArchiveFile
+from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries import cases, ordering
 from batch.queries.ordering import CaseOrder, by_names
+from batch.queries.pool import Pool
 from batch.terminal.running import run_and_tell
 from batch.terminal.show import as_json, show
 from met.cli import main
@@ -29,6 +30,10 @@ def required(experiment: Experiment, *requirements: Requirement) -> Experiment:
     return replace(experiment, requirements=requirements)
 
 
+def alone(group: ArchiveGroup) -> Pool:
+    return Pool(group.name, [group])
+
+
 def made(experiment: Experiment, **options: Any) -> ArchiveFile:
     batch.run(plans.plan(experiment), output="a.h5", **options)
     return ArchiveFile("a.h5")
@@ -43,7 +48,7 @@ def test_failed_cases_stand_before_those_that_miss_more_and_by_more(
     monkeypatch.setattr(run, "run", partial(plans.answer, fails=frozenset({7, 12})))
     settle, volts = plans.gains(20).requirements
     with made(required(plans.gains(20), settle, replace(volts, text="volts < 6 V", limit=6.0))) as file:
-        order = ordering.worst_first(file.groups[0]).tolist()
+        order = alone(file.groups[0]).worst_first.tolist()
         group = file.groups[0]
         missed, value = (group.values("met") == 0).sum(axis=1), group.values("volts")
     assert order[:2] == [7, 12]
@@ -59,7 +64,7 @@ def test_failed_cases_stand_before_those_that_miss_more_and_by_more(
 def test_where_all_requirements_are_met_the_closest_to_a_limit_is_first(here: Path) -> None:
     with made(required(plans.gains(9), Requirement("volts > 1 V", "volts", ">", 1.0))) as file:
         group = file.groups[0]
-        order = ordering.worst_first(group)
+        order = alone(group).worst_first
         assert order[0] == np.argmin(group.values("volts"))
         assert cases.title(group) == "cases, closest to a limit first:"
 
@@ -73,7 +78,7 @@ def test_of_cases_that_are_equally_bad_the_first_are_far_from_one_another(
     archives.failing(monkeypatch, *range(90))
     with made(archives.grid([0.01 * n for n in range(1, 11)], [10.0 * n for n in range(1, 11)])) as file:
         group = file.groups[0]
-        order = ordering.worst_first(group).tolist()
+        order = alone(group).worst_first.tolist()
         assert order[:4] == [0, 89, 9, 80]  # the corners of the 90 that fail: kp in tens, mass in ones
         assert sorted(order) == list(range(100)) and set(order[:90]) == set(range(90))
         assert order[cases.SHOWN_CASES : 90] == sorted(order[cases.SHOWN_CASES : 90])
@@ -85,13 +90,13 @@ def test_of_cases_that_are_equally_bad_the_first_are_far_from_one_another(
 def test_a_limit_of_zero_has_an_order_too(here: Path) -> None:
     with made(required(plans.gains(9), Requirement("volts < 0 V", "volts", "<", 0.0))) as file:
         group = file.groups[0]
-        assert ordering.worst_first(group)[0] == np.argmax(group.values("volts"))
+        assert alone(group).worst_first[0] == np.argmax(group.values("volts"))
 
 
 @pytest.mark.slow
 def test_without_requirements_the_order_is_the_tables(here: Path) -> None:
     with made(required(plans.gains(9))) as file:
-        assert ordering.worst_first(file.groups[0]).tolist() == list(range(9))
+        assert alone(file.groups[0]).worst_first.tolist() == list(range(9))
         assert cases.title(file.groups[0]) == "cases:"
 
 
@@ -106,7 +111,7 @@ def test_by_a_metric_or_what_is_varied_and_without_a_value_last(
     monkeypatch.setattr(run, "run", partial(plans.answer, fails=frozenset({7, 12})))
     with made(plans.gains(20)) as file:
         group = file.groups[0]
-        order = ordering.positions(group, CaseOrder(name, largest)).tolist()
+        order = ordering.places(alone(group), CaseOrder(name, largest)).tolist()
         [variable] = [v for v in (*group.role("metric"), *group.role("coordinate")) if v.path == name]
         values = group.values(variable.name)
         said = json.loads(as_json(file, by=CaseOrder(name, largest), all_cases=True))["experiments"][0]["case_table"]
@@ -130,7 +135,7 @@ def test_by_several_each_its_own_way_round(here: Path, monkeypatch: pytest.Monke
         group = file.groups[0]
         by = by_names(["links.lower.mass", "volts:smallest"], reverse=True)
         assert by is not None
-        order = ordering.positions(group, by).tolist()
+        order = ordering.places(alone(group), by).tolist()
         mass, volts = group.values("links.lower.mass"), group.values("volts")
         text = show(file, by=by, all_cases=True)
     assert len(set(mass.tolist())) < 20, "no two are equal in the first"

@@ -10,8 +10,9 @@ import pytest
 
 import batch
 from batch.archive.read import ArchiveFile
-from batch.queries import ordering
+from batch.queries import cases
 from batch.queries.best import Designs
+from batch.queries.best_answer import BestAnswer
 from batch.queries.grids import column_levels
 from batch.queries.pool import ENDED, CaseColumn, Pool, pools
 from batch.report.contents import histories, overview, stability
@@ -23,7 +24,6 @@ from batch.report.contents.maps import ruler
 from batch.report.contents.parts import OutcomeCount, Report
 from batch.report.contents.thinning import thin, thin_clock
 from batch.report.html.payload import _column
-from batch.terminal.best import BestAnswer
 from met.analysis.margin import margins
 from tests.batch import plans
 from tests.batch.report import archives
@@ -128,9 +128,12 @@ class TestWorstCases:
     @pytest.mark.slow
     def test_come_in_the_order_of_met_show(self, here: Path, engine: None, monkeypatch: pytest.MonkeyPatch) -> None:
         archives.failing(monkeypatch, 3, 17)
-        with ArchiveFile(archives.made(here / "a.h5", plans.gains(40))) as file:
-            [pool] = pools(file.groups)
-            assert pool.worst_first.tolist() == ordering.worst_first(file.groups[0]).tolist()
+        path = archives.made(here / "a.h5", plans.gains(40))
+        with ArchiveFile(path) as file:
+            listed = [row["row"] for row in cases.rows_json(file.groups[0])]
+        worst = gathered(path).sections[0].worst
+        assert worst is not None and list(worst.cases) == listed
+        assert listed[:2] == [3, 17]
 
     @pytest.mark.slow
     def test_have_the_command_that_runs_them_again(self, sweep: Path) -> None:

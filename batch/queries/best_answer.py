@@ -1,4 +1,4 @@
-"""`met best`: the design of a sweep to use, in a terminal and as data."""
+"""The design of a sweep to use: in lines, and as data."""
 
 from __future__ import annotations
 

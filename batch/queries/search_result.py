@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.queries.best_answer import context
 from batch.queries.pool import Pool
 from batch.queries.search_answers import SearchAnswer
-from batch.terminal.best import context
 from ic.driver.written_value import WrittenValue
 from met.frozen import frozen
 from met.outputs import quoted
