@@ -17,12 +17,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 import numpy as np
 
 from ic.meaning.checks.magnitudes import LENGTHS, MASSES, MEANT, SMALLEST_GYRATION
-from ic.meaning.checks.run_numbers import BEARING_NOTHING, RunNumbers
+from ic.meaning.checks.run_numbers import BEARING_NOTHING, INSTANTS, RunNumbers
 from ic.meaning.control.servos import Use, unit_written
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.frozen import frozen
 from met.plan import BASE, Structure
+from met.plan.channel import JOINT_LIMITS
 from met.servos.motor import RATIO
 
 TURN = 2.0 * math.pi
@@ -45,6 +46,7 @@ class Scale:
     low     smallest usual multiple;  high: the largest;  usual: where these are from, in words
     meant   unit of the parameter where another may have been meant, "" where it may not;  power: the multiple goes as
             this power of the parameter
+    said    what is so, in words, where the multiple does not say it
     """
 
     what: str
@@ -59,6 +61,7 @@ class Scale:
     verb: str = "is"
     meant: str = ""
     power: float = 1.0
+    said: str = ""
 
     @property
     def multiple(self) -> float:
@@ -74,11 +77,14 @@ class Scale:
         """The warning in words. case: words for the case; others: number of further paths that are so"""
         times = f", {self.multiple:.4g} times {self.other}" if self.other else ""
         more = f"; {others} more {'is' if others == 1 else 'are'} so" if others else ""
-        return f"`{self.path}` {self.verb} {self.size:.4g} {self.unit}".rstrip() + f"{case}{times}{more}; {self.usual}"
+        said = self.said or f"{self.verb} {self.size:.4g} {self.unit}".rstrip()
+        return f"`{self.path}` {said}{case}{'' if self.said else times}{more}; {self.usual}"
 
     @property
     def remedies(self) -> list[str]:
         """Other units of the parameter with which the multiple would be usual, if there are any, and what is usual."""
+        if self.said:
+            return ["ask for less, or move the limit"]
         multiples = [(unit, self.multiple * factor**self.power) for unit, factor in OTHER_UNITS.get(self.meant, ())]
         usual = [(unit, each) for unit, each in multiples if max(self.low, 1e-2 * self.high) <= each <= self.high]
         usual.sort(key=lambda each: abs(math.log(each[1] / (0.1 * self.high))))
@@ -213,6 +219,45 @@ def _speeds(run: RunNumbers) -> Iterator[Scale]:
             yield Scale("commanded rate", path, fastest, unit, most, other, 0.0, 1.0, usual, verb="asks for")
 
 
+def _limits(run: RunNumbers) -> Iterator[Scale]:
+    """Commands beside the limits of their joints: positions, also where a commanded rate leads, rates and torques."""
+    usual = "a limit of a joint holds nothing, and is only watched"
+    t = np.linspace(0.0, run.duration, INSTANTS)
+    for use in run.uses:
+        course, kind = run.course(use), use.command.kind if use.command is not None else ""
+        if course is None:
+            continue
+        places, rates = course if kind == "position" else (course[0] * math.nan, course[0])
+        if kind == "rate":
+            ways = np.cumsum(rates[1:] + rates[:-1]) * (0.5 * t[1])
+            places = run.numbers.get(f"initial.{use.joint}.q", math.nan) + np.append(0.0, ways)
+        own = {name: run.numbers.get(f"{use.joint}.{name}", math.nan) for name in JOINT_LIMITS}
+        for name, asked, other, beside in (
+            ("q_min", places, own["q_max"], "the range of the joint"),
+            ("q_max", places, own["q_min"], "the range of the joint"),
+            ("tau_max" if kind == "torque" else "qd_max", np.abs(rates), 0.0, "the limit of the joint"),
+        ):
+            path, multiples = f"{use.joint}.{name}", (asked - other) / (own[name] - other)
+            k = int(multiples.argmax())
+            if math.isfinite(multiples[k]) and kind != "acceleration":
+                unit, scale = unit_written([run.settled[path]], run.settled[path].unit)
+                end = f"`{path}` is {own[name] / scale:.6g} {unit}"
+                said = f"leads to {asked[k] / scale:.6g} {unit} at {t[k]:.4g} s, and {end}"
+                size, most = abs(float(asked[k]) - other), abs(own[name] - other)
+                yield Scale(
+                    "command beside a limit",
+                    f"{use.joint}.servo.command",
+                    size,
+                    run.settled[path].unit,
+                    most,
+                    beside,
+                    0.0,
+                    1.01 if kind == "rate" else 1.001,
+                    usual,
+                    said=said,
+                )
+
+
 def _frictions(run: RunNumbers) -> Iterator[Scale]:
     """Dry friction of a motor beside its largest torque."""
     usual = "a motor that cannot break away moves nothing"
@@ -344,6 +389,7 @@ SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
     _levers,
     _gears,
     _speeds,
+    _limits,
     _frictions,
     _loads,
     _brakes,
@@ -358,7 +404,8 @@ SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
 
 def scales(run: RunNumbers) -> list[Scale]:
     """All scales of one case of a run."""
-    return [scale for kind in SCALES for scale in kind(run)]
+    with np.errstate(all="ignore"):  # of a swing at 1e308 Hz there are no numbers
+        return [scale for kind in SCALES for scale in kind(run)]
 
 
 def check_scales(scope: Scope, structure: Structure, uses: Iterable[Use]) -> None:
