@@ -31,6 +31,9 @@ TURN = 2.0 * math.pi
 EARTH = 9.80665
 """Acceleration of free fall on the Earth, m/s^2."""
 
+FAR = 1e4
+"""Multiple of what a motor can give from which on a limit is a large number for none."""
+
 MOST_CASES = 16
 """Largest number of cases that are looked at: the first, and those with the ends of what varies."""
 
@@ -103,6 +106,7 @@ OTHER_UNITS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "kg": (("g", 1e-3),),
     "kg*m^2": (("kg*cm^2", 1e-4), ("kg*mm^2", 1e-6), ("g*cm^2", 1e-7), ("g*mm^2", 1e-9)),
     "N*m": (("N*cm", 1e-2), ("N*mm", 1e-3)),
+    "A": (("mA", 1e-3),),
 }
 """Units in which a number may have been meant, and their size in that which it has."""
 
@@ -258,6 +262,20 @@ def _limits(run: RunNumbers) -> Iterator[Scale]:
                 )
 
 
+def _strengths(run: RunNumbers) -> Iterator[Scale]:
+    """Limits of torque and current beside what the voltage gives at a standstill; one `FAR` beyond means no limit."""
+    usual = "a motor has more only where it is turned backwards, and then at most twice that"
+    for use in run.uses:
+        kt, resistance, volts = run.of_motor(use, "kt"), run.of_motor(use, "resistance"), run.limit(use, "V")
+        for unit, each in (("N*m", kt), ("A", 1.0)):
+            limit = run.limit(use, unit)
+            if limit is not None and volts is not None and each and resistance and volts[1] < math.inf:
+                path, most = f"{use.joint}.servo.{limit[0]}", each * volts[1] / resistance
+                other = f"what all of `{volts[0]}` gives at a standstill, {most:.4g} {unit}"
+                if 0.0 < limit[1] < FAR * most:
+                    yield Scale("limit of a motor", path, limit[1], unit, most, other, 0.0, 10.0, usual, meant=unit)
+
+
 def _frictions(run: RunNumbers) -> Iterator[Scale]:
     """Dry friction of a motor beside its largest torque."""
     usual = "a motor that cannot break away moves nothing"
@@ -390,6 +408,7 @@ SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
     _gears,
     _speeds,
     _limits,
+    _strengths,
     _frictions,
     _loads,
     _brakes,

@@ -89,6 +89,12 @@ PUSH = "push = wrench { link = fore; point = [0.4, 0, 0] m; force = [0, 0, 1] N;
         (("max_rate = 0.8 rad/s, max_acceleration = 2", "max_rate = 8 rad/s, max_acceleration = 200"),
          "`shoulder.servo.command` asks for 8 rad/s, 1.667 times the rate at which the motor's back-EMF is all of `v_max`, "
          "4.8 rad/s; 1 more is so; no motor runs faster", ("at most 4.8 rad/s is usual",)),
+        (("tau_max = 1 N*m", "tau_max = 90 N*m"),
+         "`shoulder.servo.tau_max` is 90 N*m, 75 times what all of `v_max` gives at a standstill, 1.2 N*m; 1 more is so; a "
+         "motor has more only where it is turned backwards, and then at most twice that",
+         ("in N*cm it would be 0.75 times what all of `v_max` gives at a standstill, 1.2 N*m: is the unit another?", "at most 12 N*m is usual")),
+        (("tau_max = 1 N*m", "tau_max = 11 N*m"), "", ()),
+        (("tau_max = 1 N*m", "tau_max = 1e9 N*m"), "", ()),  # none
         (("f_c = 0.01", "f_c = 1.5"),
          "`shoulder.servo.f_c` is 1.5 N*m, 1.5 times the motor's largest torque, 1 N*m; 1 more is so; a motor that cannot "
          "break away moves nothing", ("in N*cm it would be 0.015 times the motor's largest torque, 1 N*m: is the unit "
