@@ -24,6 +24,7 @@ from met import models
 from met.frozen import frozen
 from met.plan import BASE, Structure
 from met.plan.channel import JOINT_LIMITS
+from met.plan.defaults import INERTIA
 from met.servos.motor import RATIO
 
 TURN = 2.0 * math.pi
@@ -158,8 +159,8 @@ def _touches(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _gyrations(run: RunNumbers) -> Iterator[Scale]:
-    """Radii of gyration of bodies whose inertia is written; small ones only beside a body of a usual one, and up to 2 m
-    none on a short arm, whose links may be test bodies."""
+    """Radii of gyration of bodies whose inertia is written, and up to 2 m none on a short arm, whose links may be test
+    bodies. Small ones only beside a body of a usual one, and of bodies with equal moments (D298 is about others)."""
     usual = "of 620 links of published robots all have 0.00018 to 1.3 times their robot's reach"
     heads = [f"links.{link.name}" for link in run.structure.links if link.name in run.moved and not link.lumped]
     heads += [
@@ -169,6 +170,7 @@ def _gyrations(run: RunNumbers) -> Iterator[Scale]:
     low = 1e-4 if max(radii.values(), default=0.0) > 0.01 * run.reach else 0.0
     for head, radius in radii.items():
         path, shape = f"{head}.inertia", run.extent(head)
+        moments = {run.numbers.get(f"{path}.{part}") for part in INERTIA[:3]}
         beside, high = (shape, 10.0) if shape else (run.reach, max(4.0, 2.0 / run.reach if run.reach else 0.0))
         if beside > 0.0 and radius > SMALLEST_GYRATION and run.is_written(path):
             yield Scale(
@@ -178,7 +180,7 @@ def _gyrations(run: RunNumbers) -> Iterator[Scale]:
                 "m",
                 beside,
                 f"the size of its shape, {shape:.4g} m" if shape else run.reach_words,
-                low,
+                low if len(moments) == 1 else 0.0,
                 high,
                 usual,
                 verb="has a radius of gyration of",

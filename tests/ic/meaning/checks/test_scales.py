@@ -77,7 +77,7 @@ PUSH = "push = wrench { link = fore; point = [0.4, 0, 0] m; force = [0, 0, 1] N;
         (("[0.004, 0.03, 0.03] kg*m^2", "[40, 300, 300] kg*m^2"),
          "`links.fore.inertia` has a radius of gyration of 12.25 m, 20.41 times the arm's reach, 0.6 m; of 620 links of published robots all have 0.00018 to 1.3 times their robot's reach",
          ("in kg*cm^2 it would be 0.204 times the arm's reach, 0.6 m: is the unit another?", "at most 2.4 m is usual")),
-        (("[0.004, 0.03, 0.03] kg*m^2", "[4e-10, 3e-9, 3e-9] kg*m^2"),
+        (("[0.004, 0.03, 0.03] kg*m^2", "[3e-9, 3e-9, 3e-9] kg*m^2"),
          "`links.fore.inertia` has a radius of gyration of 3.873e-05 m, 6.455e-05 times the arm's reach, 0.6 m; of 620 links of published robots all have 0.00018 to 1.3 times their robot's reach",
          ("at least 6e-05 m is usual",)),
         (("point = [0.4, 0, 0] m", "point = [400, 0, 0] m"),
