@@ -1,4 +1,4 @@
-"""Axes of a sweep under which no metric of any case changes by a bit."""
+"""Axes of a sweep under which no metric of any case changes by more than rounding."""
 
 from __future__ import annotations
 
@@ -16,23 +16,29 @@ if TYPE_CHECKING:
     from met.plan import Experiment
 
 
+ROUNDING = 1e-9
+"""Largest change of a metric that counts as none, as a share of the metric."""
+
+
 def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
     """The warning about axes that change no metric, if there are any: about the first, with the others by name.
 
     experiment  of the plan, for places
     """
     done = group.values("status") == DONE
-    metrics = [group.values(variable.name)[done].view(np.uint64) for variable in group.role("metric")]
+    metrics = [group.values(variable.name)[done] for variable in group.role("metric")]
     axes = {variable.path: group.values(variable.name)[done] for variable in group.role("coordinate")}
+    if group.allows("D329") or not all(np.isfinite(each).all() for each in metrics):
+        return []  # of a metric that is not finite nobody knows what changes it
     idle = _idle(axes, metrics)
-    if not idle or group.allows("D329"):
+    if not idle:
         return []
     first, *others = idle
     values = counted(len(np.unique(axes[first])), "value")
     same = (
-        f"the {len(metrics)} metrics are the same to the bit"
+        f"the {len(metrics)} metrics are the same to 9 digits"
         if len(metrics) > 1
-        else "its metric is the same to the bit"
+        else "its metric is the same to 9 digits"
     )
     message = f"`{first}` changes no metric of any case: at its {values}, all else the same, {same}"
     helps = ["is it what was meant to vary? a metric of what it changes would show it"]
@@ -75,6 +81,6 @@ def _numbered(codes: Iterable[np.ndarray], count: int) -> np.ndarray:
 
 
 def _same(of: np.ndarray, values: Iterable[np.ndarray]) -> bool:
-    """True where cases with the same number `of` have the same values."""
+    """True where cases with the same number `of` have the same values, but for rounding."""
     _, first, number = np.unique(of, return_index=True, return_inverse=True)
-    return all(bool((each[first[number]] == each).all()) for each in values)
+    return all(np.isclose(each[first[number]], each, rtol=ROUNDING, atol=0.0).all() for each in values)

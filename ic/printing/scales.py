@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 from ic.driver.compile import Compiled
 from ic.meaning.checks.scales import Scale
 from ic.printing.columns import columns
+
+BESIDE = textwrap.TextWrapper(100, initial_indent="      ", subsequent_indent="      ", break_long_words=False)
+"""The form of the line below a row, which is never wider than 100 columns."""
+
+HEADINGS = ("kind", "how many", "ratio", "usual")
+LEGEND = ("  Of each kind the number whose ratio to another is nearest to an end of what is usual, or outside:", "")
 
 
 def print_scales(compiled: Compiled) -> list[str]:
@@ -18,24 +25,24 @@ def print_scales(compiled: Compiled) -> list[str]:
         by_kind: dict[str, list[Scale]] = {}
         for scale in scope.scales:
             by_kind.setdefault(scale.what, []).append(scale)
-        rows = [("", "", "", "number", "times", "of", "usual"), *map(_row, by_kind.values())]
-        lines += [*([""] if lines else []), experiment.name, *columns(rows, right=(4,))]
+        nearest = [max(scales, key=lambda each: each.nearness) for scales in by_kind.values()]
+        counts = (f"{len(scales)}" for scales in by_kind.values())
+        table = columns([HEADINGS, *map(_row, nearest, counts)], right=(1, 2))
+        lines += [*([""] if lines else []), experiment.name, *(() if lines else LEGEND), table[0]]
+        for line, scale in zip(table[1:], nearest, strict=True):
+            lines += [line, *BESIDE.wrap(_numbers(scale))]
     return lines
 
 
-def _row(scales: list[Scale]) -> tuple[str, ...]:
-    scale = max(scales, key=lambda each: each.nearness)
+def _row(scale: Scale, count: str) -> tuple[str, ...]:
     usual = f"up to {scale.high:g}" if scale.low == 0.0 else f"{scale.low:g} to {scale.high:g}"
-    verb = "" if scale.verb == "is" else f"{scale.verb} "
-    return (
-        scale.what,
-        f"nearest of {len(scales)}:" if len(scales) > 1 else "",
-        scale.path,
-        f"{verb}{scale.size:.4g} {scale.unit}".rstrip(),
-        f"{scale.multiple:.3g}" if scale.other else "",
-        scale.other,
-        usual + ("  OUTSIDE" if scale.nearness > 1.0 else ""),
-    )
+    return scale.what, count, f"{scale.multiple:.3g}", usual + ("  OUTSIDE" if scale.nearness > 1.0 else "")
+
+
+def _numbers(scale: Scale) -> str:
+    """The two numbers of a ratio in words."""
+    number = f"{scale.path} {scale.verb} {scale.size:.4g} {scale.unit}".rstrip()
+    return f"{number}, beside {scale.other}" if scale.other else number
 
 
 def scales_json(compiled: Compiled) -> list[dict[str, Any]]:

@@ -19,20 +19,26 @@ def remark_unread(scope: Scope, uses: Iterable[Use], structure: Structure) -> No
     """Report sensors that no law uses and nothing records, and dead ones that no law would notice."""
     servos = {each.joint: each for each in structure.servos}
     known: dict[Hashable, frozenset[str] | None] = {}  # many joints have one law
+    by_use: list[tuple[Use, frozenset[str] | None]] = []
     for use in uses:
-        servo = servos[use.joint]
         read = None
         if use.parameters is not None:
-            law = of_law(servo, use.parameters)
-            read = known[law] = known[law] if law in known else reads(servo, use.parameters)
+            law = of_law(servos[use.joint], use.parameters)
+            read = known[law] = known[law] if law in known else reads(servos[use.joint], use.parameters)
+        by_use.append((use, read))
+    # a sensor of a definition is seen where the law of one of its joints sees it, or is not known
+    every = [(each, read) for use, read in by_use for each in servos[use.joint].sensors]
+    seen_at = {each.place for each, read in every if read is None or each.of in read}
+    for use, read in by_use:
         if read is None:
             continue
+        servo = servos[use.joint]
         label = f"the law of servo `{use.definition}` ({servo.model})"
         under = f" under a {servo.command.kind} command" if servo.command is not None else ""
         seen = [of for of in quantities(servo) if of in read]
         helps = known_words(f"it reads{under}", seen) if seen else f"it reads nothing of its joint{under}"
         for sensor in servo.sensors:
-            if sensor.of not in read and sensor.place is not None and not _kept(structure, servo, sensor.of):
+            if sensor.place is not None and sensor.place not in seen_at and not _kept(structure, servo, sensor.of):
                 scope.complaints.remark(
                     "D290",
                     f"sensor `{sensor.of}` changes nothing: {label} does not read `{sensor.of}`",

@@ -17,18 +17,23 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 import numpy as np
 
 from ic.meaning.checks.magnitudes import LENGTHS, MASSES, MEANT, SMALLEST_GYRATION
-from ic.meaning.checks.run_numbers import BEARING_NOTHING, RunNumbers
+from ic.meaning.checks.run_numbers import BEARING_NOTHING, INSTANTS, RunNumbers
 from ic.meaning.control.servos import Use, unit_written
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.frozen import frozen
 from met.plan import BASE, Structure
+from met.plan.channel import JOINT_LIMITS
+from met.plan.defaults import INERTIA
 from met.servos.motor import RATIO
 
 TURN = 2.0 * math.pi
 
 EARTH = 9.80665
 """Acceleration of free fall on the Earth, m/s^2."""
+
+FAR = 1e4
+"""Multiple of what a motor can give from which on a limit is a large number for none."""
 
 MOST_CASES = 16
 """Largest number of cases that are looked at: the first, and those with the ends of what varies."""
@@ -45,6 +50,7 @@ class Scale:
     low     smallest usual multiple;  high: the largest;  usual: where these are from, in words
     meant   unit of the parameter where another may have been meant, "" where it may not;  power: the multiple goes as
             this power of the parameter
+    said    what is so, in words, where the multiple does not say it
     """
 
     what: str
@@ -59,6 +65,7 @@ class Scale:
     verb: str = "is"
     meant: str = ""
     power: float = 1.0
+    said: str = ""
 
     @property
     def multiple(self) -> float:
@@ -74,11 +81,14 @@ class Scale:
         """The warning in words. case: words for the case; others: number of further paths that are so"""
         times = f", {self.multiple:.4g} times {self.other}" if self.other else ""
         more = f"; {others} more {'is' if others == 1 else 'are'} so" if others else ""
-        return f"`{self.path}` {self.verb} {self.size:.4g} {self.unit}".rstrip() + f"{case}{times}{more}; {self.usual}"
+        said = self.said or f"{self.verb} {self.size:.4g} {self.unit}".rstrip()
+        return f"`{self.path}` {said}{case}{'' if self.said else times}{more}; {self.usual}"
 
     @property
     def remedies(self) -> list[str]:
         """Other units of the parameter with which the multiple would be usual, if there are any, and what is usual."""
+        if self.said:
+            return ["ask for less, or move the limit"]
         multiples = [(unit, self.multiple * factor**self.power) for unit, factor in OTHER_UNITS.get(self.meant, ())]
         usual = [(unit, each) for unit, each in multiples if max(self.low, 1e-2 * self.high) <= each <= self.high]
         usual.sort(key=lambda each: abs(math.log(each[1] / (0.1 * self.high))))
@@ -97,6 +107,7 @@ OTHER_UNITS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "kg": (("g", 1e-3),),
     "kg*m^2": (("kg*cm^2", 1e-4), ("kg*mm^2", 1e-6), ("g*cm^2", 1e-7), ("g*mm^2", 1e-9)),
     "N*m": (("N*cm", 1e-2), ("N*mm", 1e-3)),
+    "A": (("mA", 1e-3),),
 }
 """Units in which a number may have been meant, and their size in that which it has."""
 
@@ -148,8 +159,8 @@ def _touches(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _gyrations(run: RunNumbers) -> Iterator[Scale]:
-    """Radii of gyration of bodies whose inertia is written; small ones only beside a body of a usual one, and up to 2 m
-    none on a short arm, whose links may be test bodies."""
+    """Radii of gyration of bodies whose inertia is written, and up to 2 m none on a short arm, whose links may be test
+    bodies. Small ones only beside a body of a usual one, and of bodies with equal moments (D298 is about others)."""
     usual = "of 620 links of published robots all have 0.00018 to 1.3 times their robot's reach"
     heads = [f"links.{link.name}" for link in run.structure.links if link.name in run.moved and not link.lumped]
     heads += [
@@ -159,6 +170,7 @@ def _gyrations(run: RunNumbers) -> Iterator[Scale]:
     low = 1e-4 if max(radii.values(), default=0.0) > 0.01 * run.reach else 0.0
     for head, radius in radii.items():
         path, shape = f"{head}.inertia", run.extent(head)
+        moments = {run.numbers.get(f"{path}.{part}") for part in INERTIA[:3]}
         beside, high = (shape, 10.0) if shape else (run.reach, max(4.0, 2.0 / run.reach if run.reach else 0.0))
         if beside > 0.0 and radius > SMALLEST_GYRATION and run.is_written(path):
             yield Scale(
@@ -168,7 +180,7 @@ def _gyrations(run: RunNumbers) -> Iterator[Scale]:
                 "m",
                 beside,
                 f"the size of its shape, {shape:.4g} m" if shape else run.reach_words,
-                low,
+                low if len(moments) == 1 else 0.0,
                 high,
                 usual,
                 verb="has a radius of gyration of",
@@ -211,6 +223,59 @@ def _speeds(run: RunNumbers) -> Iterator[Scale]:
             other = f"the rate at which the motor's back-EMF is all of `{limit[0]}`, {most:.4g} {unit}"
             path, fastest = f"{use.joint}.servo.command", float(np.abs(rates).max())
             yield Scale("commanded rate", path, fastest, unit, most, other, 0.0, 1.0, usual, verb="asks for")
+
+
+def _limits(run: RunNumbers) -> Iterator[Scale]:
+    """Commands beside the limits of their joints: positions, also where a commanded rate leads, rates and torques."""
+    usual = "a limit of a joint holds nothing, and is only watched"
+    t = np.linspace(0.0, run.duration, INSTANTS)
+    for use in run.uses:
+        course, kind = run.course(use), use.command.kind if use.command is not None else ""
+        if course is None:
+            continue
+        places, rates = course if kind == "position" else (course[0] * math.nan, course[0])
+        if kind == "rate":
+            ways = np.cumsum(rates[1:] + rates[:-1]) * (0.5 * t[1])
+            places = run.numbers.get(f"initial.{use.joint}.q", math.nan) + np.append(0.0, ways)
+        own = {name: run.numbers.get(f"{use.joint}.{name}", math.nan) for name in JOINT_LIMITS}
+        for name, asked, other, beside in (
+            ("q_min", places, own["q_max"], "the range of the joint"),
+            ("q_max", places, own["q_min"], "the range of the joint"),
+            ("tau_max" if kind == "torque" else "qd_max", np.abs(rates), 0.0, "the limit of the joint"),
+        ):
+            path, multiples = f"{use.joint}.{name}", (asked - other) / (own[name] - other)
+            k = int(multiples.argmax())
+            if math.isfinite(multiples[k]) and kind != "acceleration":
+                unit, scale = unit_written([run.settled[path]], run.settled[path].unit)
+                end = f"`{path}` is {own[name] / scale:.6g} {unit}"
+                said = f"leads to {asked[k] / scale:.6g} {unit} at {t[k]:.4g} s, and {end}"
+                size, most = abs(float(asked[k]) - other), abs(own[name] - other)
+                yield Scale(
+                    "command beside a limit",
+                    f"{use.joint}.servo.command",
+                    size,
+                    run.settled[path].unit,
+                    most,
+                    beside,
+                    0.0,
+                    1.01 if kind == "rate" else 1.001,
+                    usual,
+                    said=said,
+                )
+
+
+def _strengths(run: RunNumbers) -> Iterator[Scale]:
+    """Limits of torque and current beside what the voltage gives at a standstill; one `FAR` beyond means no limit."""
+    usual = "a motor has more only where it is turned backwards, and then at most twice that"
+    for use in run.uses:
+        kt, resistance, volts = run.of_motor(use, "kt"), run.of_motor(use, "resistance"), run.limit(use, "V")
+        for unit, each in (("N*m", kt), ("A", 1.0)):
+            limit = run.limit(use, unit)
+            if limit is not None and volts is not None and each and resistance and volts[1] < math.inf:
+                path, most = f"{use.joint}.servo.{limit[0]}", each * volts[1] / resistance
+                other = f"what all of `{volts[0]}` gives at a standstill, {most:.4g} {unit}"
+                if 0.0 < limit[1] < FAR * most:
+                    yield Scale("limit of a motor", path, limit[1], unit, most, other, 0.0, 10.0, usual, meant=unit)
 
 
 def _frictions(run: RunNumbers) -> Iterator[Scale]:
@@ -344,6 +409,8 @@ SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
     _levers,
     _gears,
     _speeds,
+    _limits,
+    _strengths,
     _frictions,
     _loads,
     _brakes,
@@ -358,7 +425,8 @@ SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
 
 def scales(run: RunNumbers) -> list[Scale]:
     """All scales of one case of a run."""
-    return [scale for kind in SCALES for scale in kind(run)]
+    with np.errstate(all="ignore"):  # of a swing at 1e308 Hz there are no numbers
+        return [scale for kind in SCALES for scale in kind(run)]
 
 
 def check_scales(scope: Scope, structure: Structure, uses: Iterable[Use]) -> None:

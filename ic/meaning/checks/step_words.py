@@ -44,6 +44,10 @@ def _case(experiment: Experiment, case: int) -> str:
     return f"case #{int(experiment.cases.table[case])}"
 
 
+EDGE = 0.98
+"""Share of a stable gain that is told, so that a deck which takes it, with its gains rounded apart, is stable."""
+
+
 def loop_warning(experiment: Experiment, loop: Unstable, place: Place | None, where: str) -> Diagnostic:
     """A warning about servo loops that are unstable with this arm: by their ticks, D320, or without them, D322.
 
@@ -89,12 +93,13 @@ def _fitting(experiment: Experiment, loop: Unstable) -> str:
         return "how much of the gain is stable was not searched for: the arm is too large"
     if share is None:
         return "no share of the gain is stable"
+    share = float(_inside(share * EDGE if share < 1.0 else share / EDGE, share, 2))
     gains = [
         _value_of(experiment, loop.case, path, share)
         for path in (f"{joint}.servo.{name}" for name in ("kp", "ki"))
         if path in experiment.parameters and len(loop.joints) == 1
     ]
-    fits = f"stable {'up to' if share < 1.0 else 'from'} {_inside(share, share, 2)} times the gain"
+    fits = f"stable {'up to' if share < 1.0 else 'from'} {share:g} times the gain"
     return f"{fits}: {', '.join(gains)}" if gains else fits
 
 

@@ -97,6 +97,7 @@ def report_others(scope: Scope, name: str, item: Item, joints: Iterable[Joint], 
         also=why,
         help=[
             f"write `{first.name}.{name} = 0 {_UNITS[first.kind][name]};` beside it",
+            *([f"or give `{first.name}` a servo with such a command, in `servos`"] if use is None else []),
             *([names] if len(others) > 1 else []),
         ],
     )

@@ -322,7 +322,7 @@ run bare like nominal { servos { remove elbow; } }
 
 @pytest.mark.slow
 def test_a_drive_at_its_largest_torque_is_noted(met_bed: Bed, here: Path) -> None:
-    text = PUSHED.replace("tau_max = 10 N*m", "tau_max = 0.03 N*m")
+    text = PUSHED.replace("tau_max = 0.5 N*m", "tau_max = 0.03 N*m")
     (here / "deck.ic").write_text(text, encoding="utf-8")
     found = sized(met_bed, "--joint", "swing")
     assert (found["at_largest_torque"], found["drive"]["figures"]["torque_peak"]["value"]) == (1, 0.03)

@@ -51,6 +51,39 @@ def test_axes_that_change_no_metric_are_told(tmp_path: Path, varied: str, idle: 
     if idle:
         (told,) = found
         assert told.message.startswith(f"`{idle[0]}` changes no metric of any case: at its ")
-        assert told.message.endswith("all else the same, the 2 metrics are the same to the bit")
+        assert told.message.endswith("all else the same, the 2 metrics are the same to 9 digits")
         assert told.help[1:] == ((f"the same of `{idle[1]}`",) if idle[1:] else ())
         assert told.at is not None and told.at.place.file == str(path)
+
+
+SWING = """deck 2;
+let along = 0 m;
+arm a {
+    link b { mass = 1 kg;  com = [0.11 m + along, 0.03 m + 2*along, 3*along];  inertia = [0.01, 0.02, 0.03] kg*m^2; }
+    joint j revolute { parent = base;  child = b;  axis = [1, 2, 3]; }
+}
+run r {
+    arm = a;  initial { j.q = 1 rad; }  environment { gravity = [0, -9.81, 0] m/s^2; }
+    rates { dynamics = 100 Hz; }  duration = 1 s;  record = [];  metric last = final { of = j.q; }
+}
+default sweep w of r { vary along = [0, 0.1, 0.7] m; }
+"""
+"""A deck whose sweep moves a centre of mass along the joint's axis: the motion stays, but for rounding."""
+LATE = "metric late = settling_time { of = j.q;  target = 99 rad;  band = 1 %; }"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("more", ["", LATE])
+def test_a_change_by_rounding_is_none_and_of_a_metric_without_a_value_nothing_is_said(
+    tmp_path: Path, more: str
+) -> None:
+    path = tmp_path / "deck.ic"
+    path.write_text(SWING.replace("metric last", f"{more}  metric last"))
+    plan = ic.compile(path)
+    with ArchiveFile(batch.run(plan, output=tmp_path / "a.h5", verify="none").path) as file:
+        found = campaign_warnings(file.groups, {each.name: each for each in plan.experiments})
+        last = next(
+            file.groups[0].values(each.name) for each in file.groups[0].role("metric") if each.name.endswith("last")
+        )
+    assert 0.0 < abs(last - last[0]).max() < 1e-12
+    assert [each.code for each in found if each.code == "D329"] == ["D329"] * (not more)

@@ -25,7 +25,7 @@ BEST = (Path(__file__).parents[3] / "docs" / "best.md").read_text(encoding="utf-
 PUSHED = """
 servo pushed {
     model = rigid_gearbox;  ratio = 50;  kp = 1 V*s/rad;  ki = 0 V/rad;  v_max = 1000 V;  resistance = 100 ohm;
-    kt = 0.01 N*m/A;  tau_max = 10 N*m;  j_m = 1e-4 kg*m^2;  command = torque(2 N*m);
+    kt = 0.01 N*m/A;  tau_max = 0.5 N*m;  j_m = 1e-4 kg*m^2;  command = torque(2 N*m);
 }
 arm one {
     link disk { mass = 1 kg;  inertia = [1, 1, 0.3] kg*m^2; }

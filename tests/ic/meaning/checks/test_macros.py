@@ -9,6 +9,21 @@ import pytest
 import ic
 from tests.ic.small_decks import ARM, RUN, SERVO
 
+TAKEN = [
+    ("#define TWICE(x) x * 2\n", "TWICE(1 + 2)", "x * 2", "(x) * 2"),
+    ("#define TWICE(x) 2 * x\n", "TWICE(1 + 2)", "2 * x", "2 * (x)"),
+    ("#define LESS(x) 9 - x\n", "LESS(1 + 2)", "9 - x", "9 - (x)"),
+    ("#define SQUARE(x) x ^ 2\n", "SQUARE(3 * 2)", "x ^ 2", "(x) ^ 2"),
+    ("#define BACK -2\n", "BACK ^ 2", "-2", "(-2)"),
+]
+SAME = [
+    ("#define TWICE(x) x * 2\n", "TWICE(3 * 2)"),
+    ("#define TWICE(x) x * 2\n", "TWICE((1 + 2))"),
+    ("#define MORE(x) 1 + x\n", "MORE(3 - 2)"),
+    ("#define MORE(x) x + 1\n", "MORE(3 * 2)"),
+    ("#define BACK -2\n", "3 * BACK"),
+    ("#define BACK -2\n", "-2 ^ 2 + BACK"),
+]
 MACROS = "#define SUM 1 + 4\n#define LESS 5 - 3\n#define TIMES 2 * 3\n#define OF(x) x + 1\n#define SAFE (1 + 4)\n"
 
 
@@ -54,3 +69,16 @@ def test_a_macro_that_means_the_same_as_with_brackets_is_not_told(tmp_path: Path
     ]
     assert told(tmp_path, f"[{', '.join(same)}]") == []
     assert told(tmp_path, f"[{', '.join(same)}, 2 * SUM]") == ["D389"]
+
+
+@pytest.mark.parametrize(("macro", "value", "without", "brackets"), TAKEN)
+def test_an_argument_and_a_sign_that_are_taken_apart_are_told(
+    tmp_path: Path, macro: str, value: str, without: str, brackets: str
+) -> None:
+    assert told(tmp_path, value, macro) == ["D389"]
+    assert told(tmp_path, value, macro.replace(without, brackets)) == []
+
+
+@pytest.mark.parametrize(("macro", "value"), SAME)
+def test_an_argument_and_a_sign_that_stay_whole_are_not(tmp_path: Path, macro: str, value: str) -> None:
+    assert told(tmp_path, value, macro) == []

@@ -35,8 +35,13 @@ def shown(folder: Path, *parts: str) -> str:
          "44.72 m (its radius of gyration), and would be of 0.002378 kg/m^3; solids have 1 to 22,600",
          "it would be of 0.04472 m, 2.5 kg and 2378 kg/m^3, were all its numbers in mm and g"),
         ("mass = 2.5 kg; com = [0.15, 0, 0] m; inertia = [3e-12, 5e-12, 5e-12] kg*m^2;",
-         "1.414e-06 m (its radius of gyration), and weighs 2.5 kg; a point mass has `inertia = [0, 0, 0] kg*m^2`",
+         "1.414e-06 m (its radius of gyration), and weighs 2.5 kg, more than any solid of that size; a point mass has "
+         "`inertia = [0, 0, 0] kg*m^2`",
          "it would be of 0.04472 m, were it 0.005 kg*m^2: was it converted from g*mm^2 twice?"),
+        ("mass = 5 kg; com = [0.5, 0, 0] m; inertia = [4e-7, 5e-6, 5e-6] kg*m^2;",
+         "0.001 m (its radius of gyration), and weighs 5 kg, more than any solid of that size; a point mass has "
+         "`inertia = [0, 0, 0] kg*m^2`",
+         "it would be of 0.1 m, were it 0.05 kg*m^2: was it converted from kg*cm^2 twice?"),
     ],
 )  # fmt: skip
 def test_an_inertia_in_other_units_on_an_arm_in_these_and_one_converted_twice_are_told(
@@ -135,7 +140,7 @@ def test_a_torque_constant_in_milli_is_told(tmp_path: Path) -> None:
     servo = changed(SERVO, ("kt = 0.05", "kt = 600"), ("resistance = 1 ohm", "resistance = 1e8 ohm"))
     assert [code for code in codes(tmp_path, ARM, servo, RUN) if code == "D297"] == [
         "D297"
-    ] * 2  # such a motor turns slowly
+    ] * 3  # such a motor turns slowly, and never has its largest torque
 
 
 @pytest.mark.parametrize(
@@ -146,6 +151,8 @@ def test_a_torque_constant_in_milli_is_told(tmp_path: Path) -> None:
         "mass = 1 kg; com = [0, 0, 0] m; inertia = [500, 500, 500] kg*m^2;",  # of no length: its mass does not count
         "mass = 1 kg; com = [0.1, 0, 0] mm; inertia = [1, 1, 1] kg*m^2;",  # a rotor that is nearly balanced
         "mass = 1 kg; com = [0.5, 0, 0] m; inertia = [1e-9, 1e-9, 1e-9] kg*m^2;",  # nearly a point
+        "mass = 1 kg; com = [0.5, 0, 0] m; inertia = [2e-5, 3e-5, 3e-5] kg*m^2;",  # a ball of steel, nearly
+        "mass = 2 kg; com = [0.5, 0, 0] m; inertia = [0, 0.17, 0.17] kg*m^2;",  # a thin rod
         "mass = 20 kg; shape = box(size = [10, 3, 0.1] m);",  # a panel of solar cells
         "mass = 300 kg; com = [20, 0, 0] m; inertia = [40020, 40020, 80000, -39980, 0, 0] kg*m^2;",  # a mast, 40 m long
         "mass = 400 t; com = [10, 0, 0] m; inertia = [1e8, 2e8, 2e8] kg*m^2;",  # a station

@@ -77,7 +77,7 @@ PUSH = "push = wrench { link = fore; point = [0.4, 0, 0] m; force = [0, 0, 1] N;
         (("[0.004, 0.03, 0.03] kg*m^2", "[40, 300, 300] kg*m^2"),
          "`links.fore.inertia` has a radius of gyration of 12.25 m, 20.41 times the arm's reach, 0.6 m; of 620 links of published robots all have 0.00018 to 1.3 times their robot's reach",
          ("in kg*cm^2 it would be 0.204 times the arm's reach, 0.6 m: is the unit another?", "at most 2.4 m is usual")),
-        (("[0.004, 0.03, 0.03] kg*m^2", "[4e-10, 3e-9, 3e-9] kg*m^2"),
+        (("[0.004, 0.03, 0.03] kg*m^2", "[3e-9, 3e-9, 3e-9] kg*m^2"),
          "`links.fore.inertia` has a radius of gyration of 3.873e-05 m, 6.455e-05 times the arm's reach, 0.6 m; of 620 links of published robots all have 0.00018 to 1.3 times their robot's reach",
          ("at least 6e-05 m is usual",)),
         (("point = [0.4, 0, 0] m", "point = [400, 0, 0] m"),
@@ -89,6 +89,12 @@ PUSH = "push = wrench { link = fore; point = [0.4, 0, 0] m; force = [0, 0, 1] N;
         (("max_rate = 0.8 rad/s, max_acceleration = 2", "max_rate = 8 rad/s, max_acceleration = 200"),
          "`shoulder.servo.command` asks for 8 rad/s, 1.667 times the rate at which the motor's back-EMF is all of `v_max`, "
          "4.8 rad/s; 1 more is so; no motor runs faster", ("at most 4.8 rad/s is usual",)),
+        (("tau_max = 1 N*m", "tau_max = 90 N*m"),
+         "`shoulder.servo.tau_max` is 90 N*m, 75 times what all of `v_max` gives at a standstill, 1.2 N*m; 1 more is so; a "
+         "motor has more only where it is turned backwards, and then at most twice that",
+         ("in N*cm it would be 0.75 times what all of `v_max` gives at a standstill, 1.2 N*m: is the unit another?", "at most 12 N*m is usual")),
+        (("tau_max = 1 N*m", "tau_max = 11 N*m"), "", ()),
+        (("tau_max = 1 N*m", "tau_max = 1e9 N*m"), "", ()),  # none
         (("f_c = 0.01", "f_c = 1.5"),
          "`shoulder.servo.f_c` is 1.5 N*m, 1.5 times the motor's largest torque, 1 N*m; 1 more is so; a motor that cannot "
          "break away moves nothing", ("in N*cm it would be 0.015 times the motor's largest torque, 1 N*m: is the unit "
@@ -201,14 +207,13 @@ def test_all_scales_are_shown_and_given_to_programs(tmp_path: Path, capsys: pyte
     shown = capsys.readouterr().out.splitlines()
     assert shown[0] == "lift"
     assert [line.split("  ")[1] for line in shown if "OUTSIDE" in line] == ["dry friction"]
-    assert any(line.split() == GRAVITY for line in shown)
+    at = next(at for at, line in enumerate(shown) if line.split() == ["gravity", "1", "1", "up", "to", "30"])
+    assert shown[at + 1] == "      environment.gravity.g is 9.81 m/s^2, beside that on the Earth"
+    assert shown[3].split("  ")[1] == "kind" and max(map(len, shown)) <= 100
     assert main(["explain", f"{path}", "--scales", "--format", "json"]) == 0
     [run] = json.loads(capsys.readouterr().out)
     [friction] = [each for each in run["scales"] if each["path"] == "elbow.servo.f_c"]
     assert (friction["multiple"], friction["high"], friction["unit"]) == (1.5, 1.0, "N*m")
-
-
-GRAVITY = ["gravity", "environment.gravity.g", "9.81", "m/s^2", "1", "that", "on", "the", "Earth", "up", "to", "30"]
 
 
 def test_a_path_or_scales_must_be_asked_for_and_a_plan_has_none(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -193,3 +194,27 @@ def test_the_gain_of_a_rate_loop_brakes_the_swing_and_a_current_loop_may_swing(t
     fast, told = check(tmp_path, ARM, loop, RUN).diagnostics
     assert fast.code == "D105" and told.code == "D249"
     assert told.message.startswith("the current loop of servo `drive` swings, and this step of modified_euler")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("mass", "position", "rate", "sensor"),
+    [
+        (1, 40, 50, ""),
+        (20, 0, 100, "sensor qd = tachometer { delay = 3; }"),
+    ],
+)
+def test_a_deck_that_takes_the_told_gains_is_stable(
+    tmp_path: Path, mass: int, position: int, rate: int, sensor: str
+) -> None:
+    """What was found: with kp and ki rounded apart a loop at the very edge went on to grow."""
+    command = "position(0 deg)" if position else "rate(0 rad/s)"
+    gains = f"kp = 0.5 V*s/rad; ki = 20 V/rad; k_position = {position} 1/s; {sensor}"
+    servo = changed(SERVO, ("kp = 0.1 V*s/rad; ki = 1 V/rad;", gains), ("rate(0.1 rad/s)", command))
+    run = changed(RUN, ("servos = 1 kHz", f"servos = {rate} Hz"), ("record = 100 Hz", "record = 50 Hz"))
+    arm = changed(ARM, ("mass = 2 kg", f"mass = {mass} kg"))
+    [found] = check(tmp_path, arm, servo, run).diagnostics
+    kp, ki = re.findall(r"k[pi] = \S+", str(found.help[0]))
+    assert found.code == "D320"
+    told = changed(servo, ("kp = 0.5", kp), ("ki = 20", ki))
+    assert codes(tmp_path, arm, told, run) == []

@@ -152,6 +152,7 @@ error[D380]: `q = command` takes the position from a command, and joint `slide` 
    |                   ^^^^^^^
   ::: deck.ic:5:5  joint `slide` has no servo
    = help: write `slide.q = 0 m;` beside it
+   = help: or give `slide` a servo with such a command, in `servos`
 
 error[D380]: `qd = command` takes the rate from a command, and joint `slide` has no position or rate command of its own
   --> deck.ic:13:33
@@ -160,6 +161,7 @@ error[D380]: `qd = command` takes the rate from a command, and joint `slide` has
    |                                 ^^^^^^^
   ::: deck.ic:5:5  joint `slide` has no servo
    = help: write `slide.qd = 0 m/s;` beside it
+   = help: or give `slide` a servo with such a command, in `servos`
 
 2 errors
 """,
