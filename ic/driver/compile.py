@@ -20,7 +20,7 @@ from ic.meaning.control.servos import check_servo_definition
 from ic.meaning.control.unused_servos import check_on_a_joint, servos_in_use
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.definitions.row_tables import is_row_table
-from ic.meaning.definitions.unused_params import misspelt_params, unused_servos
+from ic.meaning.definitions.unused_params import misspelt_params
 from ic.meaning.mechanics.arm import check_arm, resolve_arm
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import allowed_warnings, silence_of_all, warn_of_unneeded
@@ -178,7 +178,6 @@ def compile_deck(
         if select == "all":
             _remark_unused_rows(definitions, scopes, complaints)
         if not settings and not defines:  # which make another deck of it
-            complaints.add(*unused_servos(deck))
             warn_of_unneeded(definitions, asked, experiments, complaints)
     else:
         return Compiled(None, in_order(complaints.all, sources), texts)

@@ -1,15 +1,14 @@
 """Warnings about what nothing uses: a `param` that was meant for one of another file, `param raech = 0.9 m;` above an
-include; a servo that is like another one."""
+include; the first of a list, `for i in 1 .. 2` over `lengths[i]`."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from ic.grammar.syntax import Deck, Entry, Group, Let, Name, Setting
-from met.diagnostic import Diagnostic, Help, Label, Place, write
+from ic.grammar.syntax import Entry, Let, Name, Setting
+from met.diagnostic import Diagnostic, Label, Place, write
 from met.messages.alike import meant
 from met.messages.message import shown_place
 
@@ -31,26 +30,6 @@ def misspelt_params(entries: Sequence[Entry]) -> Iterator[Diagnostic]:
             also = Label(other.name.place, f"`{text}`, which an including deck may set")
             helps = write(text, f"did you mean `{text}`?")
             yield Diagnostic("D386", message, Label(let.name.place), (also,), (helps,), severity="warning")
-
-
-def unused_servos(deck: Deck) -> Iterator[Diagnostic]:
-    """Warn about each servo of the deck's own file that is like another one, and that nothing names: neither the deck,
-    if it has a run, nor what an `#if` leaves out there (D386)."""
-    own = [each for each in deck.entries if isinstance(each, Group) and not shown_place(each.place).included]
-    if all(group.words[-2].text != "run" for group in own):
-        return
-    text = _COMMENT.sub("", next(source.text for source in deck.sources if source.name == deck.file))
-    named = _named(deck.entries)
-    for group in own:
-        name = group.words[-1]
-        is_variant = group.words[-2].text == "servo" and group.like is not None and name.text not in named
-        if is_variant and len(re.findall(rf"\b{name.text}\b", text)) < 2:
-            helps = Help(f"give it to a joint, `servos {{ JOINT = {name.text}; }}`, or leave it out")
-            message = f"nothing uses servo `{name.text}`, so it has no effect"
-            yield Diagnostic("D386", message, Label(name.place), (), (helps,), severity="warning")
-
-
-_COMMENT = re.compile(r"//.*|/\*(?s:.*?)\*/")
 
 
 def _is_included(let: Let, by: str) -> bool:

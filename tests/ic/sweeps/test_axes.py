@@ -153,7 +153,7 @@ def test_a_definition_and_one_of_its_joints_on_one_parameter_is_an_error(tmp_pat
     (diagnostic,) = compiled.diagnostics
     assert (diagnostic.code, len(diagnostic.also)) == ("D123", 1)
     other = "vary drive.kp = [1, 2] V*s/rad; vary wrist.servo.ki = [3, 4] V/rad;"
-    assert swept_codes(tmp_path, other, TWO.partition("servo")[0], BOTH) == []
+    assert swept_codes(tmp_path, other, TWO, BOTH) == []
 
 
 @pytest.mark.slow

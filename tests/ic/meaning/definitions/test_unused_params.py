@@ -64,19 +64,3 @@ def test_the_first_element_of_a_list_that_loops_pass_over_is_told(
 ) -> None:
     assert codes(tmp_path, before="let spans = [0.5, 0.4, 0.3] m;", behind=lets) == expected
     assert codes(tmp_path, before="let spans = [0, 0.4, 0.3] m;", behind=lets) == []
-
-
-@pytest.mark.parametrize(
-    ("more", "told"),
-    [
-        ("servo gentle like drive { kp = 0.05 V*s/rad; }", True),
-        ("servo gentle like drive { kp = 0.05 V*s/rad; }\n#ifdef SLOW\nsweep s of gentle { }\n#endif", False),
-        ("servo gentle { model = passive;  damping = 1 N*m*s/rad; }", False),  # for another day
-        ("servo gentle like drive { kp = 0.05 V*s/rad; }\nservo soft like gentle { } \n"
-         "run other like hold { servos { hinge = soft; } }", False),
-        ("servo gentle like drive { kp = 0.05 V*s/rad; }\nrun other like hold { servos { hinge = gentle; } }", False),
-    ],
-)  # fmt: skip
-def test_a_servo_like_another_one_that_no_joint_has_is_told(tmp_path: Path, more: str, told: bool) -> None:
-    assert codes(tmp_path, behind=more) == ["D386"] * told
-    assert codes(tmp_path, part=PART + more) == []
