@@ -49,8 +49,10 @@ DISK = "stability:disk"
 """The name, among metrics, of the disk margin by which a tuning is steered: no metric of a deck has it."""
 
 
-AIM = 1.02
-"""Share of the least margin at which a tuning aims: it looks at some frequencies, and where cases begin."""
+def aimed_at(least_margin: float) -> float:
+    """The disk margin at which a tuning aims, 2 % above the least and below 2: it looks at some frequencies, and where
+    cases begin."""
+    return min(1.02 * least_margin, 0.5 * (least_margin + 2.0))
 
 
 @frozen
@@ -66,7 +68,7 @@ class CampaignSearch:
     """A search on its way.
 
     section  all cases that were asked for so far, in the order in which they were
-    worth    what each of those is worth that are done
+    worth    what each of those is worth that are done, by the least margin too where that steers
     """
 
     def __init__(self, section: CampaignSection) -> None:
@@ -78,6 +80,7 @@ class CampaignSearch:
         self._requirements = experiment.requirements
         self._metrics: dict[str, list[np.ndarray]] = {}
         self._done: list[np.ndarray] = []
+        self._by_requirements: list[np.ndarray] = []
         self._method = search_method(self.search, TuningSlopes(experiment) if self.search.gradients else None)
         self._table = np.empty((0, len(experiment.cases.coordinates)))
         self._generations: list[int] = []
@@ -110,8 +113,9 @@ class CampaignSearch:
         goal = run.metrics[self.search.metric]
         if self.search.kind == "tune":
             worth = self._served(run, done, self._requirements, run.metrics)
+            self._by_requirements.append(worth)
             if self.search.steers and (worth < MET).any():
-                limits: list[MetricLimit] = [*self._requirements, _LeastDisk(AIM * self.search.least_margin)]
+                limits: list[MetricLimit] = [*self._requirements, _LeastDisk(aimed_at(self.search.least_margin))]
                 worth = self._served(run, done, limits, {**run.metrics, DISK: self._disks(run, worth < MET)})
         else:
             worth = hurt(goal, self.search.largest, done)
@@ -130,7 +134,7 @@ class CampaignSearch:
         """The least disk margin of the loops of these cases where they begin, [case]; infinite where there is none, and
         where it is not wanted."""
         disks = np.full(len(run.case), np.inf)
-        rows, least = run.case[wanted].tolist(), AIM * self.search.least_margin
+        rows, least = run.case[wanted].tolist(), aimed_at(self.search.least_margin)
         found = margins_at_start(self.section.prepared.experiment, rows, least)
         if found is not None:
             disks[wanted] = found
@@ -149,6 +153,8 @@ class CampaignSearch:
         search = replace(search, starts=starts_of(self._method, search, self._table, self.worth))
         if search.kind == "tune" and search.least_margin:
             designs = designs_that_stand(search, self._table, self.worth)
+            if search.steers and not designs:  # none keeps the margin: judge those that meet the requirements
+                designs = designs_that_stand(search, self._table, np.concatenate(self._by_requirements))
             search = replace(search, judged=judged_designs(prepared, search, designs))
         experiment = replace(prepared.experiment, search=search)
         self.section = replace(self.section, prepared=prepared.of_cases(experiment))

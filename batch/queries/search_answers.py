@@ -31,6 +31,9 @@ OVER_CASES = re.compile(r" in [^<>]* of cases\b[^<>]*$")
 NEAR_BEST = 0.02
 """Share of a goal by which two starts of a tuning may differ, and are taken to have come to the same optimum."""
 
+ROUNDING = 1e-9
+"""Share of the largest goal of all cases below which goals differ by rounding."""
+
 NEAREST = 1
 """Number of requirements that are named as nearest to their limits."""
 
@@ -157,19 +160,25 @@ class SearchAnswer:
 
     def _sureness(self) -> list[str]:
         """Lines about how sure it is that a tuning's optimum is the best: the goals that its starts came to."""
-        reached, words = np.array(self.starts), "another `seed` or a larger `at_most` may find better"
-        if len(reached) == 1:
-            return wrapped(f"not sure that it is the best: there was one start alone; {words}")
-        if not np.isfinite(reached).any():
+        found, reached = self.found, np.array(self.starts)
+        if not found.serves or not np.isfinite(reached).any():
             return []
+        if found.left is not None:
+            words = f"`least_margin = {self.search.least_margin:g};` in the tuning makes it look for one that keeps it"
+            return wrapped(f"not sure that it is the best with its margin: the tuning went by the goal alone; {words}")
+        if len(reached) == 1:
+            return wrapped("not sure that it is the best: there was one start alone; another `seed` may find better")
         best = np.nanmax(reached) if self.search.largest else np.nanmin(reached)
-        near = np.abs(reached - best) <= NEAR_BEST * abs(best)
+        goals = self._given[2][self.search.metric]
+        rounding = ROUNDING * np.abs(goals[np.isfinite(goals)]).max(initial=0.0)
+        near = np.abs(reached - best) <= max(NEAR_BEST * abs(best), rounding)
         if near.sum() > 1:
             share = f"{100.0 * NEAR_BEST:g} %"
             return wrapped(f"{near.sum()} of its {len(reached)} starts came to within {share} of one another")
         others = [self.goal(value) if np.isfinite(value) else "none that meets all" for value in reached[~near]]
         count = f"{len(reached)} starts one alone came to {self.goal(float(best))}, the other{'s' * (len(others) > 1)}"
-        return wrapped(f"not sure that it is the best: of {count} to {', '.join(others)}; {words}")
+        return wrapped(f"not sure that it is the best: of {count} to {', '.join(others)}; "
+                       "another `seed` or a larger `at_most` may find better")  # fmt: skip
 
     def _border(self) -> list[str]:
         """The nearest tried candidate that does not meet the requirements, in lines."""

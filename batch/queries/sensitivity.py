@@ -20,6 +20,9 @@ from met.statistics.sensitivity import FEWEST, InputShare, dependent, shares
 UNCLEAR = 0.1
 """Half width of an interval from which on more cases are recommended, and a rest from which on it is mentioned."""
 
+WIDE = 0.5
+"""Half width of an interval from which on it says next to nothing."""
+
 FAILURE = "failure"
 """The name of failing as an output: 1 in a case that failed, else 0."""
 
@@ -139,6 +142,8 @@ def _inputs(group: ArchiveGroup, positions: np.ndarray) -> list[VariedInput]:
     variables = group.role("coordinate")
     values = [np.asarray(group.values(each.name), float)[positions] for each in variables]
     found = [VariedInput(tuple(variables[i].path for i in part), values[part[0]]) for part in in_step(values)]
+    if not len(positions):
+        raise Problem(error("E361", f"no case of `{group.name}` is in both archives"))
     if not found:
         helps = "a sweep varies some: `vary`, `sample`"
         raise Problem(error("E361", f"nothing varies in the cases of `{group.name}`", help=helps))
@@ -223,17 +228,19 @@ def notes_of(found: Sensitivity) -> list[str]:
     if found.why:
         notes.append(f"{found.why}: estimated as from any cases")
     if found.rest is not None and found.rest > UNCLEAR:
+        many = "three inputs or more together, of " if len(found.inputs) > 2 else ""
         notes.append(
-            f"{found.rest:.2f} of the variance is of three inputs or more together, of noise, or of too few cases: "
-            "any input may have part in it"
+            f"{found.rest:.2f} of the variance is of {many}noise, or of too few cases: any input may have part in it"
         )
     widest = max((share.first_by for share in found.shares if math.isfinite(share.first_by)), default=0.0)
-    if widest > UNCLEAR:
+    if widest > WIDE:
+        notes.append("these intervals say next to nothing: of few cases, or some make up most of the variance")
+    elif widest > UNCLEAR and found.design:
+        notes.append("not enough cases for narrow intervals: four times as many halve them")
+    elif widest > UNCLEAR:
         cases = float(f"{found.cases * (widest / UNCLEAR) ** 2:.1g}")
         notes.append(f"few cases: it takes about {cases:,.0f} for shares alone within ± {UNCLEAR}")
     for one, other, size in found.together:
-        notes.append(
-            f"{one} and {other} do not vary independently (rank correlation {size:+.2f}): their shares overlap, and "
-            "have no interval"
-        )
+        how = f"rank correlation {size:+.2f}" if abs(size) > UNCLEAR else "some values of one go with some of the other"
+        notes.append(f"{one} and {other} do not vary independently ({how}): their shares overlap, and have no interval")
     return notes

@@ -166,13 +166,13 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
         if total is not None and unexplained is not None:
             most = total[number] + unexplained
             least = max(_share(total[number]), _share(first[number]))
-            low = max(0.0, float(total[number][0]) - interval(total[number]) - cut[number])
             high = min(1.0, max(least, float(most[0])) + interval(most) + cut[number] + hidden[number])
+            low = min(high, max(0.0, float(total[number][0]) - interval(total[number]) - cut[number]))
         from_low, to_high = means_of_ends(values, output)
         found.append(
             InputShare(
                 first=_share(first[number]),
-                first_by=interval(first[number]) + hidden[number],
+                first_by=min(1.0, interval(first[number]) + hidden[number]),
                 total=least,
                 total_low=low,
                 total_high=high,
@@ -184,14 +184,38 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
     return Shares(tuple(found), rest)
 
 
+DEPENDENT = 1e-3
+"""Probability by which a pair of independent inputs, over all pairs, is called dependent."""
+
+SLIGHT = 0.05
+"""Rank correlation below which two inputs that depend on each other may count as independent."""
+
+
 def dependent(inputs: Sequence[np.ndarray]) -> list[tuple[int, int, float]]:
-    """Pairs of inputs that do not vary independently of each other, with the correlation of their ranks: it exceeds one
-    that occurs by chance in one of 15,000 pairs, and a twentieth."""
-    ranks = [_ranks(values[:: max(1, len(values) // 20_000)]) for values in inputs]
+    """Pairs of inputs that do not vary independently of each other, with the correlation of their ranks.
+
+    It is tested by that correlation, and by the numbers of cases in cells of both (K. Pearson's chi-squared test): it
+    sees what does not rise or fall. The level `DEPENDENT` holds over all pairs (Bonferroni).
+    """
+    from scipy.special import chdtrc, ndtri
+
+    if len(inputs) < 2:
+        return []
+    some = np.random.default_rng(0).permutation(len(inputs[0]))[:20_000]
+    count, pairs = len(some), len(inputs) * (len(inputs) - 1) // 2
+    level = 0.5 * DEPENDENT / pairs
+    ranks = [_ranks(values[some]) for values in inputs]
+    coarse = [cells(values[some], max(4, min(8, int((count / 12) ** 0.5)))).astype(np.int64) for values in inputs]
     found = []
     for i, j in combinations(range(len(inputs)), 2):
         size = _correlation(ranks[i], ranks[j])
-        if abs(size) > 0.05 + 4.0 / np.sqrt(max(1, len(ranks[i]) - 1)):
+        is_correlated = abs(size) > max(SLIGHT, -ndtri(0.5 * level) / np.sqrt(max(1, count - 1)))
+        a, b = _count(coarse[i]), _count(coarse[j])
+        both = np.bincount(coarse[i] * b + coarse[j], minlength=a * b).reshape(a, b)
+        expected = np.outer(both.sum(axis=1), both.sum(axis=0)) / count
+        excess = float(((both - expected) ** 2 / np.maximum(expected, 1e-300)).sum())
+        is_uneven = excess > SLIGHT**2 * count and chdtrc(max(1, (a - 1) * (b - 1)), excess) < level
+        if is_correlated or is_uneven:
             found.append((i, j, size))
     return found
 

@@ -51,6 +51,9 @@ tune tuned of hold { choose geared.kp = logbetween(0.05, 1) V*s/rad;  minimise l
 tune firm of hold {
     choose geared.kp = logbetween(0.05, 1) V*s/rad;  minimise late;  at_most = 40;  least_margin = 0.67;
 }
+tune never of hold {
+    choose geared.kp = logbetween(0.05, 1) V*s/rad;  minimise late;  at_most = 40;  least_margin = 1.99;
+}
 """
 
 
@@ -209,7 +212,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the deck and the archives of its sweep and its tunings."""
     folder = tmp_path_factory.mktemp("run")
     (folder / "d.ic").write_text(DECK, encoding="utf-8")
-    for name in ("gains", "tuned", "firm"):
+    for name in ("gains", "tuned", "firm", "never"):
         batch.run(ic.compile(folder / "d.ic", select=[name]), output=folder / f"{name}.h5", threads=1)
     return folder
 
@@ -275,3 +278,10 @@ def test_a_tuning_is_stable_and_one_with_a_margin_keeps_it(best: Said) -> None:
     assert firm["stability"]["disk"] >= 0.67 and firm["least_margin"] == 0.67
     assert firm["value"] >= tuned["value"]
     assert tuned["stability"]["gain"] >= (1.0 + 0.5 * 0.3) / (1.0 - 0.5 * 0.3) and math.isfinite(tuned["value"])
+
+
+@pytest.mark.slow
+def test_a_margin_that_no_candidate_keeps_advises_none(best: Said) -> None:
+    status, text = best("never.h5")
+    assert status == 1 and text.startswith("not advised: ")
+    assert " the least margin of 1.99" in text

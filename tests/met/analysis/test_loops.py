@@ -109,11 +109,12 @@ run hold {
 
 
 def test_only_the_loop_is_blamed_whose_gain_is_too_large(tmp_path: Path) -> None:
-    """Here two loops do not meet: each has the limit of one alone."""
+    """Here two loops do not meet: each has the limit of one alone. The gain that is named is inside of it, a share of
+    the deck's with two digits."""
     (found,) = check(tmp_path, TWO, select="all").diagnostics
     assert found.code == "D320" and "on joint `two`" in found.message
     kp = re.search(r"kp = ([0-9.]+) V", found.help[0])
-    assert kp is not None and float(kp[1]) == pytest.approx(LIMIT, rel=0.01)
+    assert kp is not None and 0.95 * LIMIT < float(kp[1]) <= 0.98 * LIMIT
     torque = changed(TWO, ("kp = 9 V*s/rad;", "kp = 9 V*s/rad;  command = torque(1 N*m);"))
     assert check(tmp_path, torque, select="all").diagnostics == ()
 

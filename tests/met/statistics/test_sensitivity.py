@@ -127,3 +127,24 @@ def test_ranks_and_dependence() -> None:
     assert dependent([a, b]) == []
     [(first, second, size)] = dependent([a, b, a + 0.3 * b])[:1]
     assert (first, second) == (0, 2) and size > 0.9
+
+
+def test_what_depends_without_rising_or_falling_is_seen_and_what_is_independent_seldom() -> None:
+    rng = np.random.default_rng(7)
+    a, b = rng.uniform(-1.0, 1.0, (2, 2_000))
+    inside = a**2 + b**2 < 1.0
+    assert [pair[:2] for pair in dependent([a[inside], b[inside]])] == [(0, 1)]
+    assert [pair[:2] for pair in dependent([a, b, a**2])] == [(0, 2)]
+    assert dependent([each.ravel() for each in np.meshgrid(np.arange(7.0), np.arange(50.0), np.arange(90.0))]) == []
+    seen = sum(bool(dependent(list(rng.uniform(size=(3, 100))))) for _ in range(200))
+    assert seen <= 2, "one in a thousand is said"
+
+
+def test_ranges_stay_among_the_shares_that_there_are() -> None:
+    a, b = (each.ravel() for each in np.meshgrid(np.linspace(0.0, 1.0, 11), np.linspace(0.0, 1.0, 11)))
+    rows = a + b <= 1.01
+    found = shares([a[rows], b[rows]], 3.0 * a[rows] + b[rows])
+    assert found is not None
+    assert all(0.0 <= share.total_low <= share.total_high <= 1.0 for share in found.inputs)
+    heavy = shares(list(np.random.default_rng(8).uniform(size=(2, 64))), np.exp(np.linspace(0.0, 200.0, 64)))
+    assert heavy is not None and all(share.first_by <= 1.0 for share in heavy.inputs)
