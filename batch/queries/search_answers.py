@@ -223,6 +223,8 @@ class SearchAnswer:
             out.append(f"  {search.metric} is {self.value()}{among}; {self._cases}")
         if found.confirmed and not found.stands and search.at_most - self.group.count < SHORTEST * found.all:
             out.append(f"  its cases are spent, of {search.at_most:,} at most; a larger `at_most` goes on")
+        if not found.stands and search.steers:
+            out.append(f"  `least_margin = {search.least_margin:g};` is required too: without it more may be found")
         if not found.confirmed:
             out[0] = f"not tried with all that it must bear: {self._chosen}"
             out.append(
