@@ -301,10 +301,11 @@ class DesignMap:
 class DesignAnswer:
     """The design to use, as `met best` says it.
 
-    headline, why  which it is, and what it has for it;  table: it and others;  stretches: how far each parameter may go
+    headline, why  which it is, and what it has for it, in lines;  table: it and others
+    stretches      how far each parameter may go
     said, command  how to run it or confirm it;  map: None where no two parameters with an order are chosen
     title, about   what the table is called, and what its numbers are
-    heading, link  over all of it, and in the page's menu
+    heading, link  over all of it, and in the page's menu;  chooses: False where it is the worst case of a search
     progress       of a search: the cases after each look at it, the best value by then, and the cases of a sweep that
                    this was tried with; none of what is none
     """
@@ -321,6 +322,7 @@ class DesignAnswer:
     about: str = "Each number is that of the worst case of a design."
     heading: str = "Which design to use"
     link: str = "Which design"
+    chooses: bool = True
     progress: tuple[tuple[int, float, int], ...] = ()
 
 
@@ -551,3 +553,11 @@ class Report:
     sources: tuple[SourceListing, ...]
     provenance: tuple[Fact, ...]
     changes: ArchiveChanges | None = None
+
+    @property
+    def chosen_design(self) -> DesignAnswer | None:
+        """The design to use, with which a page begins: that of a report on one sweep or tuning that chooses."""
+        if len(self.sections) != 1 or self.changes is not None:
+            return None
+        answer = self.sections[0].designs
+        return answer if answer is not None and answer.chooses else None

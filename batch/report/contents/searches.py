@@ -37,7 +37,7 @@ def search_answer(archive: ArchiveFile, group: ArchiveGroup) -> DesignAnswer | N
     headline, *why = unwrapped(answer.lines())
     return DesignAnswer(
         headline=headline[:1].upper() + headline[1:],
-        why="; ".join(why),
+        why="\n".join(why),
         table=TextTable(heads, ("",) * len(heads), tuple(rows[n] for n in shown), frozenset({0, 1, 2, 4})),
         stretches=None,
         said=said,
@@ -49,5 +49,6 @@ def search_answer(archive: ArchiveFile, group: ArchiveGroup) -> DesignAnswer | N
         + (": in the worst of the cases that it was tried with." if tunes else "."),
         heading="Which design to use" if tunes else "The worst case found",
         link="Which design" if tunes else "The worst case",
+        chooses=tunes,
         progress=tuple((cases, best.value / scale, best.tried) for _, cases, best in looks),
     )

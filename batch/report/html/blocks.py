@@ -64,15 +64,15 @@ def spot_link(spot: Spot | None, anchors: Anchors) -> Html | None:
 # The verdict
 
 
-def verdict(found: Verdict, anchors: Anchors) -> Html:
-    """The answer, large, beside its grounds and doubts."""
+def verdict(found: Verdict, anchors: Anchors, *, tried: bool = False) -> Html:
+    """The answer, large, beside its grounds and doubts. tried: it is of all candidates, and neither yes nor no"""
     if found.kind == "comparison":
         return _comparison(found)
     yes, no = (found.word, found.word) if found.kind == "answer" else _words(found)
     answer = el(
         "div",
         el("p", found.about, cls="about") if found.about else None,
-        el("p", mark(found.ok), yes if found.ok else no, cls="word"),
+        None if tried else el("p", mark(found.ok), yes if found.ok else no, cls="word"),
         el("p", share(found.good, found.cases), cls="share") if found.cases > 1 else None,
         el("p", found.headline, ".", cls="headline"),
         cls="answer",
@@ -82,7 +82,8 @@ def verdict(found: Verdict, anchors: Anchors) -> Html:
         evidence.append(_failing(found.failing, single=found.cases == 1))
     evidence += [_warning(each, anchors) for each in found.warnings]
     evidence += [el("p", note, cls="note") for note in found.notes]
-    return el("div", answer, el("div", evidence, cls="evidence"), cls=f"verdict {'yes' if found.ok else 'no'}")
+    kind = "" if tried else " yes" if found.ok else " no"
+    return el("div", answer, el("div", evidence, cls="evidence"), cls=f"verdict{kind}")
 
 
 def _words(found: Verdict) -> tuple[str, str]:

@@ -19,7 +19,8 @@ SHADES = 4
 
 def designs(found: DesignAnswer) -> Html:
     """The answer of `met best`, or of a search."""
-    words: list[Child] = [el("p", found.headline, cls="pick"), el("p", found.why, cls="said")]
+    words: list[Child] = [el("p", found.headline, cls="pick")]
+    words += [el("p", line, cls="said") for line in found.why.split("\n")]
     if found.command:
         words += [el("p", found.said, cls="said"), el("p", command(found.command), cls="command")]
     words += [table(found.stretches, "How far each may go")] if found.stretches is not None else []

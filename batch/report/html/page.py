@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from batch.arms.scripts import arm_style
-from batch.report.contents.parts import Report, ReportSection
+from batch.report.contents.parts import DesignAnswer, Report, ReportSection
 from batch.report.html import blocks, changes, designs, inlined, tables
 from batch.report.html.head import page_head
 from batch.report.html.markup import Child, Html, el, join, lines
@@ -37,7 +38,7 @@ def page(report: Report) -> str:
     ]
     body = lines(
         [
-            el("a", "To the report", href="#verdict", cls="skip"),
+            el("a", "To the report", href="#verdict" if report.chosen_design is None else "#s0-designs", cls="skip"),
             _header(report),
             el("main", lines([*_main(report, anchors)])),
             _footer(report),
@@ -58,9 +59,11 @@ def _replay(report: Report, section: ReportSection) -> str:
 
 def _header(report: Report) -> Html:
     lede = report.sections[0].lede if len(report.sections) == 1 else f"{len(report.sections)} runs and sweeps."
-    links = [("verdict", "Verdict"), *([("changed", "What changed")] if report.changes is not None else [])]
+    links = [("verdict", _verdict_name(report)), *([("changed", "What changed")] if report.changes is not None else [])]
     links += [link for n, section in enumerate(report.sections) for link in _links(n, section, report)]
     links += [("parameters", "Parameters"), ("provenance", "Provenance")]
+    if report.chosen_design is not None:
+        links.sort(key=lambda link: link[0] != "s0-designs")
     items = [el("li", el("a", name, href=f"#{where}")) for where, name in links]
     return el(
         "header",
@@ -95,6 +98,13 @@ def _links(number: int, section: ReportSection, report: Report) -> list[tuple[st
     return [(f"s{number}-{key}", name) for key, name, there in found if there]
 
 
+def _verdict_name(report: Report) -> str:
+    """The heading of the verdict: where a sweep chose a design it is about all candidates, of which most may be bad."""
+    chosen = report.chosen_design
+    tried = chosen is not None and chosen.command and report.verdicts[0].kind == "requirements"
+    return "All that was tried" if tried else "Verdict"
+
+
 def _signals_name(section: ReportSection) -> str:
     found = section.simulation
     drawn = found is not None and any(each.arm.scene is not None for each in found.structures)
@@ -103,12 +113,16 @@ def _signals_name(section: ReportSection) -> str:
 
 def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
     several = len(report.sections) > 1
-    answers = [blocks.verdict(each, anchors) for each in report.verdicts]
-    out: list[Child] = [el("section", el("h2", "Verdict", cls="quiet"), answers, id="verdict")]
+    first, name = report.chosen_design, _verdict_name(report)
+    tried = name != "Verdict"
+    answers = [blocks.verdict(each, anchors, tried=tried) for each in report.verdicts]
+    verdict = el("section", el("h2", name, cls="" if tried else "quiet"), answers, id="verdict")
+    out: list[Child] = [verdict if first is None else [_designs(0, first, "h2"), verdict]]
     if report.changes is not None:
         out.append(el("section", el("h2", "What changed"), changes.origins(report.changes), id="changed"))
     for number, section in enumerate(report.sections):
-        parts = lines(_section(number, section, anchors, "h3" if several else "h2"))
+        shown = section if first is None else replace(section, designs=None)
+        parts = lines(_section(number, shown, anchors, "h3" if several else "h2"))
         if several:
             head = [el("h2", section.name), el("p", section.lede, cls="lede")]
             out.append(el("section", head, parts, id=f"s{number}", cls="whole", data_section=number))
@@ -143,7 +157,7 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
             )
         )
     if section.designs is not None:
-        out.append(part("designs", section.designs.heading, designs.designs(section.designs)))
+        out.append(_designs(number, section.designs, head))
     if section.evidence is not None:
         out.append(part("evidence", "Evidence", tables.evidence(section.evidence)))
     if section.best is not None:
@@ -204,6 +218,10 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
         words = f"Parameters and stability are not shown, for the plan could not be read here: {section.trouble}."
         out.append(el("p", words, cls="note"))
     return out
+
+
+def _designs(number: int, answer: DesignAnswer, head: str) -> Html:
+    return el("section", el(head, answer.heading), designs.designs(answer), id=f"s{number}-designs", cls="designs")
 
 
 def _notes(notes: Sequence[str]) -> Html | None:

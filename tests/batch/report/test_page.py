@@ -169,11 +169,22 @@ def test_answers_come_first(here: Path, engine: None) -> None:
     one = archives.grid([0.01, 0.02, 0.03, 0.04], [20.0, 21.0, 22.0])
     one = replace(one, requirements=tuple(replace(each, limit=20.0) for each in one.requirements))
     source = report(archives.made(here / "a.h5", one)).read_text(encoding="utf-8")
-    parts = ("verdict", "s0-designs", "s0-evidence", "s0-best", "s0-worst", "s0-overview", "s0-signals", "s0-run")
+    parts = ("s0-designs", "verdict", "s0-evidence", "s0-best", "s0-worst", "s0-overview", "s0-signals", "s0-run")
     places = [source.index(f'<section id="{part}"') for part in parts]
     assert places == sorted(places)
     links = re.findall(r'<a href="#([\w-]+)">', source[source.index("<nav") : source.index("</nav>")])
     assert links == [*parts, "parameters", "provenance"]
+    assert '<a href="#s0-designs" class="skip">' in source
+    assert "All that was tried" in source and "Requirements not met" not in source, "candidates are no failure"
+
+
+@pytest.mark.slow
+def test_where_no_design_serves_the_verdict_says_so(here: Path, engine: None) -> None:
+    one = archives.grid([0.01, 0.02, 0.03, 0.04], [20.0, 21.0, 22.0])
+    one = replace(one, requirements=tuple(replace(each, limit=-1.0) for each in one.requirements))
+    source = report(archives.made(here / "a.h5", one)).read_text(encoding="utf-8")
+    assert source.index('<section id="s0-designs"') < source.index('<section id="verdict"')
+    assert "Requirements not met" in source and "All that was tried" not in source
 
 
 @pytest.mark.slow
