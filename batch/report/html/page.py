@@ -99,10 +99,11 @@ def _links(number: int, section: ReportSection, report: Report) -> list[tuple[st
 
 
 def _verdict_name(report: Report) -> str:
-    """The heading of the verdict: where a sweep chose a design it is about all candidates, of which most may be bad."""
+    """The heading of the verdict: where a sweep chose a design it is about all candidates, of which some may be bad."""
     chosen = report.chosen_design
-    tried = chosen is not None and chosen.command and report.verdicts[0].kind == "requirements"
-    return "All that was tried" if tried else "Verdict"
+    if chosen is None or not chosen.command or report.verdicts[0].kind != "requirements":
+        return "Verdict"
+    return "All that was tried" if report.verdicts[0].good < report.verdicts[0].cases else "Verdict"
 
 
 def _signals_name(section: ReportSection) -> str:
