@@ -227,16 +227,22 @@ COUNTS = {
 }
 """Counters of each case besides its records, with their meanings."""
 
+FIGURES = ("limit", "excess", "extreme", "grapple")
+"""Roles of the figures that each case has besides its metrics: of its limits and its grapples."""
+
 
 def _counts(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: ExperimentDiff) -> None:
-    """Note counts that differ where nothing else does: then something unrecorded differs."""
+    """Note counts and figures that differ where nothing else does: then something unrecorded differs."""
     if any(signal.equivalent or signal.different for signal in out.signals):
         return
-    for name, words in COUNTS.items():
-        if name in a.variables and name in b.variables:
-            unlike = int((a.values(name)[matched.a] != b.values(name)[matched.b]).sum())
+    figures = {v.name: v.long_name for role in FIGURES for v in a.role(role)}
+    named = {name: f"number of {words}" for name, words in COUNTS.items() if name in a.variables} | figures
+    for name, words in named.items():
+        if name in b.variables:
+            here, there = a.values(name)[matched.a], b.values(name)[matched.b]
+            unlike = int(((here != there) & ((here == here) | (there == there))).sum())
             if unlike:
-                out.notes.append(f"the number of {words} is another in {unlike:,} of {matched.count:,} cases")
+                out.notes.append(f"the {words} is another in {unlike:,} of {matched.count:,} cases")
                 out.partial = True
 
 
@@ -384,7 +390,12 @@ def _signals(
         about.notes.append(f"signals are compared at the {len(rows_a):,} instants that both have, {of}")
         about.partial = True
     aligned = len(rows_a) == len(time_a) == len(time_b)
-    if len(rows_a) and (other := _instants(time_a[rows_a], time_b[rows_b], allowed, len(places))) is not None:
+    if a.attributes.get("record_hz") == b.attributes.get("record_hz"):
+        rows = min(len(time_a), len(time_b))  # at one rate, the n-th rows of both are of one instant
+        planned_a, planned_b = time_a[:rows], time_b[:rows]
+    else:
+        planned_a, planned_b = time_a[rows_a], time_b[rows_b]
+    if len(planned_a) and (other := _instants(planned_a, planned_b, allowed, len(places))) is not None:
         yield other
     whole = slice(None)
     at_a, at_b = (

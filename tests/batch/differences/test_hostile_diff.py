@@ -137,6 +137,30 @@ def test_instants_are_compared_to_the_bit(two: Callable[..., tuple[Path, Path]])
 
 
 @pytest.mark.slow
+def test_an_instant_that_moved_is_a_difference(two: Callable[..., tuple[Path, Path]]) -> None:
+    def one(file: Any) -> None:
+        file["time"][3] += 1e-3
+
+    def rest(file: Any) -> None:
+        file["time"][3:] += 1e-3
+
+    for change in (one, rest):
+        found = diff(*two(change))
+        assert (signal(found, "time").verdict, found.verdict) == (DIFFERENT, DIFFERENT)
+        assert diff("a.h5", "b.h5", tolerances(["time=2ms"])).verdict == EQUIVALENT
+
+
+@pytest.mark.slow
+def test_a_figure_of_limits_that_differs_is_said(two: Callable[..., tuple[Path, Path]]) -> None:
+    def change(file: Any) -> None:
+        name = next(name for name in file if name.startswith("at_limit."))
+        file[name][2] = 0.5
+
+    found = diff(*two(change))
+    assert found.verdict == EQUIVALENT and "another in 1 of 6 cases" in " ".join(only(found).notes)
+
+
+@pytest.mark.slow
 def test_two_that_have_nothing_to_compare_are_not_identical(ran: Callable[..., Path]) -> None:
     a = ran("a.h5", "turning", histories="none")
     b = ran("b.h5", "turning", histories="none", change=("one.qd = 1 rad/s", "one.qd = 2 rad/s"))
