@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Setting
 from ic.robots.attributes import shown
-from ic.robots.doubts import in_degrees, incomplete
+from ic.robots.doubts import in_other_units, incomplete
 from ic.robots.entries import LIMITS, ArmEntries, RobotEntry, spelled
 from ic.robots.following import hold_position
 from ic.robots.names import word
@@ -65,7 +65,7 @@ def remarks(body: ArmEntries) -> Iterator[str]:
     attributes = {what: elements for what, elements in body.robot.dropped.items() if " of " in what}
     if attributes:
         yield f"attributes not read, and not in the deck: {_counted(attributes)}"
-    yield from (each.text for each in in_degrees(body.robot))
+    yield from (each.text for each in in_other_units(body.robot))
     yield from incomplete(body.robot)
     if body.no_body:
         yield f"the inertia of `{shown(body.robot.root.name.text)}`, the base, is not in the deck: {body.no_body}"

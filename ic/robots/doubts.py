@@ -1,4 +1,4 @@
-"""What a URDF file says that is hardly meant: angles that look like degrees, and inertia with a product left out."""
+"""What a URDF file says that is hardly meant: numbers that look like degrees or mm, and inertia without a product."""
 
 from __future__ import annotations
 
@@ -13,10 +13,15 @@ from met.diagnostic import Label
 
 MOST_TURNS = 2  # of an end of a joint's range: cables allow hardly more
 MOST_DEGREES = 720.0  # the same in degrees; what is above, such as 1e16, is written for no limit
+MOST_TRAVEL = 50.0  # m; of an end of a sliding joint's range: published robots have 15 m at most
+MOST_SPEED = {"revolute": 60.0, "continuous": 60.0, "prismatic": 20.0}  # rad/s, m/s; published robots have 60 and 5
 
 
-def in_degrees(robot: Robot) -> Iterator[Label]:
-    """Each angle that is several turns if it is in radians, and none if it is in degrees, in words that stand alone."""
+def in_other_units(robot: Robot) -> Iterator[Label]:
+    """Each number that is far from usual in URDF's unit, and usual in degrees or mm, in words that stand alone.
+
+    A power of ten is written for no limit: in 128 published robots each velocity above 60 rad/s is one.
+    """
     for link in robot.links:
         if link.inertial is not None:
             yield from _turned(link.inertial.rpy, f"the inertia of link `{shown(link.name.text)}`")
@@ -28,6 +33,20 @@ def in_degrees(robot: Robot) -> Iterator[Label]:
             limit = joint.limits.get(end)
             if limit is not None and MOST_TURNS * 2.0 * math.pi < abs(limit.values[0]) <= MOST_DEGREES:
                 yield _degrees(limit, limit.values[0], f"`{end}` of {name}")
+        slides = joint.type.text == "prismatic"
+        speed, usual_speed = ("m/s", "mm/s") if slides else ("rad/s", "deg/s")
+        for attribute, most, unit, usual in (
+            *(((end, MOST_TRAVEL, "m", "mm") for end in ("lower", "upper")) if slides else ()),
+            ("velocity", MOST_SPEED.get(joint.type.text, math.inf), speed, usual_speed),
+        ):
+            limit = joint.limits.get(attribute)
+            if limit is not None and most < abs(limit.values[0]) < math.inf and not _power_of_ten(limit.values[0]):
+                value = spelled(limit.values[0])
+                yield Label(limit.place, f"`{attribute}` of {name} is {value} {unit}: is it in {usual}?")
+
+
+def _power_of_ten(value: float) -> bool:
+    return math.log10(abs(value)).is_integer()
 
 
 def _turned(rpy: Numbers | None, of: str) -> Iterator[Label]:

@@ -1,11 +1,11 @@
-"""Warnings about a URDF file's arm: omitted parts, a line for each kind; angles in degrees; and changed names."""
+"""Warnings about a URDF file's arm: omitted parts, a line for each kind; numbers in other units; and changed names."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
 from ic.robots.attributes import shown
-from ic.robots.doubts import in_degrees
+from ic.robots.doubts import in_other_units
 from ic.robots.entries import ArmEntries
 from ic.robots.robot import MOVING, Joint
 from met.diagnostic import Diagnostic, Label, Place
@@ -26,15 +26,15 @@ def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
             ("`met import` makes a deck of such a file, with friction beside each joint",),
             "warning",
         )
-    turned = tuple(in_degrees(body.robot))
-    if turned:
-        angles = f"{_count(len(turned), 'angle')} of `{body.robot.file}`"
+    doubtful = tuple(in_other_units(body.robot))
+    if doubtful:
+        numbers = f"{_count(len(doubtful), 'number')} of `{body.robot.file}`"
         yield Diagnostic(
             "D218",
-            f"{angles} {'is' if len(turned) == 1 else 'are'} several turns",
+            f"{numbers} {'looks' if len(doubtful) == 1 else 'look'} like another unit",
             Label(named),
-            turned[:MOST_NAMED],
-            ("URDF has angles in radians: correct the file",),
+            doubtful[:MOST_NAMED],
+            ("URDF has radians and metres: correct the file",),
             "warning",
         )
     changed = body.names.changed

@@ -308,6 +308,24 @@ def test_angles_that_look_like_degrees_are_told(limit: str, turned: str, inertia
     assert [label.text for each in warned for label in each.also] == told
 
 
+@pytest.mark.parametrize(
+    ("kind", "limit", "told"),
+    [
+        ("revolute", 'upper="1" velocity="115"', ["`velocity` of joint `hinge` is 115 rad/s: is it in deg/s?"]),
+        ("continuous", 'velocity="180"', ["`velocity` of joint `hinge` is 180 rad/s: is it in deg/s?"]),
+        ("revolute", 'upper="1" velocity="1e3"', []),  # which is written for no limit
+        ("revolute", 'upper="1" velocity="59"', []),
+        ("prismatic", 'upper="800" velocity="1"', ["`upper` of joint `hinge` is 800 m: is it in mm?"]),
+        ("prismatic", 'upper="0.8" velocity="250"', ["`velocity` of joint `hinge` is 250 m/s: is it in mm/s?"]),
+        ("prismatic", 'lower="-15" upper="15" velocity="5"', []),
+    ],
+)
+def test_limits_that_look_like_degrees_or_millimetres_are_told(kind: str, limit: str, told: list[str]) -> None:
+    joint = f'<limit {limit} effort="1"/> <axis'
+    Path("two.urdf").write_text(changed(TWO, ('type="revolute"', f'type="{kind}"'), ("<axis", joint)), encoding="utf-8")
+    assert [each for each in import_with_remarks("two.urdf")[1] if "is it in" in each] == told
+
+
 def test_a_file_that_is_there_is_left_alone_unless_forced(capsys: pytest.CaptureFixture[str]) -> None:
     Path("arm.ic").write_text("mine", encoding="utf-8")
     assert cli.main(["import", "arm.urdf", "-o", "arm.ic", "--mimic", "fixed"]) == 2
