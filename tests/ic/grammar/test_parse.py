@@ -378,6 +378,7 @@ error[D026]: `m` is the unit metre, so it cannot name a value
         ("x = 2 * m;", "error[D025]: `m` is the unit metre, and stands here without a number", "write `2 m`"),
         ("x = a * m;", "error[D025]: `m` is the unit metre, and stands here without a number", "write `1 m`"),
         ("x = slow rad/s;", "error[D030]: `slow` is a name, and only a number takes a unit", "`(slow) rad/s`"),
+        ("x = NaN V;", "error[D030]: `NaN` is a name, and only a number takes a unit", "every number of a deck is"),
         ("x = 3 N m;", "error[D030]: units are multiplied with `*`", "write `N*m`"),
         ("x = 3 Nm;", "error[D028]: `Nm` is not a unit", "did you mean `N*m`?"),
         ("x = 3 m/sec;", "error[D028]: `sec` is not a unit", "did you mean `s`?"),
