@@ -1,4 +1,4 @@
-"""Measured signals of an MCAP file, as a log beside a page's run: what `met export` writes, and joint states as JSON.
+"""Measured signals of an MCAP file, as the channels of a run: what `met export` writes, and joint states as JSON.
 
     /q, /elbow/servo/voltage   protobuf: a signal's topic, and a field for each joint and component; units are told by
                                the channel's metadata, `unit`, or `unit.FIELD` where they differ
