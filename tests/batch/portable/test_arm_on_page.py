@@ -68,16 +68,17 @@ def opened(chromium: Chromium, path: Path, **words: object) -> Page:
 
 def pixels(page: Page, folder: Path) -> np.ndarray:
     """The view as the browser shows it, without its edge, (row, column, rgb) from 0 to 1, once its fine picture is
-    drawn: by the process that draws, too, and shown, which a busy machine does later: two pictures are alike then."""
+    drawn: by the process that draws, too, and shown, which a busy machine does later: three pictures in a row are
+    alike then, for two may both be of before."""
     page.run("new Promise(d => { const f = () => MET.shown.isStill() ? d() : setTimeout(f, 20); f(); })")
     page.run("MET.shown.finish()")
-    before = None
+    alike: list[np.ndarray] = []
     for _ in range(PICTURES):
         page.settle()
         found = image.imread(page.picture(folder / "view.png", ".stage .view", margin=0))[4:-4, 4:-4, :3]
-        if before is not None and np.array_equal(before, found):
+        alike = [*alike, found] if alike and np.array_equal(alike[-1], found) else [found]
+        if len(alike) == 3:
             break
-        before = found
     return found
 
 
