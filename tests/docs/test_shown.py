@@ -12,7 +12,16 @@ from tests.docs.pages import Page, differs
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "count"),
-    [("bed", 6), ("bench", 4), ("best", 5), ("evidence", 2), ("linear", 15), ("search", 6), ("sensitivity", 2)],
+    [
+        ("bed", 6),
+        ("bench", 4),
+        ("best", 5),
+        ("evidence", 2),
+        ("linear", 15),
+        ("residuals", 4),
+        ("search", 6),
+        ("sensitivity", 2),
+    ],
 )
 def test_a_page_shows_what_its_commands_print(name: str, count: int, tmp_path: Path) -> None:
     page = Page(f"{name}.md")

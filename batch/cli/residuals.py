@@ -1,0 +1,53 @@
+"""`met residuals`: a face of batch.measured."""
+
+from __future__ import annotations
+
+import click
+
+from met.cli import YES, format_option
+from met.messages.visible import line, say
+
+
+@click.command(short_help="Compare a run with a log of measured signals.")
+@click.argument("archive", metavar="ARCHIVE")
+@click.argument("log", metavar="LOG")
+@click.option("--run", "run", metavar="NAME", help="This run or sweep of the archive [the first].")
+@click.option("--case", "case", metavar="ID", help="This case: the beginning of its id, or its position, as '#0' [#0].")
+@format_option
+def residuals(archive: str, log: str, run: str | None, case: str | None, form: str) -> int:
+    """Compare a run with LOG, a CSV or MCAP file of the real arm's signals: how far what was measured is from what was
+    computed, and whether the rest is noise.
+
+    The head of a CSV file names `time [s]` and signals that the run records, each with its unit: `elbow.q [deg]`. Where
+    a residual is no noise, what it follows is told, such as the sign of the joint's rate, as dry friction leaves it;
+    and columns with another unit or sign, exchanged columns and a late clock are.
+    """
+    import json
+
+    from batch.archive.read import ArchiveFile
+    from batch.measured.log import read_log
+    from batch.measured.residuals import compare, computed
+    from batch.modules.description import described_columns
+    from batch.queries.groups import groups_named
+    from batch.queries.signals import case_text
+    from batch.terminal.residuals import as_data, residual_lines
+    from met.diagnostic import Problem, error
+
+    with ArchiveFile(archive) as file:
+        group = groups_named(file, [run] if run is not None else [])[0]
+        position = group.recorded_position(case if case is not None else "#0")
+        experiment = next(each for each in file.plan().experiments if each.name == group.name)
+        columns = described_columns(experiment)
+        measured = read_log(log, columns)
+        joints = [joint.name for joint in experiment.structure.joints]
+        found = compare(computed(group, position, columns), columns, joints, measured)
+        if not found.residuals:
+            message = f"`{log}` and the run have no instant in common"
+            raise Problem(
+                error("E478", message, measured.head, help="let its times begin where the run begins, at 0 s")
+            )
+        if form == "json":
+            say(json.dumps({"experiment": group.name, "case": case_text(group, position), **as_data(found)}, indent=1))
+        else:
+            say("\n".join(map(line, [f"{group.name}, {case_text(group, position)}", "", *residual_lines(found)])))
+    return YES
