@@ -7,8 +7,6 @@ their own above it, as `met export` writes them.
 
 from __future__ import annotations
 
-import csv
-import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -16,15 +14,11 @@ import numpy as np
 
 from batch.measured.mcap_log import MeasuredSignals, mcap_signals
 from ic.meaning.definitions.csv_files import CsvTable, read_csv
-from met.diagnostic import Label, Place, Problem, error
-from met.host.files import open_regular
+from met.diagnostic import Label, Problem, error
 from met.messages.visible import visible
 from met.unit_parser import parse_unit
 
 TIME, CASE = "time", "case"
-UNITS = "# units: "
-LONGEST_LINE, MOST_REMARKS = 1 << 16, 100
-"""Length, and number, of the lines above a head that are searched."""
 
 SHOWN = 12
 """Largest number of channels that a message names."""
@@ -54,7 +48,7 @@ def read_log(path: str | Path, columns: Sequence[Mapping[str, str]]) -> Measured
 
 
 def _csv_signals(path: str | Path, columns: Sequence[Mapping[str, str]]) -> MeasuredSignals:
-    table = _with_units(read_csv(str(path)))
+    table = read_csv(str(path))
     head = table.columns[0].place
     time_column = table.column(TIME)
     if time_column is None:
@@ -77,28 +71,6 @@ def _csv_signals(path: str | Path, columns: Sequence[Mapping[str, str]]) -> Meas
     used = [f"{each.name} [{each.unit or '1'}]" for each in table.columns if each.name in known]
     unused = [visible(each.name) for each in table.columns if each.name not in known]
     return MeasuredSignals(signals, [visible(each) for each in used], unused, time_column.place if signals else head)
-
-
-def _with_units(table: CsvTable) -> CsvTable:
-    """The table with the units of the line `# units: s,rad`, which stands above the head of a file by `met export`.
-    Raises Problem E478 where that line does not have a unit for each column."""
-    line = table.columns[0].place.line
-    if any(each.unit is not None for each in table.columns) or line < 2:
-        return table
-    with open_regular(table.file) as file:
-        above = [file.readline(LONGEST_LINE).decode("utf-8-sig", "replace") for _ in range(min(line - 1, MOST_REMARKS))]
-    number, told = next(((n, each) for n, each in enumerate(above, 1) if each.startswith(UNITS)), (0, ""))
-    if not number:
-        return table
-    units = next(csv.reader([told.removeprefix(UNITS).rstrip("\r\n")]), [])
-    if len(units) != len(table.columns):
-        message = f"this line has {len(units)} units, and {len(table.columns)} columns follow"
-        place = Place(table.file, number, 1, max(len(told.rstrip()), 1))
-        raise Problem(error("E478", message, place, help="give each column its unit, and 1 where it has none"))
-    columns = zip(table.columns, units, strict=True)
-    return dataclasses.replace(
-        table, columns=tuple(dataclasses.replace(each, unit=unit.strip() or None) for each, unit in columns)
-    )
 
 
 def _column(table: CsvTable, recorded: Mapping[str, str]) -> tuple[float, ...] | None:

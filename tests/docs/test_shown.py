@@ -18,7 +18,7 @@ from tests.docs.pages import Page, differs
         ("best", 5),
         ("evidence", 2),
         ("linear", 15),
-        ("residuals", 4),
+        ("residuals", 6),
         ("search", 6),
         ("sensitivity", 2),
     ],

@@ -16,6 +16,7 @@ import itertools
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator
+from dataclasses import replace
 from functools import partial
 
 from ic.grammar.syntax import Deck
@@ -37,6 +38,10 @@ _HEADER = re.compile(r"(?P<name>[^\[\]]*)(?:\[(?P<unit>[^\[\]]*)\])?")  # spaces
 _CELL = re.compile(r',((?:[^",]|"[^"]*")*)')  # with the comma before it
 _WORD = re.compile(r"[^\W\d]\w*")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+
+
+UNITS, MOST_REMARKS = "# units: ", 100
+"""The beginning of a line above a head that has the columns' units, and how many lines above a head may be it."""
 
 
 @frozen
@@ -222,7 +227,7 @@ def _table(file: str, text: str, declared: Collection[str] = ()) -> CsvTable:
                 help="its first line names the columns, as in `time [s], shoulder [deg]`",
             )
         )
-    columns = tuple(_columns(file, *head, declared))
+    columns = _with_units(file, text, head[0], tuple(_columns(file, *head, declared)))
     rows = []
     for line, row in lines:
         count = len(_cells(row))
@@ -239,6 +244,23 @@ def _table(file: str, text: str, declared: Collection[str] = ()) -> CsvTable:
             )
         rows.append((line, row))
     return CsvTable(file, columns, tuple(rows))
+
+
+def _with_units(file: str, text: str, head: int, columns: tuple[CsvColumn, ...]) -> tuple[CsvColumn, ...]:
+    """The columns with the units of a line `# units: s,rad` above their head, as `met export` writes them, where none
+    has a unit in the head. Raises Problem D197 where that line does not have a unit for each column."""
+    if head < 2 or any(each.unit is not None for each in columns):
+        return columns
+    above = text.split("\n", min(head - 1, MOST_REMARKS))[: head - 1]
+    line, told = next(((n, each) for n, each in enumerate(above, 1) if each.startswith(UNITS)), (0, ""))
+    if not line:
+        return columns
+    cells = [_stripped(cell)[0] for cell in _cells(told.removeprefix(UNITS))]
+    if len(cells) != len(columns):
+        message = f"this line has {len(cells)} units, and {len(columns)} columns follow"
+        helps = "give each column its unit, and 1 where it has none"
+        raise Problem(error("D197", message, Place(file, line, 1, max(len(told.rstrip()), 1)), help=helps))
+    return tuple(replace(each, unit=unit or None) for each, unit in zip(columns, cells, strict=True))
 
 
 def _lines_with_cells(text: str) -> Iterator[tuple[int, str]]:
