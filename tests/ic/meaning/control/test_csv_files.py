@@ -707,3 +707,13 @@ def test_a_first_line_of_spaces_is_read_as_soon_as_another(tmp_path: Path, head:
     """No pattern tries each way of cutting them: that took minutes."""
     said = shown(tmp_path, head + "\n1\n")
     assert said.startswith("error[D191]: `") and " does not name a column\n --> moves.csv:1:1\n" in said
+
+
+def test_units_may_stand_in_a_line_above_the_head(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text('# MET: nominal\n# units: s,deg,1\ntime,"hinge",on\n0,180,1\n', encoding="utf-8")
+    assert [each.unit for each in read_csv(str(path)).columns] == ["s", "deg", "1"]
+    path.write_text("# units: s,deg\ntime [ms],hinge [rad]\n0,180\n", encoding="utf-8")
+    assert [each.unit for each in read_csv(str(path)).columns] == ["ms", "rad"]
+    path.write_text("time,hinge\n# units: s,deg\n0,180\n", encoding="utf-8")
+    assert [each.unit for each in read_csv(str(path)).columns] == [None, None]
