@@ -13,9 +13,11 @@ first, until one fails. What survives is printed, and what only tests outside `s
     --cap SECONDS     processor time of tests of a tier for each mutant, after which the next tier's are tried [60]
     -o FILE           write each mutant as a line of JSON: file, line, change, the test that noticed it, or null, and
                       that test's tier (default, ci or release)
+    --again FILE      of the sample only what FILE, which an earlier `-o` wrote, says that no test noticed
 
 First all tests are run once on the unchanged tree, to see which lines they execute and what they cost; those that fail
 there are left out. Lines that only another process executes are not seen, and a line without a test is printed as that.
+What runs when a module is imported belongs to all tests that execute a line of it.
 """
 
 from __future__ import annotations
@@ -136,6 +138,14 @@ def _become(node: ast.AST, other: ast.AST) -> None:
 # which tests execute which lines
 
 
+def imported_lines(text: str) -> list[int]:
+    """The lines of a module's text that no function's body holds: they run when the module is imported."""
+    functions = (ast.FunctionDef, ast.AsyncFunctionDef)
+    bodies = [node for node in ast.walk(ast.parse(text)) if isinstance(node, functions)]
+    inside = {line for node in bodies for line in range(node.body[0].lineno, (node.end_lineno or 0) + 1)}
+    return [line for line in range(1, text.count("\n") + 2) if line not in inside]
+
+
 class Traced:
     """Plugin of pytest: writes which lines of some files each test function executes, and what it costs."""
 
@@ -201,7 +211,8 @@ def _tests_pass(words: list[str], cap: float) -> bool:
             for stream in (1, 2):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
             sys.dont_write_bytecode = True  # no other mutant may find this one's
-            status = int(pytest.main(["-q", "-p", "no:cacheprovider", "-n", "0", *words]))
+            words = ["-n", "0", "-o", f"faulthandler_timeout={cap}", *words]  # what waits for ever is ended too
+            status = int(pytest.main(["-q", "-p", "no:cacheprovider", *words]))
         finally:
             os._exit(status)
     _, status = os.waitpid(child, 0)
@@ -266,6 +277,10 @@ def trace(files: list[str], paths: list[str], marks: str) -> Known:
             for function, seconds in table["costs"].items():
                 costs[function] += seconds
             tiers.update(table["tiers"])
+        for file in files:
+            every = {test for line, tests in executing.items() if line.startswith(f"{file}:") for test in tests}
+            for number in imported_lines((ROOT / file).read_text(encoding="utf-8")):
+                executing[f"{file}:{number}"] = sorted(every)
         return Known({line: sorted(set(functions)) for line, functions in executing.items()}, dict(costs), tiers)
 
 
@@ -305,17 +320,17 @@ def main() -> int:
     parser.add_argument("--paths", nargs="+", default=["tests"])
     parser.add_argument("--cap", type=float, default=60.0)
     parser.add_argument("-o", "--output", type=Path)
+    parser.add_argument("--again", type=Path)
     asked = parser.parse_args()
     if "MET_MUTANTS_TREE" in os.environ:
         return _in_this_tree(asked)
-    if asked.output is not None:
-        asked.output = asked.output.resolve()
     with tempfile.TemporaryDirectory(prefix="met-mutants-") as folder:
         tree = Path(folder, "tree")
         shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".git", ".venv", "build"))
         words = [*asked.modules, "--paths", *asked.paths, "--tests", asked.tests]
         words += ["--count", str(asked.count), "--seed", str(asked.seed), "--cap", str(asked.cap)]
-        words += ["-o", str(asked.output)] if asked.output is not None else []
+        words += ["-o", str(asked.output.resolve())] if asked.output is not None else []
+        words += ["--again", str(asked.again.resolve())] if asked.again is not None else []
         known = {"MET_MUTANTS_TREE": str(tree), "PYTHONPATH": str(tree)}
         command = [sys.executable, "-m", "tests.mutants", *words]
         return subprocess.run(command, cwd=tree, env={**os.environ, **known}).returncode
@@ -332,10 +347,14 @@ def _in_this_tree(asked: argparse.Namespace) -> int:
     if sound and not _tests_pass(sound[:1], 60.0):
         sys.exit(f"{sound[0]} fails without a mutant, in a child of this process")
     counts: dict[str, int] = defaultdict(int)
+    earlier = [json.loads(line) for line in asked.again.read_text("utf-8").splitlines()] if asked.again else []
+    unnoticed = {(each["file"], each["line"], each["change"]) for each in earlier if each["test"] is None}
     for file in asked.modules:
         every = mutants(file, (ROOT / file).read_text(encoding="utf-8"))
         sample = random.Random(f"{asked.seed}/{file}").sample(every, min(asked.count, len(every)))
         for mutant in sorted(sample, key=lambda each: each.line):
+            if asked.again and (mutant.file, mutant.line, mutant.change) not in unnoticed:
+                continue
             tier, test = tried(mutant, known, asked.cap) or (None, None)
             executed = f"{file}:{mutant.line}" in known.executing
             how = f"noticed by {tier}" if tier else "survived" if executed else "no test"
