@@ -2,8 +2,9 @@
 
 A mutant is the module with one small change (a comparison turned, a sign, a constant, a condition, a statement left
 out). A seeded sample of them is tried on a copy of the tree, never on the tree itself. Each is given the tests that
-execute the changed line, those of `scripts/test` before those that CI adds and those before the rest, the cheapest
-first, until one fails. What survives is printed, and what only tests outside `scripts/test` notice.
+execute the changed line, until one fails: those of `scripts/test` before those that CI adds and those before the rest,
+and of a tier those of the module's own folder before others, the cheapest first. What survives is printed, and what
+only tests outside `scripts/test` notice.
 
     MODULE            a file, such as met/statistics/confidence.py
     --count N         mutants of each module [20]
@@ -34,6 +35,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 from collections import defaultdict
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
@@ -71,10 +73,13 @@ class Mutant:
 
 
 def mutants(file: str, text: str) -> list[Mutant]:
-    """All mutants of a module's text, in the order of its lines."""
+    """All mutants of a module's text, in the order of its lines. Annotations stay, which nothing evaluates."""
     found = []
-    for index, node in enumerate(ast.walk(ast.parse(text))):
-        for number in range(len(_changes(node))):
+    nodes = list(ast.walk(ast.parse(text)))
+    types = [getattr(node, name, None) for node in nodes for name in ("annotation", "returns")]
+    unread = {id(node) for each in types if each is not None for node in ast.walk(each)}
+    for index, node in enumerate(nodes):
+        for number in range(len(_changes(node)) if id(node) not in unread else 0):
             tree = ast.parse(text)
             changed = list(ast.walk(tree))[index]
             before = ast.unparse(changed)
@@ -176,10 +181,12 @@ class Traced:
         self._tiers[function] = tier_of(mark.name for mark in item.iter_markers())
         before = os.times()
         sys.settrace(self._called)
+        threading.settrace(self._called)
         try:
             return (yield)
         finally:
             sys.settrace(None)
+            threading.settrace(None)  # type: ignore[arg-type]
             after = os.times()
             self._costs[function] += sum(after[:4]) - sum(before[:4])
 
@@ -232,13 +239,15 @@ class Known:
     costs: dict[str, float]
     tiers: dict[str, str]
 
-    def groups(self, functions: list[str]) -> Iterator[tuple[str, list[list[str]]]]:
-        """Each tier that has some of these functions, the quickest tier first, and its functions in the order of their
-        costs, so many together that pytest's start does not cost most."""
+    def groups(self, file: str, line: int) -> Iterator[tuple[str, list[list[str]]]]:
+        """Each tier that has functions which execute a line, the quickest tier first, and its functions, so many
+        together that pytest's start does not cost most: those of the module's own folder first, the cheapest first."""
+        functions = self.executing.get(f"{file}:{line}", [])
+        own = f"tests/{Path(file).parent.as_posix()}/"
         for tier in ("default", "ci", "release"):
             groups: list[list[str]] = []
             of_tier = [each for each in functions if self.tiers[each] == tier]
-            for function in sorted(of_tier, key=self.costs.__getitem__):
+            for function in sorted(of_tier, key=lambda each: (not each.startswith(own), self.costs[each])):
                 if not groups or len(groups[-1]) == 100 or sum(self.costs[each] for each in groups[-1]) > 3.0:
                     groups.append([])
                 groups[-1].append(function)
@@ -262,10 +271,10 @@ def trace(files: list[str], paths: list[str], marks: str) -> Known:
             *paths,
         ]
         known = {"MET_MUTANTS_FILES": ":".join(files), "MET_MUTANTS_OUT": out}
-        quiet = subprocess.DEVNULL
-        subprocess.run(
-            [sys.executable, "-m", "pytest", *words], env={**os.environ, **known}, stdout=quiet, stderr=quiet
-        )
+        command = [sys.executable, "-m", "pytest", *words]
+        done = subprocess.run(command, env={**os.environ, **known}, capture_output=True, text=True)
+        if not any(Path(out).glob("*.json")):
+            sys.exit(f"no test ran: {done.stdout}{done.stderr}")
         executing: dict[str, list[str]] = defaultdict(list)
         costs: dict[str, float] = defaultdict(float)
         tiers: dict[str, str] = {}
@@ -296,7 +305,7 @@ def tried(mutant: Mutant, known: Known, cap: float) -> tuple[str, str] | None:
     for compiled in (path.parent / "__pycache__").glob(f"{path.stem}.*.pyc"):
         compiled.unlink()
     try:
-        for tier, groups in known.groups(known.executing.get(f"{mutant.file}:{mutant.line}", [])):
+        for tier, groups in known.groups(mutant.file, mutant.line):
             spent = 0.0
             for group in groups:
                 if spent > cap:
