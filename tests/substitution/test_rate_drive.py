@@ -102,8 +102,8 @@ def test_a_position_loop_of_the_servo_s_tells_the_rate() -> None:
 
 
 @pytest.mark.slow
-def test_the_loop_of_a_shaft_without_friction_does_as_its_difference_equation_says(tmp_path: Path) -> None:
-    plant = shaft(tmp_path, "rate_drive(f_c = 0 N*m, f_v = 0 N*m*s/rad)")
+def test_the_loop_of_a_shaft_without_friction_does_as_its_difference_equation_says() -> None:
+    plant = shaft("rate_drive(f_c = 0 N*m, f_v = 0 N*m*s/rad)")
     plant.start(3.0)
     w, integral, h = 3.0, 0.0, 2.5e-4
     fading = math.exp(-KT * KT / R / J * h)
@@ -117,8 +117,8 @@ def test_the_loop_of_a_shaft_without_friction_does_as_its_difference_equation_sa
         assert plant.shaft_rate == pytest.approx(w, rel=1e-9), tick
 
 
-def test_its_loop_brings_a_shaft_with_friction_to_the_rate_that_is_told(tmp_path: Path) -> None:
-    plant = shaft(tmp_path, "rate_drive(kp = 0.2 V*s/rad, ki = 5 V/rad)")
+def test_its_loop_brings_a_shaft_with_friction_to_the_rate_that_is_told() -> None:
+    plant = shaft("rate_drive(kp = 0.2 V*s/rad, ki = 5 V/rad)")
     plant.start(0.0)
     for _ in range(3000):
         plant.tick(25.0, -0.05)
