@@ -42,7 +42,8 @@ run fall { arm = two;  rates { dynamics = 1 kHz; }  duration = 10 ms;  record = 
 def check(folder: Path, robot: str | bytes = TWO, deck: str = DECK) -> Compiled:
     """The deck beside the robot, compiled."""
     (folder / "two.urdf").write_bytes(robot if isinstance(robot, bytes) else robot.encode())
-    return ic.check(text=deck)
+    (folder / "deck.ic").write_text(deck, encoding="utf-8")
+    return ic.check(folder / "deck.ic")
 
 
 def said(folder: Path, robot: str | bytes = TWO, deck: str = DECK) -> str:
