@@ -284,7 +284,6 @@ error[D028]: `kgs` is not a unit
 """)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "line", "help"),
     [
