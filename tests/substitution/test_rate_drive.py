@@ -4,7 +4,6 @@ loop, and runs beside those in software of the same loop, of other gains, and on
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -162,20 +161,18 @@ def test_on_a_scaled_bed_it_is_the_same_run() -> None:
     assert off(full, lab) < 1e-11
 
 
-def turner(folder: Path, law: str, loads: list[float]) -> Experiment:
-    return torque_drive.turner(folder, law, loads, "rate_drive(delay = 1, kp = 0.03 V*s/rad)")
+def turner(law: str, loads: list[float]) -> Experiment:
+    return torque_drive.turner(law, loads, "rate_drive(delay = 1, kp = 0.03 V*s/rad)")
 
 
 @pytest.mark.release
 @pytest.mark.parametrize("law", ["measured_acceleration", "velocity_tracking"])
-def test_a_pole_of_the_whole_program_leaves_the_unit_circle_at_the_limit_of_its_margin(
-    law: str, tmp_path: Path
-) -> None:
+def test_a_pole_of_the_whole_program_leaves_the_unit_circle_at_the_limit_of_its_margin(law: str) -> None:
     rotor = 1570.0**2 * J
-    ((found,),) = margins(turner(tmp_path, law, [rotor]))
+    ((found,),) = margins(turner(law, [rotor]))
     sides = [(False, 100.0)] if found.limit is None else [(False, 0.999 * found.limit), (True, 1.001 * found.limit)]
     assert (found.limit is None) == (law == "velocity_tracking")
-    question = LinearQuestion(turner(tmp_path, law, [r * rotor for _, r in sides]))
+    question = LinearQuestion(turner(law, [r * rotor for _, r in sides]))
     for case, (grows, r) in enumerate(sides):
         largest = max(abs(pole.z) for pole in question.of(case).poles)
         assert (largest > 1.0 + 1e-7) == grows, (r, largest)
