@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import importlib
 import os
+import random
 import re
 import signal
 import sys
@@ -19,6 +20,10 @@ from tests import costs
 ROOT = Path(__file__).parents[1]
 PASSED = "met/passed"
 """Where pytest's cache keeps which of the default tests passed last, and the digest of the files that they tested."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--order", type=int, metavar="SEED", help="shuffle the files of tests, and the tests of each file")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -129,9 +134,16 @@ class _Passed:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """With `--rest` of `scripts/test`, leave out what passed when the same files were tested by `scripts/test`.
 
-    Tests that make environments come first: at the end they would keep one core waiting for minutes.
+    With `--order`, shuffle. Tests that make environments come first: at the end they would keep one core waiting for
+    minutes.
     """
     _draw_the_same_whatever_the_sources_say()
+    if (seed := config.getoption("order")) is not None:
+        drawing = random.Random(seed)
+        files = sorted({item.path for item in items})
+        place = dict(zip(drawing.sample(files, len(files)), range(len(files)), strict=True))
+        drawing.shuffle(items)
+        items.sort(key=lambda item: place[item.path])
     items.sort(key=lambda item: item.path.name != "test_scripts.py")
     passed = passed_on_these_files(config) if "MET_TEST_REST" in os.environ else set()
     left_out = [item for item in items if item.nodeid in passed]

@@ -2,8 +2,9 @@
 
 A mutant is the module with one small change (a comparison turned, a sign, a constant, a condition, a statement left
 out). A seeded sample of them is tried on a copy of the tree, never on the tree itself. Each is given the tests that
-execute the changed line, those of `scripts/test` before those that CI adds and those before the rest, the cheapest
-first, until one fails. What survives is printed, and what only tests outside `scripts/test` notice.
+execute the changed line, until one fails: those of `scripts/test` before those that CI adds and those before the rest,
+and of a tier those of the module's own folder before others, the cheapest first. What survives is printed, and what
+only tests outside `scripts/test` notice.
 
     MODULE            a file, such as met/statistics/confidence.py
     --count N         mutants of each module [20]
@@ -13,9 +14,11 @@ first, until one fails. What survives is printed, and what only tests outside `s
     --cap SECONDS     processor time of tests of a tier for each mutant, after which the next tier's are tried [60]
     -o FILE           write each mutant as a line of JSON: file, line, change, the test that noticed it, or null, and
                       that test's tier (default, ci or release)
+    --again FILE      of the sample only what FILE, which an earlier `-o` wrote, says that no test noticed
 
 First all tests are run once on the unchanged tree, to see which lines they execute and what they cost; those that fail
 there are left out. Lines that only another process executes are not seen, and a line without a test is printed as that.
+What runs when a module is imported belongs to all tests that execute a line of it.
 """
 
 from __future__ import annotations
@@ -32,6 +35,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 from collections import defaultdict
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
@@ -69,10 +73,13 @@ class Mutant:
 
 
 def mutants(file: str, text: str) -> list[Mutant]:
-    """All mutants of a module's text, in the order of its lines."""
+    """All mutants of a module's text, in the order of its lines. Annotations stay, which nothing evaluates."""
     found = []
-    for index, node in enumerate(ast.walk(ast.parse(text))):
-        for number in range(len(_changes(node))):
+    nodes = list(ast.walk(ast.parse(text)))
+    types = [getattr(node, name, None) for node in nodes for name in ("annotation", "returns")]
+    unread = {id(node) for each in types if each is not None for node in ast.walk(each)}
+    for index, node in enumerate(nodes):
+        for number in range(len(_changes(node)) if id(node) not in unread else 0):
             tree = ast.parse(text)
             changed = list(ast.walk(tree))[index]
             before = ast.unparse(changed)
@@ -136,6 +143,14 @@ def _become(node: ast.AST, other: ast.AST) -> None:
 # which tests execute which lines
 
 
+def imported_lines(text: str) -> list[int]:
+    """The lines of a module's text that no function's body holds: they run when the module is imported."""
+    functions = (ast.FunctionDef, ast.AsyncFunctionDef)
+    bodies = [node for node in ast.walk(ast.parse(text)) if isinstance(node, functions)]
+    inside = {line for node in bodies for line in range(node.body[0].lineno, (node.end_lineno or 0) + 1)}
+    return [line for line in range(1, text.count("\n") + 2) if line not in inside]
+
+
 class Traced:
     """Plugin of pytest: writes which lines of some files each test function executes, and what it costs."""
 
@@ -166,10 +181,12 @@ class Traced:
         self._tiers[function] = tier_of(mark.name for mark in item.iter_markers())
         before = os.times()
         sys.settrace(self._called)
+        threading.settrace(self._called)
         try:
             return (yield)
         finally:
             sys.settrace(None)
+            threading.settrace(None)  # type: ignore[arg-type]
             after = os.times()
             self._costs[function] += sum(after[:4]) - sum(before[:4])
 
@@ -201,7 +218,8 @@ def _tests_pass(words: list[str], cap: float) -> bool:
             for stream in (1, 2):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
             sys.dont_write_bytecode = True  # no other mutant may find this one's
-            status = int(pytest.main(["-q", "-p", "no:cacheprovider", "-n", "0", *words]))
+            words = ["-n", "0", "-o", f"faulthandler_timeout={cap}", *words]  # what waits for ever is ended too
+            status = int(pytest.main(["-q", "-p", "no:cacheprovider", *words]))
         finally:
             os._exit(status)
     _, status = os.waitpid(child, 0)
@@ -221,13 +239,15 @@ class Known:
     costs: dict[str, float]
     tiers: dict[str, str]
 
-    def groups(self, functions: list[str]) -> Iterator[tuple[str, list[list[str]]]]:
-        """Each tier that has some of these functions, the quickest tier first, and its functions in the order of their
-        costs, so many together that pytest's start does not cost most."""
+    def groups(self, file: str, line: int) -> Iterator[tuple[str, list[list[str]]]]:
+        """Each tier that has functions which execute a line, the quickest tier first, and its functions, so many
+        together that pytest's start does not cost most: those of the module's own folder first, the cheapest first."""
+        functions = self.executing.get(f"{file}:{line}", [])
+        own = f"tests/{Path(file).parent.as_posix()}/"
         for tier in ("default", "ci", "release"):
             groups: list[list[str]] = []
             of_tier = [each for each in functions if self.tiers[each] == tier]
-            for function in sorted(of_tier, key=self.costs.__getitem__):
+            for function in sorted(of_tier, key=lambda each: (not each.startswith(own), self.costs[each])):
                 if not groups or len(groups[-1]) == 100 or sum(self.costs[each] for each in groups[-1]) > 3.0:
                     groups.append([])
                 groups[-1].append(function)
@@ -251,10 +271,10 @@ def trace(files: list[str], paths: list[str], marks: str) -> Known:
             *paths,
         ]
         known = {"MET_MUTANTS_FILES": ":".join(files), "MET_MUTANTS_OUT": out}
-        quiet = subprocess.DEVNULL
-        subprocess.run(
-            [sys.executable, "-m", "pytest", *words], env={**os.environ, **known}, stdout=quiet, stderr=quiet
-        )
+        command = [sys.executable, "-m", "pytest", *words]
+        done = subprocess.run(command, env={**os.environ, **known}, capture_output=True, text=True)
+        if not any(Path(out).glob("*.json")):
+            sys.exit(f"no test ran: {done.stdout}{done.stderr}")
         executing: dict[str, list[str]] = defaultdict(list)
         costs: dict[str, float] = defaultdict(float)
         tiers: dict[str, str] = {}
@@ -266,6 +286,10 @@ def trace(files: list[str], paths: list[str], marks: str) -> Known:
             for function, seconds in table["costs"].items():
                 costs[function] += seconds
             tiers.update(table["tiers"])
+        for file in files:
+            every = {test for line, tests in executing.items() if line.startswith(f"{file}:") for test in tests}
+            for number in imported_lines((ROOT / file).read_text(encoding="utf-8")):
+                executing[f"{file}:{number}"] = sorted(every)
         return Known({line: sorted(set(functions)) for line, functions in executing.items()}, dict(costs), tiers)
 
 
@@ -281,7 +305,7 @@ def tried(mutant: Mutant, known: Known, cap: float) -> tuple[str, str] | None:
     for compiled in (path.parent / "__pycache__").glob(f"{path.stem}.*.pyc"):
         compiled.unlink()
     try:
-        for tier, groups in known.groups(known.executing.get(f"{mutant.file}:{mutant.line}", [])):
+        for tier, groups in known.groups(mutant.file, mutant.line):
             spent = 0.0
             for group in groups:
                 if spent > cap:
@@ -305,17 +329,17 @@ def main() -> int:
     parser.add_argument("--paths", nargs="+", default=["tests"])
     parser.add_argument("--cap", type=float, default=60.0)
     parser.add_argument("-o", "--output", type=Path)
+    parser.add_argument("--again", type=Path)
     asked = parser.parse_args()
     if "MET_MUTANTS_TREE" in os.environ:
         return _in_this_tree(asked)
-    if asked.output is not None:
-        asked.output = asked.output.resolve()
     with tempfile.TemporaryDirectory(prefix="met-mutants-") as folder:
         tree = Path(folder, "tree")
         shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".git", ".venv", "build"))
         words = [*asked.modules, "--paths", *asked.paths, "--tests", asked.tests]
         words += ["--count", str(asked.count), "--seed", str(asked.seed), "--cap", str(asked.cap)]
-        words += ["-o", str(asked.output)] if asked.output is not None else []
+        words += ["-o", str(asked.output.resolve())] if asked.output is not None else []
+        words += ["--again", str(asked.again.resolve())] if asked.again is not None else []
         known = {"MET_MUTANTS_TREE": str(tree), "PYTHONPATH": str(tree)}
         command = [sys.executable, "-m", "tests.mutants", *words]
         return subprocess.run(command, cwd=tree, env={**os.environ, **known}).returncode
@@ -332,10 +356,14 @@ def _in_this_tree(asked: argparse.Namespace) -> int:
     if sound and not _tests_pass(sound[:1], 60.0):
         sys.exit(f"{sound[0]} fails without a mutant, in a child of this process")
     counts: dict[str, int] = defaultdict(int)
+    earlier = [json.loads(line) for line in asked.again.read_text("utf-8").splitlines()] if asked.again else []
+    unnoticed = {(each["file"], each["line"], each["change"]) for each in earlier if each["test"] is None}
     for file in asked.modules:
         every = mutants(file, (ROOT / file).read_text(encoding="utf-8"))
         sample = random.Random(f"{asked.seed}/{file}").sample(every, min(asked.count, len(every)))
         for mutant in sorted(sample, key=lambda each: each.line):
+            if asked.again and (mutant.file, mutant.line, mutant.change) not in unnoticed:
+                continue
             tier, test = tried(mutant, known, asked.cap) or (None, None)
             executed = f"{file}:{mutant.line}" in known.executing
             how = f"noticed by {tier}" if tier else "survived" if executed else "no test"

@@ -64,12 +64,11 @@ def test_a_quick_look_leaves_out_what_is_slow_and_what_follows_from_it(capsys: p
 
 
 @pytest.mark.parametrize("lines", [20, 100])
-def test_the_long_deck_has_its_lines_and_is_sound(tmp_path: Path, lines: int) -> None:
+def test_the_long_deck_has_its_lines_and_is_sound(lines: int) -> None:
     text = long_deck.text(lines)
     used = [line for line in text.splitlines() if line.count("(") >= 2 and line.startswith(("let", "LINK"))]
     assert len(used) == lines
-    (tmp_path / "deck.ic").write_text(text)
-    assert ic.check(tmp_path / "deck.ic").diagnostics == ()
+    assert ic.check(text=text).diagnostics == ()
 
 
 def test_what_a_figure_follows_from_is_taken_with_it() -> None:

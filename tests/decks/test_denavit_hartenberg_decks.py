@@ -101,6 +101,5 @@ def test_of_decks_included_together_none_is_the_default_but_the_decks_own(tmp_pa
         "D162",
         "this deck has 2 runs and sweeps, and several included files mark a `default`",
     )
-    (tmp_path / "own.ic").write_text(both + "default run mine like puma_reach { duration = 1 s; }\n", encoding="utf-8")
-    (made,) = ic.compile(tmp_path / "own.ic").experiments
+    (made,) = ic.compile(text=both + "default run mine like puma_reach { duration = 1 s; }\n").experiments
     assert made.name == "mine"

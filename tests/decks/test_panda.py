@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,10 +25,8 @@ arm bare like panda { remove flange; remove load; }
 """
 
 
-def experiment(tmp_path: Path, text: str, name: str) -> Experiment:
-    deck = tmp_path / "deck.ic"
-    deck.write_text(text)
-    return ic.compile(deck, select=[name]).experiments[0]
+def experiment(text: str, name: str) -> Experiment:
+    return ic.compile(text=text, select=[name]).experiments[0]
 
 
 def pose(values: np.ndarray) -> str:
@@ -41,7 +38,7 @@ def zipped(what: str, values: np.ndarray, unit: str) -> str:
 
 
 @pytest.mark.oracle
-def test_accelerations_are_those_of_pinocchio_built_from_the_published_tables(tmp_path):
+def test_accelerations_are_those_of_pinocchio_built_from_the_published_tables():
     seed = 20190401
     random = np.random.default_rng(seed)
     q, qd = random.uniform(-2.5, 2.5, (8, 7)), random.uniform(-2.0, 2.0, (8, 7))
@@ -55,7 +52,7 @@ def test_accelerations_are_those_of_pinocchio_built_from_the_published_tables(tm
         sweep poses of fall {{ zip {{ {zipped("q", q, "rad")} {zipped("qd", qd, "rad/s")} }} }}
     """
     )
-    found = engine.run(experiment(tmp_path, deck, "poses")).signals["qdd"][:, 0]
+    found = engine.run(experiment(deck, "poses")).signals["qdd"][:, 0]
     model = panda()
     data = model.createData()
     expected = np.array([pin.aba(model, data, q[k], qd[k], np.zeros(7)) for k in range(len(q))])
@@ -64,7 +61,7 @@ def test_accelerations_are_those_of_pinocchio_built_from_the_published_tables(tm
 
 
 @pytest.mark.oracle
-def test_holding_the_ready_pose_takes_the_gravity_torques_of_pinocchio_and_of_frankas_own_model(tmp_path):
+def test_holding_the_ready_pose_takes_the_gravity_torques_of_pinocchio_and_of_frankas_own_model():
     servos = "".join(
         f"{j} = panda_{j} {{ f_c = 0 N*m;  command = position({v!r} rad); }}"
         for j, v in zip(JOINTS, READY.tolist(), strict=True)
@@ -79,7 +76,7 @@ def test_holding_the_ready_pose_takes_the_gravity_torques_of_pinocchio_and_of_fr
         }}
     """
     )
-    signals = engine.run(experiment(tmp_path, deck, "hold")).signals
+    signals = engine.run(experiment(deck, "hold")).signals
     q, tau = signals["q"][0, -1], signals["tau"][0, -1]
     np.testing.assert_allclose(q, READY, atol=1e-9)  # settled: the slowest mode is 10 /s or so
     model = panda()
@@ -89,7 +86,7 @@ def test_holding_the_ready_pose_takes_the_gravity_torques_of_pinocchio_and_of_fr
 
 
 @pytest.mark.oracle
-def test_the_reach_without_friction_is_that_of_pinocchio_under_the_same_servos(tmp_path):
+def test_the_reach_without_friction_is_that_of_pinocchio_under_the_same_servos():
     away = np.array([45.0, 15.0, -20.0, -90.0, 25.0, 110.0, 10.0]) * DEG
 
     def course(t: float) -> tuple[np.ndarray, np.ndarray]:
@@ -98,7 +95,7 @@ def test_the_reach_without_friction_is_that_of_pinocchio_under_the_same_servos(t
 
     smooth = "".join(f"{joint} {{ f_c = 0 N*m; }} " for joint in JOINTS)
     deck = f"#include <panda.ic>\nrun smooth like reach {{ servos {{ {smooth} }}  rates {{ record = 1 kHz; }} }}"
-    signals = engine.run(experiment(tmp_path, deck, "smooth")).signals
+    signals = engine.run(experiment(deck, "smooth")).signals
     q, tau = follow(
         panda(load=0.5, load_radius=0.04, rotors=ROTORS), READY, course,
         ratio=100.0, kt=np.array([0.1] * 4 + [0.06] * 3), resistance=np.array([0.5] * 2 + [0.6] * 5),

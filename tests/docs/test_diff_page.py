@@ -66,6 +66,8 @@ def test_the_page_says_what_another_limit_makes_of_the_standard_sweep(tmp_path: 
     deck = (LIBRARY / "two_link.ic").read_text(encoding="utf-8")
     before, after = (tmp_path / name for name in ("before.h5", "after.h5"))
     for path, limit in ((before, "10 s"), (after, "1 s")):
-        (tmp_path / "arm.ic").write_text(deck.replace("require settle < 10 s", f"require settle < {limit}"))
-        batch.run(ic.compile(tmp_path / "arm.ic", select=["gains"]), output=path)
+        batch.run(
+            ic.compile(text=deck.replace("require settle < 10 s", f"require settle < {limit}"), select=["gains"]),
+            output=path,
+        )
     assert f"\n{verdict(batch.diff(before, after))}\n" in PAGE.text

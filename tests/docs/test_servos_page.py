@@ -32,11 +32,9 @@ run still {{
 
 @pytest.mark.parametrize(("file", "servo", "model", "ratio", "torque", "rate"), ROWS)
 def test_a_row_has_the_numbers_of_its_file(
-    tmp_path: Path, file: str, servo: str, model: str, ratio: str, torque: str, rate: str
+    file: str, servo: str, model: str, ratio: str, torque: str, rate: str
 ) -> None:
-    deck = tmp_path / "deck.ic"
-    deck.write_text(DECK.format(file=file, servo=servo), encoding="utf-8")
-    [of] = ic.compile(deck).experiments
+    [of] = ic.compile(text=DECK.format(file=file, servo=servo)).experiments
     values = {path.removeprefix("hinge.servo."): each.value for path, each in of.parameters.items()}
     assert of.structure.servos[0].model == model
     n = values["ratio"]

@@ -21,15 +21,13 @@ RATIO, SLOW = 1570.0, 0.03
 LIGHT_TO_HEAVY = (0.5, 1.5, 5.0, 20.0)
 
 
-def experiment(folder: Path, more: str, name: str) -> Experiment:
-    deck = folder / "page.ic"
-    deck.write_text(DECK + more, encoding="utf-8")
-    return ic.compile(deck, select=[name]).experiments[0]
+def experiment(more: str, name: str) -> Experiment:
+    return ic.compile(text=DECK + more, select=[name]).experiments[0]
 
 
 @pytest.mark.slow
-def test_the_deck_of_the_page_runs(tmp_path: Path) -> None:
-    result = engine.run(experiment(tmp_path, "", "bench"))
+def test_the_deck_of_the_page_runs() -> None:
+    result = engine.run(experiment("", "bench"))
     assert result.cause == [""]
     shaft = result.signals["swing.bed.shaft_rate"].ravel()
     # After 5 s, with an arm of five rotors; the error of the whole course is held to below.
@@ -37,8 +35,8 @@ def test_the_deck_of_the_page_runs(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_as_many_motors_pass_as_the_page_says(tmp_path: Path) -> None:
-    result = engine.run(experiment(tmp_path, MOTORS, "motors"), record=False)
+def test_as_many_motors_pass_as_the_page_says() -> None:
+    result = engine.run(experiment(MOTORS, "motors"), record=False)
     met = result.met["late < 1.8 s"]
     (said, of) = re.search(r"met by (\d+) of (\d+) cases", PAGE).groups()  # type: ignore[union-attr]
     assert (met.sum(), met.size) == (int(said), int(of))
@@ -172,18 +170,18 @@ def test_the_limits_of_the_page_are_those_that_are_predicted(rate: str) -> None:
 
 
 @pytest.mark.slow
-def test_an_arm_that_is_too_light_rings_where_the_page_says(tmp_path: Path) -> None:
+def test_an_arm_that_is_too_light_rings_where_the_page_says() -> None:
     more = """
         run stiff like bench { rates { record = 1 kHz; }  record = [swing.servo.voltage]; }
         sweep arms of stiff { vary gearbox.kp = [1] V*s/rad;  vary r = [0.1, 0.3, 0.5, 0.6, 5]; }
     """
-    voltage = engine.run(experiment(tmp_path, more, "arms")).signals["swing.servo.voltage"].reshape(5, -1)
+    voltage = engine.run(experiment(more, "arms")).signals["swing.servo.voltage"].reshape(5, -1)
     *ringing, smooth, heavy = voltage[:, -1000:].std(axis=1)
     assert f"{' / '.join(f'{each:.1f}' for each in ringing)} V rms at r = 0.1 / 0.3 / 0.5" in LINEAR
     assert f"{smooth:.3f} {heavy:.3f}" == "0.004 0.004"
 
 
-def off(folder: Path, law: str, bed: str = "emulated", servos: int = 1000, dynamics: int = 1000) -> str:
+def off(law: str, bed: str = "emulated", servos: int = 1000, dynamics: int = 1000) -> str:
     """Errors of the page's deck from its lightest to its heaviest arm, after each step: `0.13 / 0.13 / 0.14 / 0.17`."""
     rates = f"base = {servos} Hz; dynamics = {dynamics} Hz; servos = {servos} Hz; record = {dynamics} Hz;"
     more = f"""
@@ -192,7 +190,7 @@ def off(folder: Path, law: str, bed: str = "emulated", servos: int = 1000, dynam
         sweep beds of mixed {{ vary links.beam.mass = {masses()}; }}
         sweep pures of pure {{ vary links.beam.mass = {masses()}; }}
     """
-    mixed, pure = (engine.run(experiment(folder, more, name)) for name in ("beds", "pures"))
+    mixed, pure = (engine.run(experiment(more, name)) for name in ("beds", "pures"))
     shaft = mixed.signals["swing.bed.shaft_rate"].reshape(len(LIGHT_TO_HEAVY), -1) / RATIO
     found = 100.0 * np.sqrt(np.mean((shaft - pure.signals["qd"][:, :, 0]) ** 2, axis=1)) / SLOW
     return " / ".join(f"{each:#.2g}".rstrip(".") for each in found)
@@ -208,15 +206,15 @@ def columns(law: str) -> list[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
-def test_the_errors_of_the_page_are_those_of_its_deck(law: str, tmp_path: Path) -> None:
+def test_the_errors_of_the_page_are_those_of_its_deck(law: str) -> None:
     """At 1 kHz, without faults and delay; the third digit is the page's rounding."""
-    assert columns(law)[0] == off(tmp_path, law)
+    assert columns(law)[0] == off(law)
 
 
 @pytest.mark.release
 @pytest.mark.parametrize("law", LAWS)
-def test_so_are_those_at_the_papers_rates_and_with_faults(law: str, tmp_path: Path) -> None:
-    slow, faulty = off(tmp_path, law, servos=100, dynamics=25), off(tmp_path, law, "emulated(faults = typical)")
+def test_so_are_those_at_the_papers_rates_and_with_faults(law: str) -> None:
+    slow, faulty = off(law, servos=100, dynamics=25), off(law, "emulated(faults = typical)")
     assert columns(law)[1:] == [slow, faulty]
 
 
@@ -225,11 +223,11 @@ FAULTS = re.findall(r"^\| `(\w+)` = (\S+) (\S+) \| ([^|]*/[^|]*) \| ([^|]*/[^|]*
 
 @pytest.mark.release
 @pytest.mark.parametrize("fault", FAULTS, ids=[row[0] for row in FAULTS])
-def test_so_are_those_of_each_fault_alone(fault: tuple[str, ...], tmp_path: Path) -> None:
+def test_so_are_those_of_each_fault_alone(fault: tuple[str, ...]) -> None:
     name, size, unit, fast, slow = fault
     bed = f"emulated({name} = {size} {'N*m' if unit == 'N' else unit})"
-    assert off(tmp_path, "velocity_tracking", bed) == fast
-    assert off(tmp_path, "velocity_tracking", bed, servos=100, dynamics=25) == slow
+    assert off("velocity_tracking", bed) == fast
+    assert off("velocity_tracking", bed, servos=100, dynamics=25) == slow
 
 
 def masses() -> str:

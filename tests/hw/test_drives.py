@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -31,9 +30,8 @@ def about() -> About:
     return EmulatedBed(Shaft(), emulated.scales(values), emulated.limits(values, 1e-3)).connect()
 
 
-def test_a_drive_that_takes_a_torque_is_not_sent_voltages(tmp_path: Path) -> None:
-    (tmp_path / "deck.ic").write_text(DECK)
-    (experiment,) = ic.compile(tmp_path / "deck.ic", select=["bench"]).experiments
+def test_a_drive_that_takes_a_torque_is_not_sent_voltages() -> None:
+    (experiment,) = ic.compile(text=DECK, select=["bench"]).experiments
     case._check_drive(about(), experiment, "shoulder")
     with pytest.raises(Problem) as refused:
         case._check_drive(replace(about(), drive="torque"), experiment, "shoulder")
@@ -45,9 +43,8 @@ def test_a_drive_that_takes_a_torque_is_not_sent_voltages(tmp_path: Path) -> Non
     assert told.help == ("bed models that send a torque: torque_drive",)
 
 
-def test_a_drive_that_takes_a_torque_is_sent_torques(tmp_path: Path) -> None:
-    (tmp_path / "deck.ic").write_text(DECK.replace("emulated(", "torque_drive("))
-    (experiment,) = ic.compile(tmp_path / "deck.ic", select=["bench"]).experiments
+def test_a_drive_that_takes_a_torque_is_sent_torques() -> None:
+    (experiment,) = ic.compile(text=DECK.replace("emulated(", "torque_drive("), select=["bench"]).experiments
     case._check_drive(replace(about(), drive="torque"), experiment, "shoulder")
     with pytest.raises(Problem, match="takes a voltage, and `torque_drive` of joint `shoulder` sends it a torque"):
         case._check_drive(about(), experiment, "shoulder")

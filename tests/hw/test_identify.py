@@ -66,11 +66,9 @@ def hidden(seed: int) -> dict[str, float]:
     return {name: value * float(chance.uniform(0.7, 1.3)) for name, value in SHEET.items()}
 
 
-def experiment(folder: Path, truth: Mapping[str, float], faults: str) -> Experiment:
+def experiment(truth: Mapping[str, float], faults: str) -> Experiment:
     values = ", ".join(f"{name} = {value!r} {UNITS[name]}" for name, value in truth.items())
-    path = folder / "deck.ic"
-    path.write_text(DECK.format(values=values, faults=faults))
-    return ic.compile(path, select=["wired"]).experiments[0]
+    return ic.compile(text=DECK.format(values=values, faults=faults), select=["wired"]).experiments[0]
 
 
 class OwnTime(EmulatedBed):
@@ -147,15 +145,15 @@ def outside(found: FitResult, truth: Mapping[str, float]) -> list[str]:
     return [name for name, each in found.parameters.items() if each.found and not each.low <= truth[name] <= each.high]
 
 
-def identified(folder: Path, seed: int, faults: str) -> tuple[FitResult, dict[str, float]]:
+def identified(seed: int, faults: str) -> tuple[FitResult, dict[str, float]]:
     truth = hidden(seed)
-    what, its, _ = moved(experiment(folder, truth, faults), seed)
+    what, its, _ = moved(experiment(truth, faults), seed)
     return fitted(what, its, {**SHEET, "kt_load": truth["kt_load"]}), truth
 
 
 @pytest.mark.parametrize("faults", ["none", "typical"])
-def test_hidden_parameters_are_found_and_sure_to_a_percent_or_so(tmp_path: Path, faults: str) -> None:
-    found, truth = identified(tmp_path, 3, faults)
+def test_hidden_parameters_are_found_and_sure_to_a_percent_or_so(faults: str) -> None:
+    found, truth = identified(3, faults)
     assert found.settled and [name for name, each in found.parameters.items() if each.found] == TOLD
     assert outside(found, truth) == []
     for name in TOLD:
@@ -163,20 +161,20 @@ def test_hidden_parameters_are_found_and_sure_to_a_percent_or_so(tmp_path: Path,
         assert math.log(each.high / each.value) < (0.08 if name == "f_v" else 0.01), name
 
 
-def missed(folder: Path, seeds: int, faults: str) -> dict[str, int]:
+def missed(seeds: int, faults: str) -> dict[str, int]:
     """In how many of so many seeds the truth is outside of its interval, by parameter."""
     out = dict.fromkeys(TOLD, 0)
     for seed in range(seeds):
-        for name in outside(*identified(folder, seed, faults)):
+        for name in outside(*identified(seed, faults)):
             out[name] += 1
     return out
 
 
 @pytest.mark.release
 @pytest.mark.parametrize("faults", ["none", "typical"])
-def test_the_truth_is_in_its_interval(tmp_path: Path, faults: str) -> None:
+def test_the_truth_is_in_its_interval(faults: str) -> None:
     """Of 100 seeds it is in 90 at least: `python -m tests.hw.test_identify` counts them, in half an hour."""
-    assert not any(missed(tmp_path, 3, faults).values())
+    assert not any(missed(3, faults).values())
 
 
 def test_each_group_of_moves_has_all_kinds() -> None:
@@ -187,8 +185,8 @@ def test_each_group_of_moves_has_all_kinds() -> None:
 
 
 @pytest.mark.release
-def test_moves_keep_within_their_peaks_and_slews_and_end_at_rest(tmp_path: Path) -> None:
-    _, _, told = moved(experiment(tmp_path, hidden(1), "typical"), 1)
+def test_moves_keep_within_their_peaks_and_slews_and_end_at_rest() -> None:
+    _, _, told = moved(experiment(hidden(1), "typical"), 1)
     volts, amperes, rates = np.array(told).T
     assert np.abs(volts).max() <= 20.0 and np.abs(amperes).max() <= 2.0
     assert np.abs(np.diff(volts)).max() <= 40.0 + 1e-9 and np.abs(np.diff(amperes)).max() <= 6.0 + 1e-9
@@ -225,26 +223,26 @@ def test_a_shaft_that_does_not_come_to_rest_is_found_out() -> None:
 
 
 @pytest.mark.release
-def test_a_bed_with_a_time_of_its_own_holds_what_it_is_told_until_the_next(tmp_path: Path) -> None:
+def test_a_bed_with_a_time_of_its_own_holds_what_it_is_told_until_the_next() -> None:
     truth = hidden(3)
-    what, its, _ = moved(experiment(tmp_path, truth, "none"), 3, OwnTime)
+    what, its, _ = moved(experiment(truth, "none"), 3, OwnTime)
     found = fitted(what, its, {**SHEET, "kt_load": truth["kt_load"]})
     assert outside(found, truth) == [] and float((found.residual**2).mean() ** 0.5) < 1e-3
 
 
 @pytest.mark.release
-def test_drive_current_that_is_measured_gives_the_load_motors_constant_too(tmp_path: Path) -> None:
+def test_drive_current_that_is_measured_gives_the_load_motors_constant_too() -> None:
     truth = hidden(4)
-    what, its, _ = moved(experiment(tmp_path, truth, "typical"), 4, Measuring)
+    what, its, _ = moved(experiment(truth, "typical"), 4, Measuring)
     found = fitted(what, its, SHEET)
     assert [name for name, each in found.parameters.items() if each.found] == list(UNITS)
     assert outside(found, truth) == []
 
 
 @pytest.mark.release
-def test_friction_and_back_emf_are_not_told_apart_where_the_drive_never_reaches_its_limit(tmp_path: Path) -> None:
+def test_friction_and_back_emf_are_not_told_apart_where_the_drive_never_reaches_its_limit() -> None:
     truth = {**SHEET, "kt": 0.065, "f_c": 0.018}
-    what, its, _ = moved(experiment(tmp_path, truth, "none"), 1, voltage=4.0)
+    what, its, _ = moved(experiment(truth, "none"), 1, voltage=4.0)
     found = fitted(what, its, SHEET)
     assert [name for name, each in found.parameters.items() if not each.found] == ["tau_max", "f_v", "kt_load"]
     assert found.parameters["f_v"].value == pytest.approx(SHEET["f_v"], rel=1e-12)
@@ -288,4 +286,4 @@ def test_what_the_moves_cannot_be(more: dict[str, float], message: str) -> None:
 if __name__ == "__main__":
     for faults in ("none", "typical"):
         with tempfile.TemporaryDirectory() as name:
-            print(faults, {each: f"{100 - count} of 100" for each, count in missed(Path(name), 100, faults).items()})
+            print(faults, {each: f"{100 - count} of 100" for each, count in missed(100, faults).items()})

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -62,11 +60,8 @@ SCALED = "shoulder { scale { torque = 4;  rate = 1.5;  voltage = 2; } }"
 
 @pytest.mark.release
 @pytest.mark.parametrize(("duration", "scale"), [(2, ""), pytest.param(20, "", marks=pytest.mark.slow), (2, SCALED)])
-def test_a_run_is_the_same_to_the_bit_inside_the_kernel_in_process_and_over_a_line(
-    tmp_path: Path, duration: int, scale: str
-) -> None:
-    (tmp_path / "bench.ic").write_text(DECK.format(duration=duration, scale=scale), encoding="utf-8")
-    experiment = ic.compile(tmp_path / "bench.ic", select=["bench"]).experiments[0]
+def test_a_run_is_the_same_to_the_bit_inside_the_kernel_in_process_and_over_a_line(duration: int, scale: str) -> None:
+    experiment = ic.compile(text=DECK.format(duration=duration, scale=scale), select=["bench"]).experiments[0]
     values = {
         path.removeprefix("shoulder.bed."): quantity.value
         for path, quantity in experiment.parameters.items()

@@ -60,6 +60,11 @@ def messages(compiled: Compiled) -> str:
     return text
 
 
+def shown(folder: Path, *parts: str, select: Select = "all") -> str:
+    """What was said of a deck, as of `messages`, without the counting line."""
+    return messages(check(folder, *parts, select=select)).rpartition("\n\n")[0] + "\n"
+
+
 def codes(folder: Path, *parts: str, select: Select = None) -> list[str]:
     """Codes of what was said, in order."""
     return [diagnostic.code for diagnostic in check(folder, *parts, select=select).diagnostics]

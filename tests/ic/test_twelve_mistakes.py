@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 import ic
@@ -47,11 +45,10 @@ MISTAKES = [
 ]  # fmt: skip
 
 
-def told(folder: Path, wrong: set[int]) -> list[tuple[str, int]]:
+def told(wrong: set[int]) -> list[tuple[str, int]]:
     """The errors of the deck with these mistakes in it: codes and lines."""
     pieces = [mistake[i in wrong] for i, mistake in enumerate(MISTAKES)]
-    (folder / "deck.ic").write_text(DECK.format(*pieces))
-    errors = [d for d in ic.check(folder / "deck.ic").diagnostics if d.severity == "error"]
+    errors = [d for d in ic.check(text=DECK.format(*pieces)).diagnostics if d.severity == "error"]
     return sorted((d.code, d.at.place.line) for d in errors if d.at is not None)
 
 
@@ -61,27 +58,27 @@ def expected(wrong: set[int]) -> list[tuple[str, int]]:
 
 
 @pytest.mark.slow
-def test_the_deck_without_mistakes_is_sound(tmp_path: Path) -> None:
-    assert told(tmp_path, set()) == []
+def test_the_deck_without_mistakes_is_sound() -> None:
+    assert told(set()) == []
 
 
-def test_all_mistakes_are_told_in_one_run_and_nothing_else(tmp_path: Path) -> None:
+def test_all_mistakes_are_told_in_one_run_and_nothing_else() -> None:
     everything = set(range(len(MISTAKES)))
     assert len(everything) >= 12
-    assert told(tmp_path, everything) == expected(everything)
+    assert told(everything) == expected(everything)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mended", range(len(MISTAKES)), ids=[wrong or "nothing" for _, wrong, _ in MISTAKES])
-def test_to_mend_a_mistake_takes_just_its_message_away(tmp_path: Path, mended: int) -> None:
+def test_to_mend_a_mistake_takes_just_its_message_away(mended: int) -> None:
     others = set(range(len(MISTAKES))) - {mended}
-    assert told(tmp_path, others) == expected(others)
+    assert told(others) == expected(others)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("alone", range(len(MISTAKES)), ids=[wrong or "nothing" for _, wrong, _ in MISTAKES])
-def test_a_mistake_alone_is_told_once(tmp_path: Path, alone: int) -> None:
-    assert told(tmp_path, {alone}) == expected({alone})
+def test_a_mistake_alone_is_told_once(alone: int) -> None:
+    assert told({alone}) == expected({alone})
 
 
 HIDING = """\
@@ -113,7 +110,8 @@ SOUND = {
     ({"channel": "elbw.qd", "part": "secnd"}, ["D041", "D125"]),
     ({"extra": "tolerancs { }"}, ["D109"]),
 ])  # fmt: skip
-def test_a_wrong_word_of_a_run_hides_no_other_mistake(tmp_path: Path, wrong: dict[str, str], codes: list[str]) -> None:
-    deck = tmp_path / "deck.ic"
-    deck.write_text(HIDING.format(**{**SOUND, **wrong}))
-    assert sorted(d.code for d in ic.check(deck).diagnostics if d.severity == "error") == codes
+def test_a_wrong_word_of_a_run_hides_no_other_mistake(wrong: dict[str, str], codes: list[str]) -> None:
+    assert (
+        sorted(d.code for d in ic.check(text=HIDING.format(**{**SOUND, **wrong})).diagnostics if d.severity == "error")
+        == codes
+    )

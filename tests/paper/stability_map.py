@@ -7,7 +7,6 @@ Above the limit a pole of the loop from tick to tick is larger than one (met/ana
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -36,10 +35,7 @@ def limits(law: str, rate_hz: float, delays: Sequence[int] = DELAYS, bed: str = 
         }}
         sweep delays of there {{ vary shoulder.bed.delay = {list(delays)}; }}
     """
-    with tempfile.TemporaryDirectory() as folder:
-        deck = Path(folder) / "there.ic"
-        deck.write_text(text)
-        (experiment,) = ic.compile(deck, select=["delays"]).experiments
+    (experiment,) = ic.compile(text=text, select=["delays"]).experiments
     return [joint.limit for (joint,) in margins(experiment)]
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import tempfile
-from pathlib import Path
 
 import ic
 from met import run as engine
@@ -44,10 +42,7 @@ def experiment(
             {run}
         }}
     """
-    with tempfile.TemporaryDirectory() as folder:
-        deck = Path(folder) / "two_link_changed.ic"
-        deck.write_text(text)
-        return ic.compile(deck, select=["changed"]).experiments[0]
+    return ic.compile(text=text, select=["changed"]).experiments[0]
 
 
 def run(**changes: object) -> engine.Run:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 
@@ -30,10 +28,7 @@ TWO_LINK = ("two_link", ("shoulder", "elbow"), "")
 
 def compiled(text: str, name: str) -> Experiment:
     """The run or sweep of this name in a deck."""
-    with tempfile.TemporaryDirectory() as folder:
-        deck = Path(folder) / "hybrid.ic"
-        deck.write_text(text)
-        return ic.compile(deck, select=[name]).experiments[0]
+    return ic.compile(text=text, select=[name]).experiments[0]
 
 
 @lru_cache(maxsize=64)

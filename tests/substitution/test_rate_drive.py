@@ -4,7 +4,6 @@ loop, and runs beside those in software of the same loop, of other gains, and on
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -102,8 +101,8 @@ def test_a_position_loop_of_the_servo_s_tells_the_rate() -> None:
 
 
 @pytest.mark.slow
-def test_the_loop_of_a_shaft_without_friction_does_as_its_difference_equation_says(tmp_path: Path) -> None:
-    plant = shaft(tmp_path, "rate_drive(f_c = 0 N*m, f_v = 0 N*m*s/rad)")
+def test_the_loop_of_a_shaft_without_friction_does_as_its_difference_equation_says() -> None:
+    plant = shaft("rate_drive(f_c = 0 N*m, f_v = 0 N*m*s/rad)")
     plant.start(3.0)
     w, integral, h = 3.0, 0.0, 2.5e-4
     fading = math.exp(-KT * KT / R / J * h)
@@ -117,8 +116,8 @@ def test_the_loop_of_a_shaft_without_friction_does_as_its_difference_equation_sa
         assert plant.shaft_rate == pytest.approx(w, rel=1e-9), tick
 
 
-def test_its_loop_brings_a_shaft_with_friction_to_the_rate_that_is_told(tmp_path: Path) -> None:
-    plant = shaft(tmp_path, "rate_drive(kp = 0.2 V*s/rad, ki = 5 V/rad)")
+def test_its_loop_brings_a_shaft_with_friction_to_the_rate_that_is_told() -> None:
+    plant = shaft("rate_drive(kp = 0.2 V*s/rad, ki = 5 V/rad)")
     plant.start(0.0)
     for _ in range(3000):
         plant.tick(25.0, -0.05)
@@ -162,20 +161,18 @@ def test_on_a_scaled_bed_it_is_the_same_run() -> None:
     assert off(full, lab) < 1e-11
 
 
-def turner(folder: Path, law: str, loads: list[float]) -> Experiment:
-    return torque_drive.turner(folder, law, loads, "rate_drive(delay = 1, kp = 0.03 V*s/rad)")
+def turner(law: str, loads: list[float]) -> Experiment:
+    return torque_drive.turner(law, loads, "rate_drive(delay = 1, kp = 0.03 V*s/rad)")
 
 
 @pytest.mark.release
 @pytest.mark.parametrize("law", ["measured_acceleration", "velocity_tracking"])
-def test_a_pole_of_the_whole_program_leaves_the_unit_circle_at_the_limit_of_its_margin(
-    law: str, tmp_path: Path
-) -> None:
+def test_a_pole_of_the_whole_program_leaves_the_unit_circle_at_the_limit_of_its_margin(law: str) -> None:
     rotor = 1570.0**2 * J
-    ((found,),) = margins(turner(tmp_path, law, [rotor]))
+    ((found,),) = margins(turner(law, [rotor]))
     sides = [(False, 100.0)] if found.limit is None else [(False, 0.999 * found.limit), (True, 1.001 * found.limit)]
     assert (found.limit is None) == (law == "velocity_tracking")
-    question = LinearQuestion(turner(tmp_path, law, [r * rotor for _, r in sides]))
+    question = LinearQuestion(turner(law, [r * rotor for _, r in sides]))
     for case, (grows, r) in enumerate(sides):
         largest = max(abs(pole.z) for pole in question.of(case).poles)
         assert (largest > 1.0 + 1e-7) == grows, (r, largest)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -88,14 +87,13 @@ def test_on_a_scaled_bed_it_is_the_same_run() -> None:
     assert apart(full, lab) < 1e-11
 
 
-def shaft(tmp_path: Path, bed: str) -> Plant:
-    (tmp_path / "deck.ic").write_text(bench(bed))
-    return Plant(ic.compile(tmp_path / "deck.ic", select=["bench"]).experiments[0], "shoulder")
+def shaft(bed: str) -> Plant:
+    return Plant(ic.compile(text=bench(bed), select=["bench"]).experiments[0], "shoulder")
 
 
 @pytest.mark.slow
-def test_a_shaft_without_friction_turns_as_newton_says(tmp_path: Path) -> None:
-    plant = shaft(tmp_path, "torque_drive(f_c = 0 N*m, f_v = 0 N*m*s/rad, inertia = 1e-4 kg*m^2)")
+def test_a_shaft_without_friction_turns_as_newton_says() -> None:
+    plant = shaft("torque_drive(f_c = 0 N*m, f_v = 0 N*m*s/rad, inertia = 1e-4 kg*m^2)")
     plant.start(2.0)
     for _ in range(500):
         plant.tick(0.01, -0.05)
@@ -103,8 +101,8 @@ def test_a_shaft_without_friction_turns_as_newton_says(tmp_path: Path) -> None:
     assert plant.shaft_rate == pytest.approx(2.0 + gained, rel=1e-7)
 
 
-def test_the_torque_comes_as_a_low_pass_of_order_1(tmp_path: Path) -> None:
-    plant = shaft(tmp_path, "torque_drive(bandwidth = 40 Hz, gain = 1.1, f_c = 0 N*m, f_v = 0 N*m*s/rad)")
+def test_the_torque_comes_as_a_low_pass_of_order_1() -> None:
+    plant = shaft("torque_drive(bandwidth = 40 Hz, gain = 1.1, f_c = 0 N*m, f_v = 0 N*m*s/rad)")
     plant.start(0.0)
     for _ in range(20):
         plant.tick(0.01, 0.0)
@@ -122,26 +120,21 @@ def test_no_more_torque_is_told_than_the_drive_gives() -> None:
     assert np.abs(told).max() == 0.025 and np.abs(given).max() == 0.025
 
 
-def turner(
-    folder: Path, law: str, loads: list[float], bed: str = "torque_drive(delay = 1, bandwidth = 300 Hz)"
-) -> Experiment:
+def turner(law: str, loads: list[float], bed: str = "torque_drive(delay = 1, bandwidth = 300 Hz)") -> Experiment:
     deck = TURNER.replace("LAW", law).replace("RATE", "100 Hz")
     deck = deck.replace("emulated(delay = DELAY)", bed)
-    (folder / "deck.ic").write_text(deck)
-    (made,) = ic.compile(folder / "deck.ic", select=["loads"]).experiments
+    (made,) = ic.compile(text=deck, select=["loads"]).experiments
     return with_loads(made, loads)
 
 
 @pytest.mark.release
 @pytest.mark.parametrize("law", ["measured_acceleration", "velocity_tracking"])
-def test_a_pole_of_the_whole_program_leaves_the_unit_circle_at_the_limit_of_its_margin(
-    law: str, tmp_path: Path
-) -> None:
+def test_a_pole_of_the_whole_program_leaves_the_unit_circle_at_the_limit_of_its_margin(law: str) -> None:
     rotor = 1570.0**2 * 6.38e-5
-    ((found,),) = margins(turner(tmp_path, law, [rotor]))
+    ((found,),) = margins(turner(law, [rotor]))
     sides = [(False, 100.0)] if found.limit is None else [(False, 0.999 * found.limit), (True, 1.001 * found.limit)]
     assert (found.limit is None) == (law == "velocity_tracking")
-    question = LinearQuestion(turner(tmp_path, law, [r * rotor for _, r in sides]))
+    question = LinearQuestion(turner(law, [r * rotor for _, r in sides]))
     for case, (grows, r) in enumerate(sides):
         largest = max(abs(pole.z) for pole in question.of(case).poles)
         assert (largest > 1.0 + 1e-7) == grows, (r, largest)

@@ -112,9 +112,8 @@ def test_units_and_frames_are_told(files: dict[str, Path]) -> None:
 
 
 @pytest.mark.slow
-def test_the_archive_holds_what_the_engine_gave(files: dict[str, Path], tmp_path: Path) -> None:
-    (tmp_path / "crane.ic").write_text(DECK)
-    run = engine.run(ic.compile(tmp_path / "crane.ic", select=["masses"]).experiments[0])
+def test_the_archive_holds_what_the_engine_gave(files: dict[str, Path]) -> None:
+    run = engine.run(ic.compile(text=DECK, select=["masses"]).experiments[0])
     with xarray.open_dataset(files["masses"]) as data:
         for name, values in run.signals.items():
             assert data[name].values.tobytes() == np.ascontiguousarray(values).tobytes(), name
@@ -212,8 +211,10 @@ def test_cases_of_a_vector_have_a_plot_a_component(sweep: ArchiveFile, figures: 
 
 @pytest.mark.slow
 def test_many_cases_are_a_fan_of_each_component(files: dict[str, Path], figures: list[Any], tmp_path: Path) -> None:
-    (tmp_path / "crane.ic").write_text(DECK.replace("[1, 2, 3] kg", "linspace(1, 3, 12) kg"))
-    batch.run(ic.compile(tmp_path / "crane.ic", select=["masses"]), output=tmp_path / "a.h5")
+    batch.run(
+        ic.compile(text=DECK.replace("[1, 2, 3] kg", "linspace(1, 3, 12) kg"), select=["masses"]),
+        output=tmp_path / "a.h5",
+    )
     with ArchiveFile(tmp_path / "a.h5") as file:
         draw(file, tmp_path / "a.png", ["links.sled.position"])
         middle = np.median([file.groups[0].signal("links.sled.position", i)[:, 2] for i in range(12)], axis=0)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -74,9 +73,8 @@ def deck(joints: Sequence[RandomJoint], *, free: bool = False) -> str:
     return "\n".join(lines)
 
 
-def compiled(folder: Path, text: str, name: str = "sizes") -> Experiment:
-    (folder / "tree.ic").write_text(text, encoding="utf-8")
-    return ic.compile(folder / "tree.ic", select=[name]).experiments[0]
+def compiled(text: str, name: str = "sizes") -> Experiment:
+    return ic.compile(text=text, select=[name]).experiments[0]
 
 
 def link_frames(

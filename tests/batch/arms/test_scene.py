@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -51,13 +50,13 @@ def in_node(scene: ArmScene, values: dict[str, float], instants: list[list[float
 @pytest.mark.release
 @pytest.mark.node
 @pytest.mark.parametrize("free", [False, True])
-def test_bodies_of_random_trees_are_where_rodrigues_formula_puts_them(tmp_path: Path, free: bool) -> None:
+def test_bodies_of_random_trees_are_where_rodrigues_formula_puts_them(free: bool) -> None:
     seed = 20261126 + free
     rng = np.random.default_rng(seed)
     compared = 0
     for count in (1, 2, 3, 7, 12, 30):
         joints = random_joints(rng, count)
-        experiment = compiled(tmp_path, deck(joints, free=free))
+        experiment = compiled(deck(joints, free=free))
         scene = arm_scene(experiment, recorded(experiment))
         assert lacking(scene, recorded(experiment)) == ()
         far = float(rng.uniform(0.5, 2.0))
@@ -121,8 +120,8 @@ sweep sizes of it { vary links.two.shape.radius = [1, 5] cm; }
 """
 
 
-def test_shapes_are_those_of_the_deck_and_of_the_case(tmp_path: Path) -> None:
-    experiment = compiled(tmp_path, BEAM.replace("RECORD", "q"))
+def test_shapes_are_those_of_the_deck_and_of_the_case() -> None:
+    experiment = compiled(BEAM.replace("RECORD", "q"))
     scene = arm_scene(experiment, recorded(experiment))
     assert [body.name for body in scene.bodies] == ["base", "one", "two"]
     assert [body.carrier for body in scene.bodies] == [-1, 0, 1]
@@ -142,8 +141,8 @@ def test_shapes_are_those_of_the_deck_and_of_the_case(tmp_path: Path) -> None:
     assert numbers[3].tolist() == [0.25, 0, 0, 1, 0, 0, 0.01, 0.01, 0.5]
 
 
-def test_what_is_not_recorded_is_named(tmp_path: Path) -> None:
-    experiment = compiled(tmp_path, BEAM.replace("RECORD", "b.q"))
+def test_what_is_not_recorded_is_named() -> None:
+    experiment = compiled(BEAM.replace("RECORD", "b.q"))
     assert lacking(arm_scene(experiment, recorded(experiment)), recorded(experiment)) == ("a.q",)
-    experiment = compiled(tmp_path, BEAM.replace("RECORD", "qd"))
+    experiment = compiled(BEAM.replace("RECORD", "qd"))
     assert lacking(arm_scene(experiment, recorded(experiment)), recorded(experiment)) == ("q",)

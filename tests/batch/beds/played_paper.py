@@ -172,11 +172,8 @@ class OnTime(CanBed):
 @functools.cache
 def compiled(name: str, gains: tuple[float, float] = (1.0, 1.0), hz: int = FAST) -> Experiment:
     """A run of the deck. gains: of its rate loop, over `GAIN` and `INTEGRAL`;  hz: of the fast runs, Hz"""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "paper.ic"
-        text = DECK.replace("GAIN", f"{gains[0] * GAIN!r}").replace("INTEGRAL", f"{gains[1] * INTEGRAL!r}")
-        path.write_text(text.replace("1 kHz", f"{hz} Hz"))
-        return ic.compile(path, select=[name]).experiments[0]
+    text = DECK.replace("GAIN", f"{gains[0] * GAIN!r}").replace("INTEGRAL", f"{gains[1] * INTEGRAL!r}")
+    return ic.compile(text=text.replace("1 kHz", f"{hz} Hz"), select=[name]).experiments[0]
 
 
 def bench(dialect: str, name: str, folder: Path, gains: tuple[float, float] = (1.0, 1.0)) -> OnTime:

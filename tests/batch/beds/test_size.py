@@ -142,8 +142,8 @@ def judged(work: ShaftWork, role: str, *, beside: float | None = None, **figures
 
 
 @pytest.fixture(scope="module")
-def pushed(tmp_path_factory: pytest.TempPathFactory) -> ShaftWork:
-    return work(compiled(tmp_path_factory.mktemp("pushed"), PUSHED, "push"), "swing")
+def pushed() -> ShaftWork:
+    return work(compiled(PUSHED, "push"), "swing")
 
 
 @pytest.mark.parametrize(
@@ -347,10 +347,10 @@ def test_a_run_that_fails_at_once_has_nothing_to_size(
 
 
 @pytest.mark.slow
-def test_the_range_of_filters_ends_where_the_law_is_unstable(tmp_path: Path) -> None:
+def test_the_range_of_filters_ends_where_the_law_is_unstable() -> None:
     """`measured_acceleration` at 1 kHz is stable up to r = 13.6, 5.35, 2.95 and 1.91 with filters of 20, 50, 100 and
     200 Hz (docs/substitution.md). With r = 2 and a margin of 1.5 that is 3: up to a little below 100 Hz."""
-    at_two = compiled(tmp_path, ON_BED.format(mass=2 * 157.26062, law="measured_acceleration"), "bench")
+    at_two = compiled(ON_BED.format(mass=2 * 157.26062, law="measured_acceleration"), "bench")
     found = filter_range(at_two, "swing", [0], (2.0, 2.0), 1.5)
     assert found.f_cut == 50.0
     assert found.good == tuple(f_cut for f_cut, _ in found.tried if f_cut < 98.0)
@@ -360,20 +360,20 @@ def test_the_range_of_filters_ends_where_the_law_is_unstable(tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-def test_an_arm_that_grows_beyond_all_that_is_searched_of_decks_is_looked_at(tmp_path: Path) -> None:
+def test_an_arm_that_grows_beyond_all_that_is_searched_of_decks_is_looked_at() -> None:
     """`velocity_tracking` has no limit here: up to 2000 for the arm at the start, and as far as the run's arm asks."""
-    deck = compiled(tmp_path, ON_BED.format(mass=2 * 157.26062, law="velocity_tracking"), "bench")
+    deck = compiled(ON_BED.format(mass=2 * 157.26062, law="velocity_tracking"), "bench")
     [[at_start]] = margins(deck, [0])
     own = filter_range(deck, "swing", [0], (2.0, 6365.0), 1.5).own
     assert (at_start.limit, at_start.searched, at_start.stable) == (None, 2000.0, True)
     assert (own.limit, own.least, own.together, own.searched, own.stable) == (None, 2.0, 6365.0, 3.0 * 6365.0, True)
-    [[alone]] = margins(compiled(tmp_path, ON_BED.format(mass=6365 * 157.26062, law="velocity_tracking"), "bench"), [0])
+    [[alone]] = margins(compiled(ON_BED.format(mass=6365 * 157.26062, law="velocity_tracking"), "bench"), [0])
     assert alone.stable and alone.together == pytest.approx(6365.0, rel=1e-6)
 
 
 @pytest.mark.slow
-def test_the_search_goes_as_far_as_the_margin_that_is_asked(tmp_path: Path) -> None:
-    deck = compiled(tmp_path, ON_BED.format(mass=2 * 157.26062, law="velocity_tracking"), "bench")
+def test_the_search_goes_as_far_as_the_margin_that_is_asked() -> None:
+    deck = compiled(ON_BED.format(mass=2 * 157.26062, law="velocity_tracking"), "bench")
     found = filter_range(deck, "swing", [0], (100.0, 100.0), 50.0)
     assert found.own.limit is None and found.own.room >= 50.0
     assert max(found.good) == found.tried[-1][0]

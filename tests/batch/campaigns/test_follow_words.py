@@ -70,8 +70,7 @@ run draw {
 
 
 def warned(folder: Path, name: str, deck: str = DECK) -> list[Diagnostic]:
-    (folder / "deck.ic").write_text(deck)
-    plan = ic.compile(folder / "deck.ic", select=[name])
+    plan = ic.compile(text=deck, select=[name])
     return list(perform(prepare(plan, output=folder / f"{name}.h5", verify="none"), executor=Threads(1)).warned)
 
 
@@ -94,8 +93,7 @@ def test_a_joint_that_its_brake_holds_is_told_with_the_limit_and_the_brake(tmp_p
 @pytest.mark.slow
 def test_an_unstable_loop_is_told_alone(tmp_path: Path) -> None:
     deck = DECK.replace("servos = 500 Hz", "servos = 50 Hz").replace("kp = 0.05 V*s/rad", "kp = 0.5 V*s/rad")
-    (tmp_path / "deck.ic").write_text(deck)
-    assert "D320" in {each.code for each in ic.check(tmp_path / "deck.ic").diagnostics}
+    assert "D320" in {each.code for each in ic.check(text=deck).diagnostics}
     assert warned(tmp_path, "move", deck) == []
 
 

@@ -7,7 +7,6 @@ import json
 import math
 import random
 import shlex
-import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -104,12 +103,6 @@ def undisturbed(place: Path) -> bytes:
     return (place / "undisturbed.h5").read_bytes()
 
 
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 def answers(path: Path) -> dict[str, Said]:
     found = {}
     with ArchiveFile(path) as file:
@@ -177,51 +170,6 @@ def test_a_tuning_says_how_far_it_went_along_slopes_and_comes_nearer_than_withou
     least = FAR * abs(math.cos(phase))
     near, far = (answers(path)["still"].found for path in (place / "undisturbed.h5", here / "off.h5"))
     assert near.value == pytest.approx(least, rel=1e-5) and far.value > 1.001 * least
-
-
-@pytest.mark.slow
-def test_a_tuning_says_how_many_of_its_starts_came_to_its_answer(place: Path, here: Path) -> None:
-    def answer(file: ArchiveFile) -> SearchAnswer:
-        found = SearchAnswer.of(next(group for group in file.groups if group.name == "still"))
-        assert found is not None
-        return found
-
-    def with_starts(text: str) -> list[str]:
-        shutil.copy(place / "undisturbed.h5", here / "other.h5")
-        with h5py.File(here / "other.h5", "r+") as data:
-            data["still"].attrs["search_starts"] = text
-        with ArchiveFile(here / "other.h5") as file:
-            return answer(file).lines()
-
-    with ArchiveFile(place / "undisturbed.h5") as file:
-        first, second, third = answer(file).search.starts
-        near, again, none = answer(file).starts
-        assert near == answer(file).found.value and near < again < 1.02 * near and math.isnan(none)
-        assert "  2 of its 3 starts came to within 2 % of one another" in answer(file).lines()
-        assert first.first == 0 and third.best == -1
-    assert "not sure that it is the best: there was one start alone" in "\n".join(
-        with_starts(json.dumps([{"first": 0, "best": first.best}]))
-    )
-    worse = with_starts(json.dumps([{"first": 0, "best": first.best}, {"first": second.first, "best": second.first}]))
-    assert "not sure that it is the best: of 2 starts one alone came to " in "\n".join(worse)
-    assert not [line for line in with_starts("[]") if "start" in line], "made before starts were kept"
-
-
-@pytest.mark.parametrize("text", [
-    '[{"first": 1, "best": 2}]',
-    '[{"first": 0, "best": 5}, {"first": 3, "best": 4}]',
-    '[{"first": 0, "best": 1000000000}]',
-    '[{"first": 0, "best": 0}, {"first": 0, "best": 1}]',
-    "{",
-    '["a"]',
-])  # fmt: skip
-@pytest.mark.slow
-def test_starts_that_cannot_be_are_refused(text: str, place: Path, here: Path) -> None:
-    shutil.copy(place / "undisturbed.h5", here / "odd.h5")
-    with h5py.File(here / "odd.h5", "r+") as data:
-        data["still"].attrs["search_starts"] = text
-    with pytest.raises(Problem, match="search"), ArchiveFile(here / "odd.h5"):
-        pass
 
 
 @pytest.mark.slow
@@ -569,7 +517,6 @@ def test_results_that_cannot_be_read_back_stop_it(here: Path, plan: Plan, monkey
 def test_an_archive_that_says_of_a_search_what_none_is_is_no_archive(
     here: Path, undisturbed: bytes, name: str, value: object
 ) -> None:
-    import h5py
 
     (here / "a.h5").write_bytes(undisturbed)
     with h5py.File(here / "a.h5", "r+") as file:
@@ -593,7 +540,6 @@ COORDINATE = "environment.held.stiffness"
 def test_an_archive_whose_cases_no_search_asks_for_is_no_archive(
     here: Path, undisturbed: bytes, name: str, at: int, value: float
 ) -> None:
-    import h5py
 
     (here / "a.h5").write_bytes(undisturbed)
     with h5py.File(here / "a.h5", "r+") as file:
@@ -606,7 +552,6 @@ def test_an_archive_whose_cases_no_search_asks_for_is_no_archive(
 @pytest.mark.slow
 @pytest.mark.parametrize(("low", "high"), [(0.0, 9.0), (-1.0, 9.0), (-9.0, 0.0), (math.nan, 9.0), (2.0, math.inf)])
 def test_ends_without_a_ratio_are_none_of_equal_ratios(here: Path, undisturbed: bytes, low: float, high: float) -> None:
-    import h5py
 
     (here / "a.h5").write_bytes(undisturbed)
     with h5py.File(here / "a.h5", "r+") as file:

@@ -21,9 +21,9 @@ RECORD = "record   = [links.lower.position, payloads.crate.position, "
 
 @pytest.mark.release
 def test_frames_are_where_the_archive_has_the_links(tmp_path: Path) -> None:
-    deck = tmp_path / "deck.ic"
-    deck.write_text(ARM + changed(RUN, (BOX, BOX + HELD), ("record   = [", RECORD)), encoding="utf-8")
-    batch.run(ic.compile(deck), output=tmp_path / "deck.h5")
+    batch.run(
+        ic.compile(text=ARM + changed(RUN, (BOX, BOX + HELD), ("record   = [", RECORD))), output=tmp_path / "deck.h5"
+    )
     with batch.open(tmp_path / "deck.h5") as data:
         frames = data.met.frames()
         assert frames.link.values.tolist() == ["base", "upper", "lower"]
@@ -46,9 +46,7 @@ def test_frames_are_where_the_archive_has_the_links(tmp_path: Path) -> None:
 
 @pytest.mark.release
 def test_a_payload_that_flies_and_was_not_recorded_is_not_drawn(tmp_path: Path) -> None:
-    deck = tmp_path / "deck.ic"
-    deck.write_text(ARM + changed(RUN, ("payloads.box.orientation, ", "")), encoding="utf-8")
-    batch.run(ic.compile(deck), output=tmp_path / "deck.h5")
+    batch.run(ic.compile(text=ARM + changed(RUN, ("payloads.box.orientation, ", ""))), output=tmp_path / "deck.h5")
     read = Mcap(export(tmp_path / "deck.h5").path)
     assert set(next(iter(read.worlds("/tf")))) == {"base", "upper", "lower"}
     (scene,) = (message.data for message in read.of("/scene"))

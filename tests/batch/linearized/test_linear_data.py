@@ -31,10 +31,9 @@ run hold {
 
 
 @pytest.fixture
-def answer(tmp_path: Path) -> LinearAnswer:
-    (tmp_path / "deck.ic").write_text(DECK)
+def answer() -> LinearAnswer:
     return batch.linear(
-        ic.compile(tmp_path / "deck.ic"),
+        ic.compile(text=DECK),
         at=0.5,
         inputs=["hinge.servo.command", "hinge.servo.voltage"],
         outputs=["q", "hinge.tau"],
@@ -66,8 +65,9 @@ def test_a_step_of_the_system_is_the_step_of_the_run(answer: LinearAnswer, tmp_p
     ends = []
     for rate in ("0.1 rad/s", "0.101 rad/s"):
         moved = f"rate(step(start = 0.1 rad/s, at = 0.5 s, to = {rate}))"
-        (tmp_path / "moved.ic").write_text(DECK.replace("rate(0.1 rad/s)", moved))
-        archive = batch.run(ic.compile(tmp_path / "moved.ic"), output=tmp_path / f"{len(ends)}.h5", verify="none")
+        archive = batch.run(
+            ic.compile(text=DECK.replace("rate(0.1 rad/s)", moved)), output=tmp_path / f"{len(ends)}.h5", verify="none"
+        )
         ends.append(float(archive.open().q.isel(recorded_case=0, joint=0).sel(time=0.7, method="nearest")))
     assert found.states[0] == "hinge.q"
     assert ends[1] - ends[0] == pytest.approx(x[0], rel=1e-9)

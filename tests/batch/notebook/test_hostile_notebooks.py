@@ -56,8 +56,7 @@ def made(folder: Path, text: str, *names: str, output: str = "a.h5", **words: st
     """The open archive of runs and sweeps of a deck."""
     for word, value in {"AT": "0.5", "TURNED": "0.3", **words}.items():
         text = text.replace(word, value)
-    (folder / "a.ic").write_text(text, encoding="utf-8")
-    batch.run(ic.compile(folder / "a.ic", select=list(names)), output=folder / output, fresh=True)
+    batch.run(ic.compile(text=text, select=list(names)), output=folder / output, fresh=True)
     return batch.open(folder / output)
 
 

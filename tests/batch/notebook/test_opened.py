@@ -75,8 +75,7 @@ def test_an_archive_that_is_run_anew_meanwhile(tmp_path: Path) -> None:
     with batch.open(archive) as data:
         before = data["q"].isel(recorded_case=3).values
         other = TUNING.replace("linspace(0.010, 0.040, 4)", "linspace(0.020, 0.050, 4)")
-        (tmp_path / "tuning.ic").write_text(other, encoding="utf-8")
-        batch.run(ic.compile(tmp_path / "tuning.ic", select=["tuning"]), output=archive, fresh=True)
+        batch.run(ic.compile(text=other, select=["tuning"]), output=archive, fresh=True)
         np.testing.assert_array_equal(data["q"].isel(recorded_case=3), before)
         assert data.met.sel({"gearbox.kp": 0.01}).sizes["case"] == 6
         told = (

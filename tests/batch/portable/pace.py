@@ -31,8 +31,7 @@ PLAY = """(length => new Promise(done => { MET.shown.seek(0); MET.shown.play(tru
 def main() -> None:
     with tempfile.TemporaryDirectory() as name, browser() as chromium:
         home = Path(name)
-        (home / "hundred.ic").write_text(HUNDRED, encoding="utf-8")
-        batch.run(ic.compile(home / "hundred.ic", select=["hundred"]), output=home / "hundred.h5", histories="none")
+        batch.run(ic.compile(text=HUNDRED, select=["hundred"]), output=home / "hundred.h5", histories="none")
         assert cli.main(["view", str(home / "hundred.h5"), "-q"]) == 0
         for width, height in ((1280, 900), (400, 800)):
             page = chromium.open(home / "hundred.view.html", width=width, height=height)

@@ -11,7 +11,16 @@ import pytest
 from matplotlib import image
 
 from met import cli
-from tests.batch.report.browser import PACKAGE, PATIENCE_SECONDS, Chromium, Page, browser, program, quiet
+from tests.batch.report.browser import (
+    PACKAGE,
+    PATIENCE_SECONDS,
+    Chromium,
+    Page,
+    browser,
+    browser_or_skip,
+    program,
+    quiet,
+)
 
 PICTURES = 12
 """Pictures that are taken at most until two in a row are alike."""
@@ -42,12 +51,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
-def webgl() -> Iterator[Chromium]:
-    if program() is None:
-        pytest.skip(f"no chromium; on Debian or Ubuntu: apt-get install {PACKAGE}")
-    with browser() as started:
-        yield started
+webgl = pytest.fixture(scope="module")(browser_or_skip)
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from batch.portable.beside import log_data
 from met import cli
 from met.diagnostic import Problem
 from tests.batch.portable.test_arm_on_page import changed, opened, pixels
-from tests.batch.report.browser import PACKAGE, Chromium, browser, program, quiet
+from tests.batch.report.browser import Chromium, browser_or_skip, quiet
 
 DECK = """\
 #include <two_link.ic>
@@ -40,12 +39,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Chromium]:
-    if program() is None:
-        pytest.skip(f"no chromium; on Debian or Ubuntu: apt-get install {PACKAGE}")
-    with browser() as started:
-        yield started
+chromium = pytest.fixture(scope="module")(browser_or_skip)
 
 
 @pytest.mark.release

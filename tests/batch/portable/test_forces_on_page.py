@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from batch.portable import page as portable_page
 from met import cli
 from tests.batch.arms.decks import about
 from tests.batch.portable.test_arm_on_page import becomes, changed, opened, pixels
-from tests.batch.report.browser import PACKAGE, Chromium, Page, browser, program, quiet
+from tests.batch.report.browser import Chromium, Page, browser_or_skip, quiet
 
 DECK = """\
 #include <two_link.ic>
@@ -28,12 +27,7 @@ AROUND = "MET.shown.around().filter(each => each.mesh !== 'block').map(each => e
 LOOKED = "new Promise(d => { const f = () => MET.shown.legend.looked() ? d() : setTimeout(f, 20); f(); })"
 
 
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Chromium]:
-    if program() is None:
-        pytest.skip(f"no chromium; on Debian or Ubuntu: apt-get install {PACKAGE}")
-    with browser() as started:
-        yield started
+chromium = pytest.fixture(scope="module")(browser_or_skip)
 
 
 @pytest.mark.browser

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 import xarray
 
 from met import cli
-from tests.batch.report.browser import PACKAGE, Chromium, Page, browser, program, quiet
+from tests.batch.report.browser import Chromium, Page, browser_or_skip, quiet
 
 DECK = """\
 #include <servos/rigid_gearbox.ic>
@@ -41,12 +40,7 @@ sweep loads of raised { vary links.fore.mass = [2, 3, 5] kg; }
 """
 
 
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Chromium]:
-    if program() is None:
-        pytest.skip(f"no chromium; on Debian or Ubuntu: apt-get install {PACKAGE}")
-    with browser() as started:
-        yield started
+chromium = pytest.fixture(scope="module")(browser_or_skip)
 
 
 @pytest.fixture(scope="module")

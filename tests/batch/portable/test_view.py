@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +16,7 @@ import xarray
 from batch.archive.read import ArchiveFile
 from batch.portable import page as portable_page
 from met import cli
-from tests.batch.report.browser import INK, PACKAGE, Chromium, browser, program, quiet
+from tests.batch.report.browser import INK, Chromium, browser_or_skip, quiet
 
 DECK = """\
 #include <two_link.ic>
@@ -83,12 +82,7 @@ def test_pages_are_refused_before_anything_is_computed(
     assert (sent / "mine.html").read_text() == "<p>mine"
 
 
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Chromium]:
-    if program() is None:
-        pytest.skip(f"no chromium; on Debian or Ubuntu: apt-get install {PACKAGE}")
-    with browser() as started:
-        yield started
+chromium = pytest.fixture(scope="module")(browser_or_skip)
 
 
 SAID = "document.querySelector('.came').textContent"

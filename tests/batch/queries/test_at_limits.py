@@ -53,8 +53,7 @@ run judged like beyond { metric room = min { of = limits.margin; }  require room
 
 
 def made(folder: Path, run: str, verify: str = "none") -> tuple[Path, Plan]:
-    (folder / "d.ic").write_text(DECK, encoding="utf-8")
-    plan = ic.compile(folder / "d.ic", select=[run])
+    plan = ic.compile(text=DECK, select=[run])
     return batch.run(plan, output=folder / "a.h5", verify=verify).path, plan  # type: ignore[arg-type]
 
 
@@ -147,8 +146,7 @@ def test_what_a_requirement_judges_is_not_warned_of_besides(tmp_path: Path) -> N
 @pytest.mark.slow
 def test_cases_that_are_at_a_limit_for_most_of_the_time_are_counted(tmp_path: Path) -> None:
     asked = DECK.replace("times = [0, 0.5, 0.501, 2] s", "times = [0, 1.5, 1.501, 2] s")
-    (tmp_path / "d.ic").write_text(asked, encoding="utf-8")
-    path = batch.run(ic.compile(tmp_path / "d.ic", select=["motors"]), output=tmp_path / "a.h5", verify="none").path
+    path = batch.run(ic.compile(text=asked, select=["motors"]), output=tmp_path / "a.h5", verify="none").path
     with ArchiveFile(path) as file:
         [said] = [line for line in show(file).splitlines() if "share of the time at hinge" in line]
     assert said.endswith(" % at most, in #0; not 0 in 2 of 3 cases, more than half in 2")

@@ -130,8 +130,7 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     tune still of swing { choose environment.held.stiffness = between(2, 9) N/m;  maximise far;  at_most = 12; }
     """
     folder = tmp_path_factory.mktemp("judged")
-    (folder / "d.ic").write_text(deck, encoding="utf-8")
-    return batch.run(ic.compile(folder / "d.ic", select=["still"]), output=folder / "a.h5", threads=1).path
+    return batch.run(ic.compile(text=deck, select=["still"]), output=folder / "a.h5", threads=1).path
 
 
 Planted = Callable[..., tuple[list[str], dict[str, Any], bool, str]]

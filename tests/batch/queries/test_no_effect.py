@@ -77,9 +77,7 @@ LATE = "metric late = settling_time { of = j.q;  target = 99 rad;  band = 1 %; }
 def test_a_change_by_rounding_is_none_and_of_a_metric_without_a_value_nothing_is_said(
     tmp_path: Path, more: str
 ) -> None:
-    path = tmp_path / "deck.ic"
-    path.write_text(SWING.replace("metric last", f"{more}  metric last"))
-    plan = ic.compile(path)
+    plan = ic.compile(text=SWING.replace("metric last", f"{more}  metric last"))
     with ArchiveFile(batch.run(plan, output=tmp_path / "a.h5", verify="none").path) as file:
         found = campaign_warnings(file.groups, {each.name: each for each in plan.experiments})
         last = next(

@@ -50,8 +50,7 @@ sweep many of nominal {
 
 @pytest.mark.slow
 def test_parameters_that_are_zipped_are_one_input(tmp_path: Path) -> None:
-    (tmp_path / "zipped.ic").write_text(ZIPPED)
-    plan = ic.compile(tmp_path / "zipped.ic")
+    plan = ic.compile(text=ZIPPED)
     with ArchiveFile(batch.run(plan, output=tmp_path / "a.h5", experiments=["many"], histories="none").path) as file:
         settle, _ = sensitivities(file.groups[0])
     assert settle.inputs == ("links.upper.mass with links.lower.mass", "gearbox.kp") and not settle.together
@@ -72,8 +71,7 @@ sweep many of brief {
 
 @pytest.mark.slow
 def test_parameters_that_depend_on_each_other_have_no_intervals(tmp_path: Path) -> None:
-    (tmp_path / "dependent.ic").write_text(DEPENDENT)
-    plan = ic.compile(tmp_path / "dependent.ic", select=["many"])
+    plan = ic.compile(text=DEPENDENT, select=["many"])
     with ArchiveFile(batch.run(plan, output=tmp_path / "a.h5", histories="none").path) as file:
         [settle, *_] = sensitivities(file.groups[0], ["settle"])
     by_name = dict(zip(settle.inputs, settle.shares, strict=True))
@@ -119,8 +117,7 @@ sweep made of brief {
 
 
 def made(folder: Path, vary: str = "", **options: Any) -> Path:
-    (folder / "made.ic").write_text(SALTELLI.replace("VARY", vary))
-    plan = ic.compile(folder / "made.ic", select=["made"])
+    plan = ic.compile(text=SALTELLI.replace("VARY", vary), select=["made"])
     return batch.run(plan, output=folder / "made.h5", histories="none", **options).path
 
 

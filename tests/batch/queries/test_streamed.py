@@ -16,6 +16,9 @@ from batch.queries.evidence_table import requirement_evidence
 from batch.queries.summary import SummedMetric, summarise
 from batch.terminal.show import show, show_evidence
 from met.plan import swept
+from met.plan.judged import Requirement
+from met.run import DONE
+from met.statistics.confidence import percentile_rank
 
 DECK = """
 #include <two_link.ic>
@@ -39,8 +42,73 @@ sweep many of short {
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("streamed")
-    (folder / "d.ic").write_text(DECK, encoding="utf-8")
-    return batch.run(ic.compile(folder / "d.ic", select=["many"]), output=folder / "d.h5", verify="some").path
+    return batch.run(ic.compile(text=DECK, select=["many"]), output=folder / "d.h5", verify="some").path
+
+
+@pytest.mark.parametrize(("size", "spoilt"), [(1, True), (7, True), (60, True), (7, False)])
+def test_tallies_of_blocks_of_any_size_are_those_of_all_cases(
+    size: int, spoilt: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two design points. spoilt: a case in five fails, a case in seven has no value, and one value is infinite."""
+    monkeypatch.setattr(tallies, "MOST_CAUSES", 2)
+    cases, at = 60, np.arange(60)
+    values = np.random.default_rng(1).normal(3.0, 1.0, cases)
+    if spoilt:
+        values[at % 7 == 0], values[11] = np.nan, np.inf
+    status = np.where(spoilt & (at % 5 == 0), DONE + 1, DONE)
+    cause = [f"{'abcd'[place // 15]} at {place} s" if status[place] != DONE else "" for place in at]
+    unknown, points = np.isnan(values) | (status != DONE), at % 2
+    asked = [
+        Requirement("m < 0", "m", "<", 0.0),
+        Requirement("m > 2", "m", ">", 2.0, None, 0.3, 0.5),
+        Requirement("m < 4", "m", "<", 4.0, None, 0.4, 0.9),
+        Requirement("m < 3", "m", "<", 3.0, None, 0.5),
+    ]
+    met = [np.where(unknown, -1, (values < each.limit) == (each.comparison == "<")) for each in asked]
+    found = tallies.CaseTallies(["m", "none"], asked, [30, 30])
+    for first in range(0, cases, size):
+        part = slice(first, first + size)
+        found.add(
+            tallies.CaseBlock(
+                at[part], status[part], cause[part], [""] * len(at[part]),
+                {"m": values[part], "none": np.full(len(at[part]), np.nan)},
+                np.stack(met, 1)[part], points[part], 1,
+            )
+        )  # fmt: skip
+    numbers = tallies.PointNumbers()
+    numbers.of([points], cases)
+    said = {
+        name: each.tolist()
+        for name, each in found.values(lambda at: at + 100, {"m": "m", "none": "none"}, ["p"], numbers).items()
+    }
+    finite = np.isfinite(values)
+    assert found.limited == -(-cases // size)
+    assert said["finite"] == [finite.sum(), 0] and said["infinite"] == [int(spoilt), 0]
+    assert said["unknown"] == [np.isnan(values).sum(), cases]
+    assert said["mean"][0] == pytest.approx(values[finite].mean(), rel=1e-12)
+    assert said["variance"][0] == pytest.approx(values[finite].var(ddof=1), rel=1e-12)
+    assert (said["least"][0], said["most"][0]) == (values[finite].min(), values[finite].max())
+    assert said["least_case"] == [100 + int(np.flatnonzero(values == values[finite].min())[0]), -1]
+    if spoilt:
+        assert said["cause"] == ["a at 0 s", "b at 15 s", tallies.OTHERS]
+        assert (said["cause_cases"], said["cause_first"]) == ([3, 3, 6], [100, 115, 130])
+        assert said["cause_status"] == [DONE + 1] * 3
+    assert said["judged_point"] == [-1, -1, -1, -1, 0, 1, 0, 1, 0, 1]
+    assert said["judged_requirement"] == [0, 1, 2, 3, 1, 1, 2, 2, 3, 3]
+    for row, (number, point) in enumerate(zip(said["judged_requirement"], said["judged_point"], strict=True)):
+        here, each = np.ones(cases, bool) if point < 0 else points == point, asked[number]
+        sign = 1.0 if each.comparison == "<" else -1.0
+        far = np.where(unknown, np.inf, sign * values)[here]
+        assert said["judged_cases"][row] == here.sum()
+        assert said["judged_missed"][row] == np.count_nonzero(met[number][here] == 0)
+        assert said["judged_unknown"][row] == unknown[here].sum()
+        assert said["judged_no_value"][row] == (np.isnan(values) & (status == DONE))[here].sum()
+        assert said["judged_worst_case"][row] == 100 + at[here][np.argmax(far)]
+        least = np.nan
+        if point >= 0 and each.share and each.confidence:
+            rank = percentile_rank(30, each.share, each.confidence)
+            least = sign * np.sort(far)[rank - 1]
+        assert said["judged_bound"][row] == pytest.approx(least if np.isfinite(least) else np.nan, nan_ok=True)
 
 
 @pytest.fixture

@@ -24,6 +24,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import pytest
+
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 PACKAGE = "chromium"
 PATIENCE_SECONDS = 60.0
@@ -110,6 +112,14 @@ def browser(*, webgl: bool = True) -> Iterator[Chromium]:
                     process.kill()
                 os.close(down[1])
                 os.close(up[0])
+
+
+def browser_or_skip() -> Iterator[Chromium]:
+    """A browser, for fixtures; where there is none, the test is left out."""
+    if program() is None:
+        pytest.skip(f"no chromium; on Debian or Ubuntu: apt-get install {PACKAGE}")
+    with browser() as started:
+        yield started
 
 
 @dataclass

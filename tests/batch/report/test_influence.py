@@ -27,8 +27,7 @@ sweep few of brief { vary gearbox.kp = [0.015, 0.025] V*s/rad; vary gearbox.ki =
 
 
 def made(folder: Path, sweep: str, count: int = 100) -> Path:
-    (folder / "deck.ic").write_text(DECK.replace("COUNT", str(count)), encoding="utf-8")
-    plan = ic.compile(folder / "deck.ic", select=[sweep])
+    plan = ic.compile(text=DECK.replace("COUNT", str(count)), select=[sweep])
     return batch.run(plan, output=folder / "a.h5", histories="none").path
 
 

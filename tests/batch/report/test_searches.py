@@ -41,10 +41,7 @@ tune still of swing { choose environment.held.stiffness = between(2, 9) N/m;  ma
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("searches")
-    (folder / "d.ic").write_text(DECK, encoding="utf-8")
-    return batch.run(
-        ic.compile(folder / "d.ic", select=["slowest", "wild", "still"]), output=folder / "a.h5", threads=1
-    ).path
+    return batch.run(ic.compile(text=DECK, select=["slowest", "wild", "still"]), output=folder / "a.h5", threads=1).path
 
 
 @pytest.mark.slow

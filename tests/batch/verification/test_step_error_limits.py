@@ -29,9 +29,7 @@ sweep gain of brief {{ vary gearbox.kp = [0.02, 0.021, 0.03] V*s/rad; }}
 
 
 def made(here: Path, required: str, run: str = "brief", verify: str = "auto") -> batch.Archive:
-    deck = here / "d.ic"
-    deck.write_text(DECK.format(required=required))
-    return batch.run(ic.compile(deck, select=[run]), output=here / "a.h5", verify=verify)  # type: ignore[arg-type]
+    return batch.run(ic.compile(text=DECK.format(required=required), select=[run]), output=here / "a.h5", verify=verify)  # type: ignore[arg-type]
 
 
 def said(archive: batch.Archive) -> list[str]:

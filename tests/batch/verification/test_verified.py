@@ -32,10 +32,8 @@ sweep gain of brief { vary gearbox.kp = linspace(0.010, 0.040, 6) V*s/rad; }
 
 
 @pytest.fixture(scope="module")
-def sweep(tmp_path_factory: pytest.TempPathFactory) -> Plan:
-    deck = tmp_path_factory.mktemp("deck") / "d.ic"
-    deck.write_text(SWEEP)
-    return ic.compile(deck, select=["gain"])
+def sweep() -> Plan:
+    return ic.compile(text=SWEEP, select=["gain"])
 
 
 def datasets(path: Path) -> dict[str, bytes]:

@@ -43,9 +43,9 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def made(
     here: Path, name: str, verify: str, deck: str = SWEEP, run: str = "gain", given: dict[str, object] | None = None
 ) -> Path:
-    written = here / f"{name}.ic"
-    written.write_text(deck)
-    return batch.run(ic.compile(written, select=[run], set=given or {}), output=here / f"{name}.h5", verify=verify).path
+    return batch.run(
+        ic.compile(text=deck, select=[run], set=given or {}), output=here / f"{name}.h5", verify=verify
+    ).path
 
 
 def metric(*errors: StepError | None) -> MetricError:

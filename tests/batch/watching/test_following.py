@@ -266,11 +266,13 @@ run spun {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 12])
-def test_a_save_ends_a_long_case_of_the_deck_before_it(tmp_path: Path, count: int) -> None:
-    (tmp_path / "deck.ic").write_text(
-        LONG + "sweep many of spun { vary initial.turn.qd = linspace(1, 2, 12) rad/s; }\n"
+def test_a_save_ends_a_long_case_of_the_deck_before_it(count: int) -> None:
+    prepared = prepare(
+        ic.compile(
+            text=LONG + "sweep many of spun { vary initial.turn.qd = linspace(1, 2, 12) rad/s; }\n",
+            select=["spun" if count == 1 else "many"],
+        ).experiments[0]
     )
-    prepared = prepare(ic.compile(tmp_path / "deck.ic", select=["spun" if count == 1 else "many"]).experiments[0])
     prepared.kernel  # noqa: B018 - compiled before it is asked to end
     asked = threading.Event()
     threading.Timer(0.5, asked.set).start()

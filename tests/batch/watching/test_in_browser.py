@@ -4,24 +4,18 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.batch.report.browser import PACKAGE, Chromium, Page, browser, program
+from tests.batch.report.browser import Chromium, Page, browser_or_skip
 from tests.batch.watching.watched import DECK, View, replace, viewing, write_deck
 
 pytestmark = pytest.mark.browser
 
 
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Chromium]:
-    if program() is None:
-        pytest.skip(f"no chromium; on Debian or Ubuntu: apt-get install {PACKAGE}")
-    with browser() as started:
-        yield started
+chromium = pytest.fixture(scope="module")(browser_or_skip)
 
 
 RUN = "document.querySelector('iframe:not(.coming)').contentWindow"

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from hw import conformance
-from hw.bed import About, BedDriver, BedSample
+from hw.bed import About, BedDriver, BedSample, BedState
 from hw.beds.can_bed import CanBed
 from hw.drives import DIALECTS
 from hw.drives.bench_file import TwoDrives, two_drives
@@ -122,6 +122,15 @@ def host_on(
 def host_of(bench: TwoDrives, line: PlayedLine, period: float | None = None, drive: DriveCommand = "voltage") -> CanBed:
     """The host's side of a bench, on a line, or on two."""
     return host_on(bench, lambda: host_line(bench, line), period, drive)
+
+
+def go(bed: CanBed, line: PlayedLine, seconds: float, voltage: float) -> None:
+    """Command a voltage each millisecond, as long as the bed is armed."""
+    for _ in range(round(seconds * 1e3)):
+        line.sleep(1e-3)
+        sample = bed.exchange(voltage, 0.0)
+        if sample is not None and sample.state != BedState.ARMED:
+            return
 
 
 class PlayedConformance(conformance.FreeRunning):

@@ -339,8 +339,7 @@ def test_a_filter_that_is_not_the_deck_s_is_refused(tmp_path: Path) -> None:
 
 def test_a_bench_without_a_filter_says_whose_the_deck_s_has_to_be(tmp_path: Path) -> None:
     path = bench_file(tmp_path)
-    (tmp_path / "deck.ic").write_text(DECK)
-    (experiment,) = ic.compile(tmp_path / "deck.ic", select=["bench"]).experiments
+    (experiment,) = ic.compile(text=DECK, select=["bench"]).experiments
     check_model(f"can:{path}", experiment, "shoulder")
     bed = opened(Port(f"can:{path}"), experiment, "shoulder", 0, 1e-3)
     (warning,) = bed.warnings

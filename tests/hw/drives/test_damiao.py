@@ -14,7 +14,7 @@ from hw.drives.mit import STEPS_12, STEPS_16, count_of, packed, value_of
 from hw.players.damiao import PlayedDamiao
 from hw.players.player import PlayedBench, PlayedLine
 from tests.hw.conftest import refusal
-from tests.hw.drives.played import HalfStepConformance, bench_file, host_of, played_bench
+from tests.hw.drives.played import HalfStepConformance, bench_file, go, host_of, played_bench
 
 
 class TestDamiao(HalfStepConformance):
@@ -45,14 +45,6 @@ def bench(folder: Path) -> tuple[CanBed, PlayedLine, PlayedBench, PlayedDamiao]:
     line = PlayedLine(played)
     assert isinstance(played.drive, PlayedDamiao)
     return host_of(two_drives(bench_file(folder, "damiao")), line), line, played, played.drive
-
-
-def go(bed: CanBed, line: PlayedLine, seconds: float, voltage: float) -> None:
-    for _ in range(round(seconds * 1e3)):
-        line.sleep(1e-3)
-        sample = bed.exchange(voltage, 0.0)
-        if sample is not None and sample.state != BedState.ARMED:
-            return
 
 
 @pytest.mark.slow

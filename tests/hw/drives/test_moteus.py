@@ -17,7 +17,7 @@ from hw.drives.moteus import MoteusDrive, answered, asked_for, number, padded, w
 from hw.players.moteus import PlayedMoteus
 from hw.players.player import PlayedBench, PlayedLine
 from tests.hw.conftest import refusal
-from tests.hw.drives.played import PlayedConformance, bench_file, host_of, played_bench
+from tests.hw.drives.played import PlayedConformance, bench_file, go, host_of, played_bench
 
 
 class TestMoteus(PlayedConformance):
@@ -53,14 +53,6 @@ def bench(folder: Path) -> tuple[CanBed, PlayedLine, PlayedBench, PlayedMoteus, 
     line = PlayedLine(played)
     assert isinstance(played.drive, PlayedMoteus) and isinstance(played.load, PlayedMoteus)
     return host_of(two_drives(bench_file(folder, "moteus")), line), line, played, played.drive, played.load
-
-
-def go(bed: CanBed, line: PlayedLine, seconds: float, voltage: float) -> None:
-    for _ in range(round(seconds * 1e3)):
-        line.sleep(1e-3)
-        sample = bed.exchange(voltage, 0.0)
-        if sample is not None and sample.state != BedState.ARMED:
-            return
 
 
 def test_it_brakes_where_it_is_stopped(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from hw.drives.robstride import RobstrideDrive
 from hw.players.player import PlayedBench, PlayedLine
 from hw.players.robstride import PlayedRobstride
 from tests.hw.conftest import refusal
-from tests.hw.drives.played import HalfStepConformance, bench_file, host_of, played_bench
+from tests.hw.drives.played import HalfStepConformance, bench_file, go, host_of, played_bench
 
 
 class TestRobstride(HalfStepConformance):
@@ -94,14 +94,6 @@ def bench(folder: Path) -> tuple[CanBed, PlayedLine, PlayedBench, PlayedRobstrid
     line = PlayedLine(played)
     assert isinstance(played.drive, PlayedRobstride)
     return host_of(two_drives(bench_file(folder, "robstride")), line), line, played, played.drive
-
-
-def go(bed: CanBed, line: PlayedLine, seconds: float, voltage: float) -> None:
-    for _ in range(round(seconds * 1e3)):
-        line.sleep(1e-3)
-        sample = bed.exchange(voltage, 0.0)
-        if sample is not None and sample.state != BedState.ARMED:
-            return
 
 
 def test_it_says_what_it_is_and_what_a_step_is(tmp_path: Path) -> None:

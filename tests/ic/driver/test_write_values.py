@@ -145,8 +145,7 @@ def test_a_long_line_has_its_remark_above_and_keeps_one(tmp_path: Path) -> None:
 @pytest.mark.parametrize("si", [0.1, 1 / 3, 0.30000000000000004, 1e-5, 0.05 * (1 + 2**-52), 123456.789])
 def test_the_deck_written_means_what_set_does_to_the_bit(si: float, tmp_path: Path) -> None:
     found = made(tmp_path, ("base_drive.kp", si, "V*s/rad"))
-    (tmp_path / "new.ic").write_text(found.text)
-    plan = ic.compile(tmp_path / "new.ic", select="hold")
+    plan = ic.compile(text=found.text, select="hold")
     assert plan.experiments[0].parameters["hinge.servo.kp"].value == si
 
 

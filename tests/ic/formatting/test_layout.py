@@ -19,9 +19,9 @@ def told(text: str) -> str:
     return render(caught.value.diagnostics, caught.value.sources)
 
 
-def test_a_line_is_indented_by_the_brackets_it_stands_in() -> None:
-    assert (
-        fmt("""\
+LAYOUTS = {
+    "a line is indented by the brackets it stands in": (
+        """\
 run hold {
 arm=bar;
     servos {
@@ -34,8 +34,8 @@ arm=bar;
   }
     }
 }
-""")
-        == """\
+""",
+        """\
 run hold {
     arm = bar;
     servos {
@@ -48,19 +48,41 @@ run hold {
         }
     }
 }
-"""
-    )
-
-
-def test_brackets_that_open_on_one_line_indent_once() -> None:
-    assert fmt("a { b = f(g([\n1,\n2\n]));\n}\n") == "a { b = f(g([\n    1,\n    2\n]));\n}\n"
-
-
-def test_a_line_that_goes_on_with_an_entry_is_indented_further() -> None:
-    assert fmt("a {\nb =\nc\n+ d;\nexclude when x > 1 m\nand y < 2 m;\nROD(x, 1 kg)\nROD(y, 2 kg)\n}\n") == (
+""",
+    ),
+    "brackets that open on one line indent once": (
+        "a { b = f(g([\n1,\n2\n]));\n}\n",
+        "a { b = f(g([\n    1,\n    2\n]));\n}\n",
+    ),
+    "a line that goes on with an entry is indented further": (
+        "a {\nb =\nc\n+ d;\nexclude when x > 1 m\nand y < 2 m;\nROD(x, 1 kg)\nROD(y, 2 kg)\n}\n",
         "a {\n    b =\n        c\n        + d;\n    exclude when x > 1 m\n        and y < 2 m;\n"
-        "    ROD(x, 1 kg)\n    ROD(y, 2 kg)\n}\n"
-    )
+        "    ROD(x, 1 kg)\n    ROD(y, 2 kg)\n}\n",
+    ),
+    "blank lines at most one in a block two outside and none at the edges": (
+        "\n\na {\n\n\nb = 1;\n\n\n\nc = 2;\n\n}\n\n\n\nd { }\n\n\n",
+        "a {\n    b = 1;\n\n    c = 2;\n}\n\n\nd { }\n",
+    ),
+    "a name that has become longer takes the others with it": (
+        "mass    = 1 kg;\ninertia_of_it = [1, 1, 1] kg*m^2;\ncom     = [0, 0, 0] m;\n",
+        "mass          = 1 kg;\ninertia_of_it = [1, 1, 1] kg*m^2;\ncom           = [0, 0, 0] m;\n",
+    ),
+    "what is not aligned has the blanks it needs": ("a  = 1;\n\nbc =    2;\n", "a = 1;\n\nbc = 2;\n"),
+    "a long comment moves as a whole": (
+        "a {\n  /* one\n     two\n\n   three */\n  b = 1;  \n}\n",
+        "a {\n    /* one\n       two\n\n     three */\n    b = 1;\n}\n",
+    ),
+    "what stands between if and endif is laid out where its parts agree about brackets": (
+        "#if A\nrun x {\n#else\nrun y {\n#endif\narm=b;\n#ifdef C\nd=e;\n#endif\n}\n",
+        "#if A\nrun x {\n#else\nrun y {\n#endif\n    arm = b;\n#ifdef C\n    d = e;\n#endif\n}\n",
+    ),
+}
+"""A text, and how it is laid out."""
+
+
+@pytest.mark.parametrize(("text", "laid_out"), LAYOUTS.values(), ids=LAYOUTS)
+def test_a_text_is_laid_out_so(text: str, laid_out: str) -> None:
+    assert fmt(text) == laid_out
 
 
 @pytest.mark.parametrize(("written", "laid"), [
@@ -97,12 +119,6 @@ def test_blanks_between_tokens(written: str, laid: str) -> None:
     assert fmt(written) == laid + "\n"
 
 
-def test_blank_lines_at_most_one_in_a_block_two_outside_and_none_at_the_edges() -> None:
-    assert fmt("\n\na {\n\n\nb = 1;\n\n\n\nc = 2;\n\n}\n\n\n\nd { }\n\n\n") == (
-        "a {\n    b = 1;\n\n    c = 2;\n}\n\n\nd { }\n"
-    )
-
-
 def test_where_lines_are_counted_they_stay() -> None:
     text = "let a = 1;\n\n\n\nlet b = __LINE__;\n"
     assert fmt(text) == text
@@ -113,19 +129,9 @@ def test_what_the_author_aligned_stays_aligned_when_something_before_it_grows() 
     assert fmt("a { x=1;  y = 2; }\nb { xx=1; y = 2; }\n") == "a { x = 1;   y = 2; }\nb { xx = 1;  y = 2; }\n"
 
 
-def test_a_name_that_has_become_longer_takes_the_others_with_it() -> None:
-    assert fmt("mass    = 1 kg;\ninertia_of_it = [1, 1, 1] kg*m^2;\ncom     = [0, 0, 0] m;\n") == (
-        "mass          = 1 kg;\ninertia_of_it = [1, 1, 1] kg*m^2;\ncom           = [0, 0, 0] m;\n"
-    )
-
-
 def test_the_brace_of_a_block_is_aligned_like_a_sign() -> None:
     text = "run r {\n    rates       { base = 1 kHz; }\n    environment { gravity = g; }\n    duration    = 1 s;\n}\n"
     assert fmt(text.replace("    rates ", "  rates ")) == text
-
-
-def test_what_is_not_aligned_has_the_blanks_it_needs() -> None:
-    assert fmt("a  = 1;\n\nbc =    2;\n") == "a = 1;\n\nbc = 2;\n"
 
 
 @pytest.mark.parametrize(("written", "laid"), [
@@ -216,24 +222,12 @@ def test_comments_at_the_ends_of_lines_stay_aligned() -> None:
     assert fmt(text.replace("a = 1; ", "a=1;   ")) == text
 
 
-def test_a_long_comment_moves_as_a_whole() -> None:
-    assert fmt("a {\n  /* one\n     two\n\n   three */\n  b = 1;  \n}\n") == (
-        "a {\n    /* one\n       two\n\n     three */\n    b = 1;\n}\n"
-    )
-
-
 def test_comments_and_preprocessor_lines_keep_what_is_in_them() -> None:
     text = (
         "#include   <two_link.ic>\t// a\n#  define  ROD( N,M )  link N{mass=M;}  \\\n\t  shape=x\n"
         "//\ttabs  and   blanks\n#if  A==1\n#endif\n"
     )
     assert fmt(text.replace("\n", "  \n")) == text
-
-
-def test_what_stands_between_if_and_endif_is_laid_out_where_its_parts_agree_about_brackets() -> None:
-    assert fmt("#if A\nrun x {\n#else\nrun y {\n#endif\narm=b;\n#ifdef C\nd=e;\n#endif\n}\n") == (
-        "#if A\nrun x {\n#else\nrun y {\n#endif\n    arm = b;\n#ifdef C\n    d = e;\n#endif\n}\n"
-    )
 
 
 def test_what_if_leaves_out_may_be_anything_and_stays() -> None:

@@ -123,11 +123,10 @@ run r { arm = a;  rates { dynamics = 1 kHz; }  duration = 1 s;  record = [q]; }
 """
 
 
-def test_a_plan_keeps_the_editions_of_its_files_and_nothing_else_of_them(tmp_path: Path) -> None:
+def test_a_plan_keeps_the_editions_of_its_files_and_nothing_else_of_them() -> None:
     made = []
     for edition in ("", "deck 1;", "deck 2;"):
-        (tmp_path / "deck.ic").write_text(f"{edition}\nlet it = 1 kg;\n{RUN}", encoding="utf-8")
-        made.append(ic.compile(tmp_path / "deck.ic"))
+        made.append(ic.compile(text=f"{edition}\nlet it = 1 kg;\n{RUN}"))
     assert [plan.sources[0].edition for plan in made] == [1, 1, 2]
     assert made[0].experiments == made[1].experiments == made[2].experiments
     texts = [plan_file.dumps(plan) for plan in made]
@@ -181,7 +180,7 @@ def test_a_hostile_declaration_ends_in_a_message(tmp_path: Path) -> None:
             value(tmp_path, f"deck 2;\n{text}let it = 1;\n")
 
 
-def test_a_plan_is_in_units_of_the_language_where_a_deck_varies_a_value_in_one_of_its_own(tmp_path: Path) -> None:
+def test_a_plan_is_in_units_of_the_language_where_a_deck_varies_a_value_in_one_of_its_own() -> None:
     text = f"""deck 2;
 unit stone = 6.25 kg;
 let it = 1 kg;
@@ -193,8 +192,7 @@ sweep spread of r {{ sample lhs(4) {{ it = uniform(1 stone, 2 stone); }} }}
 run measured like r {{ metric top = max {{ of = j.q; }} }}
 search worst of measured {{ maximise top; links.bar.mass = between(1, 2) stone; at_most = 40; }}
 """
-    (tmp_path / "deck.ic").write_text(text, encoding="utf-8")
-    plan = plan_file.loads(plan_file.dumps(ic.compile(tmp_path / "deck.ic", select="all")))
+    plan = plan_file.loads(plan_file.dumps(ic.compile(text=text, select="all")))
     found = {each.name: each for each in plan.experiments}
     for name in ("listed", "ranged", "drawn", "spread", "worst"):
         assert [each.unit for each in found[name].cases.coordinates] == ["kg"]

@@ -256,62 +256,6 @@ def test_each_node_s_place_is_the_text_it_was_read_from(desk: Desk):
 # messages, whole
 
 
-def test_a_missing_semicolon_is_shown_behind_what_it_should_follow_and_reading_goes_on(desk: Desk):
-    assert (
-        desk.told("run a {\n    mass = 3 kg   // heavy\n    size = 4 m\n}\n")
-        == """\
-error[D021]: expected `;`
- --> a.ic:2:16
-  |
-2 |     mass = 3 kg   // heavy
-  |                ^
-  = help: an entry ends with `;`
-
-error[D021]: expected `;`
- --> a.ic:3:15
-  |
-3 |     size = 4 m
-  |               ^
-  = help: an entry ends with `;`
-
-2 errors
-"""
-    )
-
-
-def test_a_brace_that_is_not_closed_shows_where_it_opens_and_which_was_probably_meant(desk: Desk):
-    assert (
-        desk.told("run a {\n   servos { a = b;\n   rates { x = 3; }\n}\nrun c { }\n")
-        == """\
-error[D022]: this `{` is not closed
- --> a.ic:1:7
-  |
-1 | run a {
-  |       ^
- ::: a.ic:2:11  perhaps this one: the `}` on line 4 that closes it is indented less
-  = help: write the `}` where it ends
-
-1 error
-"""
-    )
-
-
-def test_a_bracket_closed_by_another_shows_the_opening_one(desk: Desk):
-    assert (
-        desk.told("at = [1, 2) m;\n")
-        == """\
-error[D022]: expected `,` or `]`, found `)`
- --> a.ic:1:11
-  |
-1 | at = [1, 2) m;
-  |           ^
- ::: a.ic:1:6  to close this `[`
-
-1 error
-"""
-    )
-
-
 def test_a_mistake_in_a_macro_is_shown_where_it_is_used_and_told_once(desk: Desk):
     macro = "#define ROD(NAME, MASS) link NAME { mass = MASS; size = 3 foo; }\n"
     text = macro + "arm a {\n  ROD(upper, 40 kgs)\n  ROD(lower, 2 kg)\n}\n"
@@ -340,23 +284,6 @@ error[D028]: `kgs` is not a unit
 """)
 
 
-def test_a_value_named_like_a_unit_is_refused_with_the_unit_s_name(desk: Desk):
-    assert (
-        desk.told("let m = 3;\n")
-        == """\
-error[D026]: `m` is the unit metre, so it cannot name a value
- --> a.ic:1:5
-  |
-1 | let m = 3;
-  |     ^
-  = help: choose another name: after a number it would be the unit; in edition 2 (`deck 2;`) it may
-
-1 error
-"""
-    )
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "line", "help"),
     [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -51,35 +50,32 @@ LIMITED = ARM.replace("axis = z;", "axis = z; q_min = -9 rad; q_max = 9 rad; qd_
 """The arm with everything that a joint may have."""
 
 
-def experiment(tmp_path: Path, more: str = "") -> Experiment:
-    path = tmp_path / "d.ic"
-    path.write_text(LIMITED + SERVO + RUN + more)
-    return ic.compile(path, select=["hold"]).experiments[0]
+def experiment(more: str = "") -> Experiment:
+    return ic.compile(text=LIMITED + SERVO + RUN + more, select=["hold"]).experiments[0]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "of", [each for each in ENTRIES if each[1].varies == "number" and each[0].name in ("link", "joint")], ids=named
 )
-def test_numbers_of_arms_vary_by_their_declared_paths(of: tuple[BlockDeclaration, Entry], tmp_path: Path) -> None:
+def test_numbers_of_arms_vary_by_their_declared_paths(of: tuple[BlockDeclaration, Entry]) -> None:
     _, entry = of
-    known = experiment(tmp_path).parameters
-    structure = experiment(tmp_path).structure
+    known = experiment().parameters
+    structure = experiment().structure
     head = entry.path.replace("LINK", structure.links[0].name).replace("JOINT", structure.moving[0].name)
     path = next(each for each in known if each == head or each.startswith(f"{head}."))
     value = known[path].value
     assert isinstance(value, float)
     written = f"{value!r} {known[path].unit}".removesuffix(" 1")
     sweep = f"sweep some of hold {{ vary {path} = [{written}]; }}"
-    (tmp_path / "d.ic").write_text(LIMITED + SERVO + RUN + sweep)
     # one value in the place of itself; of some, such as the place of a hinge at the origin, nothing here depends
-    told = ic.check(tmp_path / "d.ic", select=["some"]).diagnostics
+    told = ic.check(text=LIMITED + SERVO + RUN + sweep, select=["some"]).diagnostics
     assert {each.code for each in told if each.severity == "error"} <= {"D137"}
 
 
-def test_paths_begin_with_what_is_declared(tmp_path: Path) -> None:
-    heads = {path.partition(".")[0] for path in experiment(tmp_path).parameters}
-    joints = {joint.name for joint in experiment(tmp_path).structure.joints}
+def test_paths_begin_with_what_is_declared() -> None:
+    heads = {path.partition(".")[0] for path in experiment().parameters}
+    joints = {joint.name for joint in experiment().structure.joints}
     assert heads - joints <= set(HEADS)
 
 

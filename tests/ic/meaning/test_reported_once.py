@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ic.small_decks import SERVO, changed, check, codes, messages
+from tests.ic.small_decks import SERVO, changed, check, codes, shown
 
 ARM = """\
 arm swing {
@@ -29,11 +29,6 @@ run hold {
 }
 """
 SWEEP = "sweep gains of hold { vary drive.kp = [0.1, 0.2] V*s/rad; }\n"
-
-
-def shown(folder: Path, *parts: str) -> str:
-    """What is said of a deck, without the counting line."""
-    return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
 
 
 def test_the_decks_that_the_next_tests_break_are_sound(tmp_path: Path) -> None:

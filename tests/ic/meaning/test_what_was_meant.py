@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.ic.small_decks import ARM, RUN, changed, check, messages
+from tests.ic.small_decks import ARM, RUN, changed, check, shown
 
 IDEAL = "servo drive { model = ideal; bandwidth = 2 1/s; command = position(0 rad); }\n"
 ARMS = changed(
@@ -18,11 +18,6 @@ ARMS = changed(
     joint glue  fixed    { parent = bar; child = tip; }""",
     ),
 )
-
-
-def shown(folder: Path, *parts: str) -> str:
-    """What is said of a deck, without the counting line."""
-    return messages(check(folder, *parts)).rpartition("\n\n")[0] + "\n"
 
 
 def test_a_wrong_unit_of_a_vector_is_told_once(tmp_path: Path) -> None:

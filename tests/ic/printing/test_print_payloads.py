@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 import ic
@@ -17,21 +15,20 @@ DECK = ARM + changed(RUN, FLIES, ("    environment {}\n", HELD))
 SWEEP = "sweep many of it { vary payloads.box.mass = [5, 10] kg;  vary payloads.box.grapple = [3, 4] s; }\n"
 
 
-def shown(folder: Path, select: str) -> list[str]:
-    (folder / "deck.ic").write_text(DECK + SWEEP, encoding="utf-8")
-    lines = list(print_plan(ic.compile(folder / "deck.ic", select=select)))
+def shown(select: str) -> list[str]:
+    lines = list(print_plan(ic.compile(text=DECK + SWEEP, select=select)))
     first = lines.index("Payloads")
     return lines[first : lines.index("", first)]
 
 
-def test_plan_shows_what_is_carried_grappled_and_released(tmp_path: Path) -> None:
-    assert shown(tmp_path, "it") == [
+def test_plan_shows_what_is_carried_grappled_and_released() -> None:
+    assert shown("it") == [
         "Payloads",
         "  payload  mass  link  grappled             released",
         "  box      5 kg  hand  3 s                  8 s",
         "  tool     1 kg  bar   held from the start  never",
     ]
-    assert shown(tmp_path, "many")[2] == "  box      5 to 10 kg  hand  3 to 4 s             8 s"
+    assert shown("many")[2] == "  box      5 to 10 kg  hand  3 to 4 s             8 s"
 
 
 @pytest.mark.parametrize(
@@ -43,8 +40,7 @@ def test_plan_shows_what_is_carried_grappled_and_released(tmp_path: Path) -> Non
         ("box.velocity", ["payloads.box.velocity.x", "payloads.box.velocity.y", "payloads.box.velocity.z"]),
     ],
 )
-def test_explain_knows_payloads_by_their_names(tmp_path: Path, path: str, found: list[str]) -> None:
-    (tmp_path / "deck.ic").write_text(DECK, encoding="utf-8")
-    experiment = with_settings(ic.compile(tmp_path / "deck.ic").experiments[0])
+def test_explain_knows_payloads_by_their_names(path: str, found: list[str]) -> None:
+    experiment = with_settings(ic.compile(text=DECK).experiments[0])
     assert find_paths(experiment, path) == found
     assert experiment.parameters["payloads.tool.on"].value == "bar"

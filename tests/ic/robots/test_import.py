@@ -222,8 +222,7 @@ def test_the_deck_with_followers_held_has_its_links_where_followers_are_that_mov
     free = free.replace("one.q = 0.4 rad;", f"one.q = 0.4 rad;  two.q = -0.1 {unit};  three.q = -0.1 rad;")
     poses = []
     for deck in (free, fixed):
-        Path("led.ic").write_text(deck.replace("[q, tau]", "[links.c.position, links.c.orientation]"), encoding="utf-8")
-        [plan] = [ic.compile("led.ic", select=["hold"])]
+        [plan] = [ic.compile(text=deck.replace("[q, tau]", "[links.c.position, links.c.orientation]"), select=["hold"])]
         found = run.run(plan.experiments[0])
         poses.append(np.concatenate([found.signals[f"links.c.{name}"][0, 0] for name in ("position", "orientation")]))
     np.testing.assert_allclose(poses[0], poses[1], atol=1e-14)
@@ -274,10 +273,13 @@ error[D087]: the inertia of link `bar` is no body's
 def test_the_root_is_a_base_with_its_mass_unless_no_body_is_so() -> None:
     root = '<link name="ground"> <inertial> <mass value="7"/> <inertia ixx="1" iyy="1" izz="1"/> </inertial> </link>'
     Path("two.urdf").write_text(changed(TWO, ('<link name="ground"/>', root)), encoding="utf-8")
-    Path("two.ic").write_text(
-        import_robot("two.urdf").replace("duration", "base = free;  duration", 1), encoding="utf-8"
+    assert (
+        ic.compile(text=import_robot("two.urdf").replace("duration", "base = free;  duration", 1))
+        .experiments[0]
+        .parameters["links.base.mass"]
+        .value
+        == 7.0
     )
-    assert ic.compile("two.ic").experiments[0].parameters["links.base.mass"].value == 7.0
     odd = root.replace('ixx="1"', 'ixx="3"')
     Path("two.urdf").write_text(changed(TWO, ('<link name="ground"/>', odd)), encoding="utf-8")
     text = import_robot("two.urdf")
@@ -303,8 +305,7 @@ def test_angles_that_look_like_degrees_are_told(limit: str, turned: str, inertia
     text = changed(TWO, ("<axis", joint), ('rpy="0 0 0"/>\n      <mass', f'rpy="{inertia}"/>\n      <mass'))
     Path("two.urdf").write_text(text, encoding="utf-8")
     assert list(import_with_remarks("two.urdf")[1]) == told
-    Path("two.ic").write_text(DECK, encoding="utf-8")
-    warned = [each for each in ic.check("two.ic").diagnostics if each.code == "D218"]
+    warned = [each for each in ic.check(text=DECK).diagnostics if each.code == "D218"]
     assert [label.text for each in warned for label in each.also] == told
 
 
@@ -383,8 +384,7 @@ def test_comments_hold_whatever_a_file_says() -> None:
         ('"bar"', '"bar\\"'),
     )
     Path("two.urdf").write_text(nasty, encoding="utf-8")
-    Path("two.ic").write_text(import_robot("two.urdf"), encoding="utf-8")
-    compiled = ic.check("two.ic")
+    compiled = ic.check(text=import_robot("two.urdf"))
     assert compiled.plan is not None and compiled.diagnostics == ()
 
 
@@ -397,8 +397,7 @@ def test_a_joint_whose_range_is_without_0_is_held_within_it(lower: str, upper: s
     Path("two.urdf").write_text(changed(TWO, ("<axis", limit)), encoding="utf-8")
     text = import_robot("two.urdf")
     assert f"command = position({held} rad);" in text and float(lower) <= float(held) <= float(upper)
-    Path("two.ic").write_text(text, encoding="utf-8")
-    assert ic.check("two.ic").plan is not None
+    assert ic.check(text=text).plan is not None
 
 
 def test_servos_of_the_deck_never_bear_a_joints_name() -> None:

@@ -10,21 +10,20 @@ from tests.ic.robots.two import OTHER, TWO, changed, said
 
 # ruff: noqa: E501 - messages are as wide as they are
 
-MISTAKES: list[tuple[str, str | bytes, str]] = []  # what, the file's text, what is said
+
+def mistake(what: str, *changes: tuple[str, str], says: str) -> tuple[str, str | bytes, str]:
+    return what, changed(TWO, *changes), says
 
 
-def mistake(what: str, *changes: tuple[str, str], says: str) -> None:
-    MISTAKES.append((what, changed(TWO, *changes), says))
+def no_robot(what: str, text: str | bytes, *, says: str) -> tuple[str, str | bytes, str]:
+    return what, text, says
 
 
-def no_robot(what: str, text: str | bytes, *, says: str) -> None:
-    MISTAKES.append((what, text, says))
-
-
-mistake(
-    "a link without a mass",
-    ('      <mass value="2"/>\n', ""),
-    says="""\
+MISTAKES = [  # what, the file's text, what is said
+    mistake(
+        "a link without a mass",
+        ('      <mass value="2"/>\n', ""),
+        says="""\
 error[D205]: this `<inertial>` has no `<mass>`
  --> two.urdf:4:5
   |
@@ -32,11 +31,11 @@ error[D205]: this `<inertial>` has no `<mass>`
   |     ^^^^^^^^^
   = help: write `<mass value="..."/>`
 """,
-)
-mistake(
-    "a number with a unit",
-    ('value="2"', 'value="2 kg"'),
-    says="""\
+    ),
+    mistake(
+        "a number with a unit",
+        ('value="2"', 'value="2 kg"'),
+        says="""\
 error[D206]: `kg` is not a number
  --> two.urdf:6:20
   |
@@ -44,11 +43,11 @@ error[D206]: `kg` is not a number
   |                    ^^^^
   = help: a number is finite, and written as 12.5 or -1e-3, without a unit
 """,
-)
-mistake(
-    "a number that is none",
-    ('value="2"', 'value="nan"'),
-    says="""\
+    ),
+    mistake(
+        "a number that is none",
+        ('value="2"', 'value="nan"'),
+        says="""\
 error[D206]: `nan` is not a number
  --> two.urdf:6:20
   |
@@ -56,11 +55,11 @@ error[D206]: `nan` is not a number
   |                    ^^^
   = help: a number is finite, and written as 12.5 or -1e-3, without a unit
 """,
-)
-mistake(
-    "a number too large",
-    ('value="2"', 'value="1e999"'),
-    says="""\
+    ),
+    mistake(
+        "a number too large",
+        ('value="2"', 'value="1e999"'),
+        says="""\
 error[D206]: `1e999` is not a number
  --> two.urdf:6:20
   |
@@ -68,11 +67,11 @@ error[D206]: `1e999` is not a number
   |                    ^^^^^
   = help: a number is finite, and written as 12.5 or -1e-3, without a unit
 """,
-)
-mistake(
-    "two numbers for three",
-    ('"0.5 0 0"', '"0.5 0"'),
-    says="""\
+    ),
+    mistake(
+        "two numbers for three",
+        ('"0.5 0 0"', '"0.5 0"'),
+        says="""\
 error[D206]: 3 numbers are needed in `xyz` of `<origin>`, not 2
  --> two.urdf:5:20
   |
@@ -80,11 +79,11 @@ error[D206]: 3 numbers are needed in `xyz` of `<origin>`, not 2
   |                    ^^^^^
   = help: spaces part the numbers
 """,
-)
-mistake(
-    "a mass below zero",
-    ('value="2"', 'value="-2"'),
-    says="""\
+    ),
+    mistake(
+        "a mass below zero",
+        ('value="2"', 'value="-2"'),
+        says="""\
 error[D077]: `mass` of link `bar` must be at least 0 kg
  --> two.urdf:6:20
   |
@@ -92,11 +91,11 @@ error[D077]: `mass` of link `bar` must be at least 0 kg
   |                    ^^ this is -2 kg
   = help: write a number of at least 0 kg (mass of the link)
 """,
-)
-mistake(
-    "an inertia without mass",
-    ('value="2"', 'value="0"'),
-    says="""\
+    ),
+    mistake(
+        "an inertia without mass",
+        ('value="2"', 'value="0"'),
+        says="""\
 error[D087]: the inertia of link `bar` is no body's
  --> two.urdf:7:7
   |
@@ -106,11 +105,11 @@ error[D087]: the inertia of link `bar` is no body's
   = help: in the arm's block: `bar { remove inertia; }`
   = help: if it is of an identified set (base parameters), which need be no body's: in the arm's block, `bar { lumped = on; }`
 """,
-)
-mistake(
-    "a moment left out",
-    ('ixx="0.1" ', ""),
-    says="""\
+    ),
+    mistake(
+        "a moment left out",
+        ('ixx="0.1" ', ""),
+        says="""\
 error[D205]: this `<inertia>` has no `ixx`
  --> two.urdf:7:7
   |
@@ -118,11 +117,11 @@ error[D205]: this `<inertia>` has no `ixx`
   |       ^^^^^^^^
   = help: write `<inertia ixx="..." iyy="..." izz="..." ixy="0" ixz="0" iyz="0"/>`
 """,
-)
-mistake(
-    "an inertia of no body",
-    ('izz="0.2"', 'izz="0.9"'),
-    says="""\
+    ),
+    mistake(
+        "an inertia of no body",
+        ('izz="0.2"', 'izz="0.9"'),
+        says="""\
 error[D087]: the inertia of link `bar` is no body's
  --> two.urdf:7:7
   |
@@ -133,11 +132,11 @@ error[D087]: the inertia of link `bar` is no body's
   = help: in the arm's block: `bar { inertia = [...] kg*m^2; }`
   = help: if it is of an identified set (base parameters), which need be no body's: in the arm's block, `bar { lumped = on; }`
 """,
-)
-mistake(
-    "an attribute that says where",
-    ('rpy="0 0 0"', 'quat="1 0 0 0"'),
-    says="""\
+    ),
+    mistake(
+        "an attribute that says where",
+        ('rpy="0 0 0"', 'quat="1 0 0 0"'),
+        says="""\
 error[D208]: `<origin>` has no attribute `quat`
  --> two.urdf:5:29
   |
@@ -145,11 +144,11 @@ error[D208]: `<origin>` has no attribute `quat`
   |                             ^^^^
   = help: it has `xyz`, `rpy`
 """,
-)
-mistake(
-    "numbers with commas",
-    ('xyz="0.5 0 0"', 'xyz="0.5, 0, 0"'),
-    says="""\
+    ),
+    mistake(
+        "numbers with commas",
+        ('xyz="0.5 0 0"', 'xyz="0.5, 0, 0"'),
+        says="""\
 error[D206]: `0.5,` is not a number
  --> two.urdf:5:20
   |
@@ -157,11 +156,11 @@ error[D206]: `0.5,` is not a number
   |                    ^^^^^^^^^
   = help: spaces part the numbers, not commas
 """,
-)
-mistake(
-    "an attribute misspelt",
-    ('rpy="0 0 0"', 'rpz="0 0 1"'),
-    says="""\
+    ),
+    mistake(
+        "an attribute misspelt",
+        ('rpy="0 0 0"', 'rpz="0 0 1"'),
+        says="""\
 error[D208]: `<origin>` has no attribute `rpz`
  --> two.urdf:5:29
   |
@@ -170,11 +169,11 @@ error[D208]: `<origin>` has no attribute `rpz`
   = help: did you mean `rpy`?
   = help: it has `xyz`, `rpy`
 """,
-)
-mistake(
-    "a child that is not there",
-    ('<child link="bar"/>', '<child link="bra"/>'),
-    says="""\
+    ),
+    mistake(
+        "a child that is not there",
+        ('<child link="bar"/>', '<child link="bra"/>'),
+        says="""\
 error[D207]: no link `bra` in this file
   --> two.urdf:12:18
    |
@@ -184,11 +183,11 @@ error[D207]: no link `bra` in this file
    = help: did you mean `bar`?
    = help: links: bar, ground
 """,
-)
-mistake(
-    "a joint without a child",
-    ('    <child link="bar"/>\n', ""),
-    says="""\
+    ),
+    mistake(
+        "a joint without a child",
+        ('    <child link="bar"/>\n', ""),
+        says="""\
 error[D205]: this `<joint>` has no `<child>`
   --> two.urdf:10:3
    |
@@ -196,11 +195,11 @@ error[D205]: this `<joint>` has no `<child>`
    |   ^^^^^^
    = help: write `<child link="..."/>`
 """,
-)
-mistake(
-    "a joint without a type",
-    (' type="revolute"', ""),
-    says="""\
+    ),
+    mistake(
+        "a joint without a type",
+        (' type="revolute"', ""),
+        says="""\
 error[D205]: this `<joint>` has no `type`
   --> two.urdf:10:3
    |
@@ -208,11 +207,11 @@ error[D205]: this `<joint>` has no `type`
    |   ^^^^^^
    = help: write `<joint name="..." type="revolute">`
 """,
-)
-mistake(
-    "a type that is none",
-    ("revolute", "revolut"),
-    says="""\
+    ),
+    mistake(
+        "a type that is none",
+        ("revolute", "revolut"),
+        says="""\
 error[D090]: no kind of joint `revolut`
   --> two.urdf:10:29
    |
@@ -221,11 +220,11 @@ error[D090]: no kind of joint `revolut`
    = help: did you mean `revolute`?
    = help: write `joint hinge revolute { ... }`, or prismatic, or fixed
 """,
-)
-mistake(
-    "a planar joint",
-    ("revolute", "planar"),
-    says="""\
+    ),
+    mistake(
+        "a planar joint",
+        ("revolute", "planar"),
+        says="""\
 error[D212]: joint `hinge` is planar, and joints are revolute, prismatic or fixed
   --> two.urdf:10:29
    |
@@ -234,11 +233,11 @@ error[D212]: joint `hinge` is planar, and joints are revolute, prismatic or fixe
    = help: two prismatic joints and a revolute one do the same; put links of `mass = 0 kg` between them
    = help: in the arm's block, `remove hinge;` makes room for them
 """,
-)
-mistake(
-    "a floating joint",
-    ("revolute", "floating"),
-    says="""\
+    ),
+    mistake(
+        "a floating joint",
+        ("revolute", "floating"),
+        says="""\
 error[D212]: joint `hinge` is floating, and joints are revolute, prismatic or fixed
   --> two.urdf:10:29
    |
@@ -246,12 +245,12 @@ error[D212]: joint `hinge` is floating, and joints are revolute, prismatic or fi
    |                             ^^^^^^^^
    = help: in the arm's block, `remove hinge;  joint hinge fixed { parent = base;  child = bar; }`, and in the run `base = free;`: base and `bar` then float as one
 """,
-)
-mistake(
-    "a joint that follows another",
-    ('<axis xyz="0 0 1"/>', '<mimic joint="other" multiplier="-1"/>'),
-    ("</robot>", OTHER),
-    says="""\
+    ),
+    mistake(
+        "a joint that follows another",
+        ('<axis xyz="0 0 1"/>', '<mimic joint="other" multiplier="-1"/>'),
+        ("</robot>", OTHER),
+        says="""\
 error[D213]: joint `hinge` follows `other`, which is not in this version
   --> two.urdf:13:19
    |
@@ -260,12 +259,12 @@ error[D213]: joint `hinge` follows `other`, which is not in this version
    = help: in the arm's block, `hinge { remove mimic; }` lets it move by itself
    = help: `met import --mimic fixed` prints the joint held where it is in the file
 """,
-)
-mistake(
-    "a joint that follows none that there is",
-    ('<axis xyz="0 0 1"/>', '<mimic joint="othre"/>'),
-    ("</robot>", OTHER),
-    says="""\
+    ),
+    mistake(
+        "a joint that follows none that there is",
+        ('<axis xyz="0 0 1"/>', '<mimic joint="othre"/>'),
+        ("</robot>", OTHER),
+        says="""\
 error[D207]: no joint `othre` in this file
   --> two.urdf:13:19
    |
@@ -275,12 +274,12 @@ error[D207]: no joint `othre` in this file
    = help: did you mean `other`?
    = help: joints: hinge, other
 """,
-)
-mistake(
-    "joints that follow each other",
-    ('<axis xyz="0 0 1"/>', '<mimic joint="other"/>'),
-    ("</robot>", OTHER.replace("<parent", '<mimic joint="hinge"/> <parent')),
-    says="""\
+    ),
+    mistake(
+        "joints that follow each other",
+        ('<axis xyz="0 0 1"/>', '<mimic joint="other"/>'),
+        ("</robot>", OTHER.replace("<parent", '<mimic joint="hinge"/> <parent')),
+        says="""\
 error[D213]: joint `hinge` follows itself: hinge -> other -> hinge
   --> two.urdf:13:19
    |
@@ -288,11 +287,11 @@ error[D213]: joint `hinge` follows itself: hinge -> other -> hinge
    |                   ^^^^^
    = help: remove the `<mimic>` of one of these joints in the file: it then moves by itself; no deck and no `--mimic` can change it
 """,
-)
-mistake(
-    "a limit with a decimal comma and one in degrees",
-    ("<axis", '<limit lower="-180deg" upper="3,14" effort="5 Nm" velocity="nan"/> <axis'),
-    says="""\
+    ),
+    mistake(
+        "a limit with a decimal comma and one in degrees",
+        ("<axis", '<limit lower="-180deg" upper="3,14" effort="5 Nm" velocity="nan"/> <axis'),
+        says="""\
 error[D206]: `-180deg` is not a number
   --> two.urdf:13:19
    |
@@ -321,11 +320,11 @@ error[D206]: `nan` is not a number
    |                                                                 ^^^
    = help: a number is finite, and written as 12.5 or -1e-3, without a unit; `inf` stands for no limit
 """,
-)
-mistake(
-    "a limit that xacro would fill in, and an endless one on the wrong side",
-    ("<axis", '<limit lower="inf" upper="$(arg up)"/> <axis'),
-    says="""\
+    ),
+    mistake(
+        "a limit that xacro would fill in, and an endless one on the wrong side",
+        ("<axis", '<limit lower="inf" upper="$(arg up)"/> <axis'),
+        says="""\
 error[D206]: `lower` cannot be `inf`
   --> two.urdf:13:19
    |
@@ -340,11 +339,11 @@ error[D203]: `$(arg up)` is to be filled in
    |                               ^^^^^^^^^
    = help: this is xacro, from which a URDF file is made: run `xacro FILE > robot.urdf` and take that
 """,
-)
-mistake(
-    "limits the wrong way round, and below zero",
-    ("<axis", '<limit lower="1" upper="-1" effort="-5" velocity="2"/> <axis'),
-    says="""\
+    ),
+    mistake(
+        "limits the wrong way round, and below zero",
+        ("<axis", '<limit lower="1" upper="-1" effort="-5" velocity="2"/> <axis'),
+        says="""\
 error[D241]: `q_min` of joint `hinge` must be less than `q_max`
   --> two.urdf:13:19
    |
@@ -360,11 +359,11 @@ error[D077]: `tau_max` of joint `hinge` must be above 0 N*m
    |                                         ^^ this is -5 N*m
    = help: write a number above 0 N*m (largest torque of the servo on the joint in either direction)
 """,
-)
-mistake(
-    "a range of one end",
-    ("<axis", '<limit lower="1" upper="inf"/> <axis'),
-    says="""\
+    ),
+    mistake(
+        "a range of one end",
+        ("<axis", '<limit lower="1" upper="inf"/> <axis'),
+        says="""\
 error[D346]: joint `hinge` has `q_min` and no `q_max`
   --> two.urdf:13:19
    |
@@ -373,11 +372,11 @@ error[D346]: joint `hinge` has `q_min` and no `q_max`
    = help: write `q_max` too: a range has two ends
    = help: in the arm's block: `hinge { q_max = ...; }`
 """,
-)
-mistake(
-    "an attribute in capitals, and an element",
-    ("<axis", '<Limits lower="-1"/> <limit Lower="-1"/> <axis'),
-    says="""\
+    ),
+    mistake(
+        "an attribute in capitals, and an element",
+        ("<axis", '<Limits lower="-1"/> <limit Lower="-1"/> <axis'),
+        says="""\
 error[D208]: `<joint>` has no element `<Limits>`
   --> two.urdf:13:5
    |
@@ -393,11 +392,11 @@ error[D208]: `<limit>` has no attribute `Lower`
    = help: did you mean `lower`?
    = help: it has `lower`, `upper`, `effort`, `velocity`
 """,
-)
-mistake(
-    "an element in the place of an attribute",
-    ("<axis", "<limit> <lower>-1</lower> </limit> <axis"),
-    says="""\
+    ),
+    mistake(
+        "an element in the place of an attribute",
+        ("<axis", "<limit> <lower>-1</lower> </limit> <axis"),
+        says="""\
 error[D208]: `<limit>` has no element `<lower>`
   --> two.urdf:13:13
    |
@@ -405,11 +404,11 @@ error[D208]: `<limit>` has no element `<lower>`
    |             ^^^^^^
    = help: `lower` is an attribute: `<limit lower="..." upper="..." effort="..." velocity="..."/>`
 """,
-)
-mistake(
-    "an axis without direction",
-    ("0 0 1", "0 0 0"),
-    says="""\
+    ),
+    mistake(
+        "an axis without direction",
+        ("0 0 1", "0 0 0"),
+        says="""\
 error[D097]: the axis of joint `hinge` has no direction
   --> two.urdf:13:16
    |
@@ -417,11 +416,11 @@ error[D097]: the axis of joint `hinge` has no direction
    |                ^^^^^
    = help: write numbers of ordinary size, not all of them zero
 """,
-)
-mistake(
-    "negative damping",
-    ('    <axis xyz="0 0 1"/>\n', '    <dynamics damping="-1"/>\n'),
-    says="""\
+    ),
+    mistake(
+        "negative damping",
+        ('    <axis xyz="0 0 1"/>\n', '    <dynamics damping="-1"/>\n'),
+        says="""\
 error[D206]: `damping` is below 0
   --> two.urdf:13:24
    |
@@ -429,11 +428,11 @@ error[D206]: `damping` is below 0
    |                        ^^
    = help: write 0, or a number above it
 """,
-)
-mistake(
-    "two links of one name",
-    ('<link name="ground"/>', '<link name="ground"/>\n  <link name="bar"/>'),
-    says="""\
+    ),
+    mistake(
+        "two links of one name",
+        ('<link name="ground"/>', '<link name="ground"/>\n  <link name="bar"/>'),
+        says="""\
 error[D204]: link `bar` is there twice
  --> two.urdf:4:15
   |
@@ -442,11 +441,11 @@ error[D204]: link `bar` is there twice
  ::: two.urdf:3:15  first
   = help: give one of the two another name
 """,
-)
-mistake(
-    "two masses",
-    ('<mass value="2"/>', '<mass value="2"/>\n      <mass value="1"/>'),
-    says="""\
+    ),
+    mistake(
+        "two masses",
+        ('<mass value="2"/>', '<mass value="2"/>\n      <mass value="1"/>'),
+        says="""\
 error[D204]: `<mass>` is there twice in this `<inertial>`
  --> two.urdf:7:7
   |
@@ -455,11 +454,11 @@ error[D204]: `<mass>` is there twice in this `<inertial>`
  ::: two.urdf:6:7  first
   = help: remove one of the two
 """,
-)
-mistake(
-    "two bases",
-    ('<link name="ground"/>', '<link name="ground"/>\n  <link name="other"/>'),
-    says="""\
+    ),
+    mistake(
+        "two bases",
+        ('<link name="ground"/>', '<link name="ground"/>\n  <link name="other"/>'),
+        says="""\
 error[D209]: 2 links of this robot hang on no other, and an arm has one base
  --> two.urdf:2:15
   |
@@ -468,11 +467,14 @@ error[D209]: 2 links of this robot hang on no other, and an arm has one base
  ::: two.urdf:3:15  other
   = help: join them by a `<joint type="fixed">`, or take one of the robots out of the file
 """,
-)
-mistake(
-    "two parents",
-    ("  <joint", '  <joint name="first" type="fixed"> <parent link="ground"/> <child link="bar"/> </joint>\n  <joint'),
-    says="""\
+    ),
+    mistake(
+        "two parents",
+        (
+            "  <joint",
+            '  <joint name="first" type="fixed"> <parent link="ground"/> <child link="bar"/> </joint>\n  <joint',
+        ),
+        says="""\
 error[D098]: link `bar` has two parents
   --> two.urdf:11:16
    |
@@ -483,11 +485,14 @@ error[D098]: link `bar` has two parents
    = help: a stiff `bushing` closes a chain: in the arm's block, `remove hinge;`
    = help: then, in the run's `environment`: `hinge = bushing { link = bar;  stiffness = [100000, 100000, 100000] N/m;  damping = [100, 100, 100] N*s/m;  turning = [1000, 1000, 0] N*m/rad;  turning_damping = [1, 1, 0] N*m*s/rad; }`
 """,
-)
-mistake(
-    "a loop without a base",
-    ("  <joint", '  <joint name="back" type="fixed"> <parent link="bar"/> <child link="ground"/> </joint>\n  <joint'),
-    says="""\
+    ),
+    mistake(
+        "a loop without a base",
+        (
+            "  <joint",
+            '  <joint name="back" type="fixed"> <parent link="bar"/> <child link="ground"/> </joint>\n  <joint',
+        ),
+        says="""\
 error[D209]: every link of this robot hangs on another: none is its base
   --> two.urdf:10:16
    |
@@ -496,14 +501,14 @@ error[D209]: every link of this robot hangs on another: none is its base
   ::: two.urdf:11:16  joint `hinge`
    = help: one of the joints closes a loop: take it out, and close it by a stiff `bushing` in the run
 """,
-)
-mistake(
-    "a loop beside the arm",
-    (
-        "</robot>",
-        '  <link name="a"/>\n  <link name="b"/>\n  <joint name="ab" type="fixed"> <parent link="a"/> <child link="b"/> </joint>\n  <joint name="ba" type="fixed"> <parent link="b"/> <child link="a"/> </joint>\n</robot>',
     ),
-    says="""\
+    mistake(
+        "a loop beside the arm",
+        (
+            "</robot>",
+            '  <link name="a"/>\n  <link name="b"/>\n  <joint name="ab" type="fixed"> <parent link="a"/> <child link="b"/> </joint>\n  <joint name="ba" type="fixed"> <parent link="b"/> <child link="a"/> </joint>\n</robot>',
+        ),
+        says="""\
 error[D086]: these joints make a loop, which hangs on no base: a -> b -> a
   --> two.urdf:18:16
    |
@@ -512,14 +517,14 @@ error[D086]: these joints make a loop, which hangs on no base: a -> b -> a
   ::: two.urdf:17:16  joint `ab`
    = help: one of them should have `parent = base;`
 """,
-)
-mistake(
-    "no mass to move",
-    (
-        '    <inertial>\n      <origin xyz="0.5 0 0" rpy="0 0 0"/>\n      <mass value="2"/>\n      <inertia ixx="0.1" iyy="0.2" izz="0.2" ixy="0" ixz="0" iyz="0"/>\n    </inertial>\n',
-        "",
     ),
-    says="""\
+    mistake(
+        "no mass to move",
+        (
+            '    <inertial>\n      <origin xyz="0.5 0 0" rpy="0 0 0"/>\n      <mass value="2"/>\n      <inertia ixx="0.1" iyy="0.2" izz="0.2" ixy="0" ixz="0" iyz="0"/>\n    </inertial>\n',
+            "",
+        ),
+        says="""\
 error[D217]: joint `hinge` moves nothing that has mass
  --> two.urdf:5:16
   |
@@ -528,14 +533,14 @@ error[D217]: joint `hinge` moves nothing that has mass
   = help: write the mass of link `bar`, or of one that it carries
   = help: or make the joint fixed
 """,
-)
-mistake(
-    "xacro",
-    (
-        '<robot name="two">',
-        '<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro">\n  <xacro:property name="mass" value="2"/>',
     ),
-    says="""\
+    mistake(
+        "xacro",
+        (
+            '<robot name="two">',
+            '<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro">\n  <xacro:property name="mass" value="2"/>',
+        ),
+        says="""\
 error[D203]: `<xacro:property>` is not URDF
  --> two.urdf:2:3
   |
@@ -543,11 +548,11 @@ error[D203]: `<xacro:property>` is not URDF
   |   ^^^^^^^^^^^^^^^
   = help: this is xacro, from which a URDF file is made: run `xacro FILE > robot.urdf` and take that
 """,
-)
-mistake(
-    "what xacro would fill in",
-    ('value="2"', 'value="${mass}"'),
-    says="""\
+    ),
+    mistake(
+        "what xacro would fill in",
+        ('value="2"', 'value="${mass}"'),
+        says="""\
 error[D203]: `${mass}` is to be filled in
  --> two.urdf:6:20
   |
@@ -555,11 +560,11 @@ error[D203]: `${mass}` is to be filled in
   |                    ^^^^^^^
   = help: this is xacro, from which a URDF file is made: run `xacro FILE > robot.urdf` and take that
 """,
-)
-mistake(
-    "a name that xacro would make",
-    ('"hinge"', '"${prefix}hinge"'),
-    says="""\
+    ),
+    mistake(
+        "a name that xacro would make",
+        ('"hinge"', '"${prefix}hinge"'),
+        says="""\
 error[D203]: `${prefix}hinge` is to be filled in
   --> two.urdf:10:16
    |
@@ -567,11 +572,11 @@ error[D203]: `${prefix}hinge` is to be filled in
    |                ^^^^^^^^^^^^^^
    = help: this is xacro, from which a URDF file is made: run `xacro FILE > robot.urdf` and take that
 """,
-)
-mistake(
-    "a document type",
-    ("<robot", '<?xml version="1.0"?>\n<!DOCTYPE robot [ <!ENTITY lol "lol"> ]>\n<robot'),
-    says="""\
+    ),
+    mistake(
+        "a document type",
+        ("<robot", '<?xml version="1.0"?>\n<!DOCTYPE robot [ <!ENTITY lol "lol"> ]>\n<robot'),
+        says="""\
 error[D201]: a document type and entities are not read
  --> two.urdf:2:1
   |
@@ -579,11 +584,11 @@ error[D201]: a document type and entities are not read
   | ^^^^^^^^^
   = help: URDF needs neither: write the values out
 """,
-)
-mistake(
-    "a tag that closes another",
-    ("</link>", "</lnk>"),
-    says="""\
+    ),
+    mistake(
+        "a tag that closes another",
+        ("</link>", "</lnk>"),
+        says="""\
 error[D200]: `two.urdf` is no XML: mismatched tag
  --> two.urdf:9:5
   |
@@ -592,11 +597,11 @@ error[D200]: `two.urdf` is no XML: mismatched tag
  ::: two.urdf:3:3  opened here
   = help: `link` is open here: it is to be closed first
 """,
-)
-mistake(
-    "a file that ends too soon",
-    ("</robot>\n", ""),
-    says="""\
+    ),
+    mistake(
+        "a file that ends too soon",
+        ("</robot>\n", ""),
+        says="""\
 error[D200]: `two.urdf` is no XML: no element found
   --> two.urdf:14:11
    |
@@ -605,11 +610,11 @@ error[D200]: `two.urdf` is no XML: no element found
   ::: two.urdf:1:1  opened here
    = help: the file ends inside `robot`: its end is missing
 """,
-)
-mistake(
-    "a declaration that comes late",
-    ("<robot", '<!-- two -->\n<?xml version="1.0"?>\n<robot'),
-    says="""\
+    ),
+    mistake(
+        "a declaration that comes late",
+        ("<robot", '<!-- two -->\n<?xml version="1.0"?>\n<robot'),
+        says="""\
 error[D200]: `two.urdf` is no XML: XML or text declaration not at start of entity
  --> two.urdf:2:1
   |
@@ -617,11 +622,11 @@ error[D200]: `two.urdf` is no XML: XML or text declaration not at start of entit
   | ^
   = help: `<?xml ... ?>` stands at the very beginning of a file, with nothing before it, or not at all
 """,
-)
-mistake(
-    "an entity",
-    ('name="bar"', 'name="&bar;"'),
-    says="""\
+    ),
+    mistake(
+        "an entity",
+        ('name="bar"', 'name="&bar;"'),
+        says="""\
 error[D200]: `two.urdf` is no XML: undefined entity
  --> two.urdf:3:3
   |
@@ -629,11 +634,11 @@ error[D200]: `two.urdf` is no XML: undefined entity
   |   ^
   = help: five have a meaning: &lt; &gt; &amp; &quot; &apos;
 """,
-)
-no_robot(
-    "an empty file",
-    "",
-    says="""\
+    ),
+    no_robot(
+        "an empty file",
+        "",
+        says="""\
 error[D200]: `two.urdf` is no XML: no element found
  --> two.urdf:1:1
   |
@@ -641,11 +646,11 @@ error[D200]: `two.urdf` is no XML: no element found
   | ^
   = help: the file is empty
 """,
-)
-no_robot(
-    "text",
-    "hello\n",
-    says="""\
+    ),
+    no_robot(
+        "text",
+        "hello\n",
+        says="""\
 error[D200]: `two.urdf` is no XML: syntax error
  --> two.urdf:1:1
   |
@@ -653,11 +658,11 @@ error[D200]: `two.urdf` is no XML: syntax error
   | ^
   = help: a URDF file is XML, `<robot> ... </robot>`: is this the right file?
 """,
-)
-no_robot(
-    "another format",
-    '<sdf version="1.7"/>\n',
-    says="""\
+    ),
+    no_robot(
+        "another format",
+        '<sdf version="1.7"/>\n',
+        says="""\
 error[D203]: `<sdf>` is not URDF: this is SDF
  --> two.urdf:1:1
   |
@@ -665,11 +670,11 @@ error[D203]: `<sdf>` is not URDF: this is SDF
   | ^^^^
   = help: a URDF file is `<robot name="..."> ... </robot>`
 """,
-)
-no_robot(
-    "an empty robot",
-    '<robot name="none"/>\n',
-    says="""\
+    ),
+    no_robot(
+        "an empty robot",
+        '<robot name="none"/>\n',
+        says="""\
 error[D209]: this robot is empty: it has no links
  --> two.urdf:1:1
   |
@@ -677,11 +682,11 @@ error[D209]: this robot is empty: it has no links
   | ^^^^^^
   = help: an arm has a joint at least
 """,
-)
-no_robot(
-    "one body",
-    '<robot name="one"> <link name="all"/> </robot>\n',
-    says="""\
+    ),
+    no_robot(
+        "one body",
+        '<robot name="one"> <link name="all"/> </robot>\n',
+        says="""\
 error[D209]: this robot has no joints: it is one body
  --> two.urdf:1:1
   |
@@ -689,11 +694,11 @@ error[D209]: this robot has no joints: it is one body
   | ^^^^^^
   = help: an arm has a joint at least
 """,
-)
-no_robot(
-    "bytes",
-    b'<robot name="\xff"/>\n',
-    says="""\
+    ),
+    no_robot(
+        "bytes",
+        b'<robot name="\xff"/>\n',
+        says="""\
 error[D002]: `two.urdf` is not UTF-8: byte 0xff
  --> two.urdf:1:14
   |
@@ -701,11 +706,11 @@ error[D002]: `two.urdf` is not UTF-8: byte 0xff
   |              ^
   = help: save the file as UTF-8
 """,
-)
-no_robot(
-    "a program",
-    b"\x7fELF\x00\x00",
-    says="""\
+    ),
+    no_robot(
+        "a program",
+        b"\x7fELF\x00\x00",
+        says="""\
 error[D002]: `two.urdf` is not text: it holds the byte 0x7f
  --> two.urdf:1:1
   |
@@ -713,7 +718,8 @@ error[D002]: `two.urdf` is not text: it holds the byte 0x7f
   | ^
   = help: is this an archive or a program? A URDF file is plain text in UTF-8
 """,
-)
+    ),
+]
 
 
 @pytest.mark.parametrize(("text", "remedy"), [

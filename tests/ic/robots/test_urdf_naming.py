@@ -8,17 +8,11 @@ import pytest
 
 from tests.ic.robots.two import DECK, TWO, said
 
-NAMING: list[tuple[str, str, str]] = []  # what, the deck's first line, what is said
-
-
-def naming(what: str, line: str, *, says: str) -> None:
-    NAMING.append((what, line, says))
-
-
-naming(
-    "a file that is not there",
-    'arm two from urdf("tow.urdf") { }',
-    says="""\
+NAMING = [  # what, the deck's first line, what is said
+    (
+        "a file that is not there",
+        'arm two from urdf("tow.urdf") { }',
+        """\
 error[D215]: cannot find "tow.urdf"
  --> deck.ic:1:19
   |
@@ -27,11 +21,11 @@ error[D215]: cannot find "tow.urdf"
   = help: did you mean `two.urdf`?
   = help: looked in `DIR`, the standard library
 """,
-)
-naming(
-    "a file of no name",
-    'arm two from urdf("") { }',
-    says="""\
+    ),
+    (
+        "a file of no name",
+        'arm two from urdf("") { }',
+        """\
 error[D215]: cannot find ""
  --> deck.ic:1:19
   |
@@ -39,11 +33,11 @@ error[D215]: cannot find ""
   |                   ^^
   = help: looked in `DIR`, the standard library
 """,
-)
-naming(
-    "no quotes",
-    "arm two from urdf(two) { }",
-    says="""\
+    ),
+    (
+        "no quotes",
+        "arm two from urdf(two) { }",
+        """\
 error[D214]: `urdf` takes the name of one file, in quotes
  --> deck.ic:1:14
   |
@@ -51,11 +45,11 @@ error[D214]: `urdf` takes the name of one file, in quotes
   |              ^^^^^^^^^
   = help: write `arm NAME from urdf("FILE") { ... }`
 """,
-)
-naming(
-    "two files",
-    'arm two from urdf("two.urdf", "two.urdf") { }',
-    says="""\
+    ),
+    (
+        "two files",
+        'arm two from urdf("two.urdf", "two.urdf") { }',
+        """\
 error[D214]: `urdf` takes the name of one file, in quotes
  --> deck.ic:1:14
   |
@@ -63,11 +57,11 @@ error[D214]: `urdf` takes the name of one file, in quotes
   |              ^^^^^^^^^^^^^^^^^^^^^^^^^^^^
   = help: write `arm NAME from urdf("FILE") { ... }`
 """,
-)
-naming(
-    "a named argument",
-    'arm two from urdf(file = "two.urdf") { }',
-    says="""\
+    ),
+    (
+        "a named argument",
+        'arm two from urdf(file = "two.urdf") { }',
+        """\
 error[D214]: `urdf` takes the name of one file, in quotes
  --> deck.ic:1:14
   |
@@ -75,11 +69,11 @@ error[D214]: `urdf` takes the name of one file, in quotes
   |              ^^^^^^^^^^^^^^^^^^^^^^^
   = help: write `arm NAME from urdf("FILE") { ... }`
 """,
-)
-naming(
-    "nothing in the brackets",
-    "arm two from urdf() { }",
-    says="""\
+    ),
+    (
+        "nothing in the brackets",
+        "arm two from urdf() { }",
+        """\
 error[D214]: `urdf` takes the name of one file, in quotes
  --> deck.ic:1:14
   |
@@ -87,11 +81,11 @@ error[D214]: `urdf` takes the name of one file, in quotes
   |              ^^^^^^
   = help: write `arm NAME from urdf("FILE") { ... }`
 """,
-)
-naming(
-    "another format",
-    'arm two from sdf("two.urdf") { }',
-    says="""\
+    ),
+    (
+        "another format",
+        'arm two from sdf("two.urdf") { }',
+        """\
 error[D214]: no arm is made from `sdf`
  --> deck.ic:1:14
   |
@@ -99,11 +93,11 @@ error[D214]: no arm is made from `sdf`
   |              ^^^
   = help: an arm is made from: urdf
 """,
-)
-naming(
-    "a file without its format",
-    'arm two from "two.urdf" { }',
-    says="""\
+    ),
+    (
+        "a file without its format",
+        'arm two from "two.urdf" { }',
+        """\
 error[D020]: a file is named by what it is
  --> deck.ic:1:14
   |
@@ -111,11 +105,11 @@ error[D020]: a file is named by what it is
   |              ^^^^^^^^^^
   = help: write `from urdf("two.urdf")`
 """,
-)
-naming(
-    "a file without quotes",
-    "arm two from two.urdf { }",
-    says="""\
+    ),
+    (
+        "a file without quotes",
+        "arm two from two.urdf { }",
+        """\
 error[D020]: the name of a file stands in quotes
  --> deck.ic:1:14
   |
@@ -123,11 +117,11 @@ error[D020]: the name of a file stands in quotes
   |              ^^^^^^^^
   = help: write `from urdf("two.urdf")`
 """,
-)
-naming(
-    "a path without quotes",
-    "arm two from ../my_arms/two-link.urdf;",
-    says="""\
+    ),
+    (
+        "a path without quotes",
+        "arm two from ../my_arms/two-link.urdf;",
+        """\
 error[D020]: the name of a file stands in quotes
  --> deck.ic:1:14
   |
@@ -135,11 +129,11 @@ error[D020]: the name of a file stands in quotes
   |              ^^^^^^^^^^^^^^^^^^^^^^^^
   = help: write `from urdf("../my_arms/two-link.urdf")`
 """,
-)
-naming(
-    "a file without brackets and quotes",
-    "arm two from urdf robots/two.urdf { }",
-    says="""\
+    ),
+    (
+        "a file without brackets and quotes",
+        "arm two from urdf robots/two.urdf { }",
+        """\
 error[D020]: the name of a file stands in quotes
  --> deck.ic:1:19
   |
@@ -147,11 +141,11 @@ error[D020]: the name of a file stands in quotes
   |                   ^^^^^^^^^^^^^^^
   = help: write `from urdf("robots/two.urdf")`
 """,
-)
-naming(
-    "no block",
-    'arm two from urdf("two.urdf")',
-    says="""\
+    ),
+    (
+        "no block",
+        'arm two from urdf("two.urdf")',
+        """\
 error[D020]: expected `{` or `;`, found `run`
  --> deck.ic:2:1
   |
@@ -159,11 +153,11 @@ error[D020]: expected `{` or `;`, found `run`
   | ^^^
   = help: a block holds what differs from the file; `;` stands for none
 """,
-)
-naming(
-    "a unit",
-    'arm two from urdf("two.urdf") m { }',
-    says="""\
+    ),
+    (
+        "a unit",
+        'arm two from urdf("two.urdf") m { }',
+        """\
 error[D020]: expected `{` or `;`, found `m`
  --> deck.ic:1:31
   |
@@ -171,11 +165,11 @@ error[D020]: expected `{` or `;`, found `m`
   |                               ^
   = help: a block holds what differs from the file; `;` stands for none
 """,
-)
-naming(
-    "two bases",
-    'arm two like one from urdf("two.urdf") { }',
-    says="""\
+    ),
+    (
+        "two bases",
+        'arm two like one from urdf("two.urdf") { }',
+        """\
 error[D032]: `like` and `from` both name a base
  --> deck.ic:1:18
   |
@@ -183,11 +177,11 @@ error[D032]: `like` and `from` both name a base
   |                  ^^^^
   = help: there is one base only
 """,
-)
-naming(
-    "two bases the other way",
-    'arm two from urdf("two.urdf") like one { }',
-    says="""\
+    ),
+    (
+        "two bases the other way",
+        'arm two from urdf("two.urdf") like one { }',
+        """\
 error[D032]: `from` and `like` both name a base
  --> deck.ic:1:31
   |
@@ -195,11 +189,11 @@ error[D032]: `from` and `like` both name a base
   |                               ^^^^
   = help: there is one base only
 """,
-)
-naming(
-    "a servo",
-    'servo two from urdf("two.urdf") { }',
-    says="""\
+    ),
+    (
+        "a servo",
+        'servo two from urdf("two.urdf") { }',
+        """\
 error[D214]: a servo is not made from a file
  --> deck.ic:1:16
   |
@@ -207,11 +201,11 @@ error[D214]: a servo is not made from a file
   |                ^^^^
   = help: `from urdf(...)` makes an arm
 """,
-)
-naming(
-    "a link that is there",
-    'arm two from urdf("two.urdf") { link bar { mass = 1 kg; } }',
-    says="""\
+    ),
+    (
+        "a link that is there",
+        'arm two from urdf("two.urdf") { link bar { mass = 1 kg; } }',
+        """\
 error[D053]: link `bar` is in `two` already
  --> deck.ic:1:33
   |
@@ -221,11 +215,11 @@ error[D053]: link `bar` is in `two` already
   = help: leave out the word `link` to change it
   = help: `remove bar;` first, to put another in its place
 """,
-)
-naming(
-    "a link that is not",
-    'arm two from urdf("two.urdf") { bra { mass = 1 kg; } }',
-    says="""\
+    ),
+    (
+        "a link that is not",
+        'arm two from urdf("two.urdf") { bra { mass = 1 kg; } }',
+        """\
 error[D083]: nothing named `bra` to change in this arm
  --> deck.ic:1:33
   |
@@ -234,11 +228,11 @@ error[D083]: nothing named `bra` to change in this arm
   = help: did you mean `bar`?
   = help: `link bra { ... }` or `joint bra revolute { ... }` would add one
 """,
-)
-naming(
-    "the root by its own name",
-    'arm two from urdf("two.urdf") { hinge { parent = ground; } }',
-    says="""\
+    ),
+    (
+        "the root by its own name",
+        'arm two from urdf("two.urdf") { hinge { parent = ground; } }',
+        """\
 error[D094]: no link `ground` in this arm
  --> deck.ic:1:50
   |
@@ -247,7 +241,8 @@ error[D094]: no link `ground` in this arm
   = help: `ground` is the root of its robot: write `base`
   = help: links: base, bar
 """,
-)
+    ),
+]
 
 
 @pytest.mark.parametrize(("line", "says"), [each[1:] for each in NAMING], ids=[each[0] for each in NAMING])

@@ -36,11 +36,9 @@ def value_of(quantity: Quantity) -> str:
 
 
 @pytest.fixture(scope="module")
-def paths(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, dict[str, str]]:
+def paths() -> tuple[str, dict[str, str]]:
     text = ARM + SENSED + WHOLE
-    deck = tmp_path_factory.mktemp("deck") / "deck.ic"
-    deck.write_text(text, encoding="utf-8")
-    compiled = ic.check(deck)
+    compiled = ic.check(text=text)
     assert compiled.plan is not None, messages(compiled)
     found = with_settings(with_all_settings(compiled)).parameters
     values = {path: value_of(each) for path, each in found.items() if not isinstance(each.value, (tuple, Formula))}

@@ -342,10 +342,9 @@ def test_mistakes_of_a_block_are_told_together(tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
-def test_a_tuning_goes_by_gradients_unless_it_says_otherwise(tmp_path: Path) -> None:
+def test_a_tuning_goes_by_gradients_unless_it_says_otherwise() -> None:
     for more, wanted in (("", True), ("gradients = on;", True), ("gradients = off;", False)):
-        (tmp_path / "d.ic").write_text(DECK + TUNE.replace("margin = 10 %;", more), encoding="utf-8")
-        search = ic.compile(tmp_path / "d.ic", select=["gains"]).experiments[0].search
+        search = ic.compile(text=DECK + TUNE.replace("margin = 10 %;", more), select=["gains"]).experiments[0].search
         assert search is not None and search.gradients is wanted
 
 

@@ -118,8 +118,7 @@ def test_a_name_that_the_deck_has_is_not_taken(tmp_path: Path) -> None:
 def test_values_may_come_from_python(tmp_path: Path) -> None:
     vary = {"drive.kp": ["0.2 V*s/rad", "0.3 V*s/rad"], "drive.ratio": (50, 100)}
     text = "sweep it of hold { vary drive.kp = [0.2, 0.3] V*s/rad; vary drive.ratio = [50, 100]; }"
-    (tmp_path / "deck.ic").write_text(DECK, encoding="utf-8")
-    found = ic.compile(tmp_path / "deck.ic", vary=vary)
+    found = ic.compile(text=DECK, vary=vary)
     assert same(found.experiments, plan(tmp_path, DECK + text, ("it",)).experiments)
 
 

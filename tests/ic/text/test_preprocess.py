@@ -190,30 +190,6 @@ error[D005]: cannot find <servos/rigid_gearbx.ic>
     )
 
 
-def test_units_as_macros_and_parameters_are_errors_that_say_why(desk: Desk):
-    assert (
-        desk.told("#define N 6\n#define ROD(name, m) link name { mass = 0.5 m; }\nx = 1 N;\n")
-        == """\
-error[D011]: a macro cannot be called `N`: that is the unit newton
- --> a.ic:1:9
-  |
-1 | #define N 6
-  |         ^
-  = help: it would replace the unit in every quantity after it: `2 N` would lose its unit
-
-error[D011]: a macro's parameter cannot be called `m`: in its body that is the unit metre
- --> a.ic:2:19
-  |
-2 | #define ROD(name, m) link name { mass = 0.5 m; }
-  |                   ^
- ::: a.ic:2:45  this `m` would be the argument, not the unit
-  = help: choose another name for it
-
-2 errors
-"""
-    )
-
-
 @pytest.mark.parametrize("body", [
     "2 m", "2 N*m", "2 N^2/(s*m)", "2 N^-1*m", "15 1/m", "(1 + X) m", "[X] m", "X m", "TWO m", "9 (m/s)", "2 m ## X",
 ])  # fmt: skip
@@ -268,54 +244,6 @@ error[D019]: `##` makes `5mm`, which is not one token
     assert [token.text for token in desk.tokens("#define PART a ## b ## 1\nPART").tokens[:-1]] == ["ab1"]
 
 
-def test_what_may_be_left_out_stands_where_a_macro_takes_more_arguments(desk: Desk):
-    assert (
-        desk.told("#define LOG(x) f(x __VA_OPT__(,))\n#define SET(x, ...) f(x __VA_OPT__, __VA_ARGS__)\n")
-        == """\
-error[D007]: `__VA_OPT__` stands in the body of a macro that takes `...` only
- --> a.ic:1:20
-  |
-1 | #define LOG(x) f(x __VA_OPT__(,))
-  |                    ^^^^^^^^^^
-  = help: `...` as the last parameter takes all further arguments
-
-error[D007]: `__VA_OPT__` needs parentheses around what it is about
- --> a.ic:2:25
-  |
-2 | #define SET(x, ...) f(x __VA_OPT__, __VA_ARGS__)
-  |                         ^^^^^^^^^^
-  = help: write `__VA_OPT__(, __VA_ARGS__)`: what stands there is left out where no more arguments are given
-
-2 errors
-"""
-    )
-
-
-def test_a_name_in_a_condition_that_is_no_macro_gets_a_warning(desk: Desk):
-    assert (
-        desk.told("#define LINKS 2\nlet span = 2 m;\n#if LINK > 1 || span > 1\n#endif\n")
-        == """\
-warning[D036]: `LINK` is no macro, so it counts as 0 in this condition
- --> a.ic:3:5
-  |
-3 | #if LINK > 1 || span > 1
-  |     ^^^^
-  = help: did you mean `LINKS`?
-  = help: ask `defined(LINK)`, or define it before: `#define LINK 1`, `-D LINK=1`
-
-warning[D036]: `span` is no macro, so it counts as 0 in this condition
- --> a.ic:3:17
-  |
-3 | #if LINK > 1 || span > 1
-  |                 ^^^^
- ::: a.ic:2:5  this `let` is a value; a condition sees macros alone
-  = help: define a macro for it, `#define NAME ...`, and ask that
-
-2 warnings
-"""
-    )
-
-
 @pytest.mark.parametrize("text", [
     "#ifdef LINK\n#elifndef ROD\n#endif", "#if defined(LINK) && LINK > 1\n#endif", "#if 1 || LINK\n#endif",
     "#if 0 && LINK\n#endif", "#if 0\n#if LINK\n#endif\n#endif", "#define LINK 0\n#if LINK\n#endif",
@@ -356,22 +284,6 @@ def test_a_character_that_some_languages_write_with_is_a_warning_in_a_comment(de
     assert sorted((d.code, d.severity) for d in both) == [("D038", "error"), ("D038", "warning")]
 
 
-def test_a_wrong_number_of_arguments_says_how_many_and_shows_the_definition(desk: Desk):
-    assert (
-        desk.told("#define ROD(NAME, MASS) link NAME { mass = MASS; }\narm a {\n  ROD(upper)\n  ROD(lower, 1 kg)\n}\n")
-        == """\
-error[D012]: macro `ROD` takes 2 arguments, but 1 is given
- --> a.ic:3:3
-  |
-3 |   ROD(upper)
-  |   ^^^^^^^^^^
- ::: a.ic:1:9  `ROD` is defined here
-
-1 error
-"""
-    )
-
-
 def test_a_circular_include_is_told_as_the_circle_it_is(desk: Desk):
     assert (
         desk.told('#include "b.ic"\n', (), {"b.ic": '// b\n  #include "c.ic"\n', "c.ic": '#include "b.ic"\n'})
@@ -386,69 +298,6 @@ error[D006]: circular include: b.ic -> c.ic -> b.ic
   = note: included from a.ic:1
 
 1 error
-"""
-    )
-
-
-def test_a_redefinition_shows_both_places(desk: Desk):
-    assert (
-        desk.told("#define SIZE 1\n\n#define SIZE 2\n")
-        == """\
-error[D010]: macro `SIZE` is defined again, differently
- --> a.ic:3:9
-  |
-3 | #define SIZE 2
-  |         ^^^^
- ::: a.ic:1:9  first defined here
-  = help: `#undef SIZE` first; or, if this is a default, write it between `#ifndef SIZE` and `#endif`
-
-1 error
-"""
-    )
-
-
-def test_comparing_decimals_or_strings_in_if_is_refused_kindly(desk: Desk):
-    assert (
-        desk.told('#if 0.5 > 0.1\n#endif\n#define X "a"\n#if X == "a"\n#endif\n')
-        == """\
-error[D009]: `#if` compares whole numbers only, as in C, and `0.5` is not whole
- --> a.ic:1:5
-  |
-1 | #if 0.5 > 0.1
-  |     ^^^
-  = help: give the switch whole values, or choose by `#ifdef`
-
-error[D009]: `#if` compares whole numbers only, as in C: a string has no value here
- --> a.ic:4:5
-  |
-4 | #if X == "a"
-  |     ^
- ::: a.ic:3:11  written here, in macro X
-  = help: define each choice as a number, `#define RIGID 1`, and compare with its name
-  = note: in expansion of macro X, used at a.ic:4:5
-
-2 errors
-"""
-    )
-
-
-def test_error_and_warning_directives_become_diagnostics_in_their_words(desk: Desk):
-    assert (
-        desk.told("#error don't use this // yet\n#warning careful\n")
-        == """\
-error[D014]: don't use this // yet
- --> a.ic:1:2
-  |
-1 | #error don't use this // yet
-  |  ^^^^^
-
-warning[D015]: careful
- --> a.ic:2:2
-  |
-2 | #warning careful
-  |  ^^^^^^^
-
-1 error, 1 warning
 """
     )
 

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import math
 import sys
-import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -189,10 +187,7 @@ def experiment(machine: Machine, count: int, rng: np.random.Generator) -> Experi
     vary = "".join(
         f"vary {name} = [{low!r}, {1.01 * low!r}] {unit};\n" for name, (low, _, unit) in machine.ranges.items()
     )
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "deck.ic")
-        path.write_text(f"{deck}\nsweep all of r {{\n{vary}}}\n")
-        (made,) = ic.compile(path, select=["all"]).experiments
+    (made,) = ic.compile(text=f"{deck}\nsweep all of r {{\n{vary}}}\n", select=["all"]).experiments
     coordinates = []
     for each in made.cases.coordinates:
         low, high, _ = machine.ranges[each.path]

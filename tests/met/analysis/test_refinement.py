@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -14,10 +12,8 @@ from met.plan import Experiment
 from tests.oracles.random_deck import random_deck
 
 
-def experiment(tmp_path: Path, text: str) -> Experiment:
-    deck = tmp_path / "deck.ic"
-    deck.write_text(text, encoding="utf-8")
-    return ic.compile(deck).experiments[0]
+def experiment(text: str) -> Experiment:
+    return ic.compile(text=text).experiments[0]
 
 
 def signals(of: Experiment) -> dict[str, np.ndarray]:
@@ -26,15 +22,15 @@ def signals(of: Experiment) -> dict[str, np.ndarray]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 11, 12])
-def test_the_error_falls_with_the_square_of_the_step(tmp_path: Path, seed: int) -> None:
-    of = experiment(tmp_path, random_deck(seed, friction=False))
+def test_the_error_falls_with_the_square_of_the_step(seed: int) -> None:
+    of = experiment(random_deck(seed, friction=False))
     q = {factor: signals(refine(of, factor))["q"] for factor in (4, 8, 16)}
     coarse, fine = (np.abs(q[factor] - q[2 * factor]).max() for factor in (4, 8))
     assert np.log2(coarse / fine) == pytest.approx(2.0, abs=0.1)
 
 
-def test_one_step_for_one_is_the_experiment_itself(tmp_path: Path) -> None:
-    of = experiment(tmp_path, random_deck(5))
+def test_one_step_for_one_is_the_experiment_itself() -> None:
+    of = experiment(random_deck(5))
     assert refine(of, 1) == of
     with pytest.raises(ValueError, match="a step cannot be parted in 0"):
         refine(of, 0)
@@ -53,10 +49,8 @@ run noisy like nominal {
 
 
 @pytest.mark.slow
-def test_noise_is_drawn_at_the_same_instants(tmp_path: Path) -> None:
-    deck = tmp_path / "deck.ic"
-    deck.write_text(NOISY, encoding="utf-8")
-    [of] = ic.compile(deck, select=["noisy"]).experiments
+def test_noise_is_drawn_at_the_same_instants() -> None:
+    [of] = ic.compile(text=NOISY, select=["noisy"]).experiments
 
     def noise(factor: int) -> np.ndarray:
         seen = signals(refine(of, factor))
@@ -67,8 +61,8 @@ def test_noise_is_drawn_at_the_same_instants(tmp_path: Path) -> None:
         np.testing.assert_allclose(noise(factor), noise(1), rtol=0.0, atol=1e-12)
 
 
-def test_factors_that_do_not_divide_the_step_make_the_base_rate_faster(tmp_path: Path) -> None:
-    of = experiment(tmp_path, random_deck(7))
+def test_factors_that_do_not_divide_the_step_make_the_base_rate_faster() -> None:
+    of = experiment(random_deck(7))
     schedule = of.structure.schedule
     for factor in (2, 3, 4, 6):
         refined = refine(of, factor).structure

@@ -38,9 +38,8 @@ run push {
 """
 
 
-def compiled(folder: Path, text: str, name: str) -> Experiment:
-    (folder / "deck.ic").write_text(text, encoding="utf-8")
-    return ic.compile(folder / "deck.ic", select=[name]).experiments[0]
+def compiled(text: str, name: str) -> Experiment:
+    return ic.compile(text=text, select=[name]).experiments[0]
 
 
 def work(experiment: Experiment, joint: str) -> ShaftWork:
@@ -48,9 +47,9 @@ def work(experiment: Experiment, joint: str) -> ShaftWork:
     return block
 
 
-def test_a_pushed_disk_needs_what_newton_says(tmp_path: Path) -> None:
+def test_a_pushed_disk_needs_what_newton_says() -> None:
     """J = N^2 J_m + I: w' = N tau/J, the load gives -I w'/N^2, and a heavier rotor of its own is to be pushed by it."""
-    found = work(compiled(tmp_path, PUSHED, "push"), "swing")
+    found = work(compiled(PUSHED, "push"), "swing")
     slope = 50.0 * 2.0 / (0.25 + 0.3)
     close = {"rtol": 1e-5, "atol": 1e-9}
     np.testing.assert_allclose(found.drive[0], 2.0 / 50.0, **close)
@@ -106,11 +105,11 @@ ARMS = {
 
 @pytest.mark.release
 @pytest.mark.parametrize("arm", ARMS)
-def test_the_load_is_what_the_shafts_equation_leaves_over(tmp_path: Path, arm: str) -> None:
+def test_the_load_is_what_the_shafts_equation_leaves_over(arm: str) -> None:
     """Torque by the arm's dynamics, against that by voltage, rate and its slope: two ways that share nothing. A step's
     mean is compared with its ends' mean, which differ by as much as the torque bends or jumps within a step."""
     text, joint, numbers = ARMS[arm]
-    experiment = compiled(tmp_path, text, "fine")
+    experiment = compiled(text, "fine")
     found = work(experiment, joint)
     other, slides = measured(experiment, joint, numbers)
     mean = 0.5 * (found.load[:, 1:] + found.load[:, :-1])
@@ -122,10 +121,10 @@ def test_the_load_is_what_the_shafts_equation_leaves_over(tmp_path: Path, arm: s
 
 @pytest.mark.slow
 @pytest.mark.parametrize("arm", ARMS)
-def test_both_motors_together_give_what_the_shaft_and_friction_take(tmp_path: Path, arm: str) -> None:
+def test_both_motors_together_give_what_the_shaft_and_friction_take(arm: str) -> None:
     """Over the run: the shaft's kinetic energy at its end, and F_c and F_v along its way."""
     text, joint, p = ARMS[arm]
-    found = work(compiled(tmp_path, text, "fine"), joint)
+    found = work(compiled(text, "fine"), joint)
     w, given = found.rate[0], (found.drive + found.load)[0] * found.rate[0]
     taken = p["f_c"] * np.abs(w) + p.get("f_v", 0.0) * w**2
     given_at_all = np.trapezoid(np.abs(found.drive[0] * w) + np.abs(found.load[0] * w), found.time)
@@ -135,9 +134,9 @@ def test_both_motors_together_give_what_the_shaft_and_friction_take(tmp_path: Pa
 
 
 @pytest.mark.slow
-def test_the_two_link_arms_load_is_its_mass_matrix_times_its_accelerations(tmp_path: Path) -> None:
+def test_the_two_link_arms_load_is_its_mass_matrix_times_its_accelerations() -> None:
     """By the closed form of Lagrange's equations; the deck's arm has no velocity products."""
-    experiment = compiled(tmp_path, ARMS["two_link"][0], "fine")
+    experiment = compiled(ARMS["two_link"][0], "fine")
     q, qdd = (each[0] for each in recorded(experiment, "q", "qdd"))
     rods = Rods()
     l1, l2, m1, m2 = rods.length_1, rods.length_2, rods.mass_1, rods.mass_2
@@ -150,14 +149,14 @@ def test_the_two_link_arms_load_is_its_mass_matrix_times_its_accelerations(tmp_p
 
 @pytest.mark.release
 @pytest.mark.parametrize("arm", ARMS)
-def test_the_figures_are_those_of_the_engines_metrics(tmp_path: Path, arm: str) -> None:
+def test_the_figures_are_those_of_the_engines_metrics(arm: str) -> None:
     text, joint, numbers = ARMS[arm]
     metrics = "".join(
         f"metric {name}_{short} = {name} {{ of = {joint}.{of}; }}"
         for name in ("rms", "peak")
         for short, of in (("drive", "servo.motor_torque"), ("load", "tau_load"), ("rate", "servo.motor_rate"))
     )
-    experiment = compiled(tmp_path, f"{text}\nrun metered like fine {{ {metrics} }}", "metered")
+    experiment = compiled(f"{text}\nrun metered like fine {{ {metrics} }}", "metered")
     found, by_engine = work(experiment, joint), run(experiment).metrics
     loads = found.load * numbers["ratio"]
     for short, values in (("drive", found.drive), ("load", loads), ("rate", found.rate)):
@@ -166,12 +165,12 @@ def test_the_figures_are_those_of_the_engines_metrics(tmp_path: Path, arm: str) 
 
 
 @pytest.mark.slow
-def test_a_joint_on_a_faultless_bed_asks_what_the_joint_itself_asks(tmp_path: Path) -> None:
+def test_a_joint_on_a_faultless_bed_asks_what_the_joint_itself_asks() -> None:
     """To the bed's own error, which settles (docs/substitution.md)."""
     text, joint, _ = ARMS["two_link"]
     bedded = "run bedded like fine { substitute shoulder { law = velocity_tracking; } }"
-    own = work(compiled(tmp_path, text, "fine"), joint)
-    bed = work(compiled(tmp_path, f"{text}\n{bedded}", "bedded"), joint)
+    own = work(compiled(text, "fine"), joint)
+    bed = work(compiled(f"{text}\n{bedded}", "bedded"), joint)
     for name, most in (("drive", 2e-4), ("load", 5e-4), ("rate", 5e-4), ("arm", 1e-8)):
         one, other = (np.sqrt((getattr(each, name) ** 2).mean()) for each in (own, bed))
         assert other == pytest.approx(one, rel=most), name
@@ -180,12 +179,12 @@ def test_a_joint_on_a_faultless_bed_asks_what_the_joint_itself_asks(tmp_path: Pa
 
 
 @pytest.mark.slow
-def test_the_torque_on_a_bed_is_of_the_bed_s_motor_and_the_current_is_of_its_load(tmp_path: Path) -> None:
+def test_the_torque_on_a_bed_is_of_the_bed_s_motor_and_the_current_is_of_its_load() -> None:
     """The motor that is there, not the one of the data sheet: 7 % more torque for an ampere."""
     text = ARMS["two_link"][0] + (
         "run bedded like fine { substitute shoulder { bed = emulated(kt = 0.0653 N*m/A, kt_load = 0.1 N*m/A); } }"
     )
-    experiment = compiled(tmp_path, text, "bedded")
+    experiment = compiled(text, "bedded")
     found = work(experiment, "shoulder")
     names = ("drive_voltage", "shaft_rate", "load_current")
     voltage, rate, current = recorded(experiment, *(f"shoulder.bed.{name}" for name in names))
@@ -193,11 +192,11 @@ def test_the_torque_on_a_bed_is_of_the_bed_s_motor_and_the_current_is_of_its_loa
     np.testing.assert_allclose(found.load, 0.1 * current, rtol=1e-12, atol=1e-15)
 
 
-def test_a_parameter_that_a_sweep_varies_is_each_case_s_own(tmp_path: Path) -> None:
+def test_a_parameter_that_a_sweep_varies_is_each_case_s_own() -> None:
     text = (
         PUSHED + "sweep ratios of push { vary pushed.ratio = [25, 50, 100];  vary pushed.j_m = [1e-4, 2e-4] kg*m^2; }"
     )
-    found = work(compiled(tmp_path, text, "ratios"), "swing")
+    found = work(compiled(text, "ratios"), "swing")
     ratio, rotor = np.repeat([25.0, 50.0, 100.0], 2), np.tile([1e-4, 2e-4], 3)
     np.testing.assert_array_equal(found.case, np.arange(6))
     np.testing.assert_allclose(found.rotor, rotor, rtol=1e-15)
@@ -207,9 +206,9 @@ def test_a_parameter_that_a_sweep_varies_is_each_case_s_own(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_a_joint_that_is_put_on_a_bed_has_the_margin_of_a_deck_that_does_it(tmp_path: Path) -> None:
+def test_a_joint_that_is_put_on_a_bed_has_the_margin_of_a_deck_that_does_it() -> None:
     text, joint, _ = ARMS["panda"]
     written = "run bedded like fine { substitute joint2 { bed = emulated(delay = 1); } }"
-    put = on_bed(compiled(tmp_path, text, "fine"), joint, delay=1)
-    assert margins(put) == margins(compiled(tmp_path, f"{text}\n{written}", "bedded"))
+    put = on_bed(compiled(text, "fine"), joint, delay=1)
+    assert margins(put) == margins(compiled(f"{text}\n{written}", "bedded"))
     assert on_bed(put, joint, delay=0) is put

@@ -190,9 +190,7 @@ run hold { arm = swing; servos { hinge = drive; } rates { dynamics = 100 Hz; ser
         ("torque = 6 N*m;  from = 0.5 s;", False),
     ],
 )
-def test_a_joint_that_its_brake_holds_from_the_start_to_the_end_stays_held(
-    tmp_path: Path, brake: str, held: bool
-) -> None:
+def test_a_joint_that_its_brake_holds_from_the_start_to_the_end_stays_held(brake: str, held: bool) -> None:
     """A bar of 1 kg whose weight takes 9.81 N * 0.5 m cos(0.2) about the hinge."""
     deck = f"""\
 arm swing {{ link bar {{ mass = 1 kg; com = [0.5, 0, 0] m; inertia = [1, 1, 1] kg*m^2; }}
@@ -201,8 +199,7 @@ run hold {{ arm = swing; initial {{ hinge.q = 0.2 rad; }} rates {{ dynamics = 10
     environment {{ gravity = [0, 0, -9.81] m/s^2;  grip = brake {{ joint = hinge;  {brake} }} }} }}
 sweep several of hold {{ vary links.bar.com.x = [0.5, 0.4, 0.3] m; }}
 """
-    (tmp_path / "deck.ic").write_text(deck)
-    made = ic.compile(tmp_path / "deck.ic", select=["several"]).experiments[0]
+    made = ic.compile(text=deck, select=["several"]).experiments[0]
     found = Linearizer(made, [0]).map()
     assert list(found.loose) == [False, True]
     assert bool(found.slope[1, 1, 0] == 0.0) is held
@@ -211,10 +208,9 @@ sweep several of hold {{ vary links.bar.com.x = [0.5, 0.4, 0.3] m; }}
     assert [bool(each) for each in several.slope[1::2, 1, 0] == 0.0] == [held, lighter, lighter]
 
 
-def test_slopes_are_equal_to_the_bit_in_blocks_of_any_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_slopes_are_equal_to_the_bit_in_blocks_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
     deck = SWING + "sweep several of hold { vary sprung.stiffness = [25, 250, 2500] N*m/rad; }\n"
-    (tmp_path / "deck.ic").write_text(deck)
-    made = ic.compile(tmp_path / "deck.ic", select=["several"]).experiments[0]
+    made = ic.compile(text=deck, select=["several"]).experiments[0]
     whole = Linearizer(made, [0, 1, 2]).slope
     ran = []
     plain = StepPhases.slope

@@ -33,22 +33,21 @@ base = prescribed {
 )
 
 
-def plan(folder: Path, text: str) -> Plan:
-    (folder / "deck.ic").write_text(ARM + text, encoding="utf-8")
-    return ic.compile(folder / "deck.ic")
+def plan(text: str) -> Plan:
+    return ic.compile(text=ARM + text)
 
 
 @pytest.mark.parametrize("text", [RUN, SHAKEN], ids=["free", "prescribed"])
 def test_a_plan_file_keeps_the_base(tmp_path: Path, text: str) -> None:
-    made = plan(tmp_path, text)
+    made = plan(text)
     plan_file.write(made, tmp_path / "p.json")
     again = plan_file.read(tmp_path / "p.json")
     assert again.experiments[0].structure == made.experiments[0].structure
     assert again.experiments[0].parameters == made.experiments[0].parameters
 
 
-def test_the_key_of_a_fixed_base_is_what_it_was_and_others_have_their_own(tmp_path: Path) -> None:
-    free = plan(tmp_path, RUN).experiments[0].structure
+def test_the_key_of_a_fixed_base_is_what_it_was_and_others_have_their_own() -> None:
+    free = plan(RUN).experiments[0].structure
     fixed = replace(free, base=None)
     assert "base" not in plan_file.encode(type(fixed), fixed)
     told = replace(free, base=Base("prescribed", (Course("x", "sine"),)))
@@ -116,8 +115,8 @@ def base(**new: Any) -> Change:
         ),
     ],
 )
-def test_what_is_wrong_is_said_with_its_path(tmp_path: Path, text: str, change: Change, said: str) -> None:
-    document = json.loads(plan_file.dumps(plan(tmp_path, text)))
+def test_what_is_wrong_is_said_with_its_path(text: str, change: Change, said: str) -> None:
+    document = json.loads(plan_file.dumps(plan(text)))
     change(document["experiments"][0])
     with pytest.raises(Problem) as caught:
         plan_file.loads(json.dumps(document), "p.json")
@@ -125,8 +124,8 @@ def test_what_is_wrong_is_said_with_its_path(tmp_path: Path, text: str, change: 
     assert diagnostic.message.removeprefix("the plan p.json is damaged: experiments[0].") == said
 
 
-def test_a_missing_number_of_the_base_is_told(tmp_path: Path) -> None:
-    document = json.loads(plan_file.dumps(plan(tmp_path, RUN)))
+def test_a_missing_number_of_the_base_is_told() -> None:
+    document = json.loads(plan_file.dumps(plan(RUN)))
     del document["experiments"][0]["parameters"]["initial.base.rate.y"]
     with pytest.raises(Problem) as caught:
         plan_file.loads(json.dumps(document), "p.json")
@@ -136,7 +135,7 @@ def test_a_missing_number_of_the_base_is_told(tmp_path: Path) -> None:
     )
 
 
-def test_a_link_named_base_may_stand_on_a_fixed_base(tmp_path: Path) -> None:
-    structure = plan(tmp_path, RUN).experiments[0].structure
+def test_a_link_named_base_may_stand_on_a_fixed_base() -> None:
+    structure = plan(RUN).experiments[0].structure
     assert Link("base") in {replace(link, place=None, shape=None) for link in structure.links}
     assert structure.ground == ("base",)

@@ -33,10 +33,8 @@ SWEEPS = {
 }
 
 
-def compiled(folder: Path, sweep: str) -> Plan:
-    deck = folder / "deck.ic"
-    deck.write_text(f"{DECK} sweep them of short {{ {SWEEPS[sweep]} }}", encoding="utf-8")
-    return ic.compile(deck, select=["them"])
+def compiled(sweep: str) -> Plan:
+    return ic.compile(text=f"{DECK} sweep them of short {{ {SWEEPS[sweep]} }}", select=["them"])
 
 
 def listed(plan: Plan) -> list[list[np.ndarray]]:
@@ -123,13 +121,11 @@ def test_any_draws_are_had_in_any_order() -> None:
 
 @pytest.mark.release
 @pytest.mark.parametrize("sweep", SWEEPS)
-def test_a_long_sweep_has_the_values_keys_and_plan_of_a_listed_one(
-    sweep: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    computed = compiled(tmp_path, sweep)
+def test_a_long_sweep_has_the_values_keys_and_plan_of_a_listed_one(sweep: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    computed = compiled(sweep)
     assert all(isinstance(c.values, columns.ComputedColumn) for e in computed.experiments for c in e.cases.coordinates)
     monkeypatch.setattr(columns, "LISTED_ROWS", 1_000_000)
-    arrays = compiled(tmp_path, sweep)
+    arrays = compiled(sweep)
     assert all(isinstance(c.values, np.ndarray) for e in arrays.experiments for c in e.cases.coordinates)
     assert alike(listed(computed), listed(arrays))
     assert plan_file.dumps(computed) == plan_file.dumps(arrays)
@@ -142,7 +138,7 @@ def test_a_long_sweep_has_the_values_keys_and_plan_of_a_listed_one(
 @pytest.mark.slow
 @pytest.mark.parametrize("sweep", SWEEPS)
 def test_what_a_table_is_computed_from_comes_back_from_a_plan(sweep: str, tmp_path: Path) -> None:
-    plan = compiled(tmp_path, sweep)
+    plan = compiled(sweep)
     plan_file.write(plan, tmp_path / "p.json", computed=True)
     back = plan_file.read(tmp_path / "p.json")
     assert alike(listed(plan), listed(back))
@@ -164,7 +160,7 @@ def test_what_a_table_is_computed_from_comes_back_from_a_plan(sweep: str, tmp_pa
     ],
 )
 def test_a_plan_whose_table_cannot_be_computed_is_damaged(was: str, now: str, tmp_path: Path) -> None:
-    plan_file.write(compiled(tmp_path, "product"), tmp_path / "p.json", computed=True)
+    plan_file.write(compiled("product"), tmp_path / "p.json", computed=True)
     text = (tmp_path / "p.json").read_text(encoding="utf-8")
     assert was in text
     (tmp_path / "p.json").write_text(text.replace(was, now), encoding="utf-8")

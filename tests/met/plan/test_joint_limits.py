@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -16,14 +15,13 @@ from tests.ic.small_decks import ARM, RUN, SERVO
 LIMITED = ARM.replace("axis = z;", "axis = z;  q_min = -1 rad;  q_max = 1 rad;  qd_max = 2 rad/s;  tau_max = 9 N*m;")
 
 
-def document(folder: Path, arm: str) -> dict:  # type: ignore[type-arg]
-    (folder / "d.ic").write_text(arm + SERVO + RUN, encoding="utf-8")
-    found: dict = json.loads(plan_file.dumps(ic.compile(folder / "d.ic")))  # type: ignore[type-arg]
+def document(arm: str) -> dict:  # type: ignore[type-arg]
+    found: dict = json.loads(plan_file.dumps(ic.compile(text=arm + SERVO + RUN)))  # type: ignore[type-arg]
     return found
 
 
-def test_a_plan_keeps_them_and_one_of_before_there_were_any_is_run_as_it_was(tmp_path: Path) -> None:
-    kept, old = document(tmp_path, LIMITED), document(tmp_path, ARM)
+def test_a_plan_keeps_them_and_one_of_before_there_were_any_is_run_as_it_was() -> None:
+    kept, old = document(LIMITED), document(ARM)
     [experiment] = plan_file.loads(json.dumps(kept)).experiments
     assert experiment.structure.joints[0].limits == ("q_min", "q_max", "qd_max", "tau_max")
     assert list(engine.run(experiment).excess) == [f"hinge.{name}" for name in experiment.structure.joints[0].limits]
@@ -34,16 +32,16 @@ def test_a_plan_keeps_them_and_one_of_before_there_were_any_is_run_as_it_was(tmp
     assert without.signals["q"].tobytes() == engine.run(experiment).signals["q"].tobytes()
 
 
-def test_a_limit_without_its_number_is_told(tmp_path: Path) -> None:
-    kept = document(tmp_path, LIMITED)
+def test_a_limit_without_its_number_is_told() -> None:
+    kept = document(LIMITED)
     del kept["experiments"][0]["parameters"]["hinge.qd_max"]
     with pytest.raises(Problem, match=r"E304: .*`hinge\.qd_max` is missing and has no default"):
         plan_file.loads(json.dumps(kept))
 
 
 @pytest.mark.parametrize(("name", "value", "why"), [("q_min", 1.0, "less than `q_max`"), ("tau_max", 0.0, "above 0")])
-def test_limits_that_a_deck_could_not_write_are_refused(tmp_path: Path, name: str, value: float, why: str) -> None:
-    kept = document(tmp_path, LIMITED)
+def test_limits_that_a_deck_could_not_write_are_refused(name: str, value: float, why: str) -> None:
+    kept = document(LIMITED)
     kept["experiments"][0]["parameters"][f"hinge.{name}"]["value"] = value
     with pytest.raises(Problem, match=rf"E302: .*{why}"):
         plan_file.loads(json.dumps(kept))

@@ -28,14 +28,13 @@ TWO = changed(RUN, (BOX, BOX + HELD))
 SWEEP = "sweep some of tumbling { zip { payloads.box.mass = [12, 14] kg;  payloads.box.grapple = [0.8, 0.9] s; } }\n"
 
 
-def plan(folder: Path, text: str = TWO, **options: object) -> Plan:
-    (folder / "deck.ic").write_text(ARM + text, encoding="utf-8")
-    return ic.compile(folder / "deck.ic", **options)  # type: ignore[arg-type]
+def plan(text: str = TWO, **options: object) -> Plan:
+    return ic.compile(text=ARM + text, **options)  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
 def test_a_plan_file_keeps_payloads_and_runs_without_the_deck(tmp_path: Path) -> None:
-    made = plan(tmp_path, TWO + SWEEP, select=["some"])
+    made = plan(TWO + SWEEP, select=["some"])
     plan_file.write(made, tmp_path / "p.json")
     again = plan_file.read(tmp_path / "p.json")
     assert again.experiments[0].structure == made.experiments[0].structure
@@ -46,8 +45,8 @@ def test_a_plan_file_keeps_payloads_and_runs_without_the_deck(tmp_path: Path) ->
     assert np.max(np.abs(one.signals["qd"][0] - one.signals["qd"][1])) > 0.1
 
 
-def test_the_key_of_an_arm_without_payloads_is_what_it_was_and_others_have_their_own(tmp_path: Path) -> None:
-    two = plan(tmp_path).experiments[0].structure
+def test_the_key_of_an_arm_without_payloads_is_what_it_was_and_others_have_their_own() -> None:
+    two = plan().experiments[0].structure
     without = replace(two, payloads=())
     assert "payloads" not in plan_file.encode(type(without), without)
     box, crate = two.payloads
@@ -63,8 +62,8 @@ def test_the_key_of_an_arm_without_payloads_is_what_it_was_and_others_have_their
     assert structure_key(drawn) == structure_key(two)
 
 
-def test_a_mass_that_varies_is_an_input_of_the_program(tmp_path: Path) -> None:
-    made = plan(tmp_path, TWO + SWEEP, select=["some"]).experiments[0]
+def test_a_mass_that_varies_is_an_input_of_the_program() -> None:
+    made = plan(TWO + SWEEP, select=["some"]).experiments[0]
     assert {"payloads.box.mass", "payloads.box.grapple"} <= set(inputs(made))
 
 
@@ -115,7 +114,7 @@ def value(path: str, to: object) -> Change:
     ],
 )
 def test_a_plan_that_somebody_broke_is_told(tmp_path: Path, change: Change, said: str) -> None:
-    plan_file.write(plan(tmp_path), tmp_path / "p.json")
+    plan_file.write(plan(), tmp_path / "p.json")
     document = json.loads((tmp_path / "p.json").read_text(encoding="utf-8"))
     change(document["experiments"][0])
     (tmp_path / "p.json").write_text(json.dumps(document), encoding="utf-8")
@@ -126,7 +125,7 @@ def test_a_plan_that_somebody_broke_is_told(tmp_path: Path, change: Change, said
 
 
 def test_a_parameter_that_is_missing_is_told(tmp_path: Path) -> None:
-    plan_file.write(plan(tmp_path), tmp_path / "p.json")
+    plan_file.write(plan(), tmp_path / "p.json")
     document = json.loads((tmp_path / "p.json").read_text(encoding="utf-8"))
     del document["experiments"][0]["parameters"]["payloads.box.velocity.y"]
     (tmp_path / "p.json").write_text(json.dumps(document), encoding="utf-8")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 ARM = """\
 arm flyer {
     link base  { mass = 40 kg; inertia = [5, 7, 9, 0.3, -0.4, 0.5] kg*m^2; com = [0.1, 0.05, -0.1] m; }
@@ -34,3 +36,10 @@ run tumbling {
                 energy, momentum, J_eff, b];
 }
 """
+
+
+def matrix(q: np.ndarray) -> np.ndarray:
+    """The rotation matrix of a unit quaternion (w, x, y, z)."""
+    w, v = q[0], q[1:]
+    K = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    return np.eye(3) + 2.0 * w * K + 2.0 * K @ K

@@ -15,7 +15,7 @@ from met.program import build
 from met.program.system import System
 from met.run import Run
 from tests.ic.small_decks import changed, check, experiment
-from tests.met.program.free_flyers import ARM, RUN
+from tests.met.program.free_flyers import ARM, RUN, matrix
 
 STATE = ("q", "qd", "links.base.position", "links.base.orientation", "links.base.velocity", "links.base.rate")
 
@@ -135,7 +135,7 @@ def test_a_free_base_falls_with_its_arm_in_gravity(tmp_path: Path) -> None:
 def test_a_wrench_on_the_base_moves_all_of_it(tmp_path: Path) -> None:
     push = "push = wrench { link = base; force = [3, 2, 1] N; point = [0.5, 0, 0] m; axes = link; until = 1 s; }"
     run = flown(tmp_path, ("environment {}", f"environment {{ {push} }}"), *at_rate(400, "rk4"))
-    axes = [_matrix(q) for q in run.signals["links.base.orientation"][0]]
+    axes = [matrix(q) for q in run.signals["links.base.orientation"][0]]
     force = np.array([R @ (3.0, 2.0, 1.0) for R in axes])
     moment = np.cross(run.signals["links.base.position"][0] + [R @ (0.5, 0.0, 0.0) for R in axes], force)
     acting = run.time < 1.0
@@ -397,11 +397,5 @@ def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.array([a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
 
 
-def _matrix(q: np.ndarray) -> np.ndarray:
-    w, v = q[0], q[1:]
-    K = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-    return np.eye(3) + 2.0 * w * K + 2.0 * K @ K
-
-
 def _turned_back(q: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    return _matrix(q).T @ vector
+    return matrix(q).T @ vector

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -67,11 +66,9 @@ Swept = tuple[engine.Prepared, tuple[np.ndarray, np.ndarray]]
 
 
 @pytest.fixture(scope="module")
-def swept(tmp_path_factory: pytest.TempPathFactory) -> Swept:
+def swept() -> Swept:
     """The sweep and what its cases leave where all is well: rows and outputs."""
-    deck = tmp_path_factory.mktemp("swept") / "deck.ic"
-    deck.write_text(DECK)
-    prepared = engine.prepare(ic.compile(str(deck), select=["many"]).experiments[0], lanes=LANES)
+    prepared = engine.prepare(ic.compile(text=DECK, select=["many"]).experiments[0], lanes=LANES)
     run = engine.run(prepared, threads=1)
     assert not run.status.any() and len(run.case) == CASES
     assert (run.events["splits"] > 0).sum() >= 15, "while a case is bad its neighbours are to have friction's events"
@@ -153,10 +150,8 @@ sweep starts of drifting { zip { initial.shoulder.q = [0, 1, 2] rad; initial.sho
 
 
 @pytest.mark.parametrize("path", ["initial.shoulder.q", "initial.shoulder.qd"])
-def test_a_state_that_no_acceleration_depends_on_hides_nothing(tmp_path: Path, path: str) -> None:
-    deck = tmp_path / "deck.ic"
-    deck.write_text(STILL)
-    experiment = ic.compile(str(deck), select=["starts"]).experiments[0]
+def test_a_state_that_no_acceleration_depends_on_hides_nothing(path: str) -> None:
+    experiment = ic.compile(text=STILL, select=["starts"]).experiments[0]
     run = engine.run(changed(experiment, 1, path, np.nan))
     assert run.status.tolist() == [0, 1, 0] and run.n_valid.tolist() == [11, 0, 11]
     assert np.isnan(run.signals["qd"][1]).all() and np.isfinite(run.signals["q"][[0, 2]]).all()
@@ -164,14 +159,17 @@ def test_a_state_that_no_acceleration_depends_on_hides_nothing(tmp_path: Path, p
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("error")
-def test_constants_that_overflow_say_nothing_while_a_program_is_made(tmp_path: Path) -> None:
+def test_constants_that_overflow_say_nothing_while_a_program_is_made() -> None:
     """They are folded as a kernel would compute them: infinity, and no warning of numpy's beside what MET prints."""
-    path = tmp_path / "deck.ic"
-    path.write_text(
-        DECK.replace(
-            "sine(amplitude = 0.5 rad/s, frequency = 2 Hz)",
-            "trapezoid(to = 1e200 rad/s, max_rate = 1e-200 rad/s^2, max_acceleration = 1e-300 rad/s^3)",
+    made = engine.run(
+        engine.prepare(
+            ic.compile(
+                text=DECK.replace(
+                    "sine(amplitude = 0.5 rad/s, frequency = 2 Hz)",
+                    "trapezoid(to = 1e200 rad/s, max_rate = 1e-200 rad/s^2, max_acceleration = 1e-300 rad/s^3)",
+                ),
+                select=["swung"],
+            ).experiments[0]
         )
     )
-    made = engine.run(engine.prepare(ic.compile(path, select=["swung"]).experiments[0]))
     assert made.status.tolist() == [0]

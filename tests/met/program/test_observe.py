@@ -6,7 +6,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -66,10 +65,8 @@ sweep masses of pick { vary links.boom.mass = [5, 7] kg;  vary links.boom.com.x 
 JOINTS = ("tau_load", "J_eff", "b", "mode", "reaction")
 
 
-def experiment(folder: Path, text: str, select: str | None = None) -> Experiment:
-    deck = folder / "deck.ic"
-    deck.write_text(text)
-    return ic.compile(str(deck), select=[select] if select else None).experiments[0]
+def experiment(text: str, select: str | None = None) -> Experiment:
+    return ic.compile(text=text, select=[select] if select else None).experiments[0]
 
 
 def recording(text: str, *names: str) -> str:
@@ -182,9 +179,9 @@ def compare(
 
 
 @pytest.mark.oracle
-def test_an_arm_with_a_stuck_joint_a_slide_a_branch_and_fixed_links(tmp_path: Path) -> None:
+def test_an_arm_with_a_stuck_joint_a_slide_a_branch_and_fixed_links() -> None:
     names = [*JOINTS, "energy", "momentum", *of_links(DECK)]
-    run = compare(experiment(tmp_path, recording(DECK, *names), "masses"), names)
+    run = compare(experiment(recording(DECK, *names), "masses"), names)
     assert set(run.signals["mode"][0, :, 1]) == {0.0, 1.0}, "the swing is to stick first, and then to move"
     assert (run.signals["mode"][0, :, 2] == 1.0).all(), "nothing drives the lamp: its torque is given, and 0"
 
@@ -196,31 +193,31 @@ servo hold   { model = locked;  release = 0.4 s; }
 
 
 @pytest.mark.oracle
-def test_joints_that_are_told_their_acceleration(tmp_path: Path) -> None:
+def test_joints_that_are_told_their_acceleration() -> None:
     text = DECK.replace("swing = turner;", "swing = follow;  pan = hold;").replace("  pan.qd = 1 rad/s;", "")
     names = [*JOINTS, "energy", "momentum", "links.lamp.position"]
 
     def given(time: float) -> Sequence[str]:
         return ("swing", "pan") if time < 0.4 else ("swing",)
 
-    run = compare(experiment(tmp_path, TOLD + recording(text, *names)), names, given)
+    run = compare(experiment(TOLD + recording(text, *names)), names, given)
     assert run.signals["mode"][0, [0, -1]].tolist() == [[1.0, 0.0, 0.0], [1.0, 0.0, 1.0]]
 
 
 @pytest.mark.release
 @pytest.mark.oracle
 @pytest.mark.parametrize("seed", range(8))
-def test_random_decks(tmp_path: Path, seed: int) -> None:
+def test_random_decks(seed: int) -> None:
     text = random_deck(seed)
     names = [*JOINTS, "energy", "momentum", *of_links(text)]
-    compare(experiment(tmp_path, recording(text, *names)), names)
+    compare(experiment(recording(text, *names)), names)
 
 
 @pytest.mark.release
 @pytest.mark.parametrize("seed", range(8, 12))
-def test_kernel_and_plain_floats_agree(tmp_path: Path, seed: int) -> None:
+def test_kernel_and_plain_floats_agree(seed: int) -> None:
     text = random_deck(seed)
-    made = experiment(tmp_path, recording(text, *JOINTS, "energy", "momentum", *of_links(text)))
+    made = experiment(recording(text, *JOINTS, "energy", "momentum", *of_links(text)))
     run = engine.run(made)
     rows, _ = execute(build(made), {}, made.structure.schedule.ticks)
     kernel = np.concatenate([values[0].reshape(len(rows), -1) for values in run.signals.values()], axis=1)
@@ -229,9 +226,9 @@ def test_kernel_and_plain_floats_agree(tmp_path: Path, seed: int) -> None:
 
 
 @pytest.mark.slow
-def test_a_link_fixed_to_the_base_stands_still(tmp_path: Path) -> None:
+def test_a_link_fixed_to_the_base_stands_still() -> None:
     text = recording(DECK, "links.foot.position", "links.foot.velocity", "links.foot.orientation", "links.foot.rate")
-    run = engine.run(experiment(tmp_path, text))
+    run = engine.run(experiment(text))
     assert np.abs(run.signals["links.foot.position"] - [0.1, 0.2, 0.3]).max() < 1e-15  # its frame was turned and back
     assert not run.signals["links.foot.velocity"].any() and not run.signals["links.foot.rate"].any()
     theirs = Rotation.from_euler("xyz", [0.0, 10.0, 90.0], degrees=True).as_quat(scalar_first=True)
@@ -252,8 +249,8 @@ run hold like nominal {
 
 
 @pytest.mark.slow
-def test_two_rods_by_their_closed_form(tmp_path: Path) -> None:
-    run = engine.run(experiment(tmp_path, TWO_RODS, "hold"))
+def test_two_rods_by_their_closed_form() -> None:
+    run = engine.run(experiment(TWO_RODS, "hold"))
     m, n, length, r = 40.0, 20.0, 2.0, 1570.0**2 * 6.38e-5
     c = np.cos(run.signals["q"][0, :, 1])
     M11 = length**2 * (m / 3.0 + n * (4.0 / 3.0 + c))
@@ -277,11 +274,11 @@ METRICS = """
 
 
 @pytest.mark.slow
-def test_a_metric_of_a_derived_channel_sees_every_instant(tmp_path: Path) -> None:
+def test_a_metric_of_a_derived_channel_sees_every_instant() -> None:
     watched = DECK.replace("    metric furthest", METRICS + "    metric furthest")
     every = watched.replace("record = 50 Hz", "record = 1 kHz")
     names = ("links.tip.position.z", "energy.kinetic", "swing.J_eff", "links.tip.jacobian.linear.swing.z")
-    slow, fast = (engine.run(experiment(tmp_path, text)) for text in (watched, recording(every, *names)))
+    slow, fast = (engine.run(experiment(text)) for text in (watched, recording(every, *names)))
     z, kinetic, J, lever = (fast.signals[name][0] for name in names)
     wanted = {"top": z.max(), "work": kinetic.max(), "felt": J.min(), "lever": lever[-1]}
     assert {name: slow.metrics[name][0] for name in wanted} == wanted
@@ -289,10 +286,10 @@ def test_a_metric_of_a_derived_channel_sees_every_instant(tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-def test_a_slow_record_has_the_rows_of_a_fast_one(tmp_path: Path) -> None:
+def test_a_slow_record_has_the_rows_of_a_fast_one() -> None:
     names = (*JOINTS, "energy", "links.tip.orientation")
     slow, fast = (
-        engine.run(experiment(tmp_path, recording(DECK.replace("record = 50 Hz", f"record = {rate}"), *names)))
+        engine.run(experiment(recording(DECK.replace("record = 50 Hz", f"record = {rate}"), *names)))
         for rate in ("50 Hz", "1 kHz")
     )
     for name, values in slow.signals.items():
@@ -300,10 +297,10 @@ def test_a_slow_record_has_the_rows_of_a_fast_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_row_between_instants_shows_the_last_one(tmp_path: Path) -> None:
+def test_a_row_between_instants_shows_the_last_one() -> None:
     rates = "dynamics = 250 Hz;  servos = 500 Hz;  record = 1 kHz;"
     text = recording(re.sub(r"dynamics = 1 kHz;.*?record = 50 Hz;", rates, DECK), "J_eff", "links.tip.position")
-    run = engine.run(experiment(tmp_path, text))
+    run = engine.run(experiment(text))
     for name in ("J_eff", "links.tip.position"):
         values = run.signals[name][0]
         assert (values[:-1].reshape(-1, 4, 3) == values[:-1:4, None]).all(), name
@@ -311,19 +308,19 @@ def test_a_row_between_instants_shows_the_last_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_asked_for_changes_no_bit_of_the_rest(tmp_path: Path) -> None:
+def test_what_is_asked_for_changes_no_bit_of_the_rest() -> None:
     names = [*JOINTS, "energy", "momentum", *of_links(DECK)]
-    plain = engine.run(experiment(tmp_path, DECK, "masses"))
+    plain = engine.run(experiment(DECK, "masses"))
     watched = DECK.replace("    metric furthest", METRICS + "    metric furthest")
-    full = engine.run(experiment(tmp_path, recording(watched, *names), "masses"))
+    full = engine.run(experiment(recording(watched, *names), "masses"))
     for name, values in plain.signals.items():
         assert values.tobytes() == full.signals[name].tobytes(), name
     assert plain.metrics["furthest"].tobytes() == full.metrics["furthest"].tobytes()
 
 
-def test_nothing_is_computed_that_nobody_asks_for(tmp_path: Path) -> None:
+def test_nothing_is_computed_that_nobody_asks_for() -> None:
     def operations(text: str) -> dict[str, int]:
-        made = record(build(experiment(tmp_path, text)))
+        made = record(build(experiment(text)))
         work = {section.name: [section.nodes[i][0] for i in section.order] for section in made.sections}
         return {name: sum(op not in ("cell", "const") for op in ops) for name, ops in work.items()}
 
@@ -338,7 +335,7 @@ def test_nothing_is_computed_that_nobody_asks_for(tmp_path: Path) -> None:
     assert rest == {name: count for name, count in all_.items() if name != "record"}
 
 
-def test_a_case_that_fails_has_not_a_number_and_no_error(tmp_path: Path) -> None:
+def test_a_case_that_fails_has_not_a_number_and_no_error() -> None:
     text = """
     arm thin {
         link rod { mass = 1 kg;  shape = rod(length = 1 m, along = x); }
@@ -351,7 +348,7 @@ def test_a_case_that_fails_has_not_a_number_and_no_error(tmp_path: Path) -> None
         metric most = max { of = spin.b; }
     }
     """
-    made = experiment(tmp_path, text)
+    made = experiment(text)
     run = engine.run(made)
     assert run.status[0] == engine.FAILED and "D is not above 0" in run.cause[0]
     assert all(np.isnan(values).all() for values in run.signals.values())

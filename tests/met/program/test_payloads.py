@@ -14,7 +14,7 @@ from met.backends.reference.plain import execute
 from met.program.build import build
 from met.run import Run
 from tests.ic.small_decks import changed, experiment
-from tests.met.program.free_flyers import ARM
+from tests.met.program.free_flyers import ARM, matrix
 from tests.met.program.payload_decks import BOX, RUN
 
 STATE = (
@@ -155,7 +155,7 @@ def test_while_it_is_held_it_moves_with_its_link(tmp_path: Path) -> None:
     r = run.signals["payloads.box.position"][0, rows] - p
     np.testing.assert_allclose(run.signals["payloads.box.rate"][0, rows], w, rtol=0, atol=1e-14)
     np.testing.assert_allclose(run.signals["payloads.box.velocity"][0, rows], v + np.cross(w, r), rtol=0, atol=1e-14)
-    R = [_matrix(q) for q in run.signals["links.lower.orientation"][0, rows]]
+    R = [matrix(q) for q in run.signals["links.lower.orientation"][0, rows]]
     own = np.array([each.T @ x for each, x in zip(R, r, strict=True)])
     np.testing.assert_allclose(own, np.broadcast_to(own[0], own.shape), rtol=0, atol=1e-14)
 
@@ -253,7 +253,7 @@ def test_a_wrench_on_a_payload_is_felt_wherever_it_is(tmp_path: Path) -> None:
     push = "push = wrench { link = box; force = [6, 4, 2] N; moment = [1, 2, 3] N*m; point = [0.2, 0.1, 0] m; };"
     run = flown(tmp_path, ("environment {}", f"environment {{ {push} }}"), EVERY, *at_rate(200, "rk4"))
     force, moment = np.array([6.0, 4.0, 2.0]), np.array([1.0, 2.0, 3.0])
-    R = np.array([_matrix(q) for q in run.signals["payloads.box.orientation"][0]])
+    R = np.array([matrix(q) for q in run.signals["payloads.box.orientation"][0]])
     point = run.signals["payloads.box.position"][0] + R @ (0.2, 0.1, 0.0)
     gained = momentum(run)[-1] - momentum(run)[0]
     np.testing.assert_allclose(gained[:3], 2.0 * force, rtol=1e-9)
@@ -553,9 +553,3 @@ def test_a_payload_that_runs_away_fails_its_case_and_says_so(tmp_path: Path) -> 
 def _simpson(rows: np.ndarray, step: float) -> np.ndarray:
     weights = np.array([1.0, *[4.0, 2.0] * (len(rows) // 2 - 1), 4.0, 1.0])
     return step / 3.0 * weights @ rows
-
-
-def _matrix(q: np.ndarray) -> np.ndarray:
-    w, v = q[0], q[1:]
-    K = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-    return np.eye(3) + 2.0 * w * K + 2.0 * K @ K

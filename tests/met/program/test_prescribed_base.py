@@ -11,7 +11,7 @@ from met import run as engine
 from met.backends.reference.plain import execute
 from met.program import build
 from tests.ic.small_decks import changed, experiment
-from tests.met.program.free_flyers import ARM
+from tests.met.program.free_flyers import ARM, matrix
 from tests.oracles.package import Package
 from tests.oracles.pinocchio_floating import Flight, FloatingPinocchio
 from tests.oracles.plan_tree import bodies
@@ -92,7 +92,7 @@ def test_pose_and_velocity_are_those_of_the_courses(tmp_path: Path) -> None:
         for name, expected in (("position", p), ("velocity", v), ("rate", w)):
             np.testing.assert_allclose(found[name], expected, rtol=0, atol=2e-14, err_msg=f"{name} at {t} s")
         q = run.signals["links.base.orientation"][0, i]
-        np.testing.assert_allclose(_matrix(q), R, rtol=0, atol=1e-15 * 4)
+        np.testing.assert_allclose(matrix(q), R, rtol=0, atol=1e-15 * 4)
 
 
 @pytest.mark.oracle
@@ -176,9 +176,3 @@ def _pose(theirs: FloatingPinocchio, base: Flight, q: np.ndarray) -> np.ndarray:
 
     pin.forwardKinematics(theirs.model, theirs.data, theirs.configuration(base, q))
     return np.array(theirs.data.oMi[theirs.model.getJointId("elbow")].rotation)
-
-
-def _matrix(q: np.ndarray) -> np.ndarray:
-    w, v = q[0], q[1:]
-    K = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-    return np.eye(3) + 2.0 * w * K + 2.0 * K @ K

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -16,17 +14,15 @@ from met.program.build import METRIC
 from tests.oracles.random_deck import random_deck
 
 
-def compiled(folder: Path, text: str, select: str | None = None) -> Experiment:
-    deck = folder / "deck.ic"
-    deck.write_text(text)
-    plan = ic.compile(str(deck), select=[select] if select else None)
+def compiled(text: str, select: str | None = None) -> Experiment:
+    plan = ic.compile(text=text, select=[select] if select else None)
     return plan.experiments[0]
 
 
 @pytest.mark.release
 @pytest.mark.parametrize("seed", range(24))
-def test_kernel_and_plain_floats_agree_on_random_decks(tmp_path: Path, seed: int) -> None:
-    experiment = compiled(tmp_path, random_deck(seed))
+def test_kernel_and_plain_floats_agree_on_random_decks(seed: int) -> None:
+    experiment = compiled(random_deck(seed))
     run = engine.run(experiment)
     assert run.status[0] == engine.DONE, (seed, run.cause)
     rows, out = execute(build(experiment), {}, experiment.structure.schedule.ticks)
@@ -42,7 +38,7 @@ def test_kernel_and_plain_floats_agree_on_random_decks(tmp_path: Path, seed: int
 
 
 @pytest.mark.slow
-def test_a_run_records_both_ends_and_holds_between_ticks(tmp_path: Path) -> None:
+def test_a_run_records_both_ends_and_holds_between_ticks() -> None:
     text = """
     #include <two_link.ic>
     run fine like nominal {
@@ -51,7 +47,7 @@ def test_a_run_records_both_ends_and_holds_between_ticks(tmp_path: Path) -> None
         record = [q, shoulder.servo.voltage];
     }
     """
-    run = engine.run(compiled(tmp_path, text, "fine"))
+    run = engine.run(compiled(text, "fine"))
     assert run.time[0] == 0.0 and run.time[-1] == 1.0 and len(run.time) == 201
     q, voltage = run.signals["q"][0], run.signals["shoulder.servo.voltage"][0]
     assert (q[:8] == q[0]).all() and (q[8] != q[0]).all(), "q moves at the dynamics' ticks: 8 rows apart"
@@ -61,13 +57,13 @@ def test_a_run_records_both_ends_and_holds_between_ticks(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-def test_a_failed_case_says_when_and_where_and_the_others_go_on(tmp_path: Path) -> None:
+def test_a_failed_case_says_when_and_where_and_the_others_go_on() -> None:
     text = """
     #include <two_link.ic>
     run spun like nominal { environment { velocity_products = on; } duration = 1 s; }
     sweep some of spun { vary initial.elbow.qd = [0, 1e200, 0.1] rad/s; }
     """
-    run = engine.run(compiled(tmp_path, text, "some"))
+    run = engine.run(compiled(text, "some"))
     assert run.status.tolist() == [engine.DONE, engine.FAILED, engine.DONE]
     assert run.cause[1].startswith("t = 0 s: joint shoulder: position, rate or acceleration is no longer a finite ")
     assert "two_link.ic>:" in run.cause[1]
@@ -89,10 +85,10 @@ run swing like nominal {
 
 
 @pytest.mark.slow
-def test_a_case_whose_friction_a_sweep_puts_to_zero_has_none(tmp_path: Path) -> None:
-    plain = engine.run(compiled(tmp_path, REVERSING, "swing"))
+def test_a_case_whose_friction_a_sweep_puts_to_zero_has_none() -> None:
+    plain = engine.run(compiled(REVERSING, "swing"))
     swept = "sweep levels of swing { vary swinging.f_c = [0.0205, 0, 0.01] N*m; }"
-    run = engine.run(compiled(tmp_path, REVERSING + swept, "levels"))
+    run = engine.run(compiled(REVERSING + swept, "levels"))
     assert run.events["splits"][1] == 0 and run.events["splits"][0] > 0
     for name in ("q", "qd", "tau"):
         size = np.abs(plain.signals[name]).max()
@@ -100,16 +96,16 @@ def test_a_case_whose_friction_a_sweep_puts_to_zero_has_none(tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-def test_a_servo_that_ticks_between_instants_sees_the_state_carried_forward(tmp_path: Path) -> None:
-    coarse = engine.run(compiled(tmp_path, REVERSING, "swing")).signals["qd"][0]
+def test_a_servo_that_ticks_between_instants_sees_the_state_carried_forward() -> None:
+    coarse = engine.run(compiled(REVERSING, "swing")).signals["qd"][0]
     finer = REVERSING.replace("dynamics = 400", "dynamics = 1200")
-    fine = engine.run(compiled(tmp_path, finer, "swing")).signals["qd"][0]
+    fine = engine.run(compiled(finer, "swing")).signals["qd"][0]
     # 9.4e-4 measured; 3.8e-3 where such a servo saw the state of the instant before
     assert np.abs(coarse - fine).max() < 1.5e-3 * np.abs(fine).max()
 
 
 @pytest.mark.slow
-def test_a_step_at_a_whole_number_of_milliseconds_is_not_a_tick_late(tmp_path: Path) -> None:
+def test_a_step_at_a_whole_number_of_milliseconds_is_not_a_tick_late() -> None:
     text = """
     #include <two_link.ic>
     servo jumping like gearbox { command = rate(step(to = slow, at = 700 ms)); }
@@ -118,5 +114,5 @@ def test_a_step_at_a_whole_number_of_milliseconds_is_not_a_tick_late(tmp_path: P
         duration = 0.71 s;  record = [shoulder.servo.command];
     }
     """
-    command = engine.run(compiled(tmp_path, text, "jump")).signals["shoulder.servo.command"][0]
+    command = engine.run(compiled(text, "jump")).signals["shoulder.servo.command"][0]
     assert np.flatnonzero(command)[0] == 700

@@ -45,8 +45,7 @@ def test_arms_of_one_joint_and_of_a_hundred_run_from_decks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, joints: int
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "chain.ic").write_text(chain(joints, "0.5 s"))
-    plan = ic.compile("chain.ic")
+    plan = ic.compile(text=chain(joints, "0.5 s"))
     run = engine.run(plan.experiments[0])
     assert run.status.tolist() == [engine.DONE] and run.signals["q"].shape == (1, 51, joints)
     assert np.ptp(run.signals["q"][0, :, 0]) > 0.05, "it swings"
@@ -58,9 +57,8 @@ def test_arms_of_one_joint_and_of_a_hundred_run_from_decks(
 
 
 @pytest.mark.release
-def test_a_hundred_joints_that_stick_run_from_a_deck(tmp_path: Path) -> None:
-    (tmp_path / "deck.ic").write_text(friction_deck(100, 9, duration="0.2 s"))
-    run = engine.run(ic.compile(str(tmp_path / "deck.ic"), select=["many"]).experiments[0])
+def test_a_hundred_joints_that_stick_run_from_a_deck() -> None:
+    run = engine.run(ic.compile(text=friction_deck(100, 9, duration="0.2 s"), select=["many"]).experiments[0])
     assert not run.status.any() and run.events["splits"].max() > 10 and not run.events["undecided"].any()
 
 

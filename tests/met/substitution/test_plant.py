@@ -40,7 +40,6 @@ ARM = ("arm-none-eabi-gcc", "-O2")
 
 
 def experiment(
-    folder: Path,
     name: str = "paper",
     *,
     dynamics: int = 25,
@@ -50,10 +49,8 @@ def experiment(
     law: str = "velocity_tracking",
     more: str = "",
 ) -> Experiment:
-    path = folder / "deck.ic"
     text = DECK.format(dynamics=dynamics, servos=servos, faults=faults, delay=delay, law=law, more=more)
-    path.write_text(text, encoding="utf-8")
-    return ic.compile(path, select=[name]).experiments[0]
+    return ic.compile(text=text, select=[name]).experiments[0]
 
 
 def assert_same_run(found: Experiment, case: int = 0, ticks: int | None = None) -> None:
@@ -98,38 +95,36 @@ def assert_same_run(found: Experiment, case: int = 0, ticks: int | None = None) 
 @pytest.mark.release
 @pytest.mark.parametrize("faults", ["none", "typical"])
 @pytest.mark.parametrize(("dynamics", "servos"), [(25, 100), (1000, 1000)])
-def test_at_the_wire_it_makes_the_run_of_the_bed_inside_to_the_bit(
-    tmp_path: Path, dynamics: int, servos: int, faults: str
-) -> None:
+def test_at_the_wire_it_makes_the_run_of_the_bed_inside_to_the_bit(dynamics: int, servos: int, faults: str) -> None:
     """All 20 s of the paper's test, and the same at 1 kHz."""
-    assert_same_run(experiment(tmp_path, dynamics=dynamics, servos=servos, faults=faults))
+    assert_same_run(experiment(dynamics=dynamics, servos=servos, faults=faults))
 
 
 @pytest.mark.release
 @pytest.mark.parametrize(("law", "delay"), [("torque_balance_observer", 0), ("torque_balance", 2)])
-def test_so_it_does_under_other_laws_and_with_a_delay(tmp_path: Path, law: str, delay: int) -> None:
-    assert_same_run(experiment(tmp_path, dynamics=250, servos=500, law=law, delay=delay), ticks=2000)
+def test_so_it_does_under_other_laws_and_with_a_delay(law: str, delay: int) -> None:
+    assert_same_run(experiment(dynamics=250, servos=500, law=law, delay=delay), ticks=2000)
 
 
 @pytest.mark.slow
-def test_so_do_two_at_two_wires(tmp_path: Path) -> None:
+def test_so_do_two_at_two_wires() -> None:
     more = "substitute elbow { bed = emulated(faults = typical, once = 0.004 N*m); }  record += [elbow.bed.shaft_rate];"
-    found = experiment(tmp_path, dynamics=250, servos=500, more=more)
+    found = experiment(dynamics=250, servos=500, more=more)
     assert [use.joint for use in found.structure.substitutions] == ["shoulder", "elbow"]
     assert_same_run(found, ticks=2000)
 
 
 @pytest.mark.release
 @pytest.mark.parametrize("case", [0, 5, 14])
-def test_a_case_of_a_sweep_over_the_bed_has_its_own_plant(tmp_path: Path, case: int) -> None:
-    found = experiment(tmp_path, "several", dynamics=250, servos=500)
+def test_a_case_of_a_sweep_over_the_bed_has_its_own_plant(case: int) -> None:
+    found = experiment("several", dynamics=250, servos=500)
     assert found.cases.count == 16
     assert_same_run(found, case, ticks=1000)
 
 
 @pytest.mark.slow
-def test_another_noise_or_another_case_is_another_plant(tmp_path: Path) -> None:
-    found = experiment(tmp_path, "several")
+def test_another_noise_or_another_case_is_another_plant() -> None:
+    found = experiment("several")
     one, other = Plant(found, "shoulder", period=0.002), Plant(found, "shoulder", case=15, period=0.002)
     ends = []
     for plant, seed, repeat in ((one, 0.0, 0.0), (one, 1.0, 0.0), (one, 0.0, 1.0), (other, 0.0, 0.0), (one, 0.0, 0.0)):
@@ -174,7 +169,7 @@ def program(found: Experiment, period: float | None) -> str:
 @pytest.mark.parametrize("faults", ["none", "typical"])
 @pytest.mark.parametrize("words", HERE, ids=" ".join)
 def test_in_c_it_has_the_same_bits(tmp_path: Path, words: tuple[str, ...], faults: str) -> None:
-    found, question = experiment(tmp_path, faults=faults), questions(20_000, 1)
+    found, question = experiment(faults=faults), questions(20_000, 1)
     command = made(tmp_path, program(found, 0.002), (*words, f"-I{FOLDER}"), include=FIRMWARE)
     ours = stepped(Plant(found, "shoulder", period=0.002), question)
     assert np.abs(ours).max(axis=0).min() > 20.0
@@ -186,15 +181,15 @@ def test_in_c_it_has_the_same_bits(tmp_path: Path, words: tuple[str, ...], fault
 def test_on_a_controller_without_floating_point_it_has_the_same_bits(
     tmp_path: Path, faults: str, period: float
 ) -> None:
-    found, question = experiment(tmp_path, faults=faults), questions(2000, 2)
+    found, question = experiment(faults=faults), questions(2000, 2)
     command = made(tmp_path, program(found, period), (*ARM, f"-I{FOLDER}"), include=FIRMWARE)
     ours = stepped(Plant(found, "shoulder", period=period), question)
     assert different(ours, answered(command, question).reshape(-1, 3)) == 0
 
 
 @pytest.mark.slow
-def test_the_text_is_the_same_each_time_and_another_cases_is_another(tmp_path: Path) -> None:
-    found = experiment(tmp_path, "several")
+def test_the_text_is_the_same_each_time_and_another_cases_is_another() -> None:
+    found = experiment("several")
     text = plant_c(found, "shoulder", case=3, period=0.002)
     assert text == plant_c(found, "shoulder", case=3, period=0.002)
     assert text != plant_c(found, "shoulder", case=15, period=0.002)
@@ -215,7 +210,7 @@ def test_it_asks_for_no_library_but_the_compilers_own_arithmetic(
     tmp_path: Path, words: tuple[str, ...], level: str
 ) -> None:
     need(words[0])
-    text = plant_c(experiment(tmp_path, "several"), "shoulder", case=3, period=0.002)
+    text = plant_c(experiment("several"), "shoulder", case=3, period=0.002)
     (tmp_path / "plant.c").write_text(text, encoding="utf-8")
     command = [
         *words,
@@ -241,6 +236,6 @@ def test_it_asks_for_no_library_but_the_compilers_own_arithmetic(
     }
 
 
-def test_a_joint_whose_motor_is_its_own_has_no_plant(tmp_path: Path) -> None:
+def test_a_joint_whose_motor_is_its_own_has_no_plant() -> None:
     with pytest.raises(ValueError, match=r"^joint 'elbow' is not substituted$"):
-        Plant(experiment(tmp_path), "elbow")
+        Plant(experiment(), "elbow")

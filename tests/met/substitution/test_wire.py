@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -31,12 +30,12 @@ run wired like nominal {{
 @pytest.mark.parametrize("dynamics", [500, 250])
 @pytest.mark.parametrize(("late", "delay"), [(0, 0), (0, 1), (1, 1), (1, 2)])
 def test_a_bed_outside_the_kernel_makes_the_same_run_as_the_emulated_one_inside(
-    tmp_path: Path, dynamics: int, late: int, delay: int
+    dynamics: int, late: int, delay: int
 ) -> None:
     """late: the delay of one tick is the kernel's, or the wire's."""
-    path = tmp_path / "wired.ic"
-    path.write_text(DECK.format(dynamics=dynamics, record=dynamics, delay=delay), encoding="utf-8")
-    experiment = ic.compile(path, select=["wired"]).experiments[0]
+    experiment = ic.compile(
+        text=DECK.format(dynamics=dynamics, record=dynamics, delay=delay), select=["wired"]
+    ).experiments[0]
     inside = run(prepare(experiment))
 
     split = build(experiment, wire=True, late=late)

@@ -8,16 +8,11 @@ import pytest
 
 from met import run as engine
 from met.diagnostic import Problem
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, shown
 
 
 def run_with(environment: str) -> str:
     return changed(RUN, ("    duration", f"    environment {{ {environment} }}\n    duration"))
-
-
-def shown(folder: Path, *parts: str) -> str:
-    """What is said of a deck, without the counting line."""
-    return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
 
 
 SLOW = changed(SERVO, ("ratio = 100;", "ratio = 100; rate = 500 Hz;"))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, messages
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, shown
 from tests.oracles.random_deck import random_deck
 
 BODY = "mass = 2 kg; shape = rod(length = 1 m, along = x);"
@@ -21,11 +21,6 @@ def arm(body: str = BODY, joint: str = "") -> str:
 
 def inside(text: str) -> str:
     return changed(RUN, ("duration", f"{text}\n    duration"))
-
-
-def shown(folder: Path, *parts: str) -> str:
-    """What is said of a deck, without the counting line."""
-    return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, messages
-
-
-def shown(folder: Path, *parts: str) -> str:
-    """What is said of a deck, without the counting line."""
-    return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, codes, shown
 
 
 def sensed(servo: str, of: str) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from met import models
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, messages
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, shown
 
 METRICS = """\
     metric most   = peak { of = hinge.qd; }
@@ -23,11 +23,6 @@ METRICS = """\
 def requiring(text: str) -> str:
     """The run with metrics, and with this before its end."""
     return changed(RUN, ("[q];\n", f"[q];\n{METRICS}    {text}\n"))
-
-
-def shown(folder: Path, *parts: str) -> str:
-    """What is said of a deck, without the counting line."""
-    return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
 
 
 def test_a_limit_where_the_metric_never_is(tmp_path: Path) -> None:

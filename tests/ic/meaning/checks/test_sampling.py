@@ -11,7 +11,7 @@ import pytest
 import met.run as engine
 from ic.meaning.checks.carried import uncarried
 from met.content import humps_from_zero, humps_of_turns
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, codes, experiment, shown
 from tests.oracles.random_deck import random_deck
 
 TICKS = ("servos = 1 kHz", "servos = 100 Hz")
@@ -19,11 +19,6 @@ TICKS = ("servos = 1 kHz", "servos = 100 Hz")
 
 def under(command: str) -> str:
     return changed(SERVO, ("rate(0.1 rad/s)", command))
-
-
-def shown(folder: Path, *parts: str) -> str:
-    """What is said of a deck, without the counting line."""
-    return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
 
 
 def test_a_sine_of_the_ticks_own_frequency_is_seen_as_nothing(tmp_path: Path) -> None:

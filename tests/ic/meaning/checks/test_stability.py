@@ -12,14 +12,9 @@ import pytest
 from ic.meaning.checks.swings import growth
 from met import models
 from met import run as engine
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, shown
 
 ANALOG = changed(RUN, ("servos = 1 kHz", "servos = continuous"))
-
-
-def shown(folder: Path, *parts: str) -> str:
-    """What is said of a deck, without the counting line."""
-    return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
 
 
 def test_the_integral_of_a_law_that_is_continuous_is_in_its_figure(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import met.run as engine
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, codes, experiment, shown
 
 IDEAL = "servo drive { model = ideal; bandwidth = 2 1/s; command = rate(1 rad/s); }\n"
 STOP = "end = joint_stop { joint = hinge; upper = 0.5 rad; stiffness = 1e3 N*m/rad; };"
@@ -24,11 +24,6 @@ def with_payload(text: str) -> str:
     """The run, with a payload that is grappled."""
     body = f"payload box {{ mass = 1 kg; shape = sphere(radius = 1 cm); on = bar; at = [1, 0, 0] m;\n {text} }}"
     return changed(RUN, ("duration", f"{body}\n    duration"))
-
-
-def shown(folder: Path, *parts: str) -> str:
-    """What is said of a deck, without the counting line."""
-    return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
 
 
 def test_an_ideal_servo_and_a_stop(tmp_path: Path) -> None:

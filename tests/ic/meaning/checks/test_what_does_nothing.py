@@ -8,15 +8,10 @@ import pytest
 
 from met.diagnostic import Problem
 from met.plan import file as plan_file
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, messages
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, shown
 
 IDEAL = "servo drive { model = ideal; bandwidth = 2 1/s; command = position(0 rad); }\n"
 PUSHED = changed(RUN, ("duration", "environment { push = wrench { link = bar; force = [1, 0, 0] N; }; }\n    duration"))
-
-
-def shown(folder: Path, *parts: str) -> str:
-    """What is said of a deck, without the counting line."""
-    return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
 
 
 def test_a_bandwidth_of_zero_never_moves_the_joint(tmp_path: Path) -> None:

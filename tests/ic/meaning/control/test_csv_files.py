@@ -46,17 +46,17 @@ error[D190]: cannot find "moves.csv"
     )
 
 
-MISTAKES: list[tuple[str, str | bytes, str, str]] = []  # what, the file's text, the command's course, what is said
+def mistake(
+    what: str, text: str | bytes, message: str, course: str = 'trajectory(file = "moves.csv")'
+) -> tuple[str, str | bytes, str, str]:
+    return what, text, course, message
 
 
-def mistake(what: str, text: str | bytes, message: str, course: str = 'trajectory(file = "moves.csv")') -> None:
-    MISTAKES.append((what, text, course, message))
-
-
-mistake(
-    "a column without a unit",
-    MOVES.replace("hinge [deg]", "hinge"),
-    """\
+MISTAKES = [  # what, the file's text, the command's course, what is said
+    mistake(
+        "a column without a unit",
+        MOVES.replace("hinge [deg]", "hinge"),
+        """\
 error[D193]: column `hinge` has no unit
  --> moves.csv:1:11
   |
@@ -66,11 +66,11 @@ error[D193]: column `hinge` has no unit
   = help: write `hinge [deg]` or `hinge [rad]`
   = help: other units of this kind: mrad, arcmin, arcsec, cycle, rev
 """,
-)
-mistake(
-    "a unit that is none",
-    MOVES.replace("[deg]", "[degree]"),
-    """\
+    ),
+    mistake(
+        "a unit that is none",
+        MOVES.replace("[deg]", "[degree]"),
+        """\
 error[D193]: `degree` is not a unit
  --> moves.csv:1:11
   |
@@ -79,11 +79,11 @@ error[D193]: `degree` is not a unit
  ::: deck.ic:9:42  read here for joint `hinge`
   = help: did you mean `hinge [deg]`?
 """,
-)
-mistake(
-    "a unit that is none and like none",
-    MOVES.replace("[deg]", "[lots]"),
-    """\
+    ),
+    mistake(
+        "a unit that is none and like none",
+        MOVES.replace("[deg]", "[lots]"),
+        """\
 error[D193]: `lots` is not a unit
  --> moves.csv:1:11
   |
@@ -93,11 +93,11 @@ error[D193]: `lots` is not a unit
   = help: write `hinge [deg]` or `hinge [rad]`, with numbers in that unit
   = help: other units of this kind: mrad, arcmin, arcsec, cycle, rev
 """,
-)
-mistake(
-    "a unit of another dimension",
-    MOVES.replace("[deg]", "[mm]"),
-    """\
+    ),
+    mistake(
+        "a unit of another dimension",
+        MOVES.replace("[deg]", "[mm]"),
+        """\
 error[D193]: column `hinge` is in m, and rad is needed
  --> moves.csv:1:11
   |
@@ -107,11 +107,11 @@ error[D193]: column `hinge` is in m, and rad is needed
   = help: write `hinge [deg]` or `hinge [rad]`, with numbers in that unit
   = help: other units of this kind: mrad, arcmin, arcsec, cycle, rev
 """,
-)
-mistake(
-    "a unit of time that does not exist",
-    MOVES.replace("[s]", "[ps]"),
-    """\
+    ),
+    mistake(
+        "a unit of time that does not exist",
+        MOVES.replace("[s]", "[ps]"),
+        """\
 error[D193]: `ps` is not a unit
  --> moves.csv:1:1
   |
@@ -121,11 +121,11 @@ error[D193]: `ps` is not a unit
   = help: write `time [s]`, with numbers in that unit
   = help: other units of this kind: ms, us, min, h, ns
 """,
-)
-mistake(
-    "a unit in Unicode",
-    MOVES.replace("[s]", "[\N{MICRO SIGN}s]"),
-    """\
+    ),
+    mistake(
+        "a unit in Unicode",
+        MOVES.replace("[s]", "[\N{MICRO SIGN}s]"),
+        """\
 error[D193]: `\N{MICRO SIGN}s` is not a unit
  --> moves.csv:1:1
   |
@@ -134,11 +134,11 @@ error[D193]: `\N{MICRO SIGN}s` is not a unit
  ::: deck.ic:9:42  read here
   = help: did you mean `time [us]`?
 """,
-)
-mistake(
-    "a pure number",
-    MOVES.replace("[deg]", "[1]"),
-    """\
+    ),
+    mistake(
+        "a pure number",
+        MOVES.replace("[deg]", "[1]"),
+        """\
 error[D193]: column `hinge` is a pure number, and rad is needed
  --> moves.csv:1:11
   |
@@ -148,11 +148,11 @@ error[D193]: column `hinge` is a pure number, and rad is needed
   = help: write `hinge [deg]` or `hinge [rad]`, with numbers in that unit
   = help: other units of this kind: mrad, arcmin, arcsec, cycle, rev
 """,
-)
-mistake(
-    "a unit of the times",
-    MOVES.replace("[s]", "[rad]"),
-    """\
+    ),
+    mistake(
+        "a unit of the times",
+        MOVES.replace("[s]", "[rad]"),
+        """\
 error[D193]: column `time` is in rad, and s is needed
  --> moves.csv:1:1
   |
@@ -162,11 +162,11 @@ error[D193]: column `time` is in rad, and s is needed
   = help: write `time [s]`, with numbers in that unit
   = help: other units of this kind: ms, us, min, h, ns
 """,
-)
-mistake(
-    "no column of the joint's name",
-    MOVES.replace("hinge", "hinges"),
-    """\
+    ),
+    mistake(
+        "no column of the joint's name",
+        MOVES.replace("hinge", "hinges"),
+        """\
 error[D192]: `moves.csv` has no column `hinge`
  --> deck.ic:9:42
   |
@@ -177,11 +177,11 @@ error[D192]: `moves.csv` has no column `hinge`
   = help: columns: time, hinges, other
   = help: that of the joint's name is taken, unless `column = "NAME"` names another
 """,
-)
-mistake(
-    "no column of the name that is written",
-    MOVES,
-    """\
+    ),
+    mistake(
+        "no column of the name that is written",
+        MOVES,
+        """\
 error[D192]: `moves.csv` has no column `elbow`
  --> deck.ic:9:64
   |
@@ -190,12 +190,12 @@ error[D192]: `moves.csv` has no column `elbow`
  ::: moves.csv:1:1  its first line
   = help: columns: time, hinge, other
 """,
-    'trajectory(file = "moves.csv", column = "elbow")',
-)
-mistake(
-    "no times",
-    MOVES.replace("time", "when"),
-    """\
+        'trajectory(file = "moves.csv", column = "elbow")',
+    ),
+    mistake(
+        "no times",
+        MOVES.replace("time", "when"),
+        """\
 error[D192]: `moves.csv` has no column `time`
  --> deck.ic:9:42
   |
@@ -205,11 +205,11 @@ error[D192]: `moves.csv` has no column `time`
   = help: columns: when, hinge, other
   = help: the times of the rows stand in a column `time [s]`
 """,
-)
-mistake(
-    "not a number",
-    MOVES.replace("30", "nan"),
-    """\
+    ),
+    mistake(
+        "not a number",
+        MOVES.replace("30", "nan"),
+        """\
 error[D194]: `nan` is not a number
  --> moves.csv:3:11
   |
@@ -218,11 +218,11 @@ error[D194]: `nan` is not a number
  ::: moves.csv:1:11  column `hinge`
   = help: a number is written as 12.5 or -1e-3, with a point and without a unit
 """,
-)
-mistake(
-    "an empty cell",
-    MOVES.replace("30,", "   ,"),
-    """\
+    ),
+    mistake(
+        "an empty cell",
+        MOVES.replace("30,", "   ,"),
+        """\
 error[D194]: there is no number here
  --> moves.csv:3:5
   |
@@ -231,11 +231,11 @@ error[D194]: there is no number here
  ::: moves.csv:1:11  column `hinge`
   = help: a number is written as 12.5 or -1e-3, with a point and without a unit
 """,
-)
-mistake(
-    "a number that is too large",
-    MOVES.replace("30", "1e999"),
-    """\
+    ),
+    mistake(
+        "a number that is too large",
+        MOVES.replace("30", "1e999"),
+        """\
 error[D194]: this number is too large: the largest is 1.8e308
  --> moves.csv:3:11
   |
@@ -244,11 +244,11 @@ error[D194]: this number is too large: the largest is 1.8e308
  ::: moves.csv:1:11  column `hinge`
   = help: a number is written as 12.5 or -1e-3, with a point and without a unit
 """,
-)
-mistake(
-    "a number that would become nothing",
-    MOVES.replace("30", "4.9e-324"),
-    """\
+    ),
+    mistake(
+        "a number that would become nothing",
+        MOVES.replace("30", "4.9e-324"),
+        """\
 error[D194]: this number is too small: it would become 0
  --> moves.csv:3:11
   |
@@ -257,11 +257,11 @@ error[D194]: this number is too small: it would become 0
  ::: moves.csv:1:11  column `hinge`
   = help: a number is written as 12.5 or -1e-3, with a point and without a unit
 """,
-)
-mistake(
-    "brackets without a unit",
-    MOVES.replace("hinge [deg]", "hinge []"),
-    """\
+    ),
+    mistake(
+        "brackets without a unit",
+        MOVES.replace("hinge [deg]", "hinge []"),
+        """\
 error[D193]: column `hinge` has no unit
  --> moves.csv:1:11
   |
@@ -271,11 +271,11 @@ error[D193]: column `hinge` has no unit
   = help: write `hinge [deg]` or `hinge [rad]`
   = help: other units of this kind: mrad, arcmin, arcsec, cycle, rev
 """,
-)
-mistake(
-    "a unit in round brackets",
-    MOVES.replace("hinge [deg]", "hinge (deg)"),
-    """\
+    ),
+    mistake(
+        "a unit in round brackets",
+        MOVES.replace("hinge [deg]", "hinge (deg)"),
+        """\
 error[D192]: `moves.csv` has no column `hinge`
  --> deck.ic:9:42
   |
@@ -286,11 +286,11 @@ error[D192]: `moves.csv` has no column `hinge`
   = help: columns: time, hinge (deg), other
   = help: that of the joint's name is taken, unless `column = "NAME"` names another
 """,
-)
-mistake(
-    "no line that names the columns",
-    "0, 0\n1, 1\n",
-    """\
+    ),
+    mistake(
+        "no line that names the columns",
+        "0, 0\n1, 1\n",
+        """\
 error[D191]: the first line names no columns: it holds numbers
  --> moves.csv:1:1
   |
@@ -298,11 +298,11 @@ error[D191]: the first line names no columns: it holds numbers
   | ^^^^
   = help: put a line above them, as in `time [s], shoulder [deg]`
 """,
-)
-mistake(
-    "a column with a name that is a book",
-    MOVES.replace("other", 50 * "o"),
-    f"""\
+    ),
+    mistake(
+        "a column with a name that is a book",
+        MOVES.replace("other", 50 * "o"),
+        f"""\
 error[D192]: `moves.csv` has no column `knee`
  --> deck.ic:9:64
   |
@@ -311,12 +311,12 @@ error[D192]: `moves.csv` has no column `knee`
  ::: moves.csv:1:1  its first line
   = help: columns: time, hinge, {40 * "o"}...
 """,
-    'trajectory(file = "moves.csv", column = "knee")',
-)
-mistake(
-    "a command about a file",
-    MOVES,
-    """\
+        'trajectory(file = "moves.csv", column = "knee")',
+    ),
+    mistake(
+        "a command about a file",
+        MOVES,
+        """\
 error[D151]: a command is about a value or a course in time, and this is text
  --> deck.ic:9:24
   |
@@ -324,12 +324,12 @@ error[D151]: a command is about a value or a course in time, and this is text
   |                        ^^^^^^^^^^^
   = help: write `position(trajectory(...))` for a column of a CSV file
 """,
-    '"moves.csv"',
-)
-mistake(
-    "the name of a course alone",
-    MOVES,
-    """\
+        '"moves.csv"',
+    ),
+    mistake(
+        "the name of a course alone",
+        MOVES,
+        """\
 error[D075]: `trajectory` has no `file`
  --> deck.ic:9:24
   |
@@ -337,12 +337,12 @@ error[D075]: `trajectory` has no `file`
   |                        ^^^^^^^^^^
   = help: write `file = "NAME.csv"`
 """,
-    "trajectory",
-)
-mistake(
-    "a word in quotes",
-    MOVES,
-    """\
+        "trajectory",
+    ),
+    mistake(
+        "a word in quotes",
+        MOVES,
+        """\
 error[D076]: `interpolation` of `trajectory` is a word, without quotes
  --> deck.ic:9:64
   |
@@ -350,12 +350,12 @@ error[D076]: `interpolation` of `trajectory` is a word, without quotes
   |                                                                ^^^^^^^
   = help: one of: linear, cubic
 """,
-    'trajectory("moves.csv", interpolation = "cubic")',
-)
-mistake(
-    "times that fall",
-    MOVES.replace("0.5,", "1.5,"),
-    """\
+        'trajectory("moves.csv", interpolation = "cubic")',
+    ),
+    mistake(
+        "times that fall",
+        MOVES.replace("0.5,", "1.5,"),
+        """\
 error[D195]: times of a file rise, and 1 s follows 1.5 s
  --> moves.csv:4:1
   |
@@ -364,11 +364,11 @@ error[D195]: times of a file rise, and 1 s follows 1.5 s
  ::: moves.csv:3:1  the row before
   = help: sort the rows; for a jump, two times close together
 """,
-)
-mistake(
-    "times that stand still",
-    MOVES.replace("0.5,", "1,  "),
-    """\
+    ),
+    mistake(
+        "times that stand still",
+        MOVES.replace("0.5,", "1,  "),
+        """\
 error[D195]: times of a file rise, and 1 s follows 1 s
  --> moves.csv:4:1
   |
@@ -377,11 +377,11 @@ error[D195]: times of a file rise, and 1 s follows 1 s
  ::: moves.csv:3:1  the row before
   = help: sort the rows; for a jump, two times close together
 """,
-)
-mistake(
-    "no rows",
-    MOVES.splitlines()[0],
-    """\
+    ),
+    mistake(
+        "no rows",
+        MOVES.splitlines()[0],
+        """\
 error[D196]: `moves.csv` has no rows
  --> moves.csv:1:1
   |
@@ -390,11 +390,11 @@ error[D196]: `moves.csv` has no rows
  ::: deck.ic:9:42  read here
   = help: a trajectory has 2 at least; `table` takes a single point
 """,
-)
-mistake(
-    "one row",
-    "\n".join(MOVES.splitlines()[:2]),
-    """\
+    ),
+    mistake(
+        "one row",
+        "\n".join(MOVES.splitlines()[:2]),
+        """\
 error[D196]: `moves.csv` has 1 row
  --> moves.csv:1:1
   |
@@ -403,11 +403,11 @@ error[D196]: `moves.csv` has 1 row
  ::: deck.ic:9:42  read here
   = help: a trajectory has 2 at least; `table` takes a single point
 """,
-)
-mistake(
-    "a row that is too short",
-    MOVES.replace("30,          2", "30"),
-    """\
+    ),
+    mistake(
+        "a row that is too short",
+        MOVES.replace("30,          2", "30"),
+        """\
 error[D197]: this row has 2 cells, and the first line names 3 columns
  --> moves.csv:3:1
   |
@@ -416,11 +416,11 @@ error[D197]: this row has 2 cells, and the first line names 3 columns
  ::: moves.csv:1:1  the columns
   = help: commas part the cells, and a number has a decimal point
 """,
-)
-mistake(
-    "a decimal comma",
-    MOVES.replace("30", "12,5"),
-    """\
+    ),
+    mistake(
+        "a decimal comma",
+        MOVES.replace("30", "12,5"),
+        """\
 error[D197]: this row has 4 cells, and the first line names 3 columns
  --> moves.csv:3:1
   |
@@ -429,11 +429,11 @@ error[D197]: this row has 4 cells, and the first line names 3 columns
  ::: moves.csv:1:1  the columns
   = help: commas part the cells, and a number has a decimal point
 """,
-)
-mistake(
-    "an empty file",
-    "",
-    """\
+    ),
+    mistake(
+        "an empty file",
+        "",
+        """\
 error[D191]: `moves.csv` is empty
  --> moves.csv:1:1
   |
@@ -441,11 +441,11 @@ error[D191]: `moves.csv` is empty
   | ^
   = help: its first line names the columns, as in `time [s], shoulder [deg]`
 """,
-)
-mistake(
-    "not UTF-8",
-    MOVES.replace("other", "\xf6ther").encode("latin-1"),
-    """\
+    ),
+    mistake(
+        "not UTF-8",
+        MOVES.replace("other", "\xf6ther").encode("latin-1"),
+        """\
 error[D002]: `moves.csv` is not UTF-8: byte 0xf6
  --> moves.csv:1:24
   |
@@ -453,11 +453,11 @@ error[D002]: `moves.csv` is not UTF-8: byte 0xf6
   |                        ^
   = help: save the file as UTF-8
 """,
-)
-mistake(
-    "UTF-16",
-    MOVES.encode("utf-16"),
-    """\
+    ),
+    mistake(
+        "UTF-16",
+        MOVES.encode("utf-16"),
+        """\
 error[D002]: `moves.csv` is UTF-16, but CSV files are UTF-8
  --> deck.ic:9:42
   |
@@ -465,11 +465,11 @@ error[D002]: `moves.csv` is UTF-16, but CSV files are UTF-8
   |                                          ^^^^^^^^^^^
   = help: save it as UTF-8
 """,
-)
-mistake(
-    "semicolons",
-    MOVES.replace(",", ";"),
-    """\
+    ),
+    mistake(
+        "semicolons",
+        MOVES.replace(",", ";"),
+        """\
 error[D191]: `time [s]; hinge [deg]; other [rad]` does not name a column
  --> moves.csv:1:1
   |
@@ -477,11 +477,11 @@ error[D191]: `time [s]; hinge [deg]; other [rad]` does not name a column
   | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
   = help: commas part the columns, as in `time [s], shoulder [deg]`
 """,
-)
-mistake(
-    "a column that is there twice",
-    MOVES.replace("other", "hinge"),
-    """\
+    ),
+    mistake(
+        "a column that is there twice",
+        MOVES.replace("other", "hinge"),
+        """\
 error[D198]: column `hinge` is there twice
  --> moves.csv:1:24
   |
@@ -490,11 +490,11 @@ error[D198]: column `hinge` is there twice
  ::: moves.csv:1:11  first
   = help: give one of them another name
 """,
-)
-mistake(
-    "a column with a unit and no name",
-    MOVES.replace("hinge ", ""),
-    """\
+    ),
+    mistake(
+        "a column with a unit and no name",
+        MOVES.replace("hinge ", ""),
+        """\
 error[D191]: `[deg]` does not name a column
  --> moves.csv:1:11
   |
@@ -502,11 +502,11 @@ error[D191]: `[deg]` does not name a column
   |           ^^^^^
   = help: write the unit in square brackets behind the name, as in `shoulder [deg]`
 """,
-)
-mistake(
-    "a column without a name",
-    MOVES.replace("hinge [deg]", ""),
-    """\
+    ),
+    mistake(
+        "a column without a name",
+        MOVES.replace("hinge [deg]", ""),
+        """\
 error[D191]: a column without a name
  --> moves.csv:1:10
   |
@@ -514,11 +514,11 @@ error[D191]: a column without a name
   |          ^
   = help: write the unit in square brackets behind the name, as in `shoulder [deg]`
 """,
-)
-mistake(
-    "a file's name without quotes",
-    MOVES,
-    """\
+    ),
+    mistake(
+        "a file's name without quotes",
+        MOVES,
+        """\
 error[D076]: `file` of `trajectory` is the name of a file, in quotes
  --> deck.ic:9:42
   |
@@ -526,12 +526,12 @@ error[D076]: `file` of `trajectory` is the name of a file, in quotes
   |                                          ^^^^^
   = help: write `file = "moves"`
 """,
-    "trajectory(file = moves)",
-)
-mistake(
-    "a file's name alone without quotes",
-    MOVES,
-    """\
+        "trajectory(file = moves)",
+    ),
+    mistake(
+        "a file's name alone without quotes",
+        MOVES,
+        """\
 error[D076]: `file` of `trajectory` is the name of a file, in quotes
  --> deck.ic:9:35
   |
@@ -539,12 +539,12 @@ error[D076]: `file` of `trajectory` is the name of a file, in quotes
   |                                   ^^^^^^^^^
   = help: write `file = "moves.csv"`
 """,
-    "trajectory(moves.csv)",
-)
-mistake(
-    "no file",
-    MOVES,
-    """\
+        "trajectory(moves.csv)",
+    ),
+    mistake(
+        "no file",
+        MOVES,
+        """\
 error[D075]: `trajectory` has no `file`
  --> deck.ic:9:24
   |
@@ -552,12 +552,12 @@ error[D075]: `trajectory` has no `file`
   |                        ^^^^^^^^^^
   = help: write `file = "NAME.csv"`
 """,
-    "trajectory(interpolation = cubic)",
-)
-mistake(
-    "two files",
-    MOVES,
-    """\
+        "trajectory(interpolation = cubic)",
+    ),
+    mistake(
+        "two files",
+        MOVES,
+        """\
 error[D153]: `trajectory` takes its values by name
  --> deck.ic:9:35
   |
@@ -565,12 +565,12 @@ error[D153]: `trajectory` takes its values by name
   |                                   ^^^^^^^^^^^
   = help: write `trajectory(file = ..., column = ..., interpolation = ..., begin = ...)`
 """,
-    'trajectory("moves.csv", "others.csv")',
-)
-mistake(
-    "a file that is written twice",
-    MOVES,
-    """\
+        'trajectory("moves.csv", "others.csv")',
+    ),
+    mistake(
+        "a file that is written twice",
+        MOVES,
+        """\
 error[D040]: `file` is written twice
  --> deck.ic:9:48
   |
@@ -579,12 +579,12 @@ error[D040]: `file` is written twice
  ::: deck.ic:9:35  first
   = help: remove one of the two
 """,
-    'trajectory("moves.csv", file = "others.csv")',
-)
-mistake(
-    "a column that is a number",
-    MOVES,
-    """\
+        'trajectory("moves.csv", file = "others.csv")',
+    ),
+    mistake(
+        "a column that is a number",
+        MOVES,
+        """\
 error[D076]: `column` of `trajectory` is the name of a column, in quotes
  --> deck.ic:9:64
   |
@@ -592,12 +592,12 @@ error[D076]: `column` of `trajectory` is the name of a column, in quotes
   |                                                                ^
   = help: write `column = "NAME"`
 """,
-    'trajectory(file = "moves.csv", column = 3)',
-)
-mistake(
-    "a list that the file has",
-    MOVES,
-    """\
+        'trajectory(file = "moves.csv", column = 3)',
+    ),
+    mistake(
+        "a list that the file has",
+        MOVES,
+        """\
 error[D141]: `trajectory` has no `times`
  --> deck.ic:9:55
   |
@@ -605,8 +605,9 @@ error[D141]: `trajectory` has no `times`
   |                                                       ^^^^^
   = help: it has: file, column, interpolation, begin
 """,
-    'trajectory(file = "moves.csv", times = [1, 2] s)',
-)
+        'trajectory(file = "moves.csv", times = [1, 2] s)',
+    ),
+]
 
 
 @pytest.mark.slow

@@ -250,10 +250,10 @@ def test_explain_tells_what_was_written_and_what_is_the_servos(tmp_path: Path) -
 # What is wrong with one
 
 
-def test_no_joint_of_this_name(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "substitute onne {}")
-        == """\
+MISTAKES = {
+    "no joint of this name": (
+        "substitute onne {}",
+        """\
 error[D144]: no joint `onne` in arm `chain`
  --> deck.ic:1:24
   |
@@ -261,20 +261,11 @@ error[D144]: no joint `onne` in arm `chain`
   |                        ^^^^^^^^^^^^^^^
   = help: did you mean `one`?
   = help: joints: one, two, three, free
-"""
-    )
-
-
-def test_nothing_is_said_of_the_channels_of_a_joint_that_is_not_there(tmp_path: Path) -> None:
-    more = "substitute onne {}  record = [bed.shaft_rate, onne.law.rate];  metric m = max { of = onne.bed.shaft_rate; }"
-    deck = f"run it like base_run {{ {more} }}"
-    assert [diagnostic.code for diagnostic in check(tmp_path, DECK, deck, select=["it"]).diagnostics] == ["D144"]
-
-
-def test_a_fixed_joint(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "substitute mount {}")
-        == """\
+""",
+    ),
+    "a fixed joint": (
+        "substitute mount {}",
+        """\
 error[D145]: joint `mount` is fixed, so it has no motor
  --> deck.ic:1:24
   |
@@ -282,14 +273,11 @@ error[D145]: joint `mount` is fixed, so it has no motor
   |                        ^^^^^^^^^^^^^^^^
  ::: deck.ic:12:5  fixed here
   = help: leave it out, or make the joint revolute or prismatic
-"""
-    )
-
-
-def test_a_joint_without_a_servo(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "substitute free {}")
-        == """\
+""",
+    ),
+    "a joint without a servo": (
+        "substitute free {}",
+        """\
 error[D175]: joint `free` has no servo, so it has no motor that a bed could take the place of
  --> deck.ic:1:24
   |
@@ -297,14 +285,11 @@ error[D175]: joint `free` has no servo, so it has no motor that a bed could take
   |                        ^^^^^^^^^^^^^^^
   = help: give it one: `servos { free = SERVO; }`
   = help: joints whose servos have a motor: one, two
-"""
-    )
-
-
-def test_a_servo_without_a_motor(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "substitute three {}")
-        == """\
+""",
+    ),
+    "a servo without a motor": (
+        "substitute three {}",
+        """\
 error[D176]: servo `follow` (ideal) of joint `three` has no motor that a bed could take the place of
  --> deck.ic:1:24
   |
@@ -312,14 +297,11 @@ error[D176]: servo `follow` (ideal) of joint `three` has no motor that a bed cou
   |                        ^^^^^^^^^^^^^^^^
  ::: deck.ic:24:40  its servo
   = help: servo models that have a motor: rigid_gearbox
-"""
-    )
-
-
-def test_two_laws_in_one_run(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "substitute one { law = bare; }  substitute two { law = torque_balance(band = 1 rad/s); }")
-        == """\
+""",
+    ),
+    "two laws in one run": (
+        "substitute one { law = bare; }  substitute two { law = torque_balance(band = 1 rad/s); }",
+        """\
 error[D177]: joint `two` has the law `torque_balance`, and joint `one` has `bare`
  --> deck.ic:1:79
   |
@@ -328,14 +310,11 @@ error[D177]: joint `two` has the law `torque_balance`, and joint `one` has `bare
  ::: deck.ic:1:47  `bare`
   = help: all substituted joints of a run are solved together, by one law: write the same for each
   = help: or substitute them in two runs
-"""
-    )
-
-
-def test_servos_that_do_not_tick_together(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "servos { two { rate = 500 Hz; } }  substitute one {}  substitute two {}")
-        == """\
+""",
+    ),
+    "servos that do not tick together": (
+        "servos { two { rate = 500 Hz; } }  substitute one {}  substitute two {}",
+        """\
 error[D178]: the servo of joint `two` ticks at 500 Hz, and that of joint `one`, whose motor is on a bed too, at 1000 Hz
  --> deck.ic:1:78
   |
@@ -344,22 +323,143 @@ error[D178]: the servo of joint `two` ticks at 500 Hz, and that of joint `one`, 
  ::: deck.ic:1:59  1000 Hz
   = help: all substituted joints of a run are solved together: give their servos the same `rate`
   = help: or substitute them in two runs
-"""
-    )
-
-
-def test_a_servo_that_ticks_too_seldom_for_a_bed(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "servos { one { rate = 5 Hz; } }  substitute one {}")
-        == """\
+""",
+    ),
+    "a servo that ticks too seldom for a bed": (
+        "servos { one { rate = 5 Hz; } }  substitute one {}",
+        """\
 error[D367]: the servo of joint `one` ticks at 5 Hz, too seldom for a motor on a bed
  --> deck.ic:1:57
   |
 1 | run it like base_run { servos { one { rate = 5 Hz; } }  substitute one {} }
   |                                                         ^^^^^^^^^^^^^^
   = help: give it 10 Hz or more: between two ticks the shaft goes on with what it was told last
-"""
-    )
+""",
+    ),
+    "the block of a joint that is not substituted": (
+        "one { law = bare; }",
+        """\
+error[D109]: nothing named `one` in run `it` to change
+ --> deck.ic:1:24
+  |
+1 | run it like base_run { one { law = bare; } }
+  |                        ^^^
+  = help: `substitute one { ... }` would put this joint's motor on a bed
+""",
+    ),
+    "a drive with a rate loop does not run away": (
+        "substitute one { bed = rate_drive(); } environment { bolt = runaway(joint = one); }",
+        """\
+error[D368]: `bolt` replaces the voltage of joint `one`, and `rate_drive` sends a rate
+ --> deck.ic:1:77
+  |
+1 | run it like base_run { substitute one { bed = rate_drive(); } environment { bolt = runaway(joint = one); } }
+  |                                                                             ^^^^
+ ::: deck.ic:1:24  on a bed
+  = help: leave it out: what the drive does with its rate is the drive's
+""",
+    ),
+    "unknown models": (
+        "substitute one { bed = emulatd; law = bar; }",
+        """\
+error[D140]: no bed model `emulatd`
+ --> deck.ic:1:47
+  |
+1 | run it like base_run { substitute one { bed = emulatd; law = bar; } }
+  |                                               ^^^^^^^
+  = help: did you mean `emulated`?
+  = help: bed models: emulated, rate_drive, torque_drive
+
+error[D140]: no law model `bar`
+ --> deck.ic:1:62
+  |
+1 | run it like base_run { substitute one { bed = emulatd; law = bar; } }
+  |                                                              ^^^
+  = help: did you mean `bare`?
+  = help: law models: bare, measured_acceleration, torque_balance, torque_balance_observer, velocity_tracking
+""",
+    ),
+    "unknown keys": (
+        "substitute one { bedd = emulated; law = bare(band = 1 rad/s); }",
+        """\
+error[D141]: `substitute one` has no `bedd`
+ --> deck.ic:1:41
+  |
+1 | run it like base_run { substitute one { bedd = emulated; law = bare(band = 1 rad/s); } }
+  |                                         ^^^^
+  = help: did you mean `bed`?
+  = help: it has: bed, law, scale
+
+error[D141]: law `bare` of joint `one` has no `band`
+ --> deck.ic:1:69
+  |
+1 | run it like base_run { substitute one { bedd = emulated; law = bare(band = 1 rad/s); } }
+  |                                                                     ^^^^
+  = help: it has: none
+""",
+    ),
+    "an unknown parameter a wrong unit and a number out of range": (
+        "substitute one { bed = emulated(ktt = 3, kt = 1 N*m, i_max = -3 A); }",
+        """\
+error[D141]: bed `emulated` of joint `one` has no `ktt`
+ --> deck.ic:1:56
+  |
+1 | run it like base_run { substitute one { bed = emulated(ktt = 3, kt = 1 N*m, i_max = -3 A); } }
+  |                                                        ^^^
+  = help: did you mean `kt`?
+  = help: it has: kt, resistance, tau_max, f_c, f_v, inertia, kt_load, i_max, f_cut, delay, faults, unevenness, lobes, once, twice, tachometer, converter_in, converter_voltage, converter_current
+
+error[D061]: `kt` of bed `emulated` of joint `one` is in N*m/A, and this is in N*m
+ --> deck.ic:1:70
+  |
+1 | run it like base_run { substitute one { bed = emulated(ktt = 3, kt = 1 N*m, i_max = -3 A); } }
+  |                                                                      ^^^^^
+  = help: write it in N*m/A
+
+error[D077]: `i_max` of bed `emulated` of joint `one` must be above 0 A
+ --> deck.ic:1:85
+  |
+1 | run it like base_run { substitute one { bed = emulated(ktt = 3, kt = 1 N*m, i_max = -3 A); } }
+  |                                                                                     ^^^^ this is -3 A
+  = help: write a number above 0 A (largest current of the load motor's amplifier)
+""",
+    ),
+    "a word of faults that there is not": (
+        "substitute one { bed = emulated(faults = typicl); }",
+        """\
+error[D076]: `faults` of bed `emulated` of joint `one` cannot be `typicl`
+ --> deck.ic:1:65
+  |
+1 | run it like base_run { substitute one { bed = emulated(faults = typicl); } }
+  |                                                                 ^^^^^^
+  = help: did you mean `typical`?
+  = help: one of: none, typical
+""",
+    ),
+    "a value without a name": (
+        "substitute one { law = torque_balance(0.5); }",
+        """\
+error[D153]: `torque_balance` takes its values by name
+ --> deck.ic:1:62
+  |
+1 | run it like base_run { substitute one { law = torque_balance(0.5); } }
+  |                                                              ^^^
+  = help: write `torque_balance(band = ...)`
+""",
+    ),
+}
+"""What a run substitutes, and what is said of it."""
+
+
+@pytest.mark.parametrize(("more", "message"), MISTAKES.values(), ids=MISTAKES)
+def test_a_mistake_is_this_message(tmp_path: Path, more: str, message: str) -> None:
+    assert shown(tmp_path, more) == message
+
+
+def test_nothing_is_said_of_the_channels_of_a_joint_that_is_not_there(tmp_path: Path) -> None:
+    more = "substitute onne {}  record = [bed.shaft_rate, onne.law.rate];  metric m = max { of = onne.bed.shaft_rate; }"
+    deck = f"run it like base_run {{ {more} }}"
+    assert [diagnostic.code for diagnostic in check(tmp_path, DECK, deck, select=["it"]).diagnostics] == ["D144"]
 
 
 def test_one_joint_and_a_block(tmp_path: Path) -> None:
@@ -402,20 +502,6 @@ error[D110]: `substitute` in a run
     )
 
 
-def test_the_block_of_a_joint_that_is_not_substituted(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "one { law = bare; }")
-        == """\
-error[D109]: nothing named `one` in run `it` to change
- --> deck.ic:1:24
-  |
-1 | run it like base_run { one { law = bare; } }
-  |                        ^^^
-  = help: `substitute one { ... }` would put this joint's motor on a bed
-"""
-    )
-
-
 def test_a_drive_with_a_rate_loop_and_a_command_without_a_rate(tmp_path: Path) -> None:
     said = shown(tmp_path, "servos { one { command = torque(2 N*m); } } substitute one { bed = rate_drive(); }")
     assert (
@@ -452,124 +538,6 @@ that could be the drive's
  ::: deck.ic:24:14  its servo
   = help: servo models that have one: none
   = help: or another bed: `emulated` sends a voltage, `torque_drive` sends a torque
-"""
-    )
-
-
-def test_a_drive_with_a_rate_loop_does_not_run_away(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "substitute one { bed = rate_drive(); } environment { bolt = runaway(joint = one); }")
-        == """\
-error[D368]: `bolt` replaces the voltage of joint `one`, and `rate_drive` sends a rate
- --> deck.ic:1:77
-  |
-1 | run it like base_run { substitute one { bed = rate_drive(); } environment { bolt = runaway(joint = one); } }
-  |                                                                             ^^^^
- ::: deck.ic:1:24  on a bed
-  = help: leave it out: what the drive does with its rate is the drive's
-"""
-    )
-
-
-def test_unknown_models(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "substitute one { bed = emulatd; law = bar; }")
-        == """\
-error[D140]: no bed model `emulatd`
- --> deck.ic:1:47
-  |
-1 | run it like base_run { substitute one { bed = emulatd; law = bar; } }
-  |                                               ^^^^^^^
-  = help: did you mean `emulated`?
-  = help: bed models: emulated, rate_drive, torque_drive
-
-error[D140]: no law model `bar`
- --> deck.ic:1:62
-  |
-1 | run it like base_run { substitute one { bed = emulatd; law = bar; } }
-  |                                                              ^^^
-  = help: did you mean `bare`?
-  = help: law models: bare, measured_acceleration, torque_balance, torque_balance_observer, velocity_tracking
-"""
-    )
-
-
-def test_unknown_keys(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "substitute one { bedd = emulated; law = bare(band = 1 rad/s); }")
-        == """\
-error[D141]: `substitute one` has no `bedd`
- --> deck.ic:1:41
-  |
-1 | run it like base_run { substitute one { bedd = emulated; law = bare(band = 1 rad/s); } }
-  |                                         ^^^^
-  = help: did you mean `bed`?
-  = help: it has: bed, law, scale
-
-error[D141]: law `bare` of joint `one` has no `band`
- --> deck.ic:1:69
-  |
-1 | run it like base_run { substitute one { bedd = emulated; law = bare(band = 1 rad/s); } }
-  |                                                                     ^^^^
-  = help: it has: none
-"""
-    )
-
-
-def test_an_unknown_parameter_a_wrong_unit_and_a_number_out_of_range(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "substitute one { bed = emulated(ktt = 3, kt = 1 N*m, i_max = -3 A); }")
-        == """\
-error[D141]: bed `emulated` of joint `one` has no `ktt`
- --> deck.ic:1:56
-  |
-1 | run it like base_run { substitute one { bed = emulated(ktt = 3, kt = 1 N*m, i_max = -3 A); } }
-  |                                                        ^^^
-  = help: did you mean `kt`?
-  = help: it has: kt, resistance, tau_max, f_c, f_v, inertia, kt_load, i_max, f_cut, delay, faults, unevenness, lobes, once, twice, tachometer, converter_in, converter_voltage, converter_current
-
-error[D061]: `kt` of bed `emulated` of joint `one` is in N*m/A, and this is in N*m
- --> deck.ic:1:70
-  |
-1 | run it like base_run { substitute one { bed = emulated(ktt = 3, kt = 1 N*m, i_max = -3 A); } }
-  |                                                                      ^^^^^
-  = help: write it in N*m/A
-
-error[D077]: `i_max` of bed `emulated` of joint `one` must be above 0 A
- --> deck.ic:1:85
-  |
-1 | run it like base_run { substitute one { bed = emulated(ktt = 3, kt = 1 N*m, i_max = -3 A); } }
-  |                                                                                     ^^^^ this is -3 A
-  = help: write a number above 0 A (largest current of the load motor's amplifier)
-"""
-    )
-
-
-def test_a_word_of_faults_that_there_is_not(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "substitute one { bed = emulated(faults = typicl); }")
-        == """\
-error[D076]: `faults` of bed `emulated` of joint `one` cannot be `typicl`
- --> deck.ic:1:65
-  |
-1 | run it like base_run { substitute one { bed = emulated(faults = typicl); } }
-  |                                                                 ^^^^^^
-  = help: did you mean `typical`?
-  = help: one of: none, typical
-"""
-    )
-
-
-def test_a_value_without_a_name(tmp_path: Path) -> None:
-    assert (
-        shown(tmp_path, "substitute one { law = torque_balance(0.5); }")
-        == """\
-error[D153]: `torque_balance` takes its values by name
- --> deck.ic:1:62
-  |
-1 | run it like base_run { substitute one { law = torque_balance(0.5); } }
-  |                                                              ^^^
-  = help: write `torque_balance(band = ...)`
 """
     )
 

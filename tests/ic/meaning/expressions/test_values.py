@@ -89,6 +89,24 @@ def test_linspace_has_the_decimals_that_one_would_write(tmp_path: Path) -> None:
     assert numbers(tmp_path, "linspace(0.010, 0.040, 7)") == [0.01, 0.015, 0.02, 0.025, 0.03, 0.035, 0.04]
 
 
+def test_a_range_of_degrees_has_the_angles_that_one_would_write(tmp_path: Path) -> None:
+    written = [number(tmp_path, f"{tenths / 10} deg") for tenths in range(31)]
+    assert numbers(tmp_path, "0 deg .. 3 deg by 0.1 deg") == written
+
+
+@pytest.mark.parametrize(("written", "message"), [
+    ("1 km .. 0 km by 100 m", "steps of 0.1 km do not lead from 1 km to 0 km"),
+    ("1 .. 0 by 0.1", "steps of 0.1 do not lead from 1 to 0"),
+    ("3 deg .. 0 deg by 1 deg", "steps of 1 deg do not lead from 3 deg to 0 deg"),
+])  # fmt: skip
+def test_steps_that_lead_elsewhere_are_told_in_the_unit_of_the_first(
+    tmp_path: Path, written: str, message: str
+) -> None:
+    with pytest.raises(Problem) as caught:
+        numbers(tmp_path, written)
+    assert caught.value.diagnostics[0].message == message
+
+
 def test_logspace_goes_by_one_ratio_and_keeps_its_ends(tmp_path: Path) -> None:
     assert numbers(tmp_path, "logspace(0.1, 10, 3) Hz") == [0.1, 1.0, 10.0]
     assert numbers(tmp_path, "logspace(0.025, 0.1, 3)") == [0.025, 0.05, 0.1]

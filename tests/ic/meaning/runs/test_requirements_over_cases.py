@@ -63,13 +63,11 @@ def test_a_bare_limit_before_in_is_no_number_of_inches(tmp_path: Path) -> None:
     assert experiment(tmp_path, ARM, SERVO, deck).requirements[0].limit == 2.0
 
 
-def test_a_plan_file_keeps_them_and_one_without_is_as_before(tmp_path: Path) -> None:
+def test_a_plan_file_keeps_them_and_one_without_is_as_before() -> None:
     import ic
 
     for number, written in enumerate(["require top < 2 rad/s;", "require top < 2 rad/s in 95 % of cases;"]):
-        path = tmp_path / f"{number}.ic"
-        path.write_text(ARM + SERVO + run(written), encoding="utf-8")
-        plan = ic.compile(path)
+        plan = ic.compile(text=ARM + SERVO + run(written))
         text = plan_file.dumps(plan)
         assert plan_file.loads(text).experiments[0].requirements == plan.experiments[0].requirements
         [kept] = json.loads(text)["experiments"][0]["requirements"]
@@ -77,13 +75,11 @@ def test_a_plan_file_keeps_them_and_one_without_is_as_before(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(("field", "value"), [("share", 0.0), ("share", 1.5), ("confidence", 1.0), ("confidence", 0.9)])
-def test_a_plan_file_with_a_share_that_cannot_be_is_damaged(tmp_path: Path, field: str, value: float) -> None:
+def test_a_plan_file_with_a_share_that_cannot_be_is_damaged(field: str, value: float) -> None:
     import ic
     from met.diagnostic import Problem
 
-    path = tmp_path / "a.ic"
-    path.write_text(ARM + SERVO + run("require top < 2 rad/s;"), encoding="utf-8")
-    data = json.loads(plan_file.dumps(ic.compile(path)))
+    data = json.loads(plan_file.dumps(ic.compile(text=ARM + SERVO + run("require top < 2 rad/s;"))))
     data["experiments"][0]["requirements"][0][field] = value
     with pytest.raises(Problem) as raised:
         plan_file.loads(json.dumps(data))
@@ -101,6 +97,7 @@ def test_a_plan_file_with_a_share_that_cannot_be_is_damaged(tmp_path: Path, fiel
     ("require top < 2 rad/s in 95 % of cases with 100 % confidence;", "D077", "confidence"),
     ("require percentile(top, 100 %) < 2 rad/s;", "D077", "share"),
     ("require percentile(top, 95 %) < 2 rad/s in 95 % of cases;", "D350", "in its brackets"),
+    ("require percentile(top) < 2 rad/s;", "D350", "of a metric and a share"),
     ("require percentile(tip, 95 %) < 2 rad/s;", "D132", "no metric `tip`"),
     ("require top < 2 rad/s in 100 % of cases with 90 % confidence;", "D350", "no number of cases"),
     ("require top < 2 rad/s in 99.99999999999 % of cases with 90 % confidence;", "D350", "so near to all or none"),

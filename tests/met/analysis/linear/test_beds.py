@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -42,12 +41,9 @@ def with_loads(made: Experiment, loads: list[float]) -> Experiment:
 @pytest.mark.parametrize("delay", [0, 1, 2])
 @pytest.mark.parametrize("rate", ["100 Hz", pytest.param("1 kHz", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("law", ["measured_acceleration", "bare"])
-def test_the_limit_of_a_law_is_where_a_pole_leaves_the_unit_circle(
-    law: str, rate: str, delay: int, tmp_path: Path
-) -> None:
+def test_the_limit_of_a_law_is_where_a_pole_leaves_the_unit_circle(law: str, rate: str, delay: int) -> None:
     deck = DECK.replace("LAW", law).replace("RATE", rate).replace("DELAY", str(delay))
-    (tmp_path / "deck.ic").write_text(deck)
-    (made,) = ic.compile(tmp_path / "deck.ic", select=["loads"]).experiments
+    (made,) = ic.compile(text=deck, select=["loads"]).experiments
     rotor = 1570.0**2 * 6.38e-5
     ((found,),) = margins(with_loads(made, [rotor]))
     if found.limit is None:
@@ -73,14 +69,11 @@ OTHER = (
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", ["torque_balance", "bare"])
-def test_a_motor_that_is_far_from_what_its_law_takes_it_for_is_as_in_the_whole_program(
-    law: str, tmp_path: Path
-) -> None:
+def test_a_motor_that_is_far_from_what_its_law_takes_it_for_is_as_in_the_whole_program(law: str) -> None:
     """Where the load would turn the shaft back within a tick, which an emulated bed does not do, the loop is looked at
     while the shaft is driven on; such light arms were told stable, and runs of them swing up."""
     deck = OTHER.replace("LAW", law).replace("RATE", "1 kHz").replace("delay = DELAY", "kt = 0.065 N*m/A")
-    (tmp_path / "deck.ic").write_text(deck)
-    (made,) = ic.compile(tmp_path / "deck.ic", select=["loads"]).experiments
+    (made,) = ic.compile(text=deck, select=["loads"]).experiments
     loads = [0.05, 0.3, 1.0, 2.0, 3.0, 3.8, 4.05, 4.1, 8.0]  # r: N^2 J_m is 1
     question = LinearQuestion(with_loads(made, loads), at=0.001)
     largest = [max(abs(pole.z) for pole in question.of(case).poles) for case in range(len(loads))]
@@ -94,12 +87,11 @@ def test_a_motor_that_is_far_from_what_its_law_takes_it_for_is_as_in_the_whole_p
 
 
 @pytest.mark.slow
-def test_a_tick_in_which_the_shaft_of_a_bed_turns_back_has_no_derivative(tmp_path: Path) -> None:
+def test_a_tick_in_which_the_shaft_of_a_bed_turns_back_has_no_derivative() -> None:
     """As an emulated bed stops it for the rest of a substep: nothing of its rate comes out of that tick."""
     deck = OTHER.replace("LAW", "torque_balance").replace("RATE", "1 kHz").replace("delay = DELAY", "kt = 0.065 N*m/A")
     turning = deck.replace("servos { hinge = drive; }", "servos { hinge = drive; }  initial { hinge.qd = 1e-4 rad/s; }")
-    (tmp_path / "deck.ic").write_text(turning)
-    (made,) = ic.compile(tmp_path / "deck.ic", select=["loads"]).experiments
+    (made,) = ic.compile(text=turning, select=["loads"]).experiments
     with pytest.raises(Problem, match="the shaft of the bed of `hinge` stops, or turns back") as refused:
         LinearQuestion(with_loads(made, [1.0]), at=0.001).of(0)
     assert refused.value.diagnostics[0].code == "D370"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 import ic
@@ -34,47 +32,45 @@ STOPPED = 0.01 * FRICTION / (2.0 / 3.0 + 50.0**2 * 6.4e-5)
 """The rate, rad/s, that dry friction takes in a step of a bar about its end, with its motor's shaft."""
 
 
-def question(folder: Path, rate: float, pull: float) -> LinearQuestion:
+def question(rate: float, pull: float) -> LinearQuestion:
     text = DECK.replace("RATE", repr(rate)).replace("PULL", repr(pull))
-    (folder / "deck.ic").write_text(text)
-    (experiment,) = ic.compile(folder / "deck.ic").experiments
+    (experiment,) = ic.compile(text=text).experiments
     return LinearQuestion(experiment)
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_the_edge_is_the_rate_that_friction_takes_in_a_step(tmp_path: Path, way: float) -> None:
+def test_the_edge_is_the_rate_that_friction_takes_in_a_step(way: float) -> None:
     """Weight pulls one way, and back-EMF slows: the edge is that of friction alone, in closed form."""
 
     def told(rate: float) -> tuple[CreepingRate, ...]:
-        (found,) = creeping([at_instant(question(tmp_path, rate, -0.7).program, 0, 0)])
+        (found,) = creeping([at_instant(question(rate, -0.7).program, 0, 0)])
         return found
 
     slow, fast = way * STOPPED * (1.0 - 1e-9), way * STOPPED * (1.0 + 1e-9)
     assert told(slow) == (CreepingRate("hinge", slow, "rad/s"),) and told(fast) == ()
 
 
-def test_a_joint_that_creeps_is_named_with_its_rate(tmp_path: Path) -> None:
+def test_a_joint_that_creeps_is_named_with_its_rate() -> None:
     """Its weight is a little more than its friction, so it goes on."""
-    found = question(tmp_path, -3e-8, -(FRICTION + 1e-6)).of(0)
+    found = question(-3e-8, -(FRICTION + 1e-6)).of(0)
     line = "  hinge creeps at 3e-08 rad/s: the answer holds for moves slower than that"
     assert list(linear_lines(found))[1] == line
     assert as_data(found)["creeping"] == [{"name": "hinge", "rate": -3e-8}]
     assert found.states[:2] == ("hinge.q", "hinge.qd")
 
 
-def test_one_that_moves_and_one_that_sticks_are_not_said_to_creep(tmp_path: Path) -> None:
-    assert question(tmp_path, 0.1, 0.0).of(0).creeping == ()
-    stuck = question(tmp_path, 0.0, 0.0).of(0)
+def test_one_that_moves_and_one_that_sticks_are_not_said_to_creep() -> None:
+    assert question(0.1, 0.0).of(0).creeping == ()
+    stuck = question(0.0, 0.0).of(0)
     assert stuck.creeping == () and stuck.held == ("hinge",)
 
 
 @pytest.mark.parametrize(("times", "creeps"), [(1.0 - 1e-9, True), (1.0 + 1e-9, False)])
-def test_a_motor_behind_an_elastic_gear_creeps_by_its_own_friction(tmp_path: Path, times: float, creeps: bool) -> None:
+def test_a_motor_behind_an_elastic_gear_creeps_by_its_own_friction(times: float, creeps: bool) -> None:
     """Its friction takes f_c/j_m of its rate in a second, whatever the arm is."""
     elastic = "model = compliant_gearbox;  stiffness = 1e4 N*m/rad;  damping = 10 N*m*s/rad;  kp"
     slow = 1e-3 * 0.02 / 6.4e-5 / 50.0
     text = DECK.replace("kp", elastic, 1).replace("100 Hz", "1 kHz").replace("PULL", "0.0")
-    (tmp_path / "deck.ic").write_text(text.replace("RATE", repr(times * slow)))
-    (experiment,) = ic.compile(tmp_path / "deck.ic").experiments
+    (experiment,) = ic.compile(text=text.replace("RATE", repr(times * slow))).experiments
     (found,) = creeping([at_instant(LinearQuestion(experiment).program, 0, 0)])
     assert [(each.name, each.unit) for each in found] == [("hinge.servo.motor_rate", "rad/s")] * creeps
