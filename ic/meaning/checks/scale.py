@@ -22,6 +22,7 @@ class Scale:
     meant   unit of the parameter where another may have been meant, "" where it may not;  power: the multiple goes as
             this power of the parameter
     said    what is so, in words, where the multiple does not say it;  cure: its remedy
+    typical  a multiple in the middle of what is usual, of a number on which the motion depends; 0: none is known
     """
 
     what: str
@@ -38,6 +39,7 @@ class Scale:
     power: float = 1.0
     said: str = ""
     cure: str = "ask for less, or move the limit"
+    typical: float = 0.0
 
     @property
     def multiple(self) -> float:
@@ -51,10 +53,19 @@ class Scale:
 
     def sentence(self, case: str, others: int) -> str:
         """The warning in words. case: words for the case; others: number of further paths that are so"""
-        times = f", {self.multiple:.4g} times {self.other}" if self.other else ""
         more = f"; {others} more {'is' if others == 1 else 'are'} so" if others else ""
         said = self.said or f"{self.verb} {self.size:.4g} {self.unit}".rstrip()
-        return f"`{self.path}` {said}{case}{'' if self.said else times}{more}; {self.usual}"
+        return f"`{self.path}` {said}{case}{'' if self.said else self.times}{more}; {self.usual}"
+
+    @property
+    def times(self) -> str:
+        """How many times the other number it is, in words."""
+        return f", {self.multiple:.4g} times {self.other}" if self.other else ""
+
+    @property
+    def words(self) -> str:
+        """The number and its multiple, in words."""
+        return f"{self.verb} {self.size:.4g} {self.unit}".rstrip() + self.times
 
     @property
     def remedies(self) -> list[str]:

@@ -60,7 +60,8 @@ def _centres(run: RunNumbers) -> Iterator[Scale]:
         if link.name in run.moved and not link.lumped and run.reach > 0.0 and run.is_written(path):
             far, large = run.length(path), 4.0 * run.gyration(f"links.{link.name}")
             other = run.reach_words if run.reach > large else f"4 times its radius of gyration, {large:.4g} m"
-            yield Scale("centre of mass", path, far, "m", max(run.reach, large), other, 0.0, 2.0, usual, meant="m")
+            most = max(run.reach, large)
+            yield Scale("centre of mass", path, far, "m", most, other, 0.0, 2.0, usual, meant="m", typical=0.2)
 
 
 def _offsets(run: RunNumbers) -> Iterator[Scale]:
@@ -71,7 +72,7 @@ def _offsets(run: RunNumbers) -> Iterator[Scale]:
         if joint.parent != BASE and rest > 0.0:
             path, far = f"{joint.name}.at", run.offsets[joint.name]
             other = f"the rest of its chain, {rest:.4g} m"
-            yield Scale("place of a joint", path, far, "m", rest, other, 0.0, 60.0, usual, meant="m")
+            yield Scale("place of a joint", path, far, "m", rest, other, 0.0, 60.0, usual, meant="m", typical=1.0)
 
 
 def _touches(run: RunNumbers) -> Iterator[Scale]:
@@ -116,6 +117,7 @@ def _gyrations(run: RunNumbers) -> Iterator[Scale]:
                 verb="has a radius of gyration of",
                 meant="kg*m^2",
                 power=0.5,
+                typical=0.2,
             )
 
 
@@ -135,7 +137,8 @@ def _gears(run: RunNumbers) -> Iterator[Scale]:
     for use in run.uses:
         ratio = run.of_motor(use, RATIO.name)
         if ratio is not None and run.kinds[use.joint] == "revolute":
-            yield Scale("gear ratio", f"{use.joint}.servo.{RATIO.name}", ratio, "", 1.0, "", 0.2, 1e5, usual)
+            path, typical = f"{use.joint}.servo.{RATIO.name}", max(20.0, 1.0 / ratio) if ratio > 0.0 else 0.0
+            yield Scale("gear ratio", path, ratio, "", 1.0, "", 0.2, 1e5, usual, typical=typical)
 
 
 def _speeds(run: RunNumbers) -> Iterator[Scale]:
@@ -309,13 +312,43 @@ def _bands(run: RunNumbers) -> Iterator[Scale]:
 def _payloads(run: RunNumbers) -> Iterator[Scale]:
     arm = sum(run.numbers.get(f"links.{link}.mass", 0.0) for link in run.moved)
     weights = [run.length(f"environment.{use.name}.g") for use in run.structure.environment if use.model == "gravity"]
-    high, usual = 200.0, "industrial robots lift a tenth to a third of their mass"
+    high, typical, usual = 200.0, 0.2, "industrial robots lift a tenth to a third of their mass"
     if not any(weights):
-        high, usual = 1e4, "the arm of the Space Station is made for 116 t, some 70 times its mass"
+        high, typical, usual = 1e4, 70.0, "the arm of the Space Station is made for 116 t, some 70 times its mass"
     for payload in run.structure.payloads:
         path, other = f"payloads.{payload.name}.mass", f"the mass of the moved links, {arm:.4g} kg"
         if path in run.numbers and arm > 0.0 and payload.link != BASE:
-            yield Scale("mass of a payload", path, run.numbers[path], "kg", arm, other, 0.0, high, usual, meant="kg")
+            mass = run.numbers[path]
+            yield Scale(
+                "mass of a payload", path, mass, "kg", arm, other, 0.0, high, usual, meant="kg", typical=typical
+            )
+
+
+def _rotors(run: RunNumbers) -> Iterator[Scale]:
+    """Inertias of rotors, as the joint feels them, beside that of all moved links at the arm's reach."""
+    usual = "arms that come with MET have up to 0.2, and short stubs on a large motor far more"
+    arm = sum(run.numbers.get(f"links.{link}.mass", 0.0) for link in run.moved) * run.reach**2
+    for use in run.uses:
+        ratio, rotor, path = run.of_motor(use, RATIO.name), run.of_motor(use, "j_m"), f"{use.joint}.servo.j_m"
+        if ratio is not None and rotor is not None and arm > 0.0 and run.kinds[use.joint] == "revolute":
+            felt, other = (
+                ratio * ratio * rotor,
+                f"the mass of the moved links times the reach squared, {arm:.4g} kg*m^2",
+            )
+            yield Scale(
+                "inertia of a rotor",
+                path,
+                felt,
+                "kg*m^2",
+                arm,
+                other,
+                0.0,
+                1e9,
+                usual,
+                verb="is felt at the joint as",
+                meant="kg*m^2",
+                typical=0.3,
+            )
 
 
 def _gravities(run: RunNumbers) -> Iterator[Scale]:
@@ -349,6 +382,7 @@ SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
     _sensors,
     _bands,
     _payloads,
+    _rotors,
     _gravities,
 )
 
