@@ -87,7 +87,8 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
         def find_usual() -> list[str]:
             return usual_number(scope, experiment, lambda changed: not step_size(changed, rows).loops)
 
-        blamed = memo.answer("usual number", experiment, find_usual, rows) if found.loops else []
+        any_told = any(not experiment.allows("D320" if loop.ticks else "D322") for loop in found.loops)
+        blamed = memo.answer("usual number", experiment, find_usual, rows) if any_told else []
         for loop in found.loops:
             start = at_the_start(experiment, loop.case)
             warning = loop_warning(experiment, loop, scope.rate_place, f"as it stands {start}")

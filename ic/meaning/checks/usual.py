@@ -14,7 +14,7 @@ from met.plan import Experiment
 FAR = 30.0
 """Factor over a typical multiple, or below it, from which on a number may be to blame for a finding."""
 
-MOST = 3
+MOST = 2
 """Largest number of numbers that are tried."""
 
 
