@@ -18,7 +18,7 @@ from met.plan.defaults import INERTIA
 def grapples(run: RunNumbers) -> Iterator[Scale]:
     """Payloads beside their written place on the link that grapples them, by the positions that joints are asked for
     then; of one beyond the arm's reach there is D339."""
-    structure, usual = run.structure, "a grapple closes on what is near"
+    structure = run.structure
     motions = {use.joint: run.motion(use) for use in run.uses}
     named = [use.name for use in structure.environment if use.model == "gravity"]
     g = sum((run.vector(f"environment.{name}.g") for name in named), np.zeros(3))
@@ -33,14 +33,27 @@ def grapples(run: RunNumbers) -> Iterator[Scale]:
             q[joint] = math.nan if motion is None else float(np.interp(t, run.instants, motion[0]))
         turned, at, _ = run.poses(q)
         flown = run.vector(f"{head}.position") + run.vector(f"{head}.velocity") * t + 0.5 * t * t * g
-        apart = float(np.linalg.norm(flown - at[payload.link] - turned[payload.link] @ run.vector(f"{head}.at")))
+        place = at[payload.link] + turned[payload.link] @ run.vector(f"{head}.at")
+        apart = float(np.linalg.norm(flown - place))
         loose = run.extent(head) + run.length(f"{head}.com") * (2.0 + run.length(f"{head}.rate") * t)
         beyond = known.away(np.array([[run.numbers[path] for path in known.paths]]), run.duration)[0].size
         most = run.depths[payload.link] + run.length(f"{head}.at") + 4.0 * loose
         if math.isfinite(apart) and most > 0.0 and not beyond:
-            other = f"the way there from the base with 4 times the payload's size, {most:.4g} m"
-            verb = f"has it, as `{payload.link}` grapples it, apart from its place there by"
-            yield Scale("grapple", f"{head}.position", apart, "m", most, other, 0.0, 0.25, usual, verb=verb)
+            there = ", ".join(f"{x:.4g}" for x in np.round(place, 6) + 0.0)
+            yield Scale(
+                "grapple",
+                f"{head}.position",
+                apart,
+                "m",
+                most,
+                f"the way there from the base with 4 times the payload's size, {most:.4g} m",
+                0.0,
+                0.25,
+                "a grapple closes on what is near",
+                verb="is apart from the place of the grapple by",
+                said=f"leads it {apart:.4g} m past its place on `{payload.link}`, which grapples it at {t:.4g} s",
+                cure=f"its place is at [{there}] m then: let it be there",
+            )
 
 
 def spreads(run: RunNumbers) -> Iterator[Scale]:

@@ -59,18 +59,28 @@ FLIES = (
 
 
 @pytest.mark.parametrize(
-    ("time", "place", "apart"),
+    ("time", "place", "apart", "there"),
     [
-        ("0", "1, 0, 0", None),
-        ("0", "1, 0.2, 0", None),
-        ("0", "1, 0.4, 0", "0.4 m, 0.3846 times"),
-        ("2.9", "1, 0, 41.26", "1.255 m"),  # it has fallen to where the arm was
+        ("0", "1, 0, 0", None, ""),
+        ("0", "1, 0.2, 0", None, ""),
+        ("0", "1, 0.4, 0", "0.4", "1, 0, 0"),
+        ("2.9", "1, 0, 41.26", "1.255", "0.1, 0, -0.866"),  # it has fallen to where the arm was
     ],
 )
-def test_a_payload_that_its_grapple_misses_is_told(tmp_path: Path, time: str, place: str, apart: str | None) -> None:
-    found = remarks(tmp_path, (FLIES[0], FLIES[1].replace("T s", f"{time} s").replace("[P]", f"[{place}]")))
-    said = "`payloads.tool.position` has it, as `fore` grapples it, apart from its place there by "
-    assert [each.startswith(f"{said}{apart}") for each, _ in found] == [True] * (apart is not None), found
+def test_a_payload_that_its_grapple_misses_is_told(
+    tmp_path: Path, time: str, place: str, apart: str | None, there: str
+) -> None:
+    def found(place: str) -> list[tuple[str, tuple[str, ...]]]:
+        return remarks(tmp_path, (FLIES[0], FLIES[1].replace("T s", f"{time} s").replace("[P]", f"[{place}]")))
+
+    message = (
+        f"`payloads.tool.position` leads it {apart} m past its place on `fore`, which grapples it at {time} s; a "
+        "grapple closes on what is near"
+    )
+    remedy = f"its place is at [{there}] m then: let it be there"
+    assert found(place) == [(message, (remedy,))] * (apart is not None)
+    x, y, z = (float(each) for each in (there or place).split(","))
+    assert found(f"{x}, {y}, {z + 0.5 * 9.81 * float(time) ** 2}") == []  # the remedy
 
 
 @pytest.mark.parametrize(
