@@ -31,6 +31,9 @@ from met.servos.motor import RATIO
 EARTH = 9.80665
 """Acceleration of free fall on the Earth, m/s^2."""
 
+LOAD_MOTOR = ("kt_load", "i_max", "scale.torque")
+"""Numbers of a bed that limit the torque of its load motor: N m/A, A, and the scale, 1 where there is none."""
+
 FAR = 1e4
 """Multiple of what a motor can give from which on a limit is a large number for none."""
 
@@ -219,7 +222,8 @@ def _frictions(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _loads(run: RunNumbers) -> Iterator[Scale]:
-    """The load of gravity at the start beside what motor and friction hold at the joint."""
+    """The load of gravity at the start beside what motor and friction hold at the joint, and what the load motor of a
+    bed can make there."""
     usual = "a motor that cannot hold its arm lets it fall"
     loads = run.loads()
     for use in run.uses:
@@ -230,6 +234,13 @@ def _loads(run: RunNumbers) -> Iterator[Scale]:
             path, other = f"{use.joint}.servo.{limit[0]}", f"what it holds at the joint, {most:.4g} {unit}"
             load = abs(loads[use.joint])
             yield Scale("load at the start", path, load, unit, most, other, 0.0, 1.0, usual, verb="meets a load of")
+            constant, current, scale = (run.numbers.get(f"{use.joint}.bed.{name}") for name in LOAD_MOTOR)
+            if constant is not None and current is not None:
+                path, most = f"{use.joint}.bed.i_max", ratio * constant * current * (1.0 if scale is None else scale)
+                other, weak = "what the load motor makes at the joint", "a bed brings its joint's load"
+                said = f"makes {most:.4g} {unit} at the joint, which gravity loads by {load:.4g} {unit} at the start"
+                cure = f"{1.01 * current * load / most:.4g} A would bring it" if most > 0.0 else "give it a current"
+                yield Scale("load of a bed", path, load, unit, most, other, 0.0, 1.0, weak, said=said, cure=cure)
 
 
 def _brakes(run: RunNumbers) -> Iterator[Scale]:

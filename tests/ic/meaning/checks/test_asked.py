@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ic.meaning.checks.test_scales import TWO_LINKS, remarks
+from tests.ic.meaning.checks.test_scales import PUSH, TWO_LINKS, remarks
 
 SETTLED = "settling_time(of = elbow.q, target = 60 deg, band = 2 %)"
 STOPPED = (
@@ -138,3 +138,19 @@ def test_a_payload_beside_its_link_by_more_than_the_arm_is_told(tmp_path: Path) 
         "`payloads.tool.at` is beside the shape of `fore` by 1.1 m, 1.1 times the arm's reach, 1 m; a payload is "
         "usually at its link, or hangs from it"
     ]
+
+
+def test_a_load_motor_too_small_for_the_load_at_the_start_is_told_with_a_current_that_does(tmp_path: Path) -> None:
+    def found(current: str, scale: str = "") -> list[tuple[str, tuple[str, ...]]]:
+        bed = f"    substitute elbow {{ bed = emulated(i_max = {current}); law = velocity_tracking; {scale} }}\n"
+        unread = ("sensor q = encoder { step = 0.0001 rad; }", "")
+        return remarks(tmp_path, (PUSH, ""), unread, ("    payload", f"{bed}    payload"))
+
+    assert found("0.05 A") == [
+        (
+            "`elbow.bed.i_max` makes 0.36 N*m at the joint, which gravity loads by 7.848 N*m at the start; a bed brings "
+            "its joint's load",
+            ("1.101 A would bring it",),
+        )
+    ]
+    assert found("1.101 A") == [] and found("0.05 A", "scale { torque = 25; rate = 25; voltage = 25; }") == []
