@@ -104,6 +104,9 @@ def targets(run: RunNumbers) -> Iterator[Scale]:
         if target is None or begins is None or of not in ("q", "qd") or joint not in motions:
             continue
         k = ("q", "qd").index(of)
+        of_both = f"{joint}.servo.command", f"{head}.{name}"
+        if any(least < most and path.startswith(of_both) for path, (least, most) in run.ranges.items()):
+            continue  # a sweep over commands may judge all by one target
         asked = np.append(motions[joint][k], begins)
         away = max(float(asked.min()) - target, target - float(asked.max()), 0.0)
         band = run.numbers.get(f"{head}.band", 0.0) * abs(target) + run.numbers.get(f"{head}.within", 0.0)

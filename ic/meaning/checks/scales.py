@@ -140,7 +140,7 @@ def _gears(run: RunNumbers) -> Iterator[Scale]:
     for use in run.uses:
         ratio = run.of_motor(use, RATIO.name)
         if ratio is not None and run.kinds[use.joint] == "revolute":
-            path, typical = f"{use.joint}.servo.{RATIO.name}", max(20.0, 1.0 / ratio) if ratio > 0.0 else 0.0
+            path, typical = f"{use.joint}.servo.{RATIO.name}", 1.0 / ratio if 0.0 < ratio < 1.0 else 0.0
             yield Scale("gear ratio", path, ratio, "", 1.0, "", 0.2, 1e5, usual, typical=typical)
 
 
@@ -358,7 +358,7 @@ def _rotors(run: RunNumbers) -> Iterator[Scale]:
                 usual,
                 verb="is felt at the joint as",
                 meant="kg*m^2",
-                typical=0.3,
+                typical=3.0,
             )
 
 

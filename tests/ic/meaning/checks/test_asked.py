@@ -154,3 +154,8 @@ def test_a_load_motor_too_small_for_the_load_at_the_start_is_told_with_a_current
         )
     ]
     assert found("1.101 A") == [] and found("0.05 A", "scale { torque = 25; rate = 25; voltage = 25; }") == []
+
+
+def test_a_target_that_all_cases_of_a_sweep_over_commands_share_is_not_told(tmp_path: Path) -> None:
+    sweep = "sweep s of lift { vary elbow.servo.command.to = [40, 50, 60] deg; }\n"
+    assert remarks(tmp_path, text=TWO_LINKS + sweep) == []

@@ -55,7 +55,7 @@ def test_the_number_of_a_servo_that_two_joints_share_is_one(tmp_path: Path) -> N
     both = helps(tmp_path, "D322", ("j_m = 1e-4", "j_m = 0.1"))
     assert {each[0] for each in both} == {
         "`shoulder.servo.j_m` is felt at the joint as 1000 kg*m^2, 205.8 times the mass of the moved links times the "
-        "reach squared, 4.86 kg*m^2: with 686 times less, which is usual, this would not be so"
+        "reach squared, 4.86 kg*m^2: with 69 times less, which is usual, this would not be so"
     }
 
 
