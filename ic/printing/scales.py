@@ -6,7 +6,7 @@ import textwrap
 from typing import Any
 
 from ic.driver.compile import Compiled
-from ic.meaning.checks.scales import Scale
+from ic.meaning.checks.scale import Scale
 from ic.printing.columns import columns
 
 BESIDE = textwrap.TextWrapper(100, initial_indent="      ", subsequent_indent="      ", break_long_words=False)

@@ -18,7 +18,7 @@ REPORTED_ONCE = ("D060", "D061", "D076", "D077", "D087", "D104", "D109", "D125",
 inertia, a rate too slow, no entry of a run, no channel, no such key, a unit that may mean cycles, a share above 1."""
 
 
-REMARKED_ONCE = ("D317", "D318", "D319", "D320", "D322")
+REMARKED_ONCE = ("D317", "D318", "D319", "D320", "D322", "D335")
 """Codes of warnings that are given once at a place: of a rate or a servo that several runs and sweeps share."""
 
 

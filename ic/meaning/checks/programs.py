@@ -17,7 +17,7 @@ def check_program(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> E
     mass matrix and its steps."""
     experiment = check_lumped(scope.complaints, experiment, memo)
     check_stops(scope.complaints, experiment)
-    check_balance(scope.complaints, experiment)
+    check_balance(scope, experiment)
     experiment = check_steps(scope, experiment, memo)
     check_beds(scope.complaints, experiment, memo)
     return experiment

@@ -25,7 +25,7 @@ def check_reach(scope: Scope, block: MergedBlock, structure: Structure) -> None:
     """Warn about payloads that are grappled beyond the reach of their links: on a fixed base, with revolute joints."""
     items = {item.name: item for item in block.of_kind("payload")}
     for payload in structure.payloads:
-        looked_at = _looked_at(structure, payload, scope.parameters)
+        looked_at = grapple_numbers(structure, payload, scope.parameters)
         if looked_at is not None:
             item = items[payload.name]
             grapple = item.body.get("grapple") if item.body is not None else None
@@ -36,7 +36,7 @@ def flies_from_afar(experiment: Experiment, name: str) -> bool:
     """True where the check warns about the grapple of the payload of this name."""
     structure = experiment.structure
     payload = next((each for each in structure.payloads if each.name == name), None)
-    looked_at = _looked_at(structure, payload, experiment.parameters) if payload is not None else None
+    looked_at = grapple_numbers(structure, payload, experiment.parameters) if payload is not None else None
     if looked_at is None or experiment.allows("D339"):
         return False
     inputs = {each.path: each.values for each in experiment.cases.coordinates}
@@ -49,7 +49,7 @@ def flies_from_afar(experiment: Experiment, name: str) -> bool:
 
 
 @frozen
-class _LookedAt:
+class GrappleNumbers:
     """The numbers that decide whether a grapple is distant: paths of scalars, then of vectors by component, those of
     gravities before those of the joints."""
 
@@ -72,7 +72,7 @@ class _LookedAt:
         return np.flatnonzero((away > FAR * (reach + loose)) & (time <= duration)), away, reach
 
 
-def _looked_at(structure: Structure, payload: Payload, parameters: Mapping[str, Any]) -> _LookedAt | None:
+def grapple_numbers(structure: Structure, payload: Payload, parameters: Mapping[str, Any]) -> GrappleNumbers | None:
     """The numbers to check; None where no statement is possible: the base moves, a joint slides, the payload is pushed,
     or it is not grappled."""
     joints = _way_to(structure, payload.link)
@@ -86,7 +86,7 @@ def _looked_at(structure: Structure, payload: Payload, parameters: Mapping[str, 
     gravity = [f"environment.{load.name}.g" for load in structure.environment if load.model == "gravity"]
     numbers = [f"{head}.grapple", *(f"{each}.{name}" for each in (head, link) for name in sizes)]
     vectors = [*(f"{head}.{name}" for name in _OF_PAYLOAD), f"{link}.com", *gravity, *(f"{each}.at" for each in joints)]
-    return _LookedAt((*numbers, *(f"{each}.{x}" for each in vectors for x in "xyz")), len(gravity))
+    return GrappleNumbers((*numbers, *(f"{each}.{x}" for each in vectors for x in "xyz")), len(gravity))
 
 
 def _way_to(structure: Structure, link: str) -> list[str] | None:
@@ -116,7 +116,7 @@ def _is_pushed(structure: Structure, payload: Payload, parameters: Mapping[str, 
     return False
 
 
-def _observe(scope: Scope, payload: Payload, looked_at: _LookedAt, duration: float, place: Place) -> None:
+def _observe(scope: Scope, payload: Payload, looked_at: GrappleNumbers, duration: float, place: Place) -> None:
     head = f"payloads.{payload.name}"
     settled = [scope.parameters.get(path) for path in looked_at.paths]
     values: list[Real] = [each.value for each in settled if each is not None]  # type: ignore[misc]  # they are numbers

@@ -29,13 +29,21 @@ class RunNumbers:
     """The numbers of one case of a run, and what follows from them for several scales.
 
     settled  parameters by path, also words and lists;  numbers: those that are numbers, in this case, SI
+    ranges   least and largest of each number in all cases
     """
 
     def __init__(
-        self, structure: Structure, uses: Iterable[Use], settled: Mapping[str, Settled], numbers: Mapping[str, float]
+        self,
+        structure: Structure,
+        uses: Iterable[Use],
+        settled: Mapping[str, Settled],
+        numbers: Mapping[str, float],
+        ranges: Mapping[str, tuple[float, float]],
     ) -> None:
         self.structure, self.uses, self.settled, self.numbers = structure, tuple(uses), settled, numbers
+        self.ranges = ranges
         self.duration = structure.schedule.duration
+        self.instants = np.linspace(0.0, self.duration, INSTANTS)
         self.by_unit = defaultdict[str, list[tuple[str, Settled]]](list)
         for path, each in settled.items():
             self.by_unit[each.unit].append((path, each))
@@ -138,19 +146,8 @@ class RunNumbers:
         g = sum((self.vector(f"environment.{name}.g") for name in named), np.zeros(3))
         if self.structure.base is not None or not g.any():
             return {}
-        turned, at = {BASE: np.eye(3)}, {BASE: np.zeros(3)}
-        lines: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-        for joint in self.outward:
-            parent = turned[joint.parent]
-            frame = parent @ np.array(rotation_rpy(*self.vector(f"{joint.name}.rpy")))
-            axis = frame @ self.vector(f"{joint.name}.axis")
-            q = self.numbers.get(f"initial.{joint.name}.q", 0.0)
-            origin = at[joint.parent] + parent @ self.vector(f"{joint.name}.at")
-            pivot = frame @ self.vector(f"{joint.name}.pivot")
-            turn = np.array(rotation_about(tuple(axis), q)) if joint.kind == "revolute" else np.eye(3)
-            slide = axis * q if joint.kind == "prismatic" else 0.0
-            turned[joint.child], at[joint.child] = turn @ frame, origin + pivot - turn @ pivot + slide
-            lines[joint.name] = axis, origin + pivot
+        begins = {joint.name: self.numbers.get(f"initial.{joint.name}.q", 0.0) for joint in self.structure.moving}
+        turned, at, lines = self.poses(begins)
         bodies = [
             (link.name, f"links.{link.name}", self.vector(f"links.{link.name}.com")) for link in self.structure.links
         ]
@@ -176,6 +173,26 @@ class RunNumbers:
             masses[joint.parent] += mass
             moments[joint.parent] = moments[joint.parent] + moment
         return {joint.name: found[joint.name] for joint in self.structure.moving}
+
+    def poses(
+        self, q: Mapping[str, float]
+    ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], dict[str, tuple[np.ndarray, np.ndarray]]]:
+        """Rotations and places of links against the base, and each joint's axis with a point of it, for positions of
+        joints."""
+        turned, at = {BASE: np.eye(3)}, {BASE: np.zeros(3)}
+        lines: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        for joint in self.outward:
+            parent = turned[joint.parent]
+            frame = parent @ np.array(rotation_rpy(*self.vector(f"{joint.name}.rpy")))
+            axis = frame @ self.vector(f"{joint.name}.axis")
+            origin = at[joint.parent] + parent @ self.vector(f"{joint.name}.at")
+            pivot = frame @ self.vector(f"{joint.name}.pivot")
+            way = q.get(joint.name, 0.0)
+            turn = np.array(rotation_about(tuple(axis), way)) if joint.kind == "revolute" else np.eye(3)
+            slide = axis * way if joint.kind == "prismatic" else 0.0
+            turned[joint.child], at[joint.child] = turn @ frame, origin + pivot - turn @ pivot + slide
+            lines[joint.name] = axis, origin + pivot
+        return turned, at, lines
 
     def is_helped(self, joint: str) -> bool:
         """True where a model of the environment may bear a joint's load at the start: one that is not of
@@ -212,7 +229,19 @@ class RunNumbers:
             if value is None:
                 return None
             setattr(p, each.name, value)
-        t = np.linspace(0.0, self.duration, INSTANTS)
+        t = self.instants
         with np.errstate(all="ignore"):  # of a swing at 1e308 Hz there are no numbers
             values, slopes = (np.broadcast_to(np.asarray(each, float), t.shape) for each in profile.course(p, t))
         return values, slopes
+
+    def motion(self, use: Use) -> tuple[np.ndarray, np.ndarray] | None:
+        """Positions and rates that a command asks for through the run, also where a commanded rate leads; positions are
+        no numbers under any other command, whose values stand for the rates. None where the course is not known."""
+        course, kind = self.course(use), use.command.kind if use.command is not None else ""
+        if course is None or kind == "position":
+            return course
+        values, places = course[0], np.full_like(self.instants, math.nan)
+        if kind == "rate":
+            ways = np.cumsum(values[1:] + values[:-1]) * (0.5 * self.instants[1])
+            places = self.numbers.get(f"initial.{use.joint}.q", math.nan) + np.append(0.0, ways)
+        return places, values

@@ -1,5 +1,5 @@
-"""Warnings about commands, courses and loads that their sampling instants do not resolve, or the run is too short for
-(`met.content`)."""
+"""Warnings about commands, courses, loads and filters that their sampling instants do not resolve, or the run is too
+short for (`met.content`)."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from typing import Any
 import numpy as np
 
 from ic.meaning.checks.carried import Uncarried, uncarried
+from ic.meaning.checks.swings import evaluate_declared
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.content import Content
 from met.diagnostic import Place
 from met.frozen import frozen
-from met.plan import BASE, Schedule, Structure
+from met.plan import BASE, LinkSensor, Schedule, SensorUse, Structure
 from met.plan.judged import Requirement
+from met.plan.uses import sensor_parts
 from met.trace import Real
 
 MOST_ROWS = 1000
@@ -100,6 +102,44 @@ def check_sampling(scope: Scope, structure: Structure, requirements: Iterable[Re
     recorded = schedule.record / schedule.base_hz if structure.record else 0.0
     for sampled in _all_sampled(structure):
         _observe(scope, replace(sampled, recorded=recorded, finishes=sampled.path in finishing), schedule)
+    for use in structure.servos:
+        for sensor in use.sensors if not use.continuous else ():
+            label = f"sensor `{sensor.of}` of servo `{use.definition}`"
+            path = f"{use.joint}.servo.sensor.{sensor.of}"
+            _observe_filter(scope, sensor, label, path, use.divisor, "its servo ticks", schedule)
+    for each in structure.sensors:
+        label, path = f"sensor `{each.name}`", f"sensors.{each.name}"
+        _observe_filter(scope, each, label, path, each.divisor, "it reads", schedule)
+
+
+def _observe_filter(
+    scope: Scope, use: SensorUse | LinkSensor, label: str, path: str, divisor: int, by: str, schedule: Schedule
+) -> None:
+    """Warn about a sensor whose filter passes what its instants, every `divisor` base ticks, take for slower swings."""
+    found = {each.name: scope.parameters.get(f"{path}.{each.name}") for each in sensor_parts(use, "parameters")}
+    settled = {name: each for name, each in found.items() if each is not None}
+    values = {name: each.value for name, each in settled.items()}
+    rate = evaluate_declared(scope, models.find("sensor", use.model).fastest, values, path)
+    place = next((each.origin.place for each in settled.values() if each.unit == "Hz" and each.origin.place), use.place)
+    if rate is None or place is None:
+        return
+    hz = schedule.base_hz / divisor
+
+    def warn(rows: np.ndarray) -> None:
+        cutoff = float(rows.max()) / (2.0 * math.pi)
+        if 2.0 * cutoff <= hz * (1.0 + ROUNDING) or scope.complaints.error_count:
+            return
+        enough = _fitting(2.0 * cutoff, schedule.base_hz)
+        more = f"; or give what reads it {_written(enough, schedule.base_hz)}" if enough < math.inf else ""
+        scope.complaints.remark(
+            "D335",
+            f"the filter of {label} passes {cutoff:.6g} Hz{scope.checks.where(int(rows.argmax()), [rate])}, and {by} "
+            f"at {hz:.6g} Hz: what swings faster than {0.5 * hz:.6g} Hz is read as slower",
+            place,
+            help=f"a cut-off frequency of {0.5 * hz:.6g} Hz or less{more}",
+        )
+
+    scope.checks.observe((rate,), warn, place, needs=(path,))
 
 
 def _all_sampled(structure: Structure) -> Iterator[SampledContent]:

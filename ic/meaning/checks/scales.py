@@ -12,104 +12,33 @@ what a motor can do by its own numbers.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
+from ic.meaning.checks.asked import grapples, spreads, targets
 from ic.meaning.checks.magnitudes import LENGTHS, MASSES, MEANT, SMALLEST_GYRATION
-from ic.meaning.checks.run_numbers import BEARING_NOTHING, INSTANTS, RunNumbers
+from ic.meaning.checks.run_numbers import BEARING_NOTHING, RunNumbers
+from ic.meaning.checks.scale import TURN, Scale
 from ic.meaning.control.servos import Use, unit_written
 from ic.meaning.parameters.scope import Scope
 from met import models
-from met.frozen import frozen
 from met.plan import BASE, Structure
 from met.plan.channel import JOINT_LIMITS
 from met.plan.defaults import INERTIA
 from met.servos.motor import RATIO
 
-TURN = 2.0 * math.pi
-
 EARTH = 9.80665
 """Acceleration of free fall on the Earth, m/s^2."""
+
+LOAD_MOTOR = ("kt_load", "i_max", "scale.torque")
+"""Numbers of a bed that limit the torque of its load motor: N m/A, A, and the scale, 1 where there is none."""
 
 FAR = 1e4
 """Multiple of what a motor can give from which on a limit is a large number for none."""
 
 MOST_CASES = 16
 """Largest number of cases that are looked at: the first, and those with the ends of what varies."""
-
-
-@frozen
-class Scale:
-    """A number of a run as a multiple of another.
-
-    what    what is compared, in words
-    path    of the parameter that the number is of, or the first of them
-    size    the number;  unit: its unit, "" of one without;  verb: that leads to it from the path
-    beside  the other number, which is `other` in words; 1 and "" where the number is a multiple already
-    low     smallest usual multiple;  high: the largest;  usual: where these are from, in words
-    meant   unit of the parameter where another may have been meant, "" where it may not;  power: the multiple goes as
-            this power of the parameter
-    said    what is so, in words, where the multiple does not say it
-    """
-
-    what: str
-    path: str
-    size: float
-    unit: str
-    beside: float
-    other: str
-    low: float
-    high: float
-    usual: str
-    verb: str = "is"
-    meant: str = ""
-    power: float = 1.0
-    said: str = ""
-
-    @property
-    def multiple(self) -> float:
-        return self.size / self.beside
-
-    @property
-    def nearness(self) -> float:
-        """How near the multiple is to an end of its usual range: 1 at the end, more outside; of a number 0 it is 0."""
-        multiple = self.multiple
-        return max(multiple / self.high, self.low / multiple) if multiple != 0.0 and math.isfinite(multiple) else 0.0
-
-    def sentence(self, case: str, others: int) -> str:
-        """The warning in words. case: words for the case; others: number of further paths that are so"""
-        times = f", {self.multiple:.4g} times {self.other}" if self.other else ""
-        more = f"; {others} more {'is' if others == 1 else 'are'} so" if others else ""
-        said = self.said or f"{self.verb} {self.size:.4g} {self.unit}".rstrip()
-        return f"`{self.path}` {said}{case}{'' if self.said else times}{more}; {self.usual}"
-
-    @property
-    def remedies(self) -> list[str]:
-        """Other units of the parameter with which the multiple would be usual, if there are any, and what is usual."""
-        if self.said:
-            return ["ask for less, or move the limit"]
-        multiples = [(unit, self.multiple * factor**self.power) for unit, factor in OTHER_UNITS.get(self.meant, ())]
-        usual = [(unit, each) for unit, each in multiples if max(self.low, 1e-2 * self.high) <= each <= self.high]
-        usual.sort(key=lambda each: abs(math.log(each[1] / (0.1 * self.high))))
-        found = ", ".join(f"in {unit} it would be {multiple:.3g} times" for unit, multiple in usual[:2])
-        end, word = (self.low, "least") if self.multiple < self.low else (self.high, "most")
-        limit = f"at {word} {end * self.beside:.3g} {self.unit}".rstrip() + " is usual"
-        return [*([f"{found} {self.other}: is the unit another?"] if found else []), limit]
-
-
-OTHER_UNITS: Mapping[str, tuple[tuple[str, float], ...]] = {
-    "rad": (("deg", math.radians(1.0)),),
-    "rad/s": (("deg/s", math.radians(1.0)), ("rpm", TURN / 60.0)),
-    "m": (("mm", 1e-3), ("cm", 1e-2)),
-    "m/s": (("mm/s", 1e-3), ("cm/s", 1e-2)),
-    "m/s^2": (("cm/s^2", 1e-2), ("mm/s^2", 1e-3)),
-    "kg": (("g", 1e-3),),
-    "kg*m^2": (("kg*cm^2", 1e-4), ("kg*mm^2", 1e-6), ("g*cm^2", 1e-7), ("g*mm^2", 1e-9)),
-    "N*m": (("N*cm", 1e-2), ("N*mm", 1e-3)),
-    "A": (("mA", 1e-3),),
-}
-"""Units in which a number may have been meant, and their size in that which it has."""
 
 
 def _turns(run: RunNumbers) -> Iterator[Scale]:
@@ -134,7 +63,8 @@ def _centres(run: RunNumbers) -> Iterator[Scale]:
         if link.name in run.moved and not link.lumped and run.reach > 0.0 and run.is_written(path):
             far, large = run.length(path), 4.0 * run.gyration(f"links.{link.name}")
             other = run.reach_words if run.reach > large else f"4 times its radius of gyration, {large:.4g} m"
-            yield Scale("centre of mass", path, far, "m", max(run.reach, large), other, 0.0, 2.0, usual, meant="m")
+            most = max(run.reach, large)
+            yield Scale("centre of mass", path, far, "m", most, other, 0.0, 2.0, usual, meant="m", typical=0.2)
 
 
 def _offsets(run: RunNumbers) -> Iterator[Scale]:
@@ -145,17 +75,21 @@ def _offsets(run: RunNumbers) -> Iterator[Scale]:
         if joint.parent != BASE and rest > 0.0:
             path, far = f"{joint.name}.at", run.offsets[joint.name]
             other = f"the rest of its chain, {rest:.4g} m"
-            yield Scale("place of a joint", path, far, "m", rest, other, 0.0, 60.0, usual, meant="m")
+            yield Scale("place of a joint", path, far, "m", rest, other, 0.0, 60.0, usual, meant="m", typical=1.0)
 
 
 def _touches(run: RunNumbers) -> Iterator[Scale]:
-    """Joints beside the rod, box or cylinder of the link that carries them; payloads may hang, and a ball is a mass."""
+    """Joints, and payloads, which may hang, beside the rod, box or cylinder of the link that carries them. A ball is a
+    mass, and not a shape."""
     usual = "a joint is usually on its link, or in it"
-    for joint in run.structure.joints:
-        path, far = f"{joint.name}.at", run.beside_shape(f"links.{joint.parent}", run.vector(f"{joint.name}.at"))
-        if far is not None and joint.parent != BASE and run.reach > 0.0:
-            verb = f"is beside the shape of `{joint.parent}` by"
-            yield Scale("place beside a shape", path, far, "m", run.reach, run.reach_words, 0.0, 0.25, usual, verb=verb)
+    points = [(f"{joint.name}.at", joint.parent, 0.25, usual) for joint in run.structure.joints]
+    usual = "a payload is usually at its link, or hangs from it"
+    points += [(f"payloads.{payload.name}.at", payload.link, 1.0, usual) for payload in run.structure.payloads]
+    for path, link, high, usual in points:
+        far = run.beside_shape(f"links.{link}", run.vector(path))
+        if far is not None and link != BASE and run.reach > 0.0:
+            verb = f"is beside the shape of `{link}` by"
+            yield Scale("place beside a shape", path, far, "m", run.reach, run.reach_words, 0.0, high, usual, verb=verb)
 
 
 def _gyrations(run: RunNumbers) -> Iterator[Scale]:
@@ -186,6 +120,7 @@ def _gyrations(run: RunNumbers) -> Iterator[Scale]:
                 verb="has a radius of gyration of",
                 meant="kg*m^2",
                 power=0.5,
+                typical=0.2,
             )
 
 
@@ -205,7 +140,8 @@ def _gears(run: RunNumbers) -> Iterator[Scale]:
     for use in run.uses:
         ratio = run.of_motor(use, RATIO.name)
         if ratio is not None and run.kinds[use.joint] == "revolute":
-            yield Scale("gear ratio", f"{use.joint}.servo.{RATIO.name}", ratio, "", 1.0, "", 0.2, 1e5, usual)
+            path, typical = f"{use.joint}.servo.{RATIO.name}", 1.0 / ratio if 0.0 < ratio < 1.0 else 0.0
+            yield Scale("gear ratio", path, ratio, "", 1.0, "", 0.2, 1e5, usual, typical=typical)
 
 
 def _speeds(run: RunNumbers) -> Iterator[Scale]:
@@ -228,15 +164,12 @@ def _speeds(run: RunNumbers) -> Iterator[Scale]:
 def _limits(run: RunNumbers) -> Iterator[Scale]:
     """Commands beside the limits of their joints: positions, also where a commanded rate leads, rates and torques."""
     usual = "a limit of a joint holds nothing, and is only watched"
-    t = np.linspace(0.0, run.duration, INSTANTS)
+    t = run.instants
     for use in run.uses:
-        course, kind = run.course(use), use.command.kind if use.command is not None else ""
-        if course is None:
+        motion, kind = run.motion(use), use.command.kind if use.command is not None else ""
+        if motion is None:
             continue
-        places, rates = course if kind == "position" else (course[0] * math.nan, course[0])
-        if kind == "rate":
-            ways = np.cumsum(rates[1:] + rates[:-1]) * (0.5 * t[1])
-            places = run.numbers.get(f"initial.{use.joint}.q", math.nan) + np.append(0.0, ways)
+        places, rates = motion
         own = {name: run.numbers.get(f"{use.joint}.{name}", math.nan) for name in JOINT_LIMITS}
         for name, asked, other, beside in (
             ("q_min", places, own["q_max"], "the range of the joint"),
@@ -289,7 +222,8 @@ def _frictions(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _loads(run: RunNumbers) -> Iterator[Scale]:
-    """The load of gravity at the start beside what motor and friction hold at the joint."""
+    """The load of gravity at the start beside what motor and friction hold at the joint, and what the load motor of a
+    bed can make there."""
     usual = "a motor that cannot hold its arm lets it fall"
     loads = run.loads()
     for use in run.uses:
@@ -300,6 +234,13 @@ def _loads(run: RunNumbers) -> Iterator[Scale]:
             path, other = f"{use.joint}.servo.{limit[0]}", f"what it holds at the joint, {most:.4g} {unit}"
             load = abs(loads[use.joint])
             yield Scale("load at the start", path, load, unit, most, other, 0.0, 1.0, usual, verb="meets a load of")
+            constant, current, scale = (run.numbers.get(f"{use.joint}.bed.{name}") for name in LOAD_MOTOR)
+            if constant is not None and current is not None:
+                path, most = f"{use.joint}.bed.i_max", ratio * constant * current * (1.0 if scale is None else scale)
+                other, weak = "what the load motor makes at the joint", "a bed brings its joint's load"
+                said = f"makes {most:.4g} {unit} at the joint, which gravity loads by {load:.4g} {unit} at the start"
+                cure = f"{1.01 * current * load / most:.4g} A would bring it" if most > 0.0 else "give it a current"
+                yield Scale("load of a bed", path, load, unit, most, other, 0.0, 1.0, weak, said=said, cure=cure)
 
 
 def _brakes(run: RunNumbers) -> Iterator[Scale]:
@@ -382,13 +323,43 @@ def _bands(run: RunNumbers) -> Iterator[Scale]:
 def _payloads(run: RunNumbers) -> Iterator[Scale]:
     arm = sum(run.numbers.get(f"links.{link}.mass", 0.0) for link in run.moved)
     weights = [run.length(f"environment.{use.name}.g") for use in run.structure.environment if use.model == "gravity"]
-    high, usual = 200.0, "industrial robots lift a tenth to a third of their mass"
+    high, typical, usual = 200.0, 0.2, "industrial robots lift a tenth to a third of their mass"
     if not any(weights):
-        high, usual = 1e4, "the arm of the Space Station is made for 116 t, some 70 times its mass"
+        high, typical, usual = 1e4, 70.0, "the arm of the Space Station is made for 116 t, some 70 times its mass"
     for payload in run.structure.payloads:
         path, other = f"payloads.{payload.name}.mass", f"the mass of the moved links, {arm:.4g} kg"
         if path in run.numbers and arm > 0.0 and payload.link != BASE:
-            yield Scale("mass of a payload", path, run.numbers[path], "kg", arm, other, 0.0, high, usual, meant="kg")
+            mass = run.numbers[path]
+            yield Scale(
+                "mass of a payload", path, mass, "kg", arm, other, 0.0, high, usual, meant="kg", typical=typical
+            )
+
+
+def _rotors(run: RunNumbers) -> Iterator[Scale]:
+    """Inertias of rotors, as the joint feels them, beside that of all moved links at the arm's reach."""
+    usual = "arms that come with MET have up to 0.2, and short stubs on a large motor far more"
+    arm = sum(run.numbers.get(f"links.{link}.mass", 0.0) for link in run.moved) * run.reach**2
+    for use in run.uses:
+        ratio, rotor, path = run.of_motor(use, RATIO.name), run.of_motor(use, "j_m"), f"{use.joint}.servo.j_m"
+        if ratio is not None and rotor is not None and arm > 0.0 and run.kinds[use.joint] == "revolute":
+            felt, other = (
+                ratio * ratio * rotor,
+                f"the mass of the moved links times the reach squared, {arm:.4g} kg*m^2",
+            )
+            yield Scale(
+                "inertia of a rotor",
+                path,
+                felt,
+                "kg*m^2",
+                arm,
+                other,
+                0.0,
+                1e9,
+                usual,
+                verb="is felt at the joint as",
+                meant="kg*m^2",
+                typical=3.0,
+            )
 
 
 def _gravities(run: RunNumbers) -> Iterator[Scale]:
@@ -405,6 +376,9 @@ SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
     _centres,
     _offsets,
     _touches,
+    grapples,
+    spreads,
+    targets,
     _gyrations,
     _levers,
     _gears,
@@ -419,6 +393,7 @@ SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
     _sensors,
     _bands,
     _payloads,
+    _rotors,
     _gravities,
 )
 
@@ -440,12 +415,13 @@ def check_scales(scope: Scope, structure: Structure, uses: Iterable[Use]) -> Non
     def warn(rows: np.ndarray) -> None:
         if scope.complaints.error_count:
             return
+        ranges = dict(zip(numbers_of, np.column_stack([rows.min(axis=0), rows.max(axis=0)]).tolist(), strict=True))
         worst: dict[str, tuple[Scale, int]] = {}
         others: dict[str, set[str]] = {}
         by_path: dict[tuple[str, str], set[float]] = {}
         for row in _chosen(rows):
             numbers = dict(zip(numbers_of, rows[row].tolist(), strict=True))
-            of_case = scales(RunNumbers(structure, uses, settled, numbers))
+            of_case = scales(RunNumbers(structure, uses, settled, numbers, ranges))
             scope.scales = scope.scales or of_case
             for scale in of_case:
                 by_path.setdefault((scale.what, scale.path), set()).add(scale.multiple)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ic.meaning.checks.step_words import at_the_start, fault_warning, loop_warning, motion_words
+from ic.meaning.checks.usual import usual_number
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.diagnostic import Problem
@@ -82,9 +83,16 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
         better = memo.answer(f"remedy for what {each.kind}", experiment, better_step, rows)
         complaints.pass_on(fault_warning(experiment, each, better, scope.rate_place, _where(experiment, each, found)))
     if "D104" not in kept and not any(each.kind == "grows" and not _is_of_loops(each, found) for each in found.faults):
+
+        def find_usual() -> list[str]:
+            return usual_number(scope, experiment, lambda changed: not step_size(changed, rows).loops)
+
+        any_told = any(not experiment.allows("D320" if loop.ticks else "D322") for loop in found.loops)
+        blamed = memo.answer("usual number", experiment, find_usual, rows) if any_told else []
         for loop in found.loops:
             start = at_the_start(experiment, loop.case)
-            complaints.pass_on(loop_warning(experiment, loop, scope.rate_place, f"as it stands {start}"))
+            warning = loop_warning(experiment, loop, scope.rate_place, f"as it stands {start}")
+            complaints.pass_on(replace(warning, help=(*blamed, *warning.help)))
     return replace(experiment, notes=(*experiment.notes, *_note(experiment, found)))
 
 

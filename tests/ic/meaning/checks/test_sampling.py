@@ -300,3 +300,36 @@ def test_integrals_of_random_pulses_are_those_of_a_fine_sum(seed: int) -> None:
 def test_random_sane_decks_are_told_nothing_of_it(tmp_path: Path, seed: int) -> None:
     said = codes(tmp_path, random_deck(seed))
     assert not [code for code in said if code > "D333"], (seed, said)
+
+
+def test_a_filter_that_passes_more_than_the_ticks_of_its_reader_resolve_is_told_and_its_remedies_work(
+    tmp_path: Path,
+) -> None:
+    def filtered(cutoff: str) -> str:
+        return changed(SERVO, ("command", f"sensor qd = low_pass {{ cutoff = {cutoff}; }}\n    command"))
+
+    run = changed(RUN, ("dynamics = 1 kHz; servos = 1 kHz", "dynamics = 2 kHz; servos = 100 Hz"))
+    assert shown(tmp_path, ARM, filtered("60 Hz"), run) == """\
+warning[D335]: the filter of sensor `qd` of servo `drive` passes 60 Hz, and its servo ticks at 100 Hz: \
+what swings faster than 50 Hz is read as slower
+ --> deck.ic:9:37
+  |
+9 |     sensor qd = low_pass { cutoff = 60 Hz; }
+  |                                     ^^^^^
+  = help: a cut-off frequency of 50 Hz or less; or give what reads it 125 Hz
+"""  # fmt: skip
+    assert codes(tmp_path, ARM, filtered("50 Hz"), run) == []
+    assert codes(tmp_path, ARM, filtered("60 Hz"), changed(run, ("servos = 100 Hz", "servos = 125 Hz"))) == []
+    assert codes(tmp_path, ARM, filtered("60 Hz"), changed(run, ("servos = 100 Hz", "servos = continuous"))) == []
+
+
+def test_the_filter_of_a_links_sensor_is_told_with_the_case_that_widens_it(tmp_path: Path) -> None:
+    sensor = "sensor up = accelerometer { link = bar; along = [0, 0, 1]; cutoff = 20 Hz; rate = 100 Hz; }"
+    run = changed(RUN, ("record = [q];", f"record = [q];  {sensor}"))
+    assert codes(tmp_path, ARM, SERVO, run) == []
+    sweep = "sweep wide of hold { vary sensors.up.cutoff = [20, 60, 40] Hz; }\n"
+    (found,) = check(tmp_path, ARM, SERVO, run, sweep, select="wide").diagnostics
+    assert found.code == "D335" and found.message == (
+        "the filter of sensor `up` passes 60 Hz in case #1, and it reads at 100 Hz: "
+        "what swings faster than 50 Hz is read as slower"
+    )

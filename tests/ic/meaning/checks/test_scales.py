@@ -188,7 +188,7 @@ def test_loads_of_gravity_are_those_of_pinocchio(tmp_path: Path, seed: int) -> N
     experiment, scope = compiled.plan.experiments[0], compiled.scopes[0]
     settled = {**scope.parameters, **scope.auxiliary}
     numbers = {path: each.value for path, each in settled.items() if isinstance(each.value, float)}
-    run = RunNumbers(experiment.structure, (), settled, numbers)
+    run = RunNumbers(experiment.structure, (), settled, numbers, {})
     g = run.vector("environment.gravity.g")
     q = [numbers[f"initial.{joint.name}.q"] for joint in experiment.structure.moving]
     zero = np.zeros(len(q))
