@@ -164,8 +164,11 @@ class SearchAnswer:
         if not found.serves or not np.isfinite(reached).any():
             return []
         if found.left is not None:
-            words = f"`least_margin = {self.search.least_margin:g};` in the tuning makes it look for one that keeps it"
-            return wrapped(f"not sure that it is the best with its margin: the tuning went by the goal alone; {words}")
+            words = "the tuning asks for it only where its cases begin, and the best by the goal does not keep it"
+            if not self.search.steers:
+                words = f"`least_margin = {self.search.least_margin:g};` in it makes it look for one that keeps it"
+                words = f"the tuning went by the goal alone; {words}"
+            return wrapped(f"not sure that it is the best with its margin: {words}")
         if len(reached) == 1:
             return wrapped("not sure that it is the best: there was one start alone; another `seed` may find better")
         best = np.nanmax(reached) if self.search.largest else np.nanmin(reached)

@@ -179,34 +179,6 @@ def test_a_tuning_says_how_far_it_went_along_slopes_and_comes_nearer_than_withou
     assert near.value == pytest.approx(least, rel=1e-5) and far.value > 1.001 * least
 
 
-@pytest.mark.slow
-def test_a_tuning_says_how_many_of_its_starts_came_to_its_answer(place: Path, here: Path) -> None:
-    def answer(file: ArchiveFile) -> SearchAnswer:
-        found = SearchAnswer.of(next(group for group in file.groups if group.name == "still"))
-        assert found is not None
-        return found
-
-    def with_starts(text: str) -> list[str]:
-        shutil.copy(place / "undisturbed.h5", here / "other.h5")
-        with h5py.File(here / "other.h5", "r+") as data:
-            data["still"].attrs["search_starts"] = text
-        with ArchiveFile(here / "other.h5") as file:
-            return answer(file).lines()
-
-    with ArchiveFile(place / "undisturbed.h5") as file:
-        first, second, third = answer(file).search.starts
-        near, again, none = answer(file).starts
-        assert near == answer(file).found.value and near < again < 1.02 * near and math.isnan(none)
-        assert "  2 of its 3 starts came to within 2 % of one another" in answer(file).lines()
-        assert first.first == 0 and third.best == -1
-    assert "not sure that it is the best: there was one start alone" in "\n".join(
-        with_starts(json.dumps([{"first": 0, "best": first.best}]))
-    )
-    worse = with_starts(json.dumps([{"first": 0, "best": first.best}, {"first": second.first, "best": second.first}]))
-    assert "not sure that it is the best: of 2 starts one alone came to " in "\n".join(worse)
-    assert not [line for line in with_starts("[]") if "start" in line], "made before starts were kept"
-
-
 @pytest.mark.parametrize("text", [
     '[{"first": 1, "best": 2}]',
     '[{"first": 0, "best": 5}, {"first": 3, "best": 4}]',
