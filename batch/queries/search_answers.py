@@ -29,7 +29,8 @@ OVER_CASES = re.compile(r" in [^<>]* of cases\b[^<>]*$")
 """The words by which a requirement is one over a share of cases."""
 
 NEAR_BEST = 0.02
-"""Share of a goal by which two starts of a tuning may differ, and are taken to have come to the same optimum."""
+"""Share of a goal by which two starts of a tuning, or two halves of a search, may differ, and are taken to have come to
+the same optimum."""
 
 ROUNDING = 1e-9
 """Share of the largest goal of all cases below which goals differ by rounding."""
@@ -266,7 +267,20 @@ class SearchAnswer:
         if np.isnan(found.value):
             return [f"{worst}: {case}, in which {search.metric} has no value", f"  of {self._cases}"]
         which = "largest" if search.largest else "least"
-        return [f"{worst}: {search.metric} = {self.value()}, {case}", f"  the {which} {search.metric} of {self._cases}"]
+        out = [f"{worst}: {search.metric} = {self.value()}, {case}", f"  the {which} {search.metric} of {self._cases}"]
+        return [*out, *self._settled()]
+
+    def _settled(self) -> list[str]:
+        """Lines about how sure it is that a search's case is the worst: what the second half of its cases brought."""
+        table, done, metrics, required = self._given
+        half = len(table) // 2
+        if not half:
+            return []
+        before = answer(self.search, table[:half], done[:half], cut(metrics, half), required).value
+        if abs(self.found.value - before) <= NEAR_BEST * abs(self.found.value):
+            return [f"  the second half of its cases found nothing that is worse by more than {100.0 * NEAR_BEST:g} %"]
+        return wrapped(f"not sure that it is the worst: the first half of its cases came to {self.goal(before)}; "
+                       "another `seed` or a larger `at_most` may find worse")  # fmt: skip
 
     def as_data(self) -> dict[str, Any]:
         """The answer for programs, SI."""

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 
 import batch
@@ -60,6 +61,25 @@ def test_a_tuning_says_how_many_of_its_starts_came_to_its_answer(said: Said) -> 
     apart = [{"first": 0, "best": first.best}, {"first": second.first, "best": second.first}]
     assert "not sure that it is the best: of 2 starts one alone came to " in said(search_starts=json.dumps(apart))[1]
     assert "start" not in said(search_starts="[]")[1], "made before starts were kept"
+
+
+@pytest.mark.slow
+def test_a_search_says_what_the_second_half_of_its_cases_brought(tmp_path: Path) -> None:
+    (tmp_path / "d.ic").write_text(DECK)
+    path = batch.run(ic.compile(str(tmp_path / "d.ic"), select=["back"]), output=str(tmp_path / "s.h5"), threads=1).path
+    with ArchiveFile(path) as file:
+        found = SearchAnswer.of(file.groups[0])
+        assert found is not None
+        far, half = file.groups[0].values("far"), file.groups[0].count // 2
+        assert "  the second half of its cases found nothing that is worse by more than 2 %" in found.lines()
+        assert far[:half].min() == pytest.approx(far.min(), rel=0.02)
+    with h5py.File(path, "r+") as data:
+        data["far"][:half] = np.maximum(far[:half], -0.05)
+    with ArchiveFile(path) as file:
+        found = SearchAnswer.of(file.groups[0])
+        assert found is not None
+        words = " ".join(" ".join(found.lines()).split())
+    assert "not sure that it is the worst: the first half of its cases came to -0.05 m; another `seed` or " in words
 
 
 @pytest.mark.slow
