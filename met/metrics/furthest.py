@@ -15,7 +15,7 @@ from typing import Any
 
 from met.metrics.metric import Metric
 from met.parameter import Memory
-from met.trace import Real, maximum, where
+from met.trace import Real, maximum, minimum, where
 
 SAMPLES = tuple(
     Memory(name=f"sample_{number}", unit="of", doc=f"sample {number} before this one", start=-math.inf)
@@ -45,6 +45,11 @@ def furthest(metric: Metric) -> Metric | None:
     return replace(metric, memory=(*metric.memory, *SAMPLES), update=update)
 
 
+STEEPER = 2.0
+"""The largest factor by which a signal may become steeper from one sample to the next towards its extreme; what is
+steeper still is a jump, such as that of a torque at a servo's tick, and does not go on."""
+
+
 class Held:
     """Values by name, as a metric reads its memory."""
 
@@ -60,7 +65,10 @@ def beyond(last: Real, d: Real, c: Real, b: Real, a: Real) -> Real:
     def meeting(up: Real, down: Real, other: Real) -> Real:
         slopes = up + down
         found = up * (down - other) / where(slopes > 0.0, slopes, 1.0)
-        return where((found > 0.0) & (found < math.inf), found, 0.0)
+        return where((up > 0.0) & (down > other) & (found < math.inf), found, 0.0)
 
-    found = maximum(meeting(rise, fall_after, fall), meeting(fall, rise_before, rise))
+    found = maximum(
+        meeting(minimum(rise, STEEPER * rise_before), fall_after, fall),
+        meeting(minimum(fall, STEEPER * fall_after), rise_before, rise),
+    )
     return where((rise >= 0.0) & (fall >= 0.0), found, 0.0)

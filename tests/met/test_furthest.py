@@ -62,6 +62,17 @@ def test_the_top_of_a_sine_is_within_it_and_the_bound_falls_with_the_square_of_t
             assert abs(true - seen) <= abs(far - seen) <= 0.6 * step**2
 
 
+def test_a_jump_does_not_go_on_beyond_its_sample() -> None:
+    """A torque at a servo's tick jumps against its slope, and at the next step back again."""
+    for course in (
+        [0.0, 0.01, 0.02, 5.0, 4.99, 4.98],
+        [83.6, 83.5, 83.4, 83.9, 78.7, 78.6, 78.5],
+        [0.0, 0.0, 9.0, 9.0, 0.0, 0.0],
+    ):
+        seen, far = with_furthest("max", np.array(course))
+        assert max(course) == seen <= far <= seen + 0.02
+
+
 def test_an_extreme_at_an_end_of_the_run_is_the_sample_itself() -> None:
     for course in (np.linspace(0.0, 1.0, 9), np.linspace(1.0, 0.0, 9), np.ones(9), np.array([1.0]), np.zeros(0)):
         seen, far = with_furthest("max", course)
