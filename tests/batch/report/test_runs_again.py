@@ -105,20 +105,6 @@ class TestWhatIsInIt:
         assert section.simulation.said == ("3 of 8 cases can be run again in this page.",)
 
     @pytest.mark.slow
-    def test_begins_with_the_design_to_use_or_with_the_middle_case(self, sent: Path, compared: Path) -> None:
-        many, ways = (gathered(sent / f"{name}.h5").sections[0] for name in ("many", "shoves"))
-        assert many.designs is not None and many.signals is not None and many.simulation is not None
-        with ArchiveFile(sent / "many.h5") as file:
-            met = file.groups[0].values("met")[many.designs.case, 0]
-        assert many.signals.opens == many.designs.case != many.signals.shown[0] and met == 1
-        assert many.signals.opens in many.simulation.structures[0].cases
-        assert ways.designs is None and ways.signals is not None and ways.signals.opens == ways.signals.middle
-        with ArchiveFile(compared / "b.h5") as file, ArchiveFile(compared / "a.h5") as other:
-            before = ComparedArchive(other, batch.diff(compared / "a.h5", compared / "b.h5"))
-            [section] = gather(file, against=before, simulate=True).sections
-        assert section.signals is not None and section.signals.opens is None, "what changed most comes first"
-
-    @pytest.mark.slow
     def test_is_left_out_where_it_is_not_asked_for(self, sent: Path) -> None:
         source = report(sent / "ways.h5", sent / "without.html", simulate=False).read_text(encoding="utf-8")
         assert "unsafe" not in source and "MET.modules" not in source and "No histories were kept." in source
@@ -211,14 +197,6 @@ class TestInTheBrowser:
                     assert said.startswith(f"Case #{case} has the archive's bits in its metric: run again here"), said
         assert count == 6 * 51 * 7
         quiet(page)
-        page.close()
-
-    def test_the_arm_begins_with_the_design_to_use(self, chromium: Chromium, sent: Path) -> None:
-        page = opened(chromium, sent / "many.html")
-        page.run("dispatchEvent(new Event('beforeprint'))")
-        page.settle()
-        opens, worst = page.run("(({ opens, shown }) => [opens, shown[0]])(MET.models[0].data.signals)")
-        assert opens != worst and page.run(SAID).startswith(f"Case #{opens} has the archive's bits")
         page.close()
 
     def test_another_archive_is_under_it_its_arm_a_ghost(self, chromium: Chromium, compared: Path) -> None:

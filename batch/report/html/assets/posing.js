@@ -113,8 +113,7 @@ MET.posing = (() => {
     model.stage = () => (shown ? shown.stage : null);
     model.seek = (time) => { if (shown && shown.stage) shown.stage.seek(time, true); };
     model.watch(choose);
-    const { opens, shown: drawn } = model.data.signals;
-    const first = [...(opens === null ? [] : [opens]), ...drawn].find(simulation.has);
+    const first = model.data.signals.shown.find(simulation.has);
     if (first !== undefined) enter(rooms[simulation.structureOf(first)]);
     const begin = () => { if (chosen === null && first !== undefined) choose(first); };
     new IntersectionObserver((entries, observer) => {
