@@ -25,6 +25,7 @@ from met.program import cell_names, plausible
 from met.program.build import COORDINATE, METRIC, build
 from met.program.control.substituted import LIMITED
 from met.program.step import EVENTS
+from met.program.system import FURTHEST
 from met.trace.identity import result_keys, state_key
 from met.trace.program import Program
 from met.trace.recorder import record
@@ -84,17 +85,18 @@ class Run:
 class Prepared:
     """An experiment with its program; the kernel is compiled, or fetched from the cache, when first used.
 
-    wire, late  for real beds, as `met.program.build.build` has them
+    wire, late, furthest  as `met.program.build.build` has them
     """
 
     experiment: Experiment
     lanes: int | None = None
     wire: bool = False
     late: int = 0
+    furthest: bool = False
 
     @cached_property
     def program(self) -> Program:
-        return build(self.experiment, wire=self.wire, late=self.late)
+        return build(self.experiment, wire=self.wire, late=self.late, furthest=self.furthest)
 
     @cached_property
     def recording(self) -> Recording:
@@ -110,6 +112,11 @@ class Prepared:
             *(WHY_ANSWER + name for name in answers),
         )
         return (*self.program.outputs, *more)
+
+    @cached_property
+    def furthest_names(self) -> tuple[str, ...]:
+        """The names of metrics with the furthest values between samples, where these are wanted."""
+        return tuple(name.removeprefix(METRIC) for name in self.program.outputs if name.endswith(FURTHEST))
 
     @cached_property
     def companions(self) -> dict[str, Any]:
@@ -170,7 +177,7 @@ class Prepared:
 
     def of_cases(self, experiment: Experiment) -> Prepared:
         """The same program, ready to run the cases of an experiment that differs only in its case table."""
-        made = Prepared(experiment, self.lanes, self.wire, self.late)
+        made = Prepared(experiment, self.lanes, self.wire, self.late, self.furthest)
         ready = (*_OF_ANY_CASES, "kernel", "work_key", "old_code_key")
         made.__dict__.update({name: self.__dict__[name] for name in ready if name in self.__dict__})
         return made
@@ -359,7 +366,8 @@ def results(
             block = history[:, :, column : column + width]
             signals[recorded.name] = block.reshape(*block.shape[:2], *recorded.shape)
             column += width
-    metrics = {use.name: np.where(failed, math.nan, out[METRIC + use.name]) for use in experiment.metrics}
+    names = [*(use.name for use in experiment.metrics), *prepared.furthest_names]
+    metrics = {name: np.where(failed, math.nan, out[METRIC + name]) for name in names}
     return Run(
         case=rows,
         status=status,

@@ -4,6 +4,8 @@
     verified_metric   names of the metrics' variables; a dimension
     half, quarter     the metrics at half and a quarter of the step, SI; not-a-number where such a case failed
     instant           s, of a metric that is an instant seen at whole steps: a quarter of the step; 0 for others
+    missed            how far the metric at a quarter of the step may be off by what lies between samples, SI, as
+                      met/metrics/furthest.py has it; 0 for what samples do not miss
     attributes        `order` of the integrator; `step_s`, the campaign's own step
 
 The values at the step itself are the campaign's own. Only these numbers are stored; errors are computed from them.
@@ -35,6 +37,7 @@ VARIABLES: tables.Declared = {
     "half": (DIMENSIONS, NUMBER, "metrics with the dynamics at half of the step, SI"),
     "quarter": (DIMENSIONS, NUMBER, "metrics with the dynamics at a quarter of the step, SI"),
     "instant": (("verified_metric",), NUMBER, "s between instants at which an instant is seen; 0 for other metrics"),
+    "missed": (DIMENSIONS, NUMBER, "distances of metrics at a quarter of the step to what may lie between samples, SI"),
 }
 """Dimensions, type and meaning of each variable."""
 
@@ -47,6 +50,7 @@ class Verified:
     metrics        names of the metrics' variables in the archive
     half, quarter  [case, metric] SI, at half and a quarter of the step; not-a-number where a case failed
     instant        [metric] s: a quarter of the step for an instant that is seen at whole steps, else 0
+    missed         [case, metric] SI, at least 0: how far `quarter` may be off by what lies between samples
     order          of the integrator;  step: the campaign's own, s
     """
 
@@ -55,6 +59,7 @@ class Verified:
     half: np.ndarray
     quarter: np.ndarray
     instant: np.ndarray
+    missed: np.ndarray
     order: int
     step: float
 
@@ -70,6 +75,7 @@ def write(parent: Any, found: Verified) -> None:
         "half": found.half,
         "quarter": found.quarter,
         "instant": found.instant,
+        "missed": found.missed,
     }
     tables.write(node, VARIABLES, values)
 
@@ -79,7 +85,8 @@ def read(node: Any, group: StoredGroup) -> Verified | None:
     inside = node.get(NAME)
     if not isinstance(inside, h5py().Group):  # a metric of an older archive may have this name
         return None
-    values = tables.read(inside, VARIABLES, NAME)
+    declared = {name: VARIABLES[name] for name in VARIABLES if name != "missed" or name in inside}  # later than others
+    values = tables.read(inside, declared, NAME)
     cases, metrics = values["verified_case"], tuple(map(str, values["verified_metric"].tolist()))
     if not len(cases) or not (np.diff(cases) > 0).all() or not are_cases(group, cases).all():
         raise Unlike("its verified cases are none of its cases")
@@ -89,9 +96,12 @@ def read(node: Any, group: StoredGroup) -> Verified | None:
     instant = values["instant"]
     if not ((instant >= 0.0) & (instant < MOST)).all():
         raise Unlike(f"variable `{NAME}/instant` has a value that it cannot have")
+    missed = values.get("missed", np.zeros(values["quarter"].shape))
+    if (missed < 0.0).any():
+        raise Unlike(f"variable `{NAME}/missed` has a value that it cannot have")
     order, step = inside.attrs.get("order"), inside.attrs.get("step_s")
     if not isinstance(order, np.integer) or not 0 < order < MOST_ORDER:
         raise Unlike(f"attribute `order` of `{NAME}` is missing or of another type")
     if not isinstance(step, np.floating) or not 1 / MOST < step < MOST:
         raise Unlike(f"attribute `step_s` of `{NAME}` is missing or of another type")
-    return Verified(cases, metrics, values["half"], values["quarter"], instant, int(order), float(step))
+    return Verified(cases, metrics, values["half"], values["quarter"], instant, missed, int(order), float(step))

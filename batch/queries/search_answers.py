@@ -29,7 +29,8 @@ OVER_CASES = re.compile(r" in [^<>]* of cases\b[^<>]*$")
 """The words by which a requirement is one over a share of cases."""
 
 NEAR_BEST = 0.02
-"""Share of a goal by which two starts of a tuning may differ, and are taken to have come to the same optimum."""
+"""Share of a goal by which two starts of a tuning, or two halves of a search, may differ, and are taken to have come to
+the same optimum."""
 
 ROUNDING = 1e-9
 """Share of the largest goal of all cases below which goals differ by rounding."""
@@ -164,8 +165,11 @@ class SearchAnswer:
         if not found.serves or not np.isfinite(reached).any():
             return []
         if found.left is not None:
-            words = f"`least_margin = {self.search.least_margin:g};` in the tuning makes it look for one that keeps it"
-            return wrapped(f"not sure that it is the best with its margin: the tuning went by the goal alone; {words}")
+            words = "the tuning asks for it only where its cases begin, and the best by the goal does not keep it"
+            if not self.search.steers:
+                words = f"`least_margin = {self.search.least_margin:g};` in it makes it look for one that keeps it"
+                words = f"the tuning went by the goal alone; {words}"
+            return wrapped(f"not sure that it is the best with its margin: {words}")
         if len(reached) == 1:
             return wrapped("not sure that it is the best: there was one start alone; another `seed` may find better")
         best = np.nanmax(reached) if self.search.largest else np.nanmin(reached)
@@ -263,7 +267,20 @@ class SearchAnswer:
         if np.isnan(found.value):
             return [f"{worst}: {case}, in which {search.metric} has no value", f"  of {self._cases}"]
         which = "largest" if search.largest else "least"
-        return [f"{worst}: {search.metric} = {self.value()}, {case}", f"  the {which} {search.metric} of {self._cases}"]
+        out = [f"{worst}: {search.metric} = {self.value()}, {case}", f"  the {which} {search.metric} of {self._cases}"]
+        return [*out, *self._settled()]
+
+    def _settled(self) -> list[str]:
+        """Lines about how sure it is that a search's case is the worst: what the second half of its cases brought."""
+        table, done, metrics, required = self._given
+        half = len(table) // 2
+        if not half:
+            return []
+        before = answer(self.search, table[:half], done[:half], cut(metrics, half), required).value
+        if abs(self.found.value - before) <= NEAR_BEST * abs(self.found.value):
+            return [f"  the second half of its cases found nothing that is worse by more than {100.0 * NEAR_BEST:g} %"]
+        return wrapped(f"not sure that it is the worst: the first half of its cases came to {self.goal(before)}; "
+                       "another `seed` or a larger `at_most` may find worse")  # fmt: skip
 
     def as_data(self) -> dict[str, Any]:
         """The answer for programs, SI."""

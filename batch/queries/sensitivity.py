@@ -23,6 +23,9 @@ UNCLEAR = 0.1
 WIDE = 0.5
 """Half width of an interval from which on it says next to nothing."""
 
+ALIKE = "no difference seen"
+"""What is said in place of two means that drawn cases do not tell apart."""
+
 FAILURE = "failure"
 """The name of failing as an output: 1 in a case that failed, else 0."""
 
@@ -54,6 +57,7 @@ class Sensitivity:
     together           pairs of inputs that do not vary independently, with the correlation of their ranks
     mean               of the output over the cases that count, SI; not a number where none does
     design             that the cases were made by and whose own estimators were used, `saltelli`; "" of any others
+    drawn              whether the inputs' values were drawn at random, so that means over cases scatter
     why                the estimators of a design were not used although its cases are there; "" where that is not so
     """
 
@@ -70,11 +74,19 @@ class Sensitivity:
     mean: float = float("nan")
     design: str = ""
     why: str = ""
+    drawn: bool = False
 
     @property
     def order(self) -> list[int]:
         """Places of the inputs, those that explain most first."""
         return sorted(range(len(self.shares)), key=lambda i: -(self.shares[i].total or self.shares[i].first))
+
+    def ends(self, share: InputShare, low: str, high: str) -> str:
+        """The means at the ends of an input, which are these texts in the output's unit, as one text; `ALIKE` where
+        the cases were drawn, and do not tell them apart."""
+        if self.drawn and abs(share.high - share.low) <= share.ends_by:
+            return ALIKE
+        return f"{low} {high} {self.unit if self.unit != '1' else ''}".rstrip()
 
     @property
     def fewest(self) -> int:
@@ -205,6 +217,7 @@ def _explained(
         mean=float(output.mean()) if len(rows) else float("nan"),
         design="saltelli" if made else "",
         why=why,
+        drawn=any(variable.attributes.get("design") for variable in group.role("coordinate")),
     )
 
 

@@ -48,9 +48,7 @@ def sensitivity_lines(found: Sensitivity) -> list[str]:
                 "█" * round(BAR * share.first) or "·",
                 share_text(share.first, share.first_by),
                 total_text(share),
-                f"{low} .. {high} {found.unit}".rstrip(" 1")
-                if found.unit == "1"
-                else f"{low} .. {high} {found.unit}".rstrip(),
+                found.ends(share, f"{low} ..", high),
                 f"{share.rank:+.2f}",
             ]
         )

@@ -23,7 +23,8 @@ ROUNDING = 1e-10
 class StepError:
     """The error of one number due to the step.
 
-    error  estimate of |x(h) - x(0)|, or a bound of it where the order is unclear; in the number's unit
+    error  estimate of |x(h) - x(0)|, or a bound of it where the order is unclear, with what samples may miss; in the
+           number's unit
     order  the observed power of the step; not a number where differences are of rounding, or not finite
     clear  True where the order is the expected one, or all differences are of rounding
     """
@@ -40,24 +41,26 @@ class StepError:
         return h * (tolerance / self.error) ** (1.0 / order)
 
 
-def step_error(first: float, second: float, scale: float, expected: int) -> StepError:
+def step_error(first: float, second: float, scale: float, expected: int, missed: float = 0.0) -> StepError:
     """The error of a number at the step h.
 
     first     |x(h) - x(h/2)|, of numbers in time its largest over time
     second    |x(h/2) - x(h/4)|
     scale     size of the number, |x|
     expected  order of the integrator
+    missed    how far x(h/4) may be off by what lies between samples (met/metrics/furthest.py). Where an extreme is the
+              same sample with all three steps, their differences show nothing of it
     """
     if not (math.isfinite(first) and math.isfinite(second)):
         return StepError(math.inf, math.nan, False)
     if max(first, second) <= ROUNDING * scale:
-        return StepError(max(first, second), math.nan, True)
+        return StepError(max(first, second) + missed, math.nan, True)
     if first <= 0.0 or second <= 0.0:
-        return StepError(3.0 * max(first, second), math.nan, False)
+        return StepError(3.0 * max(first, second) + missed, math.nan, False)
     order = math.log2(first / second)
     if any(abs(order - p) <= NEAR for p in {1, expected}):
-        return StepError(first * 2.0**order / (2.0**order - 1.0), order, True)
-    return StepError(3.0 * max(first, second), order, False)
+        return StepError(first * 2.0**order / (2.0**order - 1.0) + missed, order, True)
+    return StepError(3.0 * max(first, second) + missed, order, False)
 
 
 def instant_error(first: float, second: float, both: float, instant: float) -> StepError:

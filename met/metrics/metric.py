@@ -47,6 +47,8 @@ class Metric:
     over_joints  what it watches of several joints; None: it watches one channel
     between  the same metric told between samples, which moves as its channel does and is within a sample of this one;
              for one that moves in steps of a sample, whose gradient is that one's. None: this one moves by itself
+    furthest  the same metric with what it may be off by between samples added; None: it is not off, or says an extreme,
+              of which met/metrics/furthest.py finds it
     update  (p, held, x, t, dt) -> new memory: x the channel at time t (s), dt s since the sample before (0 at first)
     result  (p, held, t) -> the metric, at the run's last sample, time t
     """
@@ -64,6 +66,7 @@ class Metric:
     condition: bool = False
     over_joints: OverJoints | None = None
     between: Metric | None = None
+    furthest: Metric | None = None
     parameters: tuple[Parameter, ...] = ()
     memory: tuple[Memory, ...]
     update: Callable[[Any, Any, Real, Real, Real], Mapping[str, Real]]

@@ -13,6 +13,11 @@ from met.metrics.window import EVERY_JOINT, WINDOW, inside
 from met.parameter import Memory
 from met.trace import Real, both, where
 
+MEMORY = (
+    Memory(name="met", unit="1", doc="samples at which it holds"),
+    Memory(name="count", unit="1", doc="samples"),
+)
+
 
 def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
     seen = inside(p, t)
@@ -26,6 +31,14 @@ def result(p: Any, held: Any, t: Real) -> Real:
     return held.met / held.count
 
 
+def update_furthest(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
+    """The memory after a sample, with a sample added wherever the condition begins or ceases to hold between two."""
+    new = update(p, held, x, t, dt)
+    met = new["met"] - held.met
+    turned = both(held.count > 0.0, both(new["count"] > held.count, met != held.last))
+    return {"met": new["met"] + where(turned, 1.0, 0.0), "count": new["count"], "last": met}
+
+
 METRIC = Metric(
     name="share_of_time",
     doc=__doc__,
@@ -35,10 +48,16 @@ METRIC = Metric(
     condition=True,
     over_joints=EVERY_JOINT,
     parameters=WINDOW,
-    memory=(
-        Memory(name="met", unit="1", doc="samples at which it holds"),
-        Memory(name="count", unit="1", doc="samples"),
+    furthest=Metric(
+        name="share_of_time",
+        doc=__doc__,
+        unit="1",
+        parameters=WINDOW,
+        memory=(*MEMORY, Memory(name="last", unit="1", doc="1 where it holds at the sample before, else 0")),
+        update=update_furthest,
+        result=result,
     ),
+    memory=MEMORY,
     update=update,
     result=result,
 )

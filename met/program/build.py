@@ -21,7 +21,7 @@ from met.program.limits import LimitPhases
 from met.program.motion import base, bodies, payloads
 from met.program.observe import derived
 from met.program.step import EVENTS, FAILURE, StepPhases
-from met.program.system import PARAMETER, Actuator, System
+from met.program.system import FURTHEST, PARAMETER, Actuator, System
 from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.servo import Seen, Setpoint
 from met.trace import Real, Truth, both, floor, where
@@ -38,7 +38,7 @@ COORDINATE, METRIC = "coordinate:", "metric:"
 """Prefixes of outputs, and cells, that a deck names: so no name of a deck's clashes with one of the engine's."""
 
 
-def build(experiment: Experiment, *, wire: bool = False, late: int = 0) -> Program:
+def build(experiment: Experiment, *, wire: bool = False, late: int = 0, furthest: bool = False) -> Program:
     """The program of an experiment: inputs are its coordinates and the seeds of a case's own noise, columns its
     recorded channels.
 
@@ -46,8 +46,9 @@ def build(experiment: Experiment, *, wire: bool = False, late: int = 0) -> Progr
           `wire:<joint>.rate` (rad/s); what its amplifiers are told are outputs, `wire:<joint>.voltage` (V) and
           `wire:<joint>.current` (A)
     late  ticks of a bed's `delay` that pass on the wire: what is told now is held from so many ticks later on
+    furthest  as `System` has it
     """
-    return Builder(System(experiment), wire=wire, late=late).program()
+    return Builder(System(experiment, furthest=furthest), wire=wire, late=late).program()
 
 
 class Builder:
@@ -308,7 +309,8 @@ class Builder:
     def _metric(self, tape: Tape, name: str) -> tuple[NamedValues, NamedValues]:
         metric = next(model for known, model, _ in self.system.metrics if known == name)
         owner = f"metric `{name}` (model {metric.name})"
-        p = parameters(owner, f"metrics.{name}", metric.parameters, lambda path: self.system.value(path, tape.read))
+        path = f"metrics.{name.removesuffix(FURTHEST)}"
+        p = parameters(owner, path, metric.parameters, lambda path: self.system.value(path, tape.read))
         held = {memory.name: tape.read(f"{METRIC}{name}.{memory.name}") for memory in metric.memory}
         return p, NamedValues(owner, held)
 

@@ -19,6 +19,7 @@ from met.dynamics.tree import Body, Tree
 from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Integrator
+from met.metrics.furthest import furthest
 from met.metrics.metric import Metric
 from met.parameter import Memory, Parameter, State
 from met.plan import BASE, Experiment, Formula, Joint, LinkSensor, Payload, SensorUse, ServoUse, Structure
@@ -32,7 +33,7 @@ from met.substitution import BedModel, Law
 from met.trace import Formulas, Graph, Real, Scalar
 from met.vectors import Vector
 
-PARAMETER, TREE = "parameter:", "tree:"
+PARAMETER, TREE, FURTHEST = "parameter:", "tree:", ":furthest"
 """Prefixes of the cells that hold a case's own parameters, and the parts of the tree that depend on them."""
 
 ReadCell = Callable[[str], Real]
@@ -115,10 +116,13 @@ class System:
     """The models of one experiment, looked up, and its parameters, to be read by path.
 
     between_samples  whether metrics that move in steps of a sample are told between samples (`Metric.between`)
+    furthest         whether metrics that samples may miss are also told with the furthest values between these, under
+                     their names with `FURTHEST`
     """
 
     experiment: Experiment
     between_samples: bool = False
+    furthest: bool = False
 
     @property
     def structure(self) -> Structure:
@@ -163,10 +167,12 @@ class System:
     @cached_property
     def metrics(self) -> tuple[tuple[str, Metric, Channel], ...]:
         found = [(use, models.find("metric", use.model)) for use in self.structure.metrics]
-        return tuple(
+        own = [
             (use.name, (metric.between or metric) if self.between_samples else metric, self.channels[use.of])
             for use, metric in found
-        )
+        ]
+        more = [(name + FURTHEST, furthest(metric), channel) for name, metric, channel in own if self.furthest]
+        return (*own, *((name, metric, channel) for name, metric, channel in more if metric is not None))
 
     @cached_property
     def actuators(self) -> tuple[Actuator | None, ...]:

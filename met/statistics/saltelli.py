@@ -64,7 +64,7 @@ def saltelli_shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares 
     for place, values in enumerate(inputs):
         points = values.reshape(-1, width)
         own = np.concatenate([points[:, 0], points[:, -1]])
-        low, high = means_of_ends(own, drawn)
+        low, high, ends_by = means_of_ends(own, drawn)
         found.append(
             InputShare(
                 first=float(np.clip(first[0, place], 0.0, 1.0)),
@@ -75,6 +75,7 @@ def saltelli_shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares 
                 rank=rank_correlation(own, drawn),
                 low=low,
                 high=high,
+                ends_by=ends_by,
             )
         )
     return Shares(tuple(found), None)

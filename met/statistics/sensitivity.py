@@ -67,6 +67,7 @@ class InputShare:
     total_low, total_high    ends of a 95 % interval of what the input explains with any number of others
     rank                     Spearman's correlation of input and output, -1 to 1
     low, high                the mean output in the input's lowest and its highest cell
+    ends_by                  half the width of a 95 % interval of high - low, where the cases were drawn
     """
 
     first: float
@@ -77,6 +78,7 @@ class InputShare:
     rank: float
     low: float
     high: float
+    ends_by: float = 0.0
 
     def without_intervals(self) -> InputShare:
         """The same shares, with intervals that are not numbers."""
@@ -168,7 +170,7 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
             least = max(_share(total[number]), _share(first[number]))
             high = min(1.0, max(least, float(most[0])) + interval(most) + cut[number] + hidden[number])
             low = min(high, max(0.0, float(total[number][0]) - interval(total[number]) - cut[number]))
-        from_low, to_high = means_of_ends(values, output)
+        low_end, high_end, ends_by = means_of_ends(values, output)
         found.append(
             InputShare(
                 first=_share(first[number]),
@@ -177,8 +179,9 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
                 total_low=low,
                 total_high=high,
                 rank=_correlation(_ranks(values), ranks),
-                low=from_low,
-                high=to_high,
+                low=low_end,
+                high=high_end,
+                ends_by=ends_by,
             )
         )
     return Shares(tuple(found), rest)
@@ -331,10 +334,16 @@ def interval(found: np.ndarray) -> float:
     return float(QUANTILE * np.sqrt((GROUPS - 1) / GROUPS * ((each - each.mean()) ** 2).sum()))
 
 
-def means_of_ends(values: np.ndarray, output: np.ndarray) -> tuple[float, float]:
-    """The mean output in an input's lowest and in its highest cell."""
-    means = _means(cells(values, max(4, min(CELLS, len(output) // 16))), output)
-    return float(means[0]), float(means[-1])
+def means_of_ends(values: np.ndarray, output: np.ndarray) -> tuple[float, float, float]:
+    """The mean output in an input's lowest and in its highest cell, with half the width of a 95 % interval of their
+    difference where the cases were drawn. What differs from 0, or from one another, by rounding alone does not."""
+    cell = cells(values, max(4, min(CELLS, len(output) // 16)))
+    ends = [output[cell == number] for number in (cell.min(), cell.max())]
+    low, high = (float(each.mean()) for each in ends)
+    rounding = ROUNDING * float(np.abs(output).max())
+    low, high = (0.0 if abs(mean) <= rounding else mean for mean in (low, high))
+    by = QUANTILE * math.sqrt(sum(float(each.var()) / max(1, len(each) - 1) for each in ends))
+    return low, low if abs(high - low) <= rounding else high, by
 
 
 def rank_correlation(values: np.ndarray, output: np.ndarray) -> float:

@@ -220,6 +220,7 @@ def answer(
     from met.plan.limits import extremes, limits
     from met.run import Run
 
+    experiment = getattr(experiment, "experiment", experiment)  # of what is prepared
     schedule = experiment.structure.schedule
     rows = np.arange(experiment.cases.count) if cases is None else np.asarray(cases)
     time = np.arange(schedule.rows) * schedule.record / schedule.base_hz

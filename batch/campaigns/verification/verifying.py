@@ -14,6 +14,8 @@ from met import run as engine
 from met.analysis.refinement import refine
 from met.plan import Experiment
 from met.plan.channel import channels
+from met.plan.judged import MetricUse
+from met.program.system import FURTHEST
 
 FACTORS = (2, 4)
 """Numbers of steps in place of one: a verified case takes 2 + 4 times its own steps in addition."""
@@ -36,14 +38,20 @@ def verify(
     metrics = {}
     for number, factor in enumerate(FACTORS):
         told = progress and partial(_add, progress, number * len(rows))
-        metrics[factor] = _metrics(refine(experiment, factor), rows, threads, told)
+        refined = refine(experiment, factor)
+        metrics[factor] = _metrics(refined, rows, threads, told, furthest=factor == FACTORS[-1])
     half, quarter = (np.stack([metrics[factor][name] for name in names], axis=1) for factor in FACTORS)
+    last = metrics[FACTORS[-1]]
+    furthest = np.stack([last.get(name + FURTHEST, last[name]) for name in names], axis=1)
+    seen = np.array([_is_seen_at_steps(experiment, name) for name in names])
+    missed = np.subtract(furthest, quarter, out=np.zeros(quarter.shape), where=seen & (furthest != quarter))
     return Verified(
         cases=experiment.cases.table[rows],
         metrics=tuple(names.values()),
         half=half,
         quarter=quarter,
         instant=np.array([_instant(experiment, name) for name in names]),
+        missed=np.abs(missed),
         order=models.find("integrator", structure.integrator).order,
         step=structure.schedule.step,
     )
@@ -54,21 +62,32 @@ def _add(progress: Callable[[int], None], before: int, done: int) -> None:
 
 
 def _metrics(
-    refined: Experiment, rows: np.ndarray, threads: int | None, progress: Callable[[int], None] | None
+    refined: Experiment,
+    rows: np.ndarray,
+    threads: int | None,
+    progress: Callable[[int], None] | None,
+    *,
+    furthest: bool,
 ) -> dict[str, np.ndarray]:
-    """The metrics of these rows. Nothing is recorded, so that the program is as small as it can be."""
-    bare = replace(refined, structure=replace(refined.structure, record=()))
+    """The metrics of these rows, with the furthest values between samples where it is `furthest`. Nothing is recorded,
+    so that the program is as small as it can be."""
+    bare = engine.Prepared(replace(refined, structure=replace(refined.structure, record=())), furthest=furthest)
     return engine.run(bare, rows, threads=threads, record=False, progress=progress).metrics
 
 
 def _instant(experiment: Experiment, name: str) -> float:
-    """A quarter of the step, s, where a metric is an instant that is seen at whole steps; else 0.
-
-    A metric of a servo's memory is seen at the servo's ticks, which do not change.
-    """
-    structure = experiment.structure
-    use = next(each for each in structure.metrics if each.name == name)
-    schedule = structure.schedule
-    seen_at_steps = channels(structure, [use.of])[use.of].divisor == schedule.dynamics
+    """A quarter of the step, s, where a metric is an instant that is seen at whole steps; else 0."""
+    use = _use(experiment, name)
     of_time = models.find("metric", use.model, use.place).unit == "s"
-    return schedule.step / FACTORS[-1] if of_time and seen_at_steps else 0.0
+    return experiment.structure.schedule.step / FACTORS[-1] if of_time and _is_seen_at_steps(experiment, name) else 0.0
+
+
+def _is_seen_at_steps(experiment: Experiment, name: str) -> bool:
+    """True where a metric sees its channel at each step. One of a servo's memory sees it at the servo's ticks, which do
+    not change."""
+    structure, of = experiment.structure, _use(experiment, name).of
+    return channels(structure, [of])[of].divisor == structure.schedule.dynamics
+
+
+def _use(experiment: Experiment, name: str) -> MetricUse:
+    return next(each for each in experiment.structure.metrics if each.name == name)

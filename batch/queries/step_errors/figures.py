@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 class CaseError:
     """The error of a metric in a case; None where it cannot be known, and why.
 
-    case   position in the case table;  value, half, quarter: the metric at the step and these shares of it, SI
+    case    position in the case table;  value, half, quarter: the metric at the step and these shares of it, SI
+    missed  part of the error that the three do not show, SI: what may lie between samples
     """
 
     case: int
@@ -30,6 +31,7 @@ class CaseError:
     quarter: float
     error: StepError | None
     why: str = ""
+    missed: float = 0.0
 
 
 @frozen
@@ -82,10 +84,16 @@ def figures(group: ArchiveGroup, position: int | None = None) -> Verification | 
 
 
 def _of_metric(found: Verified, column: int, own: np.ndarray, rows: list[int]) -> MetricError:
-    half, quarter = found.half[:, column], found.quarter[:, column]
+    half, quarter, missed = found.half[:, column], found.quarter[:, column], found.missed[:, column]
     instant = float(found.instant[column])
     each = tuple(
-        case_error(int(found.cases[n]), (float(own[n]), float(half[n]), float(quarter[n])), found.order, instant)
+        case_error(
+            int(found.cases[n]),
+            (float(own[n]), float(half[n]), float(quarter[n])),
+            found.order,
+            instant,
+            float(missed[n]),
+        )
         for n in rows
     )
     known = [(one.error, one.case) for one in each if one.error is not None]
@@ -97,10 +105,13 @@ def _of_metric(found: Verified, column: int, own: np.ndarray, rows: list[int]) -
     return MetricError(worst.error, case, worst.order, clear, len(lost), lost[0].why if lost else "", each)
 
 
-def case_error(case: int, values: tuple[float, float, float], order: int, instant: float) -> CaseError:
+def case_error(
+    case: int, values: tuple[float, float, float], order: int, instant: float, missed: float = 0.0
+) -> CaseError:
     """The error of a metric in a case, from its values at the step, half and a quarter of it, SI.
 
     order    of the integrator;  instant: s, a quarter of the step where the metric is an instant seen at whole steps
+    missed   what lies between samples at a quarter of the step, as `Verified` has it
     """
     own, half, quarter = values
     names = ("at the step", "at half the step", "at a quarter of the step")
@@ -115,7 +126,7 @@ def case_error(case: int, values: tuple[float, float, float], order: int, instan
     first, second = abs(own - half), abs(half - quarter)
     if instant:
         return CaseError(case, own, half, quarter, instant_error(first, second, abs(own - quarter), instant))
-    return CaseError(case, own, half, quarter, step_error(first, second, abs(own), order))
+    return CaseError(case, own, half, quarter, step_error(first, second, abs(own), order, missed), missed=missed)
 
 
 def together(found: Iterable[Verification | None]) -> Verification | None:

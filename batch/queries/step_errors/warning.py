@@ -99,7 +99,8 @@ def _unclear(group: ArchiveGroup, found: Verification, name: str, experiment: Ex
     those = [
         each
         for each in found.metrics[name].cases
-        if each.error is not None and (LARGE if each.error.clear else MATTERS) * size < each.error.error < math.inf
+        if each.error is not None
+        and (LARGE if each.error.clear else MATTERS) * size < each.error.error - each.missed < math.inf
     ]
     if not those:
         return None

@@ -58,7 +58,7 @@ def _part(found: Sensitivity) -> InfluencePart:
                 together=total_text(share),
                 low=low,
                 high=high,
-                ends=f"{page_number(low)} … {page_number(high)} {found.unit}".rstrip(),
+                ends=found.ends(share, f"{page_number(low)} …", page_number(high)),
                 rank=f"{share.rank:+.2f}",
             )
         )

@@ -164,3 +164,38 @@ def test_of_other_cases_than_saltelli_s_the_estimators_for_any_are_used(
         found = sensitivities(file.groups[0])[0]
     assert (found.design, found.why) == ("", why)
     assert f"  note: {why}: estimated as from any cases" in sensitivity_lines(found)
+
+
+IDLE = """
+arm a {
+    link l { mass = 2 kg;  shape = rod(length = 0.5 m, along = x); }
+    link m { mass = 2 kg;  shape = rod(length = 0.5 m, along = x); }
+    joint s revolute { parent = base;  child = l;  axis = z; }
+    joint e revolute { parent = l;  child = m;  axis = z; }
+}
+let p = 0.5;
+let idle = 0.5;
+servo d { model = ideal;  bandwidth = 20 1/s;  command = position(p * 1 rad); }
+run brief {
+    arm = a;  servos { s = d;  e = d { command = position(idle * 1 rad); } }
+    rates { dynamics = 100 Hz;  servos = 100 Hz; }
+    duration = 1 s;  record = [];
+    metric turn = final { of = s.q; }
+}
+sweep drawn of brief { sample saltelli(64) { p = uniform(0.4, 0.6);  idle = uniform(0, 1); } }
+sweep grid of brief { vary p = linspace(0.4, 0.6, 8);  vary idle = linspace(0, 1, 8); }
+"""
+
+
+@pytest.mark.slow
+def test_means_that_drawn_cases_do_not_tell_apart_are_not_said_and_those_of_a_grid_are_equal(tmp_path: Path) -> None:
+    (tmp_path / "idle.ic").write_text(IDLE)
+    said = {}
+    for name in ("drawn", "grid"):
+        plan = ic.compile(tmp_path / "idle.ic", select=[name])
+        with ArchiveFile(batch.run(plan, output=tmp_path / f"{name}.h5", histories="none").path) as file:
+            lines = sensitivity_lines(sensitivities(file.groups[0], ["turn"])[0])
+        said[name] = {line.split()[0]: line for line in lines}
+    assert "no difference seen" in said["drawn"]["idle"] and " .. " in said["drawn"]["p"]
+    [low, high] = [word for word in said["grid"]["idle"].split() if word.startswith("0.")][-2:]
+    assert low == high and " rad " in said["grid"]["idle"]

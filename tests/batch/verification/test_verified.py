@@ -166,6 +166,9 @@ def test_what_is_damaged_is_told(sweep: Plan, tmp_path: Path) -> None:
     def negative(node: h5py.Group) -> None:
         node["instant"][0] = -1.0
 
+    def below(node: h5py.Group) -> None:
+        node["missed"][0, 0] = -1.0
+
     def no_order(node: h5py.Group) -> None:
         node.attrs["order"] = 0
 
@@ -178,6 +181,7 @@ def test_what_is_damaged_is_told(sweep: Plan, tmp_path: Path) -> None:
         gone: "variable `verification/half` is missing or of another type",
         short: "variable `verification/half` is not of the size of its dimensions",
         negative: "variable `verification/instant` has a value that it cannot have",
+        below: "variable `verification/missed` has a value that it cannot have",
         no_order: "attribute `order` of `verification` is missing or of another type",
         no_step: "attribute `step_s` of `verification` is missing or of another type",
     }
@@ -200,7 +204,65 @@ def test_a_metric_that_an_older_archive_calls_verification_is_none(sweep: Plan, 
         assert file.groups[0].verified is None
 
 
+@pytest.mark.slow
+def test_an_older_archive_says_nothing_of_what_lies_between_samples(sweep: Plan, tmp_path: Path) -> None:
+    archive = batch.run(sweep, output=tmp_path / "a.h5", verify="some").path
+    with ArchiveFile(archive) as file:
+        assert file.groups[0].verified is not None
+        errors = {name: each.error for name, each in figures(file.groups[0]).metrics.items()}
+    with h5py.File(archive, "r+") as file:
+        del file["verification/missed"]
+    with ArchiveFile(archive) as file:
+        assert {name: each.error for name, each in figures(file.groups[0]).metrics.items()} == errors, "none is missed"
+
+
 # What follows
+
+
+STOPPED = """
+arm a {
+    link l { mass = 5.2062 kg;  shape = rod(length = 0.5342 m, along = x); }
+    joint j revolute { parent = base;  child = l;  axis = -y; }
+}
+servo s {
+    model = rigid_gearbox;  ratio = 63.27;  kp = 0.0777 V*s/rad;  ki = 0.375 V/rad;  v_max = 60 V;
+    resistance = 1.2 ohm;  kt = 0.08 N*m/A;  tau_max = 8 N*m;  j_m = 2.113e-4 kg*m^2;  f_c = 0.0082 N*m;
+    command = rate(0.479 rad/s);
+}
+run r {
+    arm = a;  servos { j = s; }
+    environment {
+        g  = gravity { g = [0, 0, -9.81] m/s^2; }
+        st = joint_stop {
+            joint = j;  upper = 0.422 rad;  lower = -0.397 rad;  stiffness = 8237 N*m/rad;  dissipation = 0.82 s/rad;
+        }
+    }
+    rates { dynamics = 2000 Hz;  servos = 500 Hz;  record = 125 Hz; }
+    duration = 2 s;
+    record = [q];
+    metric fastest = peak { of = j.qd; }
+    metric slow = always { of = abs(j.qd) < 2 rad/s;  after = 0.2 s; }
+    metric volts = max { of = j.servo.voltage; }
+}
+"""
+
+
+@pytest.mark.slow
+def test_a_peak_at_a_stop_that_is_the_same_sample_at_all_three_steps_is_not_said_to_be_exact(tmp_path: Path) -> None:
+    """The three runs see the same sample, and so their differences show the error of integration alone."""
+    (tmp_path / "d.ic").write_text(STOPPED)
+    plan = ic.compile(str(tmp_path / "d.ic"))
+    with ArchiveFile(batch.run(plan, output=tmp_path / "a.h5", verify="some").path) as file:
+        verified, found = file.groups[0].verified, figures(file.groups[0])
+    assert verified is not None and found is not None
+    truth = engine.run(refine(plan.experiments[0], 64)).metrics
+    for name in ("fastest", "slow"):
+        [each] = found.metrics[name].cases
+        assert each.error is not None
+        true = abs(each.value - truth[name][0])
+        assert abs(each.value - each.half) + abs(each.half - each.quarter) < 0.1 * true < true
+        assert true <= each.error.error < 5.0 * true
+    assert verified.missed[0, verified.metrics.index("volts")] == 0.0, "seen at the servo's ticks, at all three steps"
 
 
 def test_errors_follow_from_three_values() -> None:

@@ -144,6 +144,20 @@ def test_a_metric_that_changes_with_the_step_and_not_as_the_integrator_does(tmp_
 
 
 @pytest.mark.slow
+def test_what_lies_between_samples_is_no_change_with_the_step(tmp_path: Path) -> None:
+    """Where the three values are the same, nothing depends on the step; a requirement within it is undecided."""
+    for required, codes in (("", []), ("    require turn < 0.09 rad;\n", ["D310"])):
+        plan = planned(tmp_path, DECK.replace("    require turn < 0.0721 rad;\n", required))
+        path = batch.run(plan, output=tmp_path / f"{len(required)}.h5", verify="some").path
+
+        def misses(node: h5py.Group) -> None:
+            node["missed"][0, list(node["verified_metric"].asstr()).index("turn")] = 0.02
+
+        assert warned(path, plan) == []
+        assert [found.code for found in warned(changed(path, misses), plan)] == codes
+
+
+@pytest.mark.slow
 def test_a_large_change_is_told_although_the_integrator_explains_it(tmp_path: Path) -> None:
     plan = planned(tmp_path, DECK.replace("    require turn < 0.0721 rad;\n", ""))
     path = batch.run(plan, output=tmp_path / "a.h5", verify="some").path

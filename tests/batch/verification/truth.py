@@ -1,6 +1,8 @@
 """Errors by the step as MET estimates them, against the truth: random arms with rk4 at a hundredth of the step.
 
-python -m tests.batch.verification.truth [COUNT]      200 runs take some ten minutes on one core
+python -m tests.batch.verification.truth [COUNT]          200 runs take some ten minutes on one core
+python -m tests.batch.verification.truth stops [COUNT]    other arms, with stops, friction and delays: extremes, shares
+                                                          and instants at a sixteenth of the step; 160 take two minutes
 """
 
 from __future__ import annotations
@@ -11,13 +13,15 @@ import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 import ic
-from batch.campaigns.verification.verifying import FACTORS
+from batch.campaigns.verification.verifying import verify
 from batch.queries.step_errors.figures import case_error
-from met import models
 from met import run as engine
 from met.analysis.refinement import refine
 from met.plan import Experiment
+from tests.batch.verification import stops
 from tests.oracles.random_deck import random_deck
 
 FINER = 100
@@ -46,8 +50,8 @@ class Compared:
 
     @property
     def counts(self) -> bool:
-        """True if the error is large enough, and the order is as it should be."""
-        return self.clear and math.isfinite(self.order) and self.true > SMALLEST * abs(self.value)
+        """True if the error is large enough, and the order is as it should be, or that of an instant is clear."""
+        return self.clear and self.true > SMALLEST * abs(self.value)
 
     @property
     def factor(self) -> float:
@@ -66,17 +70,31 @@ def experiment(seed: int, folder: Path) -> Experiment:
 def compared(seed: int, folder: Path) -> list[Compared]:
     """The metrics of one random arm."""
     of = experiment(seed, folder)
-    of = replace(of, structure=replace(of.structure, record=()))
     fine = refine(of, FINER)
-    fine = replace(fine, structure=replace(fine.structure, integrator="rk4"))
-    runs = [engine.run(each, record=False).metrics for each in (of, *(refine(of, n) for n in FACTORS), fine)]
-    order = models.find("integrator", of.structure.integrator).order
+    return estimated(seed, of, [replace(fine, structure=replace(fine.structure, integrator="rk4"))])
+
+
+def with_stops(seed: int, folder: Path) -> list[Compared]:
+    """The metrics of one random arm with stops, where a sixteenth of the step has converged to a tenth of the error."""
+    (folder / f"{seed}.ic").write_text(stops.deck(seed), encoding="utf-8")
+    of = ic.compile(folder / f"{seed}.ic").experiments[0]
+    return estimated(seed, of, [refine(of, 32), refine(of, 16)])
+
+
+def estimated(seed: int, of: Experiment, truths: list[Experiment]) -> list[Compared]:
+    """The estimates of the metrics named `m_...`, against the first of these experiments, where the others come to the
+    same within a tenth of the error."""
+    names = {use.name: use.name for use in of.structure.metrics if use.name.startswith("m_")}
+    found = verify(of, np.zeros(1, np.int64), names)
+    runs = [engine.run(each, record=False).metrics for each in (of, *truths)]
     out = []
-    for name in (use.name for use in of.structure.metrics if use.name.startswith("m_")):
-        own, half, quarter, truth = (float(run[name][0]) for run in runs)
-        found = case_error(0, (own, half, quarter), order, 0.0).error
-        if found is not None and math.isfinite(truth):
-            out.append(Compared(seed, name, found.error, found.order, found.clear, abs(own - truth), own))
+    for column, name in enumerate(found.metrics):
+        own, truth, *others = (float(run[name][0]) for run in runs)
+        values = (own, float(found.half[0, column]), float(found.quarter[0, column]))
+        instant, missed = float(found.instant[column]), float(found.missed[0, column])
+        error, true = case_error(0, values, found.order, instant, missed).error, abs(own - truth)
+        if error is not None and math.isfinite(truth) and all(abs(each - truth) <= 0.1 * true for each in others):
+            out.append(Compared(seed, name, error.error, error.order, error.clear, true, own))
     return out
 
 
@@ -86,11 +104,13 @@ def said(found: list[Compared]) -> str:
     good = sum(each.factor <= 2.0 for each in counted)
     small = sum(each.true <= SMALLEST * abs(each.value) for each in found)
     unclear = [each for each in found if each.true > SMALLEST * abs(each.value) and not each.counts]
+    below, far = (sum(each.estimate * factor < each.true for each in counted) for factor in (2.0, 5.0))
     bound = sum(each.estimate >= each.true for each in unclear)
     runs = len({each.seed for each in found})
     lines = [
         f"{runs} runs, {len(found)} metrics; true error below {SMALLEST:g} of the value: {small}",
         f"order as it should be: {len(counted)}, of which within a factor of 2: {good} ({share(good, len(counted))})",
+        f"too small by more than a factor of 2: {below} ({share(below, len(counted))}), of 5: {far}",
         f"order unclear, left out: {len(unclear)} ({share(len(unclear), len(unclear) + len(counted))}), of which the "
         f"rough bound holds: {bound} ({share(bound, len(unclear))})",
     ]
@@ -105,13 +125,15 @@ def share(part: int, of: int) -> str:
     return f"{100 * part / of:.1f} %" if of else "-"
 
 
-def main(count: int) -> None:
+def main(words: list[str]) -> None:
+    of_one, default = (with_stops, 160) if "stops" in words else (compared, 200)
+    count = next((int(word) for word in words if word.isdigit()), default)
     found: list[Compared] = []
     with tempfile.TemporaryDirectory() as folder:
         for seed in range(count):
-            found += compared(seed, Path(folder))
+            found += of_one(seed, Path(folder))
     print(said(found))
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 200)
+    main(sys.argv[1:])

@@ -41,6 +41,11 @@ def test_a_step_too_long_for_its_order_is_bounded_and_called_unclear() -> None:
         assert found.step_for(0.1, 0.3) < 0.1 * 0.3 / found.error * 1.01
 
 
+def test_what_lies_between_samples_is_added_whatever_the_order() -> None:
+    for first, second in ((4e-3, 1e-3), (1.0, 1.0), (1.0, 0.0), (1e-15, 0.0)):
+        assert step_error(first, second, 1.0, 2, 0.5).error == step_error(first, second, 1.0, 2).error + 0.5
+
+
 def test_rounding_has_no_order() -> None:
     found = step_error(1e-15, 3e-15, 1.0, 2)
     assert found == StepError(3e-15, pytest.approx(math.nan, nan_ok=True), True)

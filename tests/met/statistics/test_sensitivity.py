@@ -148,3 +148,22 @@ def test_ranges_stay_among_the_shares_that_there_are() -> None:
     assert all(0.0 <= share.total_low <= share.total_high <= 1.0 for share in found.inputs)
     heavy = shares(list(np.random.default_rng(8).uniform(size=(2, 64))), np.exp(np.linspace(0.0, 200.0, 64)))
     assert heavy is not None and all(share.first_by <= 1.0 for share in heavy.inputs)
+
+
+def test_the_means_at_the_ends_of_what_has_no_effect_are_told_apart_as_seldom_as_they_say() -> None:
+    """In 5 % of samples, of any cases and of those of a design, and never of what has an effect."""
+    random, apart, seen, count = np.random.default_rng(4), 0, 0, 200
+    for _ in range(count):
+        a, idle = random.uniform(0.0, 1.0, (2, 300))
+        found = shares([a, idle], a + random.normal(0.0, 0.2, 300))
+        assert found is not None
+        apart += abs(found.inputs[1].high - found.inputs[1].low) > found.inputs[1].ends_by
+        seen += abs(found.inputs[0].high - found.inputs[0].low) > found.inputs[0].ends_by
+    assert 0.01 * count <= apart <= 0.1 * count and seen == count
+
+
+def test_means_that_differ_by_rounding_are_equal() -> None:
+    a, b = (each.ravel().astype(float) for each in np.meshgrid(np.arange(-4, 5), np.arange(9)))
+    found = shares([a, b], np.sin(a) * 0.1 + 1e-17 * b)
+    assert found is not None and found.inputs[1].low == found.inputs[1].high == 0.0
+    assert found.inputs[0].low > 0.05 and found.inputs[0].high < -0.03

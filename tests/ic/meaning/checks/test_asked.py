@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from tests.ic.meaning.checks.test_scales import PUSH, TWO_LINKS, remarks
@@ -17,23 +15,23 @@ NEVER = "is asked for leads from 0 to 60 deg; a servo goes where it is asked to"
 
 
 @pytest.mark.parametrize(("target", "told"), [("60", 0), ("61", 0), ("30", 0), ("0", 0), ("62", 1), ("75", 1)])
-def test_a_target_to_which_no_command_leads_is_told(tmp_path: Path, target: str, told: int) -> None:
+def test_a_target_to_which_no_command_leads_is_told(target: str, told: int) -> None:
     """Within the band of 2 % of what the command leads to, and on the way there, nothing is."""
-    found = remarks(tmp_path, ("target = 60 deg", f"target = {target} deg"))
+    found = remarks(("target = 60 deg", f"target = {target} deg"))
     wait = "look at the joint that is meant, or wait for what this one's leads to"
     assert found == [(f"`metrics.late.target` is {target} deg, and what `elbow` {NEVER}", (wait,))] * told
 
 
-def test_the_joint_whose_command_leads_to_a_target_is_named_and_is_the_remedy(tmp_path: Path) -> None:
+def test_the_joint_whose_command_leads_to_a_target_is_named_and_is_the_remedy() -> None:
     stands = ("shoulder = drive; elbow = drive;", "shoulder = drive; elbow = drive { command = position(0 deg); }")
-    assert remarks(tmp_path, stands) == [
+    assert remarks(stands) == [
         (
             "`metrics.late.target` is 60 deg, and what `elbow` is asked for leads to 0 deg; a servo goes where it is "
             "asked to",
             ("look at `shoulder.q`, whose command leads there, or wait for what this one's leads to",),
         )
     ]
-    assert remarks(tmp_path, stands, ("of = elbow.q", "of = shoulder.q")) == []
+    assert remarks(stands, ("of = elbow.q", "of = shoulder.q")) == []
 
 
 @pytest.mark.parametrize(
@@ -45,9 +43,9 @@ def test_the_joint_whose_command_leads_to_a_target_is_named_and_is_the_remedy(tm
         ("rate(0.2 rad/s)", "overshoot(of = elbow.q, target = 0.7 rad)", True),
     ],
 )
-def test_where_a_rate_leads_counts(tmp_path: Path, command: str, metric: str, told: bool) -> None:
+def test_where_a_rate_leads_counts(command: str, metric: str, told: bool) -> None:
     unread = ("sensor q = encoder { step = 0.0001 rad; }", "")
-    found = remarks(tmp_path, unread, (STOPPED, f"command = {command};"), (SETTLED, metric))
+    found = remarks(unread, (STOPPED, f"command = {command};"), (SETTLED, metric))
     assert ["metrics.late.target" in said for said, _ in found] == [True] * told
 
 
@@ -67,11 +65,9 @@ FLIES = (
         ("2.9", "1, 0, 41.26", "1.255", "0.1, 0, -0.866"),  # it has fallen to where the arm was
     ],
 )
-def test_a_payload_that_its_grapple_misses_is_told(
-    tmp_path: Path, time: str, place: str, apart: str | None, there: str
-) -> None:
+def test_a_payload_that_its_grapple_misses_is_told(time: str, place: str, apart: str | None, there: str) -> None:
     def found(place: str) -> list[tuple[str, tuple[str, ...]]]:
-        return remarks(tmp_path, (FLIES[0], FLIES[1].replace("T s", f"{time} s").replace("[P]", f"[{place}]")))
+        return remarks((FLIES[0], FLIES[1].replace("T s", f"{time} s").replace("[P]", f"[{place}]")))
 
     message = (
         f"`payloads.tool.position` leads it {apart} m past its place on `fore`, which grapples it at {time} s; a "
@@ -92,10 +88,10 @@ def test_a_payload_that_its_grapple_misses_is_told(
     ],
 )
 def test_starts_over_more_than_a_turn_are_told_unless_the_joint_has_that_range(
-    tmp_path: Path, ends: str, limits: str, told: bool
+    ends: str, limits: str, told: bool
 ) -> None:
     sweep = f"sweep s of lift {{ seed = 1;  sample random(8) {{ initial.elbow.q = uniform{ends}; }} }}\n"
-    found = remarks(tmp_path, (f"axis = y; {PLACE}", f"axis = y; {PLACE}{limits}"), text=TWO_LINKS + sweep)
+    found = remarks((f"axis = y; {PLACE}", f"axis = y; {PLACE}{limits}"), text=TWO_LINKS + sweep)
     said = [each for each in found if "`initial.elbow.q` varies over" in each[0]]
     assert len(said) == told
     assert all(helps[0].startswith("in deg it would be 0.02") for _, helps in said)
@@ -109,11 +105,9 @@ def test_starts_over_more_than_a_turn_are_told_unless_the_joint_has_that_range(
         ("1, 4", "0.4, 0, 0", False),  # about its joint the inertia hardly counts
     ],
 )
-def test_an_inertia_that_stays_while_the_mass_varies_is_told_where_it_counts(
-    tmp_path: Path, masses: str, at: str, told: bool
-) -> None:
+def test_an_inertia_that_stays_while_the_mass_varies_is_told_where_it_counts(masses: str, at: str, told: bool) -> None:
     sweep = f"sweep s of lift {{ vary payloads.tool.mass = [{masses}] kg; }}\n"
-    found = remarks(tmp_path, ("on = fore; at = [0.4, 0, 0] m;", f"on = fore; at = [{at}] m;"), text=TWO_LINKS + sweep)
+    found = remarks(("on = fore; at = [0.4, 0, 0] m;", f"on = fore; at = [{at}] m;"), text=TWO_LINKS + sweep)
     assert (
         found
         == [
@@ -126,25 +120,25 @@ def test_an_inertia_that_stays_while_the_mass_varies_is_told_where_it_counts(
         * told
     )
     shape = ("inertia = [1e-3, 1e-3, 1e-3] kg*m^2; }\n    rates", "shape = sphere(radius = 5 cm); }\n    rates")
-    assert not told or remarks(tmp_path, shape, text=TWO_LINKS + sweep) == []  # the remedy
+    assert not told or remarks(shape, text=TWO_LINKS + sweep) == []  # the remedy
 
 
-def test_a_payload_beside_its_link_by_more_than_the_arm_is_told(tmp_path: Path) -> None:
+def test_a_payload_beside_its_link_by_more_than_the_arm_is_told() -> None:
     link = ("com = [0.2, 0, 0] m; inertia = [0.004, 0.03, 0.03] kg*m^2;", "shape = rod(length = 0.4 m, along = x);")
     hangs, far = (("on = fore; at = [0.4, 0, 0] m;", f"on = fore; at = [0.4, 0, {-z}] m;") for z in (0.9, 1.1))
     light = ("mass = 1 kg; inertia = [1e-3", "mass = 10 g; inertia = [1e-3")
-    assert remarks(tmp_path, link, hangs, light) == []
-    assert [said for said, _ in remarks(tmp_path, link, far, light)] == [
+    assert remarks(link, hangs, light) == []
+    assert [said for said, _ in remarks(link, far, light)] == [
         "`payloads.tool.at` is beside the shape of `fore` by 1.1 m, 1.1 times the arm's reach, 1 m; a payload is "
         "usually at its link, or hangs from it"
     ]
 
 
-def test_a_load_motor_too_small_for_the_load_at_the_start_is_told_with_a_current_that_does(tmp_path: Path) -> None:
+def test_a_load_motor_too_small_for_the_load_at_the_start_is_told_with_a_current_that_does() -> None:
     def found(current: str, scale: str = "") -> list[tuple[str, tuple[str, ...]]]:
         bed = f"    substitute elbow {{ bed = emulated(i_max = {current}); law = velocity_tracking; {scale} }}\n"
         unread = ("sensor q = encoder { step = 0.0001 rad; }", "")
-        return remarks(tmp_path, (PUSH, ""), unread, ("    payload", f"{bed}    payload"))
+        return remarks((PUSH, ""), unread, ("    payload", f"{bed}    payload"))
 
     assert found("0.05 A") == [
         (
@@ -156,6 +150,6 @@ def test_a_load_motor_too_small_for_the_load_at_the_start_is_told_with_a_current
     assert found("1.101 A") == [] and found("0.05 A", "scale { torque = 25; rate = 25; voltage = 25; }") == []
 
 
-def test_a_target_that_all_cases_of_a_sweep_over_commands_share_is_not_told(tmp_path: Path) -> None:
+def test_a_target_that_all_cases_of_a_sweep_over_commands_share_is_not_told() -> None:
     sweep = "sweep s of lift { vary elbow.servo.command.to = [40, 50, 60] deg; }\n"
-    assert remarks(tmp_path, text=TWO_LINKS + sweep) == []
+    assert remarks(text=TWO_LINKS + sweep) == []

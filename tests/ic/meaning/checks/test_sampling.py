@@ -11,7 +11,7 @@ import pytest
 import met.run as engine
 from ic.meaning.checks.carried import uncarried
 from met.content import humps_from_zero, humps_of_turns
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, codes, experiment, shown
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, shown
 from tests.oracles.random_deck import random_deck
 
 TICKS = ("servos = 1 kHz", "servos = 100 Hz")
