@@ -26,7 +26,8 @@ def residuals(archive: str, log: str, run: str | None, case: str | None, form: s
 
     from batch.archive.read import ArchiveFile
     from batch.measured.log import read_log
-    from batch.measured.residuals import compare, computed
+    from batch.measured.paired import computed
+    from batch.measured.residuals import compare
     from batch.modules.description import described_columns
     from batch.queries.groups import groups_named
     from batch.queries.signals import case_text
@@ -42,12 +43,14 @@ def residuals(archive: str, log: str, run: str | None, case: str | None, form: s
         joints = [joint.name for joint in experiment.structure.joints]
         found = compare(computed(group, position, columns), columns, joints, measured)
         if not found.residuals:
-            message = f"`{log}` and the run have no instant in common"
+            message = f"no number of `{log}` has one of the run beside it"
             raise Problem(
                 error("E478", message, measured.head, help="let its times begin where the run begins, at 0 s")
             )
         if form == "json":
             say(json.dumps({"experiment": group.name, "case": case_text(group, position), **as_data(found)}, indent=1))
         else:
-            say("\n".join(map(line, [f"{group.name}, {case_text(group, position)}", "", *residual_lines(found)])))
+            failed = ", which did not end well: as far as it came" if group.values("status")[position] else ""
+            head = f"{group.name}, {case_text(group, position)}{failed}"
+            say("\n".join(map(line, [head, "", *residual_lines(found)])))
     return YES

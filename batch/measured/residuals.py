@@ -12,14 +12,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import stats
 
-from batch.archive.read import ArchiveGroup
+from batch.measured.doubts import LATEST, clock_doubts, column_doubts
 from batch.measured.mcap_log import MeasuredSignals
+from batch.measured.paired import Course, Pair
 from met.frozen import frozen
 
 STRETCHES = 16
-"""Number of stretches of a log of which every other one is of the half that a share is fitted on."""
+"""Largest number of stretches of a log, of which every other one is of the half that a share is fitted on."""
 
 FEWEST = 8 * STRETCHES
 """Fewest instants of a log of which shares are told."""
@@ -33,43 +34,23 @@ ALIKE = 0.8
 LAGS, WHITE = 10, 0.01
 """Lags of the test of whiteness, in instants of the log, and its level (Ljung and Box, Biometrika 65, 1978)."""
 
-LATEST, FASTEST = 0.5, 0.05
-"""Largest delay of a log, s, and largest difference of its clock's rate, that are tried."""
-
-HALVED = 0.25
-"""A mistake of a log is suspected where mending it leaves at most this share of the squared residuals."""
-
-OUTLYING, OUTLIERS = 5.0, 0.01
-"""An outlier is so many times as far from the middle of nine tenths of a residual as these are; and the largest share
-of outliers."""
-
 STILL = 0.01
 """Share of a joint's largest rate below which it has no sign."""
 
-UNLIKE = 0.01
-"""Share of a column's mean square that its squared residuals have at least where the column is suspected."""
+ALIKE_FOR, SHORTEST = 3.0, 4
+"""A stretch is at least so many times as long as a residual stays alike, and a log at least so many stretches."""
 
-LATE, NOTHING = 0.5, 1e-6
-"""The same share of a log's times, in the mean of its columns; and the share of a column's variance that counts as
-none."""
+ROUNDING = 1e-12
+"""Share of the largest number below which a spread is that of rounding."""
 
 MOST_INSTANTS = 20_000
-"""Largest number of a log's instants with which its times are tried."""
+"""Largest number of instants with which shares are reckoned."""
 
-FAR = 30.0
-"""A column that is so many times what was computed, or as small a part of it, is suspected of another unit."""
+UNEVEN = 0.05
+"""Share of gaps among a log's steps from which on its time is uneven."""
 
 LONG_GAP = 1.5
 """A step of a log's time that is longer than this many usual ones is a gap."""
-
-SCALES = {-1.0: "with its sign turned", 1e3: "divided by 1,000", 1e-3: "times 1,000"}
-"""Factors by which a column may be wrong, with what mends it: the column is divided by the factor."""
-
-ANGLES = {
-    float(np.degrees(1.0)): "read as degrees instead of radians",
-    float(np.radians(1.0)): "read as radians instead of degrees",
-}
-"""The same of columns with angles."""
 
 
 @frozen
@@ -99,7 +80,8 @@ class Residual:
     spread              standard deviation of what was measured
     outliers            instants at which it is far beyond its usual size, of which the following is not made
     correlation         of the residual with the one an instant later; white: whether no lag is correlated, None where
-                        the residual is constant
+                        the residual is constant, or of too few instants
+    too_short           whether the log is too short to say what the residual follows
     """
 
     channel: str
@@ -114,48 +96,32 @@ class Residual:
     correlation: float
     white: bool | None
     explained: tuple[Explanation, ...]
+    too_short: bool
 
 
 @frozen
 class Comparison:
     """The residuals of a log and what makes it doubtful.
 
-    doubts   mistakes of the log that, mended, leave at most a quarter of the squared residuals, in words
-    gaps     instants (s) at which time goes on by more than one and a half usual steps, with the steps' lengths
+    doubts   mistakes of the log that are suspected, in words
+    gaps     instants (s) at which time goes on by more than one and a half usual steps, with the steps' lengths;
+             uneven: whether a twentieth of the steps are gaps
     step     the usual step of the log's time, s; of the run's record: `run_step`
-    missing  channels that the run records and the log lacks
+    log_span, run_span  first and last instant of each, s; left_out: numbers of the log without one of the run
+    missing  channels that the run records and the log lacks; unused: what the log has besides
     """
 
     residuals: tuple[Residual, ...]
     doubts: tuple[str, ...]
     gaps: tuple[tuple[float, float], ...]
+    uneven: bool
     step: float
     run_step: float
+    log_span: tuple[float, float]
+    run_span: tuple[float, float]
+    left_out: int
     missing: tuple[str, ...]
-
-
-@frozen
-class Course:
-    """A channel as computed: `values` at the run's `times`, s."""
-
-    times: np.ndarray
-    values: np.ndarray
-
-    def at(self, instants: np.ndarray) -> np.ndarray:
-        return np.interp(instants, self.times, self.values, left=np.nan, right=np.nan)
-
-
-def computed(group: ArchiveGroup, position: int, columns: Sequence[Mapping[str, str]]) -> dict[str, Course]:
-    """The channels of a recorded case as far as they are finite. columns: those of `described_columns`, in order"""
-    times = group.values("time")
-    signals = list(dict.fromkeys(each["signal"] for each in columns))
-    found = np.hstack([group.signal(name, position).reshape(len(times), -1) for name in signals])
-    out = {}
-    for each, values in zip(columns, found.T.astype(np.float64), strict=True):
-        finite = np.isfinite(values)
-        if finite.any():
-            out[each["channel"]] = Course(times[finite], values[finite])
-    return out
+    unused: tuple[str, ...]
 
 
 def compare(
@@ -166,54 +132,54 @@ def compare(
 
     courses  what was computed, by channel; columns: those of `described_columns`; joints: the arm's
     """
-    pairs = {name: _Pair(*log.signals[name], courses[name]) for name in courses if name in log.signals}
-    pairs = {name: pair for name, pair in pairs.items() if pair.rows.any()}
+    pairs = {name: Pair.of(*log.signals[name], courses[name]) for name in courses if name in log.signals}
+    pairs = {name: pair for name, pair in pairs.items() if len(pair.instants)}
     units = {each["channel"]: each["unit"] for each in columns}
     kinds = {each["channel"]: (each["signal"], each["unit"]) for each in columns}
     residuals = []
     for name, pair in pairs.items():
         joint = next((each for each in joints if name.startswith(f"{each}.")), "")
         residuals.append(_residual(name, pair, courses, units, joint))
-    step, gaps = _clock(pairs)
-    run_step = max(
-        (float(np.median(np.diff(each.times))) for each in courses.values() if len(each.times) > 1), default=0.0
+    usual = {name: pair.usual() for name, pair in pairs.items()}
+    white = {each.channel for each in residuals if each.white}
+    times = [log.signals[name][0] for name in pairs]
+    step, gaps, uneven = _clock(max(times, key=len, default=np.empty(0)))
+    return Comparison(
+        tuple(residuals),
+        (*column_doubts(usual, kinds, white), *clock_doubts(usual)),
+        gaps,
+        uneven,
+        step,
+        max((float(np.median(np.diff(each.times))) for each in courses.values() if len(each.times) > 1), default=0.0),
+        _span(times),
+        _span([each.times for each in courses.values()]),
+        sum(len(time) for time in times) - sum(each.rows for each in residuals),
+        tuple(each["channel"] for each in columns if each["channel"] not in log.signals),
+        tuple(log.unused),
     )
-    missing = tuple(each["channel"] for each in columns if each["channel"] not in log.signals)
-    doubts = (*_column_doubts(pairs, kinds), *_clock_doubts(pairs))
-    return Comparison(tuple(residuals), doubts, gaps, step, run_step, missing)
 
 
-@frozen
-class _Pair:
-    """A channel measured at `instants`, s, and its computed course."""
-
-    instants: np.ndarray
-    measured: np.ndarray
-    course: Course
-
-    @property
-    def rows(self) -> np.ndarray:
-        """True at instants at which both have a number."""
-        return np.isfinite(self.measured) & np.isfinite(self.course.at(self.instants))
-
-    def squares(self, delay: float = 0.0, rate: float = 0.0, factor: float = 1.0) -> float:
-        """Mean square of the residual where the log is late by `delay` s, its clock fast by the share `rate`, and its
-        numbers `factor` times too large."""
-        residual = self.measured / factor - self.course.at(self.instants / (1.0 + rate) - delay)
-        finite = residual[np.isfinite(residual)]
-        return float(np.mean(finite**2)) if len(finite) > len(residual) // 2 else np.inf
+def _span(times: Sequence[np.ndarray]) -> tuple[float, float]:
+    found = [each for each in times if len(each)]
+    return (min(float(each[0]) for each in found), max(float(each[-1]) for each in found)) if found else (0.0, 0.0)
 
 
-def _residual(name: str, pair: _Pair, courses: Mapping[str, Course], units: Mapping[str, str], joint: str) -> Residual:
-    rows = pair.rows
-    instants, measured = pair.instants[rows], pair.measured[rows]
-    residual = measured - pair.course.at(instants)
+def _clock(times: np.ndarray) -> tuple[float, tuple[tuple[float, float], ...], bool]:
+    """The usual step of a log's time, s; its gaps, when and how long; and whether so many steps are gaps that its time
+    is uneven."""
+    steps = np.diff(times)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    gaps = np.flatnonzero(steps > LONG_GAP * usual)
+    return usual, tuple((float(times[i]), float(steps[i])) for i in gaps), len(gaps) > UNEVEN * len(steps)
+
+
+def _residual(name: str, pair: Pair, courses: Mapping[str, Course], units: Mapping[str, str], joint: str) -> Residual:
+    residual, usual = pair.residual, pair.usual()
     largest = int(np.argmax(np.abs(residual)))
-    usual = _usual(residual)
-    correlation, white = _whiteness(residual[usual])
-    explained: tuple[Explanation, ...] = ()
-    if white is False and np.count_nonzero(usual) >= FEWEST:
-        explained = _explained(residual[usual], _features(name, courses, units, joint), instants[usual])
+    correlation, white = _whiteness(usual.residual)
+    spread = float(np.std(pair.measured))
+    few = len(usual.instants) < FEWEST
+    explained = () if white is not False or few else _explained(usual, _features(name, courses, units, joint))
     return Residual(
         name,
         units[name],
@@ -221,20 +187,14 @@ def _residual(name: str, pair: _Pair, courses: Mapping[str, Course], units: Mapp
         float(np.sqrt(np.mean(residual**2))),
         float(np.mean(residual)),
         float(residual[largest]),
-        float(instants[largest]),
-        float(np.std(measured)),
-        int(np.count_nonzero(~usual)),
+        float(pair.instants[largest]),
+        spread if spread > ROUNDING * float(np.abs(pair.measured).max()) else 0.0,
+        len(residual) - len(usual.instants),
         correlation,
         white,
-        explained,
+        explained or (),
+        explained is None or (few and white is False),
     )
-
-
-def _usual(residual: np.ndarray) -> np.ndarray:
-    """True but for outliers, as long as they are few."""
-    low, high = np.quantile(residual, [0.05, 0.95])
-    usual = np.abs(residual - 0.5 * (low + high)) <= OUTLYING * 0.5 * (high - low)
-    return usual if np.mean(~usual) <= OUTLIERS else np.ones(len(residual), bool)
 
 
 def _whiteness(residual: np.ndarray) -> tuple[float, bool | None]:
@@ -242,7 +202,7 @@ def _whiteness(residual: np.ndarray) -> tuple[float, bool | None]:
     count, centred = len(residual), residual - residual.mean()
     power = float(centred @ centred)
     lags = min(LAGS, count // 4)
-    if lags < 1 or power <= 1e-24 * float(residual @ residual):
+    if lags < 2 or power <= 1e-24 * float(residual @ residual):
         return 0.0, None
     each = np.array([centred[lag:] @ centred[:-lag] / power for lag in range(1, lags + 1)])
     statistic = count * (count + 2.0) * float(np.sum(each**2 / (count - np.arange(1, lags + 1))))
@@ -264,12 +224,14 @@ class _Feature:
 
 def _features(name: str, courses: Mapping[str, Course], units: Mapping[str, str], joint: str) -> list[_Feature]:
     own, unit = courses[name], units[name]
-    slope = Course(own.times, _rate(own))
-    found = [
-        _Feature(f"{name} itself", "a unit, a gain, a constant of the motor", "1", lambda t: own.at(t)[:, None]),
-        _Feature(f"the rate of {name}", "a delay", "s", lambda t: -slope.at(t)[:, None]),
-    ]
+    slope, middle = own.rate, float(own.times.mean())
     q, qd, tau = (f"{joint}.{signal}" for signal in ("q", "qd", "tau"))
+    why = "a unit, a gain, masses or a payload" if name == tau else "a unit, a gain, a constant of the motor"
+    found = [
+        _Feature(f"{name} itself", why, "1", lambda t: own.at(t)[:, None]),
+        _Feature(f"the rate of {name}", "a delay", "s", lambda t: -slope.at(t)[:, None]),
+        _Feature("time", "a drift", f"{unit} per s", lambda t: t[:, None] - middle),
+    ]
     if tau in courses and name in (q, qd):
         load = courses[tau]
         words = "what yields under load"
@@ -278,23 +240,19 @@ def _features(name: str, courses: Mapping[str, Course], units: Mapping[str, str]
         return found
     if qd in courses:
         rate = courses[qd]
-        faster = Course(rate.times, _rate(rate))
+        faster = rate.rate
         still = STILL * float(np.abs(rate.values).max())
         found += [
             _Feature(f"the sign of {qd}", "dry friction", unit, lambda t: _sign(rate.at(t), still)[:, None]),
             _Feature(qd, "viscous friction", f"{unit} per {units[qd]}", lambda t: rate.at(t)[:, None]),
             _Feature(
-                f"the rate of {qd}", "inertia, payload", f"{unit} per {units[qd]}/s", lambda t: faster.at(t)[:, None]
+                f"the rate of {qd}", "inertia, payload", f"{unit} per {units[qd]}^2", lambda t: faster.at(t)[:, None]
             ),
         ]
     if q in courses and units[q] == "rad":
         angle = courses[q]
         found.append(_Feature(f"sine and cosine of {q}", "gravity, payload", unit, lambda t: _turned(angle.at(t))))
     return found
-
-
-def _rate(course: Course) -> np.ndarray:
-    return np.gradient(course.values, course.times) if len(course.times) > 1 else np.zeros(len(course.times))
 
 
 def _sign(rates: np.ndarray, still: float) -> np.ndarray:
@@ -305,11 +263,17 @@ def _turned(angles: np.ndarray) -> np.ndarray:
     return np.stack([np.sin(angles), np.cos(angles)], axis=1)
 
 
-def _explained(residual: np.ndarray, features: Sequence[_Feature], instants: np.ndarray) -> tuple[Explanation, ...]:
-    """One after the other, the feature that adds most to the share of those before it."""
-    halves = np.arange(len(residual)) * STRETCHES // len(residual) % 2
+def _explained(pair: Pair, features: Sequence[_Feature]) -> tuple[Explanation, ...] | None:
+    """One after the other, the feature that adds most to the share of those before it; None where the log is too
+    short."""
+    pair = pair.thinned(MOST_INSTANTS)
+    residual, instants = pair.residual, pair.instants
+    count = min(STRETCHES, int(len(residual) / (ALIKE_FOR * _alike_for(residual))))
+    if count < SHORTEST:
+        return None
+    halves = np.arange(len(residual)) * count // len(residual) % 2
     numbers = {each: each.at(instants) for each in features}
-    left = [each for each in features if np.isfinite(numbers[each]).all() and np.ptp(numbers[each], axis=0).max() > 0.0]
+    left = [each for each in features if _told(each, numbers[each], residual)]
     chosen: list[_Feature] = []
     gains: list[tuple[float, tuple[str, ...]]] = []
     explained = 0.0
@@ -336,6 +300,22 @@ def _explained(residual: np.ndarray, features: Sequence[_Feature], instants: np.
     )
 
 
+def _told(feature: _Feature, numbers: np.ndarray, residual: np.ndarray) -> bool:
+    """Whether a feature changes, and is no delay of more than what a log's clock is tried with."""
+    if not np.isfinite(numbers).all() or np.ptp(numbers, axis=0).max() == 0.0:
+        return False
+    return feature.unit != "s" or abs(float(_fitted(residual, numbers)[1])) <= LATEST
+
+
+def _alike_for(residual: np.ndarray) -> int:
+    """Number of instants after which a residual's correlation with itself is below 1/e."""
+    centred = residual - residual.mean()
+    spectrum = np.fft.rfft(centred, 2 * len(centred))
+    correlation = np.fft.irfft(spectrum * spectrum.conj())[: len(centred)]
+    below = np.flatnonzero(correlation < correlation[0] / np.e)
+    return int(below[0]) if len(below) else len(residual)
+
+
 def _fitted(residual: np.ndarray, numbers: np.ndarray) -> np.ndarray:
     """Coefficients of least squares, the constant first."""
     scale = np.abs(numbers).max(axis=0)
@@ -354,86 +334,3 @@ def _share(residual: np.ndarray, numbers: np.ndarray, halves: np.ndarray) -> flo
         here = halves == half
         left += float(np.sum((residual[here] - fitted[0] - numbers[here] @ fitted[1:]) ** 2))
     return 1.0 - left / float(np.sum((residual - residual.mean()) ** 2))
-
-
-# What makes a log doubtful
-
-
-def _clock(pairs: Mapping[str, _Pair]) -> tuple[float, tuple[tuple[float, float], ...]]:
-    """The usual step of a log's time, s, and its gaps: when and how long."""
-    longest = max((pair.instants for pair in pairs.values()), key=len, default=np.empty(0))
-    steps = np.diff(longest)
-    usual = float(np.median(steps)) if len(steps) else 0.0
-    gaps = np.flatnonzero(steps > LONG_GAP * usual)
-    return usual, tuple((float(longest[i]), float(steps[i])) for i in gaps)
-
-
-def _column_doubts(pairs: Mapping[str, _Pair], kinds: Mapping[str, tuple[str, str]]) -> list[str]:
-    """Columns that fit with a factor, and pairs of columns that fit when they change places, and not as they are."""
-    now = {name: pair.squares() for name, pair in pairs.items()}
-    found = []
-    for name, pair in pairs.items():
-        if now[name] <= UNLIKE * float(np.mean(pair.measured[pair.rows] ** 2)):
-            continue
-        scales = SCALES | (ANGLES if "rad" in kinds[name][1] else {})
-        factor = min(scales, key=lambda each: pair.squares(factor=each))
-        after, computed_squares = pair.squares(factor=factor), float(np.mean(pair.course.values**2))
-        times = float(np.sqrt(np.mean(pair.measured[pair.rows] ** 2) / computed_squares)) if computed_squares else 1.0
-        if after <= HALVED * min(now[name], computed_squares):
-            found.append(f"`{name}` of the log fits {scales[factor]}: {_left(after, now[name])}")
-        elif not 1.0 / FAR <= times <= FAR:
-            found.append(f"`{name}` of the log is {times:.3g} times what was computed: has it another unit?")
-    names = list(pairs)
-    for i, a in enumerate(names):
-        for b in names[i + 1 :]:
-            if kinds[a] != kinds[b] or min(now[a], now[b]) == 0.0:
-                continue
-            crossed = [
-                _Pair(pairs[x].instants, pairs[x].measured, pairs[y].course).squares() for x, y in ((a, b), (b, a))
-            ]
-            before, after = now[a] + now[b], sum(crossed)
-            if after <= HALVED * before and crossed[0] <= now[b] and crossed[1] <= now[a]:
-                found.append(f"`{a}` and `{b}` of the log fit when they change places: {_left(after, before)}")
-    return found
-
-
-def _clock_doubts(pairs: Mapping[str, _Pair]) -> list[str]:
-    """A log that fits with another beginning of its time, or another rate of its clock, and not as it is."""
-    of = {name: _thinned(pair) for name, pair in pairs.items() if np.var(pair.measured[pair.rows]) > 0.0}
-    if not of:
-        return []
-    variances = {name: float(np.var(pair.measured[pair.rows])) for name, pair in of.items()}
-
-    def squares(delay: float = 0.0, rate: float = 0.0) -> float:
-        """The geometric mean over the columns: one of which the model knows little does not hide the others."""
-        shares = [pair.squares(delay, rate) / variances[name] + NOTHING for name, pair in of.items()]
-        return float(np.exp(np.mean(np.log(shares))))
-
-    def best(score: Callable[[float], float], largest: float) -> tuple[float, float]:
-        grid = np.linspace(-largest, largest, 101)
-        at = float(grid[int(np.argmin([score(each) for each in grid]))])
-        step = 2.0 * largest / 100.0
-        found = optimize.minimize_scalar(score, bounds=(at - step, at + step), method="bounded")
-        return float(found.x), float(found.fun)
-
-    now = squares()
-    (delay, late), (rate, fast) = best(squares, LATEST), best(lambda each: squares(rate=each), FASTEST)
-    longest = max((pair.instants for pair in of.values()), key=len)
-    shift = abs(delay) if late <= fast else abs(rate) * float(longest[-1] - longest[0])
-    if min(late, fast) > LATE * now or shift < float(np.median(np.diff(longest))):
-        return []
-    if late <= fast:
-        change = "less" if delay > 0.0 else "more"
-        return [f"the log fits best with its times {abs(delay):.3g} s {change}: {_left(late, now)}"]
-    times = "divided by" if rate > 0.0 else "multiplied by"
-    factor = 1.0 + rate if rate > 0.0 else 1.0 / (1.0 + rate)
-    return [f"the log fits best with its times {times} {factor:.4g}: {_left(fast, now)}"]
-
-
-def _thinned(pair: _Pair) -> _Pair:
-    every = -(-len(pair.instants) // MOST_INSTANTS)
-    return _Pair(pair.instants[::every], pair.measured[::every], pair.course)
-
-
-def _left(after: float, before: float) -> str:
-    return f"{np.sqrt(after / before):.2g} of the residual is left"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from batch.measured.residuals import FEWEST, Comparison, Explanation, Residual
@@ -48,7 +48,7 @@ def residual_lines(found: Comparison) -> Iterator[str]:
 
 def _whiteness(residual: Residual) -> str:
     if residual.white is None:
-        return "constant"
+        return "equal" if residual.rms == 0.0 else "constant" if residual.rows >= FEWEST else "too few"
     return "white" if residual.white else f"not white ({residual.correlation:.2g})"
 
 
@@ -63,23 +63,35 @@ def _notes(found: Comparison) -> Iterator[str]:
     for each in found.doubts:
         yield f"  doubt: {each}"
     far = [each.channel for each in found.residuals if each.spread and each.rms > each.spread]
-    if far and len(far) > len(found.residuals) // 2:
+    if len(far) > max(1, len(found.residuals) // 2):
         what = f"{len(far)} of {len(found.residuals)} residuals are larger than what was measured varies"
         yield f"  doubt: {what}: is the log of this run?"
-    if found.gaps:
-        when = ", ".join(f"{length:.3g} s at {at:.4g} s" for at, length in found.gaps[:SHOWN])
-        more = f", and {len(found.gaps) - SHOWN} more" if len(found.gaps) > SHOWN else ""
-        step = f"the log's time goes on by {found.step:.3g} s, but {when}{more}"
+    if found.left_out:
+        spans = " s, and the run from ".join(
+            f"{first:.6g} s to {last:.6g}" for first, last in (found.log_span, found.run_span)
+        )
+        numbers = f"{found.left_out:,} of the log's numbers have none of the run beside them, or are none"
+        yield f"  note: {numbers}: the log is from {spans} s"
+    if found.gaps and not found.uneven:
+        gaps = [f"{length:.3g} s at {at:.4g} s" for at, length in found.gaps]
+        step = f"the log's time goes on by {found.step:.3g} s, but {_listed(gaps)}"
         yield f"  note: {step}: instants are missing, or its clock jumped"
+    elif found.gaps:
+        longest = max(length for _, length in found.gaps)
+        yield f"  note: the log's time is uneven: its steps are {found.step:.3g} s, and up to {longest:.3g} s"
     if outlying := [f"{each.channel} {each.outliers:,}" for each in found.residuals if each.outliers]:
-        listed = ", ".join(outlying[:SHOWN])
-        yield f"  note: instants far from all others, left out of what a residual follows: {listed}"
-    if found.step < 0.5 * found.run_step:
+        yield f"  note: instants far from all others, left out of what a residual follows: {_listed(outlying)}"
+    if 0.0 < found.step < 0.5 * found.run_step:
         steps = f"every {number_text(found.run_step)} s, and the log has an instant every {found.step:.3g} s"
         yield f"  note: the run is recorded {steps}: between its rows, it is on straight lines"
+    if short := [each.channel for each in found.residuals if each.too_short]:
+        yield f"  note: the log is too short to say what these follow: {_listed(short)}"
     if found.missing:
-        names = ", ".join(found.missing[:SHOWN])
-        more = f", and {len(found.missing) - SHOWN} more" if len(found.missing) > SHOWN else ""
-        yield f"  note: not in the log: {names}{more}"
-    if short := [each.channel for each in found.residuals if each.rows < FEWEST and each.white is False]:
-        yield f"  note: fewer than {FEWEST} instants, too few to say what it follows: {', '.join(short[:SHOWN])}"
+        yield f"  note: not in the log: {_listed(found.missing)}"
+    if found.unused:
+        yield f"  note: not of the run, and not used: {_listed(found.unused)}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f", and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+    return ", ".join(names[:SHOWN]) + more

@@ -1,0 +1,83 @@
+"""A channel as computed and as measured, at the instants at which both have a number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from batch.archive.read import ArchiveGroup
+from met.frozen import frozen
+
+LARGEST = 1e100
+"""A measured number that is larger than this counts as none: its square would be no number."""
+
+OUTLYING, OUTLIERS = 5.0, 0.01
+"""An outlier is so many times as far from the middle of nine tenths of a residual as these are; and the largest share
+of outliers."""
+
+
+@frozen
+class Course:
+    """A channel as computed: `values` at the run's `times`, s."""
+
+    times: np.ndarray
+    values: np.ndarray
+
+    def at(self, instants: np.ndarray) -> np.ndarray:
+        """Its numbers at other instants, on straight lines; not-a-number before the first and after the last."""
+        return np.interp(instants, self.times, self.values, left=np.nan, right=np.nan)
+
+    @property
+    def rate(self) -> Course:
+        """Its slope, by central differences."""
+        values = np.gradient(self.values, self.times) if len(self.times) > 1 else np.zeros(len(self.times))
+        return Course(self.times, values)
+
+
+def computed(group: ArchiveGroup, position: int, columns: Sequence[Mapping[str, str]]) -> dict[str, Course]:
+    """The channels of a recorded case as far as they are finite. columns: those of `described_columns`, in order"""
+    times = group.values("time")
+    signals = list(dict.fromkeys(each["signal"] for each in columns))
+    found = np.hstack([group.signal(name, position).reshape(len(times), -1) for name in signals])
+    out = {}
+    for each, values in zip(columns, found.T.astype(np.float64), strict=True):
+        finite = np.isfinite(values)
+        if finite.any():
+            out[each["channel"]] = Course(times[finite], values[finite])
+    return out
+
+
+@frozen
+class Pair:
+    """A channel measured at `instants`, s, and its computed course. `of` makes one whose numbers are all usual."""
+
+    instants: np.ndarray
+    measured: np.ndarray
+    course: Course
+
+    @classmethod
+    def of(cls, instants: np.ndarray, measured: np.ndarray, course: Course) -> Pair:
+        """The instants at which both have a number."""
+        with np.errstate(invalid="ignore"):
+            rows = (np.abs(measured) <= LARGEST) & np.isfinite(course.at(instants))
+        return cls(instants[rows], measured[rows], course)
+
+    @property
+    def residual(self) -> np.ndarray:
+        """What was measured less what was computed."""
+        return self.measured - self.course.at(self.instants)
+
+    def usual(self) -> Pair:
+        """The pair without its outliers, as long as they are few."""
+        residual = self.residual
+        low, high = np.quantile(residual, [0.05, 0.95])
+        rows = np.abs(residual - 0.5 * (low + high)) <= OUTLYING * 0.5 * (high - low)
+        if rows.all() or np.mean(~rows) > OUTLIERS:
+            return self
+        return Pair(self.instants[rows], self.measured[rows], self.course)
+
+    def thinned(self, most: int) -> Pair:
+        """The pair with so many instants at most."""
+        every = -(-len(self.instants) // most)
+        return Pair(self.instants[::every], self.measured[::every], self.course)
