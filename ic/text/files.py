@@ -26,6 +26,7 @@ LIBRARY = Path(__file__).parents[1] / "decks"
 MOST_LISTED = 2_000  # names that a "did you mean" compares with
 MOST_SEEN = 20_000  # files and folders looked at for them
 MOST_NAMED = 8  # files named in a message
+CHUNK = 1 << 16  # bytes that a file is asked for beyond the size that it says
 
 DECK_IN_MEMORY = "deck"
 """The name in messages and archives of a deck that is given as text."""
@@ -241,7 +242,8 @@ def _read_bytes(file: FoundFile, kind: str, most: int) -> bytes:
                 raise Problem(_archive(file, kind))
             if about.st_size > most:
                 raise Problem(_too_large(file, kind, size_text(about.st_size), most))
-            data += stream.read(most + 1 - len(data))
+            while len(data) <= most and (more := stream.read(min(most + 1 - len(data), about.st_size + CHUNK))):
+                data += more  # room for `most` bytes at once may be more than a process is granted
         if len(data) > most:  # a file that does not say its size, or grows
             raise Problem(_too_large(file, kind, "no end", most))
         return data
