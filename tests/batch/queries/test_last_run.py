@@ -20,7 +20,7 @@ run brief like nominal {
     remove volts;
     metric fast = peak { of = elbow.qd; };
     require fast < 10 rad/s;
-    require quick: fast  <  1e-9 rad/s;
+    require quick: fast  <  1e-9 rad/s; allow D340 because "one is met";
 }
 sweep pair of brief { vary gearbox.kp = [0.02, 0.03] V*s/rad; }
 """
