@@ -237,9 +237,9 @@ class Expressions(Quantities):
                     help=f"put brackets around the number, as in `(2*pi) {text}`{turn}",
                 )
             short = name.text[:LONGEST_NUMBER]
-            helps = ("what it names has its unit already", f"if it is a bare number, write `({short}) {text}`")
+            helps = ["what it names has its unit already", f"if it is a bare number, write `({short}) {text}`"]
             if name.text.lower() in ("nan", "inf", "infinity"):
-                helps = ("every number of a deck is finite: write one, or leave the entry out",)
+                helps = ["every number of a deck is finite: write one, or leave the entry out"]
             self.fail("D030", f"`{short}` is a name, and only a number takes a unit", token, help=helps)
         return name
 
