@@ -2,10 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, TypeVar
+
 import click
 
+from batch.cli.instant import Instant
 from met.cli import YES, format_option
 from met.messages.visible import line, say
+
+Face = TypeVar("Face", bound=Callable[..., Any])
+
+
+def log_options(face: Face) -> Face:
+    """The options of commands that read a log: --column and --zero, passed as `columns` and `zero`."""
+    face = click.option(
+        "--zero",
+        type=Instant(),
+        default="0 s",
+        metavar="TIME",
+        help="The log's time at which the run begins: '12.5 s'; of a log that is 4 ms late, '4 ms'.  [0 s]",
+    )(face)
+    return click.option(
+        "--column",
+        "columns",
+        multiple=True,
+        metavar="CHANNEL=COLUMN [UNIT]",
+        help="The log's column of a channel, or of `time`, under another name, with a sign or a factor: "
+        "'elbow.q=-angle_2 [deg]', 'elbow.tau=95.8 * current_2 [N*m]'; may be repeated.",
+    )(face)
 
 
 @click.command(short_help="Compare a run with a log of measured signals.")
@@ -13,8 +38,11 @@ from met.messages.visible import line, say
 @click.argument("log", metavar="LOG")
 @click.option("--run", "run", metavar="NAME", help="This run or sweep of the archive [the first].")
 @click.option("--case", "case", metavar="ID", help="This case: the beginning of its id, or its position, as '#0' [#0].")
+@log_options
 @format_option
-def residuals(archive: str, log: str, run: str | None, case: str | None, form: str) -> int:
+def residuals(
+    archive: str, log: str, run: str | None, case: str | None, columns: tuple[str, ...], zero: float, form: str
+) -> int:
     """Compare a run with LOG, a CSV or MCAP file of the real arm's signals: how far what was measured is from what was
     computed, and whether the rest is noise.
 
@@ -25,7 +53,7 @@ def residuals(archive: str, log: str, run: str | None, case: str | None, form: s
     import json
 
     from batch.archive.read import ArchiveFile
-    from batch.measured.log import read_log
+    from batch.measured.log import mapped_column, read_log
     from batch.measured.paired import computed
     from batch.measured.residuals import compare
     from batch.modules.description import described_columns
@@ -38,10 +66,10 @@ def residuals(archive: str, log: str, run: str | None, case: str | None, form: s
         group = groups_named(file, [run] if run is not None else [])[0]
         position = group.recorded_position(case if case is not None else "#0")
         experiment = next(each for each in file.plan().experiments if each.name == group.name)
-        columns = described_columns(experiment)
-        measured = read_log(log, columns)
+        recorded = described_columns(experiment)
+        measured = read_log(log, recorded, [mapped_column(each) for each in columns], zero)
         joints = [joint.name for joint in experiment.structure.joints]
-        found = compare(computed(group, position, columns), columns, joints, measured)
+        found = compare(computed(group, position, recorded), recorded, joints, measured)
         if not found.residuals:
             message = f"no number of `{log}` has one of the run beside it"
             raise Problem(

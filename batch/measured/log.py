@@ -7,14 +7,18 @@ their own above it, as `met export` writes them.
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from batch.measured.mcap_log import MeasuredSignals, mcap_signals
 from ic.meaning.definitions.csv_files import CsvTable, read_csv
-from met.diagnostic import Label, Problem, error
+from met.diagnostic import Label, Problem, did_you_mean, error
+from met.frozen import frozen
 from met.messages.visible import visible
 from met.unit_parser import parse_unit
 
@@ -24,35 +28,91 @@ SHOWN = 12
 """Largest number of channels that a message names."""
 
 
-def read_log(path: str | Path, columns: Sequence[Mapping[str, str]]) -> MeasuredSignals:
-    """The channels of a run that a log has. columns: what the run records, of each number its channel, signal and SI
-    unit. Raises Problem E478, and those of CSV files."""
-    readers = {".csv": _csv_signals, ".mcap": mcap_signals}
+@frozen
+class MappedColumn:
+    """A channel of a run, or `time`, that a CSV file has under another name: `factor` times its column.
+
+    unit  of that product; None where the file's head says it
+    """
+
+    channel: str
+    column: str
+    factor: float
+    unit: str | None
+
+
+_MAPPED = re.compile(
+    r"(?P<channel>[^=]+)=\s*(?:(?P<minus>-)|(?P<factor>[-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*\*)?"
+    r"(?P<column>[^\[\]]+)(?:\[(?P<unit>[^\[\]]+)\])?\s*"
+)
+
+
+def mapped_column(text: str) -> MappedColumn:
+    """The meaning of `CHANNEL=[FACTOR *] COLUMN [UNIT]`, with `-` for a factor of -1. Raises Problem E478."""
+    match = _MAPPED.fullmatch(text)
+    try:
+        if match is not None:
+            factor = -1.0 if match["minus"] else float(match["factor"] or 1.0)
+            unit = None if match["unit"] is None else match["unit"].strip()
+            parse_unit(unit or "1")
+            if math.isfinite(factor) and factor:
+                return MappedColumn(match["channel"].strip(), match["column"].strip(), factor, unit)
+    except ValueError:
+        pass
+    helps = "such as `elbow.q=-angle_2 [deg]` or `elbow.tau=95.8 * current_2 [N*m]`, the unit that of the product"
+    raise Problem(error("E478", f"`{visible(text)}` is no column of a log for a channel", help=helps))
+
+
+def read_log(
+    path: str | Path, columns: Sequence[Mapping[str, str]], mapped: Sequence[MappedColumn] = (), zero: float = 0.0
+) -> MeasuredSignals:
+    """The channels of a run that a log has.
+
+    columns  what the run records, of each number its channel, signal and SI unit
+    mapped   channels that a CSV file has under other names
+    zero     the log's time at which the run begins, s
+
+    Raises Problem E478, and those of CSV files.
+    """
     ending = Path(path).suffix.lower()
-    if ending not in readers:
+    if ending not in (".csv", ".mcap"):
         helps = "write it as a CSV file whose head names `time [s]` and channels with their units: `elbow.q [deg]`"
         raise Problem(error("E478", f"{path} is neither an archive nor a CSV or MCAP file", help=helps))
-    log = readers[ending](path, columns)
+    if mapped and ending != ".csv":
+        helps = "signals of an MCAP file have the names of topics: leave `--column` out"
+        raise Problem(error("E478", f"`{path}` has no columns", help=helps))
+    log = _csv_signals(path, columns, mapped) if ending == ".csv" else mcap_signals(path, columns)
     if not log.signals:
         what = "column" if ending == ".csv" else "topic"
         channels = [each["channel"] for each in columns]
+        more = ["or say which it is: `--column 'CHANNEL=COLUMN [UNIT]'`"] if ending == ".csv" else []
         raise Problem(
             error(
                 "E478",
                 f"no {what} of `{path}` is a signal that the run records",
                 log.head,
-                help=f"it records {_listed(channels)}: name {what}s so",
+                help=[f"it records {_listed(channels)}: name {what}s so", *more],
             )
         )
-    return log
+    return replace(log, signals={name: (times - zero, each) for name, (times, each) in log.signals.items()})
 
 
-def _csv_signals(path: str | Path, columns: Sequence[Mapping[str, str]]) -> MeasuredSignals:
-    table = read_csv(str(path))
+def _csv_signals(
+    path: str | Path, columns: Sequence[Mapping[str, str]], mapped: Sequence[MappedColumn]
+) -> MeasuredSignals:
+    table = _with_names(read_csv(str(path)), mapped, [TIME, *(each["channel"] for each in columns)])
+    factors = {each.channel: each.factor for each in mapped}
     head = table.columns[0].place
     time_column = table.column(TIME)
     if time_column is None:
-        raise Problem(error("E478", f"`{path}` has no column `{TIME}`", head, help="name it in the head: `time [s]`"))
+        raise Problem(
+            error(
+                "E478",
+                f"`{path}` has no column `{TIME}`",
+                head,
+                help=["name it in the head: `time [s]`", "or say which it is: `--column 'time=COLUMN [s]'`"],
+            )
+        )
     if len(table.rows) < 2:
         raise Problem(error("E478", f"`{path}` has fewer than two rows", head, help="a log has a row an instant"))
     case = table.column(CASE)
@@ -64,13 +124,36 @@ def _csv_signals(path: str | Path, columns: Sequence[Mapping[str, str]]) -> Meas
             raise Problem(error("E478", f"`{path}` has several cases, and a log is of one", other.place, help=helps))
     time = table.numbers(time_column, "s", parse_unit("s").dimension, Label(time_column.place, "times of the log"))
     table.rising(time_column, time)
-    instants = np.array(time)
+    instants = factors.get(TIME, 1.0) * np.array(time)
     found = {each["channel"]: _column(table, each) for each in columns}
-    signals = {name: (instants, np.array(numbers)) for name, numbers in found.items() if numbers is not None}
-    known = {TIME, *found}
+    signals = {
+        name: (instants, factors.get(name, 1.0) * np.array(numbers))
+        for name, numbers in found.items()
+        if numbers is not None
+    }
+    known, sources = {TIME, *found}, {each.column for each in mapped}
     used = [f"{each.name} [{each.unit or '1'}]" for each in table.columns if each.name in known]
-    unused = [visible(each.name) for each in table.columns if each.name not in known]
+    unused = [visible(each.name) for each in table.columns if each.name not in {*known, *sources}]
     return MeasuredSignals(signals, [visible(each) for each in used], unused, time_column.place if signals else head)
+
+
+def _with_names(table: CsvTable, mapped: Sequence[MappedColumn], channels: Sequence[str]) -> CsvTable:
+    """The table with columns under the names of channels, too. channels: what the run records, and `time`."""
+    head = table.columns[0].place
+    added = []
+    for each in mapped:
+        if each.channel not in channels:
+            helps = did_you_mean(each.channel, channels) or f"it records {_listed(channels[1:])}"
+            raise Problem(error("E478", f"the run does not record `{visible(each.channel)}`", help=helps))
+        column = table.column(each.column)
+        if column is None:
+            names = [visible(one.name) for one in table.columns]
+            message = f"`{table.file}` has no column `{visible(each.column)}`"
+            raise Problem(
+                error("E478", message, head, help=did_you_mean(each.column, names) or f"it has {_listed(names)}")
+            )
+        added.append(replace(column, name=each.channel, unit=column.unit if each.unit is None else each.unit))
+    return replace(table, columns=(*added, *table.columns))
 
 
 def _column(table: CsvTable, recorded: Mapping[str, str]) -> tuple[float, ...] | None:
