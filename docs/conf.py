@@ -23,7 +23,7 @@ PAGES = {
     "Decks": ["deck", "loops", "editions", "robots", "servos", "environments", "models", "substitution", "reference",
               "diagnostics", "editors"],
     "Campaigns and results": ["cluster", "best", "search", "verification", "evidence", "sensitivity", "linear", "plots",
-                              "report", "diff", "residuals", "export", "webassembly", "notebooks"],
+                              "report", "diff", "residuals", "fit", "export", "webassembly", "notebooks"],
     "A motor on a bed": ["bed", "bench", "drives", "pico", "pico_safety", "protocol", "../hw/firmware/README"],
     "From Python": ["python", "api"],
     "What it computes": ["physics", "paper", "engine"],

@@ -39,7 +39,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType({
     "Write a deck": ("new", "import", "fmt", "check", "explain", "plan", "cases"),
     "Run it": ("run", "submit", "status"),
     "Look at what came out": ("show", "plot", "report", "view"),
-    "Decide": ("best", "diff", "residuals", "sensitivity", "linear"),
+    "Decide": ("best", "diff", "residuals", "fit", "sensitivity", "linear"),
     "Pass it on": ("export", "compile"),
     "Motors on a bed": ("margin", "bed"),
     "Help, and MET itself": ("doc", "lsp", "profile", "dump"),

@@ -128,7 +128,7 @@ def best(
             deck = None
             if (diff or write) and searched.ok:
                 deck = chosen_deck(file, searched.values, output, experiment=searched.name, of=searched.of)
-            _tell(form, finite(searched.data), searched.lines, deck, asked=diff or write, write=write)
+            tell(form, finite(searched.data), searched.lines, deck, asked=diff or write, write=write)
             return YES if searched.ok else NO
         designs = Designs(pool, over, choose)
         if not pool.requirements and not by:
@@ -147,17 +147,24 @@ def best(
             deck = chosen_deck(file, answer.values(answer.best), output, experiment=answer.name, of=of)
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
         data = answer.as_data() if form == "json" else {}
-        _tell(form, data, answer.lines(width), deck, asked=diff or write, write=write)
+        tell(form, data, answer.lines(width), deck, asked=diff or write, write=write)
         return YES if answer.advised else NO
 
 
-def _tell(
-    form: str, data: dict[str, Any], lines: Iterable[str], deck: ChosenDeck | None, *, asked: bool, write: bool
+def tell(
+    form: str,
+    data: dict[str, Any],
+    lines: Iterable[str],
+    deck: ChosenDeck | None,
+    *,
+    asked: bool,
+    write: bool,
+    why_not: str = "no design is advised",
 ) -> None:
     """Say the answer, and what changes in the deck; write it.
 
     data, lines  the answer for programs, and for people;  deck: None where nothing is good enough to be written
-    asked        whether the deck is asked for
+    asked        whether the deck is asked for;  why_not: why there is none, in words
     """
     import json
 
@@ -170,7 +177,7 @@ def _tell(
         if deck is not None:
             say("\n".join(["", *map(line, deck.diff())]))
         elif asked:
-            say("\nno design is advised, so nothing is written into the deck")
+            say(f"\n{why_not}, so nothing is written into the deck")
     if deck is not None and write:
         deck.write()
         if form != "json":

@@ -60,6 +60,14 @@ class ChosenDeck:
             raise Problem(error("E338", f"cannot write `{self.target}`: {refusal_text(reason)}")) from None
 
 
+@frozen
+class FittedValue:
+    """A value to be written into a deck, and what a comment says of it."""
+
+    value: WrittenValue
+    remark: str
+
+
 def chosen_deck(
     file: ArchiveFile, values: Sequence[WrittenValue], output: str | None, *, experiment: str, of: str
 ) -> ChosenDeck:
@@ -99,6 +107,44 @@ def chosen_deck(
     if changed:
         raise _other(f"{changed[0]} is not what it was when the archive was made", "run the sweep again")
     return ChosenDeck(target, output is None, before, made.text, made.run, made.others, newline)
+
+
+def fitted_deck(
+    deck: str,
+    values: Sequence[FittedValue],
+    output: str | None,
+    *,
+    experiment: str,
+    defines: Sequence[str] = (),
+    settings: Sequence[str] = (),
+) -> ChosenDeck:
+    """A deck with fitted values in it, each with its interval in a comment.
+
+    output  a file for a copy; None: the deck itself;  experiment: the run that was fitted
+
+    Raises Problem E397 where a value cannot be written, E398 where the deck is not to be written to.
+    """
+    if settings:
+        raise _other(f"`{setting_option(settings[0])}` is not in the deck", "write that into the deck, and fit again")
+    target = Path(output) if output is not None else Path(deck)
+    if output is not None and target.exists():
+        raise _other(f"`{target}` is there already", "name a file that is not: it would be lost")
+    before = Files().text(file_at(deck))
+    newline = "\n" if output is not None else _newline_as_archived(deck, before)
+    after, others = before, dict[str, None]()
+    for fitted in values:
+        made = with_values(
+            after,
+            [fitted.value],
+            name=Path(deck).name,
+            folder=Path(deck).parent,
+            experiment=experiment,
+            defines=defines,
+            remark=fitted.remark,
+        )
+        after = made.text
+        others |= dict.fromkeys(made.others)
+    return ChosenDeck(target, output is None, before, after, experiment, tuple(others), newline)
 
 
 def _is_there(name: str, text: str) -> bool:

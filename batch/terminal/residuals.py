@@ -59,13 +59,18 @@ def _size(explanation: Explanation) -> str:
     return f"{explanation.size:+.3g}{unit}"
 
 
-def _notes(found: Comparison) -> Iterator[str]:
+def doubt_lines(found: Comparison) -> Iterator[str]:
+    """What makes a log doubtful, in lines."""
     for each in found.doubts:
         yield f"  doubt: {each}"
     far = [each.channel for each in found.residuals if each.spread and each.rms > each.spread]
     if len(far) > max(1, len(found.residuals) // 2):
         what = f"{len(far)} of {len(found.residuals)} residuals are larger than what was measured varies"
         yield f"  doubt: {what}: is the log of this run?"
+
+
+def _notes(found: Comparison) -> Iterator[str]:
+    yield from doubt_lines(found)
     if found.left_out:
         spans = " s, and the run from ".join(
             f"{first:.6g} s to {last:.6g}" for first, last in (found.log_span, found.run_span)

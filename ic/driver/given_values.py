@@ -88,13 +88,14 @@ class GivenRun:
         return None if found is None else found.unit if not isinstance(found.value, str) else ""
 
     def written_in(self, path: str) -> tuple[str, Measure]:
-        """The unit in which the deck writes a parameter: the first of its dimension in its value or in the `let`s that
-        occur there; its SI unit where there is none."""
+        """The unit in which the deck writes a parameter or a `let`: the first of its dimension in its value or in the
+        `let`s that occur there; its SI unit where there is none."""
         (scope,) = self.compiled.scopes
-        settled = scope.settled(path)
-        si = "1" if settled is None else settled.unit
+        settled, let = scope.settled(path), scope.definitions.lets.get(path)
+        si = settled.unit if settled is not None else self.unit(path) or "1"
         wanted = parse_unit(si)
-        waiting = [] if settled is None or settled.expression is None else [settled.expression]
+        expression = settled.expression if settled is not None else None if let is None else let.value
+        waiting = [] if expression is None else [expression]
         seen: set[str] = set()
         while waiting:
             part = waiting.pop()

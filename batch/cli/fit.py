@@ -1,0 +1,106 @@
+"""`met fit`: a face of batch.fitting."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from batch.cli.best import tell
+from batch.cli.residuals import log_options
+from met.cli import NO, YES, deck_options, format_option
+from met.messages.visible import line, say
+from met.settings import varies
+
+
+@click.command(short_help="Estimate numbers of a deck from logs of the real arm.")
+@click.argument("deck", metavar="DECK")
+@click.argument("logs", metavar="[RUN=]LOG...", nargs=-1, required=True)
+@click.option(
+    "--estimate",
+    "estimates",
+    multiple=True,
+    required=True,
+    metavar="PATH",
+    help="Estimate this number, by a path that `vary` can name: 'links.jib.mass', 'links.*.mass'; may be repeated.",
+)
+@click.option(
+    "--prior",
+    "priors",
+    multiple=True,
+    metavar="PATH=normal(MEAN, SD) UNIT",
+    help="What is known of a parameter before: 'gearbox.kt=normal(0.061, 0.002) N*m/A'; may be repeated.",
+)
+@click.option(
+    "--predict",
+    multiple=True,
+    metavar="[RUN=]LOG",
+    help="Also compare a log that is not fitted, with the deck's and with the fitted numbers; may be repeated.",
+)
+@click.option("--identifiable", is_flag=True, help="Only say what the logs can tell of these numbers, and fit nothing.")
+@click.option("--diff", is_flag=True, help="Show what --write would change in the deck's text.")
+@click.option("--write", is_flag=True, help="Write the fitted values into the deck's text, and show what changed.")
+@click.option(
+    "-o", "output", metavar="FILE", help="With --diff or --write: a new file, for a changed copy of the deck."
+)
+@log_options
+@deck_options
+@format_option
+def fit(
+    deck: str,
+    logs: tuple[str, ...],
+    estimates: tuple[str, ...],
+    identifiable: bool,
+    diff: bool,
+    write: bool,
+    output: str | None,
+    form: str,
+    **options: Any,
+) -> int:
+    """Estimate numbers of a run so that it computes what LOG measured, a CSV or MCAP file of the real arm's signals.
+
+    LOG is compared with the deck's only run, the one marked `default`, or RUN; several logs are fitted together.
+
+    Exit status: 0 all numbers are known; 1 the logs cannot tell some of them; 2 the input is wrong.
+    """
+    import json
+
+    from batch.fitting.question import fit_question
+    from batch.terminal import fit as shown
+    from batch.terminal.chosen_deck import fitted_deck
+    from batch.terminal.progress import Bar
+    from met.host.sources import names_archive, names_plan
+
+    if names_plan(deck) or names_archive(deck):
+        raise click.UsageError(f"`{deck}` is no deck, of which numbers could be estimated")
+    if any(varies(each) for each in options["settings"]):
+        raise click.UsageError("--vary is for sweeps: `--estimate PATH` is what a fit moves")
+    if output is not None and not (diff or write):
+        raise click.UsageError("-o is the file for --write")
+    if identifiable and (diff or write or options["predict"]):
+        raise click.UsageError("--identifiable fits nothing: leave --diff, --write and --predict out")
+    question = fit_question(deck, logs, estimates, **options)
+    if identifiable:
+        known = question.identifiable()
+        if form == "json":
+            say(json.dumps(shown.identifiable_data(question, known), indent=1))
+        else:
+            say("\n".join(map(line, shown.identifiable_lines(question, known))))
+        return YES if set(known.verdict) == {"known"} else NO
+    bar = Bar()
+    bar.begin(f"fit of {question.runs[0].given.name}", 0)
+    answer = question.answer(bar.advance)
+    bar.end()
+    certain = set(answer.known.verdict) == {"known"} and answer.fit.converged and answer.fit.rival is None
+    lines = list(shown.fit_lines(question, answer))
+    changed = None
+    if certain:
+        head = "What is known of the arm, as a sweep of the deck:"
+        lines += ["", head, "", *shown.sweep_lines(question, answer)]
+        if diff or write:
+            values = shown.written_values(question, answer)
+            given = {key: options[key] for key in ("defines", "settings")}
+            changed = fitted_deck(deck, values, output, experiment=question.runs[0].given.name, **given)
+    data = shown.as_data(question, answer) if form == "json" else {}
+    tell(form, data, lines, changed, asked=diff or write, write=write, why_not="not all numbers are known")
+    return YES if certain else NO

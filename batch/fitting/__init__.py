@@ -1,0 +1,1 @@
+"""`met fit`: numbers of a deck, estimated so that its runs compute what logs measured."""

@@ -1,0 +1,425 @@
+"""Estimation of a deck's numbers from logs: weighted least squares of the output error, through the runs themselves.
+
+A run is simulated with its controllers, friction and delays, and what it computes is compared with what was measured.
+The numbers are moved by Levenberg's and Marquardt's steps until the weighted squares are least. Slopes are differences
+of runs to both sides, over half of what the logs can tell: so decisions at ticks, such as breaking away, count by what
+they change on average. A signal's weight is the inverse of its residual's rms, and smaller where the
+residual is alike for long; it is found again until it stays.
+
+Intervals come from the scores of stretches of the logs (White, Econometrica 48, 1980; Liang and Zeger, Biometrika 73,
+1986), so that they also hold where residuals are correlated in time or over signals, and are at least those of white
+noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from functools import cached_property
+
+import numpy as np
+from scipy import stats
+
+from batch.fitting.logged import LoggedRuns
+from batch.measured.paired import OUTLIERS, OUTLYING
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+
+STARTS, TRIED = 2, 32
+"""Number of fits from elsewhere, and of random values among which these begin."""
+
+FAR = 0.5
+"""Standard deviation of such values: of the logarithm, or in sizes of the parameter."""
+
+DAMPING = tuple(10.0**power for power in range(-7, 7))
+"""Levenberg's and Marquardt's factors that each step tries, of the squares of the scaled slopes."""
+
+WIDER = (4.0, 16.0)
+"""Factors of the differences with which slopes are tried again before a fit ends: events at other ticks make the
+squares rough."""
+
+MOST_STEPS, MOST_ROUNDS = 40, 12
+"""Largest number of steps, and of times that weights are found."""
+
+CONVERGED = 1e-3
+"""Decrease of half the weighted squares below which a fit has converged: a change by a twentieth of what noise does."""
+
+STEADY = 0.01
+"""Change of a signal's rms below which its weight stays."""
+
+LEAST_RMS = 1e-6
+"""Least rms of a residual that weights count with, as a share of the signal's largest number."""
+
+CHANGE = 0.5
+"""Size of the differences that slopes are made of, in standard deviations of the parameter by itself."""
+
+PROBED = tuple(10.0**power for power in range(-12, 7))
+"""Sizes, SI, that are tried of a parameter that is 0."""
+
+EVENT = 3.0
+"""A slope to one side that is so many times as large as the other has an event on its way, and is left out."""
+
+ELSEWHERE, AS_GOOD = 25.0, 2.0
+"""Change of the squares, as slopes predict it, from which on values are elsewhere; and by how much half of the squares
+may be larger there, for the values to be as good."""
+
+CONFIDENCE = 0.95
+"""Confidence of intervals."""
+
+
+@frozen
+class Prior:
+    """What is known of a parameter before: normal, SI."""
+
+    mean: float
+    deviation: float
+
+
+@frozen
+class Fit:
+    """Estimated numbers, [path], SI.
+
+    start, values   of the deck, and fitted; size: of each, what counts as a large change
+    deviation       standard errors; not-a-number of a parameter at its limit
+    covariance      of the estimates, [path, path];  factor: times a deviation is half of a 95 % interval
+    wider           of each deviation, how much larger it is than white noise would make it
+    at_limit        whether values above or below are not allowed;  held: whether neither is
+    slopes          of the weighted residuals, [number, path], with the priors' rows last
+    residuals       [number];  weights: their inverse rms, 0 for outliers
+    steps, runs     how many there were;  converged: whether they ended by themselves
+    rival           other values from elsewhere that explain the logs as well, or None
+    """
+
+    start: np.ndarray
+    values: np.ndarray
+    size: np.ndarray
+    deviation: np.ndarray
+    covariance: np.ndarray
+    factor: float
+    wider: np.ndarray
+    at_limit: np.ndarray
+    held: np.ndarray
+    slopes: np.ndarray
+    residuals: np.ndarray
+    weights: np.ndarray
+    steps: int
+    runs: int
+    converged: bool
+    rival: np.ndarray | None
+
+    @property
+    def outliers(self) -> int:
+        """Number of measured numbers that are left out."""
+        return int(np.sum(self.weights == 0.0))
+
+
+def noise_of(logs: LoggedRuns) -> np.ndarray:
+    """The rms of the noise of each signal, by its second differences (von Neumann), [signal]. A smooth signal that is
+    sampled often has none of its own there."""
+    found = []
+    for run in logs.runs:
+        for number in range(len(run.channels)):
+            measured = run.measured[run.channel_of == number]
+            curved = np.diff(measured, 2)
+            rms = float(np.sqrt(np.mean(curved**2) / 6.0)) if len(curved) else 0.0
+            found.append(max(rms, LEAST_RMS * float(np.abs(measured).max(initial=0.0)), 1e-300))
+    return np.array(found)
+
+
+class Fitter:
+    """The search for numbers with which runs compute what logs measured.
+
+    logs      the runs beside their logs;  start: the deck's values, SI, [path]
+    priors    by path
+    progress  called with the number of runs so far
+
+    Raises Problem E480 where the runs fail as they are.
+    """
+
+    def __init__(
+        self,
+        logs: LoggedRuns,
+        start: np.ndarray,
+        priors: Mapping[str, Prior],
+        progress: Callable[[int], None] = lambda _: None,
+    ) -> None:
+        self.logs, self.start, self._progress = logs, start, progress
+        self._mean = np.array([priors[path].mean if path in priors else 0.0 for path in logs.paths])
+        self._pull = np.array([1.0 / priors[path].deviation if path in priors else 0.0 for path in logs.paths])
+        self.runs = self.steps = 0
+        self._first = self._residuals(start[None, :])[0]
+        if not np.isfinite(self._first).all():
+            raise _fails(logs, start)
+        self._floor = self._least_rms()
+        self.weights = self._weighed(self._first)
+        self.size = self._sizes()
+        self._step = self._probed()
+
+    def fit(self) -> Fit:
+        """The fit from the deck's values and from elsewhere, the best of them."""
+        ends = []
+        for begin in (self.start, *self._elsewhere()):
+            ends.append(self._minimised(begin))
+        values, cost, converged = min(ends, key=lambda each: each[1])
+        for _ in range(MOST_ROUNDS):
+            before = self.weights
+            self.weights = self._weighed(self._residuals(values[None, :])[0], settled=True)
+            values, cost, converged = self._minimised(values)
+            both = (before > 0.0) & (self.weights > 0.0)
+            if np.all(np.abs(before[both] / self.weights[both] - 1.0) < STEADY):
+                break
+        residuals, slopes = self._slopes(values)
+        return self._answer(values, residuals, slopes, converged, self._rival(ends, values, cost, slopes))
+
+    @cached_property
+    def held(self) -> np.ndarray:
+        """Whether the deck allows no value beside that of a parameter, the others staying, [path]."""
+        moves = np.diag(1e-6 * self.size)
+        found = self.logs.refused(np.vstack([self.start + moves, self.start - moves]))
+        return np.array(np.all(found.reshape(2, -1), axis=0))
+
+    def slopes_at_start(self, noise: np.ndarray) -> np.ndarray:
+        """The slopes at the deck's values, of residuals weighted by the inverse of a noise, with the priors' rows last,
+        [number, path]. noise: rms of each signal"""
+        self.weights = 1.0 / noise[self.logs.signal_of]
+        self._step = self._probed()
+        return self._weighted(self._slopes(self.start)[1])
+
+    # Numbers of runs
+
+    def _residuals(self, values: np.ndarray) -> np.ndarray:
+        found = self.logs.residuals(values)
+        self.runs += len(values) * len(self.logs.runs)
+        self._progress(self.runs)
+        return found
+
+    def _costs(self, residuals: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Half of the weighted squares, priors included, [case]; infinite where a case fails."""
+        squares = np.sum((self.weights * residuals) ** 2, axis=1)
+        squares = np.where(np.isfinite(squares), squares, np.inf)
+        return np.asarray(0.5 * (squares + np.sum((self._pull * (values - self._mean)) ** 2, axis=1)))
+
+    def _least_rms(self) -> np.ndarray:
+        """[signal]"""
+        signal = self.logs.signal_of
+        largest = np.zeros(int(signal.max()) + 1)
+        np.maximum.at(largest, signal, np.abs(self.logs.measured))
+        return np.maximum(LEAST_RMS * largest, 1e-300)
+
+    def _weighed(self, residuals: np.ndarray, *, settled: bool = False) -> np.ndarray:
+        """The weights of numbers by their signals' rms, [number]. settled: residuals of a fit, whose outliers get none
+        as long as they are few, and of which those that are alike for long count as fewer"""
+        signal, weights = self.logs.signal_of, np.zeros(len(residuals))
+        for number, floor in enumerate(self._floor):
+            (rows,) = np.nonzero(signal == number)
+            own = residuals[rows]
+            if not len(own):
+                continue
+            alike = 1.0
+            if settled:
+                low, high = np.quantile(own, [0.05, 0.95])
+                usual = np.abs(own - 0.5 * (low + high)) <= OUTLYING * 0.5 * (high - low)
+                if np.mean(~usual) <= OUTLIERS:
+                    rows, own = rows[usual], own[usual]
+                alike = _alike_for(own)
+            weights[rows] = 1.0 / (max(float(np.sqrt(np.mean(own**2))), floor) * math.sqrt(alike))
+        return weights
+
+    # Sizes of parameters, and of the differences for slopes
+
+    def _sizes(self) -> np.ndarray:
+        """What counts as a large change of each parameter: its value; of one that is 0 its prior's deviation, or what
+        changes the weighted residuals by as much as they are."""
+        with np.errstate(divide="ignore"):
+            size = np.where(self.start != 0.0, np.abs(self.start), np.where(self._pull > 0.0, 1.0 / self._pull, 0.0))
+        for place in np.flatnonzero((size == 0.0) | ~np.isfinite(size)):
+            size[place] = self._size_of(int(place))
+        return size
+
+    def _size_of(self, place: int) -> float:
+        values = np.tile(self.start, (2 * len(PROBED), 1))
+        values[:, place] += [*PROBED, *(-each for each in PROBED)]
+        change = np.sum((self.weights * (self._residuals(values) - self._first)) ** 2, axis=1)
+        change = np.where(np.isfinite(change), change, 0.0).reshape(2, -1).max(axis=0)
+        large = np.flatnonzero(change >= 0.01 * np.count_nonzero(self.weights))
+        return PROBED[int(large[0])] if len(large) else 1.0
+
+    def _probed(self) -> np.ndarray:
+        """First differences for slopes: those by which the residuals change by `CHANGE` of what noise does, by a ladder
+        of powers of ten, [path]."""
+        ladder = 10.0 ** np.arange(-7.0, 0.0)
+        step = self.size.copy()
+        for place in range(len(step)):
+            values = np.tile(self.start, (2 * len(ladder), 1))
+            values[:, place] += np.concatenate([ladder, -ladder]) * self.size[place]
+            change = np.linalg.norm(self.weights * (self._residuals(values) - self._first), axis=1)
+            change = np.where(np.isfinite(change), change, 0.0).reshape(2, -1).max(axis=0)
+            large = np.flatnonzero(change >= CHANGE)
+            step[place] *= ladder[int(large[0])] if len(large) else ladder[-1]
+        return step
+
+    def _slopes(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The residuals and their slopes, [number], [number, path], by differences to both sides, or to the one that is
+        allowed and without an event. The next differences are by `CHANGE` of the deviations that follow."""
+        moves = np.diag(self._step)
+        found = self._residuals(np.vstack([values, values + moves, values - moves]))
+        middle, count = found[0], len(values)
+        slopes = np.zeros((len(middle), count))
+        for place, step in enumerate(self._step):
+            up, down = found[1 + place], found[1 + count + place]
+            sides = [each for each in ((up - middle) / step, (middle - down) / step) if np.isfinite(each).all()]
+            sizes = [float(np.linalg.norm(self.weights * each)) for each in sides]
+            if len(sides) == 2 and max(sizes) <= EVENT * min(sizes):
+                slopes[:, place] = 0.5 * (sides[0] + sides[1])
+            elif sides:
+                slopes[:, place] = sides[int(np.argmin(sizes))]
+        with np.errstate(divide="ignore"):
+            wanted = CHANGE / np.linalg.norm(self._weighted(slopes), axis=0)
+        self._step = np.clip(wanted, 1e-7 * self.size, 0.1 * self.size)
+        return middle, slopes
+
+    def _weighted(self, slopes: np.ndarray) -> np.ndarray:
+        return np.vstack([self.weights[:, None] * slopes, np.diag(self._pull)])
+
+    # The search
+
+    def _elsewhere(self) -> np.ndarray:
+        """Where other fits begin: those of the better quarter of random values that are farthest apart, [start,
+        path]."""
+        draws = FAR * np.random.default_rng(0).standard_normal((TRIED, len(self.start)))
+        values = self._values_of(draws)
+        costs = self._costs(self._residuals(values), values)
+        good = [place for place in np.argsort(costs, kind="stable")[: TRIED // 4] if np.isfinite(costs[place])]
+        chosen = [np.zeros(len(self.start))]
+        while good and len(chosen) <= STARTS:
+            apart = [min(float(np.linalg.norm(draws[place] - each)) for each in chosen) for place in good]
+            chosen.append(draws[good.pop(int(np.argmax(apart)))])
+        return self._values_of(np.array(chosen[1:]).reshape(-1, len(self.start)))
+
+    def _values_of(self, draws: np.ndarray) -> np.ndarray:
+        return np.where(self.start != 0.0, self.start * np.exp(draws), self.size * np.abs(draws))
+
+    def _minimised(self, values: np.ndarray) -> tuple[np.ndarray, float, bool]:
+        """The values at the end of a descent, half of their squares, and whether it ended by itself."""
+        cost, tries = np.inf, 0
+        for _ in range(MOST_STEPS):
+            self.steps += 1
+            residuals, slopes = self._slopes(values)
+            cost = float(self._costs(residuals[None, :], values[None, :])[0])
+            pulled = np.concatenate([self.weights * residuals, self._pull * (values - self._mean)])
+            weighted = self._weighted(slopes)
+            scale = np.linalg.norm(weighted, axis=0)
+            scale[scale == 0.0] = np.inf
+            left, singular, right = np.linalg.svd(weighted / scale, full_matrices=False)
+            along = singular * (left.T @ pulled)
+            moves = np.array([right.T @ (along / (singular**2 + damping)) / scale for damping in DAMPING])
+            trials = self._allowed(values, values - moves)
+            costs = self._costs(self._residuals(trials), trials)
+            best = int(np.argmin(costs))
+            gained = cost - float(costs[best])
+            if gained > 0.0:
+                cost, values = float(costs[best]), trials[best]
+            if gained >= CONVERGED:
+                tries = 0
+            elif tries < len(WIDER):
+                self._step = np.minimum(WIDER[tries] * self._step, 0.1 * self.size)
+                tries += 1
+            else:
+                return values, cost, True
+        return values, cost, False
+
+    def _allowed(self, values: np.ndarray, trials: np.ndarray) -> np.ndarray:
+        """Trials with each number that its parameter cannot have moved towards its value as far as needed, [trial,
+        path]."""
+        trials, shares = trials.copy(), np.linspace(0.0, 1.0, 65)
+        for row in np.flatnonzero(self.logs.refused(trials)):
+            for place in range(len(values)):
+                low, high = values[place], trials[row, place]
+                for _ in range(3):
+                    ladder = np.tile(values, (len(shares), 1))
+                    ladder[:, place] = low + shares * (high - low)
+                    bad = np.flatnonzero(self.logs.refused(ladder))
+                    if not len(bad) or bad[0] == 0:
+                        break
+                    low, high = ladder[bad[0] - 1, place], ladder[bad[0], place]
+                    trials[row, place] = low
+        return trials
+
+    def _rival(
+        self, ends: list[tuple[np.ndarray, float, bool]], values: np.ndarray, cost: float, slopes: np.ndarray
+    ) -> np.ndarray | None:
+        """An end of another descent that explains the logs as well, and is elsewhere by what the slopes say."""
+        weighted = self._weighted(slopes)
+        for end, _, _ in ends:
+            if float(np.sum((weighted @ (end - values)) ** 2)) > ELSEWHERE:
+                other, its_cost, converged = self._minimised(end)
+                elsewhere = float(np.sum((weighted @ (other - values)) ** 2)) > ELSEWHERE
+                if converged and elsewhere and its_cost < cost + AS_GOOD:
+                    return other
+        return None
+
+    # What the fit is worth
+
+    def _answer(
+        self, values: np.ndarray, residuals: np.ndarray, slopes: np.ndarray, converged: bool, rival: np.ndarray | None
+    ) -> Fit:
+        weighted, least = self._weighted(slopes), 1e-6 * self.size
+        beside = np.vstack([values + np.diag(least), values - np.diag(least)])
+        at_limit = np.array(np.any(self.logs.refused(beside).reshape(2, -1), axis=0))
+        free = np.flatnonzero(~at_limit & (np.linalg.norm(weighted, axis=0) > 0.0))
+        covariance = np.full((len(values), len(values)), np.nan)
+        factor, wider = 2.0, np.ones(len(values))
+        if len(free):
+            scale = np.linalg.norm(weighted[:, free], axis=0)
+            inverse = np.linalg.pinv((weighted[:, free] / scale).T @ (weighted[:, free] / scale), rcond=1e-14)
+            inverse = inverse / np.outer(scale, scale)
+            scored = self.weights[:, None] * slopes[:, free] * (self.weights * residuals)[:, None]
+            stretch = self.logs.stretch_of
+            scores = np.zeros((int(stretch.max()) + 1, len(free)))
+            np.add.at(scores, stretch, scored)
+            many = len(scores)
+            meat = scores.T @ scores * many / max(1, many - len(free)) + np.diag(self._pull[free] ** 2)
+            clustered = inverse @ meat @ inverse
+            wider[free] = np.sqrt(np.maximum(1.0, np.diag(clustered) / np.diag(inverse)))
+            covariance[np.ix_(free, free)] = inverse * np.outer(wider[free], wider[free])
+            factor = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, max(1, many - len(free))))
+        return Fit(
+            self.start,
+            values,
+            self.size,
+            np.sqrt(np.diag(covariance)),
+            covariance,
+            factor,
+            wider,
+            at_limit,
+            self.held,
+            weighted,
+            residuals,
+            self.weights,
+            self.steps,
+            self.runs,
+            converged,
+            rival,
+        )
+
+
+def _alike_for(residuals: np.ndarray) -> float:
+    """Number of residuals that count as one: their integrated autocorrelation, up to the first lag at which there is
+    none (Geyer, Statistical Science 7, 1992); 1 of white noise."""
+    centred = residuals - residuals.mean()
+    spectrum = np.fft.rfft(centred, 2 * len(centred))
+    correlation = np.fft.irfft(spectrum * spectrum.conj())[: len(centred)]
+    if not correlation[0] > 0.0:
+        return 1.0
+    correlation = correlation / correlation[0]
+    none = np.flatnonzero(correlation < 2.0 / math.sqrt(len(centred)))
+    return max(1.0, 2.0 * float(np.sum(correlation[: int(none[0]) if len(none) else None])) - 1.0)
+
+
+def _fails(logs: LoggedRuns, start: np.ndarray) -> Problem:
+    for run in logs.runs:
+        if not np.isfinite(run.computed(start[None, :])).all():
+            message = f"`{run.given.name}` fails with the deck's values: {run.cause(start)}"
+            helps = "a fit begins where the run goes through: `--set` other values, or a shorter `duration`"
+            return Problem(error("E480", message, run.given.experiment.place, help=helps))
+    raise AssertionError

@@ -1,0 +1,243 @@
+"""Runs of a deck beside logs: what the runs compute at the logs' instants, for many values of their parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from batch.measured.log import MappedColumn, read_log
+from batch.measured.mcap_log import MeasuredSignals
+from batch.measured.paired import LARGEST, Course
+from batch.modules.description import described_columns
+from ic.driver.given_values import GivenRun, VariedRun
+from met import run as engine
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+
+MOST_NUMBERS = 100_000
+"""Largest number of measured numbers of a log that are fitted; a longer one is thinned."""
+
+MOST_BYTES = 2**29
+"""Largest size of the histories that are in memory at once."""
+
+
+@frozen
+class LoggedRun:
+    """A run beside a log of the real arm.
+
+    given    the run;  file: of the log;  log: its signals
+    paths    the parameters that get values; of these the run depends on those of `varied` alone
+    """
+
+    given: GivenRun
+    file: str
+    log: MeasuredSignals
+    paths: tuple[str, ...]
+    varied: VariedRun
+
+    @classmethod
+    def read(
+        cls,
+        given: GivenRun,
+        file: str,
+        starts: Mapping[str, tuple[float, str]],
+        mapped: Sequence[MappedColumn] = (),
+        zero: float = 0.0,
+    ) -> LoggedRun:
+        """Read a log, and compile the run with these parameters as its inputs.
+
+        starts        by path, a value and its unit
+        mapped, zero  as `batch.measured.log.read_log` has them
+
+        Raises Problem for a log that does not fit beside the run (E478), and for a parameter that cannot vary.
+        """
+        log = read_log(file, described_columns(given.experiment), mapped, zero)
+        varied, _ = given.vary_most(starts)
+        logged = cls(given, file, log, tuple(starts), varied)
+        if not len(logged.measured):
+            message = f"no number of `{file}` has one of the run beside it"
+            raise Problem(error("E478", message, log.head, help="let its times begin where the run begins, at 0 s"))
+        return logged
+
+    @property
+    def name(self) -> str:
+        """The run and the log, in words."""
+        return f"{self.given.name} and {self.file}"
+
+    @cached_property
+    def used(self) -> tuple[str, ...]:
+        """The parameters on which the run depends."""
+        return tuple(each.path for each in self.varied.experiment.cases.coordinates)
+
+    @cached_property
+    def columns(self) -> list[dict[str, str]]:
+        """The recorded channels, in the order of a history's columns, each with its SI unit."""
+        return described_columns(self.given.experiment)
+
+    @cached_property
+    def channels(self) -> tuple[str, ...]:
+        """The channels that run and log have."""
+        return tuple(each["channel"] for each in self.columns if each["channel"] in self.log.signals)
+
+    @cached_property
+    def _prepared(self) -> engine.Prepared:
+        return engine.prepare(self.varied.experiment)
+
+    @cached_property
+    def _rows(self) -> list[np.ndarray]:
+        """By channel, the log's instants that are fitted, as positions."""
+        schedule = self.given.experiment.structure.schedule
+        last = (schedule.rows - 1) * schedule.record / schedule.base_hz
+        usable = []
+        for channel in self.channels:
+            instants, measured = self.log.signals[channel]
+            with np.errstate(invalid="ignore"):
+                usable.append(np.flatnonzero((instants >= 0.0) & (instants <= last) & (np.abs(measured) <= LARGEST)))
+        every = -(-sum(map(len, usable)) // MOST_NUMBERS)
+        return [rows[:: max(1, every)] for rows in usable]
+
+    @cached_property
+    def thinned(self) -> bool:
+        """Whether the log has more numbers than are fitted."""
+        return (
+            sum(len(rows) for rows in self._rows)
+            < sum(
+                int(np.sum(np.isfinite(measured))) for measured in (self.log.signals[each][1] for each in self.channels)
+            )
+            // 2
+        )
+
+    @cached_property
+    def instants(self) -> np.ndarray:
+        """The instants that are fitted, s, one channel after the other, [number]."""
+        found = [self.log.signals[each][0][rows] for each, rows in zip(self.channels, self._rows, strict=True)]
+        return np.concatenate(found) if found else np.empty(0)
+
+    @cached_property
+    def measured(self) -> np.ndarray:
+        """The measured numbers at `instants`, SI, [number]."""
+        found = [self.log.signals[each][1][rows] for each, rows in zip(self.channels, self._rows, strict=True)]
+        return np.concatenate(found) if found else np.empty(0)
+
+    @cached_property
+    def channel_of(self) -> np.ndarray:
+        """The position of each number's channel in `channels`, [number]."""
+        return np.repeat(np.arange(len(self.channels)), [len(rows) for rows in self._rows])
+
+    def computed(self, values: np.ndarray) -> np.ndarray:
+        """The numbers computed at `instants`, on straight lines between recorded rows, [case, number]; not-a-number in
+        cases that fail, or have a value that its parameter cannot have.
+
+        values  of `paths`, SI, [case, path]
+        """
+        out = np.full((len(values), len(self.measured)), np.nan)
+        own = values[:, [self.paths.index(path) for path in self.used]]
+        refused = self.varied.broken(dict(zip(self.used, own.T, strict=True)), len(own))
+        rows = np.flatnonzero(~refused)
+        many = max(1, MOST_BYTES // max(1, self.given.experiment.structure.history_bytes))
+        for first in range(0, len(rows), many):
+            some = rows[first : first + many]
+            out[some] = self._at_instants(self._histories(own[some]))
+        return out
+
+    def courses(self, values: np.ndarray) -> dict[str, Course]:
+        """What one case computes, by channel. values: of `paths`, SI, [path]"""
+        own = values[[self.paths.index(path) for path in self.used]]
+        history = self._histories(own[None, :])[0]
+        courses = {}
+        for column, each in enumerate(self.columns):
+            finite = np.isfinite(history[:, column])
+            if finite.any():
+                courses[each["channel"]] = Course(self._times[finite], history[finite, column])
+        return courses
+
+    def cause(self, values: np.ndarray) -> str:
+        """Why a case fails, in words. values: of `paths`, SI, [path]"""
+        own = values[[self.paths.index(path) for path in self.used]]
+        found = engine.run(self._with(own[None, :]), record=False)
+        return found.cause[0]
+
+    @property
+    def _times(self) -> np.ndarray:
+        schedule = self.given.experiment.structure.schedule
+        return np.arange(schedule.rows) * schedule.record / schedule.base_hz
+
+    def _with(self, own: np.ndarray) -> engine.Prepared:
+        cases = self.varied.experiment.cases
+        coordinates = tuple(replace(each, values=column) for each, column in zip(cases.coordinates, own.T, strict=True))
+        return self._prepared.with_cases(replace(cases, count=len(own), coordinates=coordinates))
+
+    def _histories(self, own: np.ndarray) -> np.ndarray:
+        """[case, row, column]; own: values of `used`, [case, path]"""
+        found = engine.run(self._with(own), record=True)
+        signals = [recorded.name for recorded in self.given.experiment.structure.record]
+        return np.concatenate([found.signals[each].reshape(len(own), len(found.time), -1) for each in signals], axis=2)
+
+    def _at_instants(self, histories: np.ndarray) -> np.ndarray:
+        low, share, column = self._between
+        return (1.0 - share) * histories[:, low, column] + share * histories[:, low + 1, column]
+
+    @cached_property
+    def _between(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of each number: the recorded row before its instant, its share of the way to the next, and its column."""
+        times = self._times
+        low = np.clip(np.searchsorted(times, self.instants, side="right") - 1, 0, len(times) - 2)
+        share = (self.instants - times[low]) / (times[low + 1] - times[low])
+        names = [each["channel"] for each in self.columns]
+        column = np.array([names.index(channel) for channel in self.channels], dtype=np.int64)[self.channel_of]
+        return low, share, column
+
+
+@frozen
+class LoggedRuns:
+    """Runs beside logs whose numbers are fitted together. paths: of the parameters, those of each run"""
+
+    runs: Sequence[LoggedRun]
+    paths: tuple[str, ...]
+
+    @cached_property
+    def measured(self) -> np.ndarray:
+        """All measured numbers, SI, [number]."""
+        return np.concatenate([each.measured for each in self.runs])
+
+    @cached_property
+    def signal_of(self) -> np.ndarray:
+        """The number of each number's signal: a channel of one log, counted over all logs, [number]."""
+        first, found = 0, []
+        for each in self.runs:
+            found.append(first + each.channel_of)
+            first += len(each.channels)
+        return np.concatenate(found)
+
+    @cached_property
+    def stretch_of(self) -> np.ndarray:
+        """The number of each number's stretch of time, of which each log has as many, [number]."""
+        found = []
+        for number, each in enumerate(self.runs):
+            first, last = float(each.instants.min()), float(each.instants.max())
+            share = (each.instants - first) / max(last - first, 1e-300)
+            found.append(number * self.stretches + np.minimum(share * self.stretches, self.stretches - 1).astype(int))
+        return np.concatenate(found)
+
+    @property
+    def stretches(self) -> int:
+        """Number of stretches of each log."""
+        return max(2, -(-24 // len(self.runs)))
+
+    def residuals(self, values: np.ndarray) -> np.ndarray:
+        """What was measured less what is computed, [case, number]; not-a-number in cases that fail or are refused.
+
+        values  SI, [case, path]
+        """
+        return self.measured - np.concatenate([each.computed(values) for each in self.runs], axis=1)
+
+    def refused(self, values: np.ndarray) -> np.ndarray:
+        """Whether a value is one that its parameter cannot have, [case]. values: SI, [case, path]"""
+        found = np.zeros(len(values), dtype=bool)
+        for each in self.runs:
+            own = {path: values[:, self.paths.index(path)] for path in each.used}
+            found |= each.varied.broken(own, len(values))
+        return found

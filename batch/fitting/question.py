@@ -1,0 +1,201 @@
+"""A fit as it is asked for: runs and logs, the parameters to estimate, what is known of them; and its answer."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from fnmatch import fnmatchcase
+from functools import cached_property
+
+import numpy as np
+
+from batch.fitting.estimate import Fit, Fitter, Prior, noise_of
+from batch.fitting.known import Known, known
+from batch.fitting.logged import LoggedRun, LoggedRuns
+from batch.measured.log import mapped_column
+from batch.measured.residuals import Comparison, compare
+from ic.driver.explain import explanations_of
+from ic.driver.given_values import GivenRun, given_run
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.unit_parser import parse_unit
+from met.units import same
+
+_PRIOR = re.compile(r"(?P<path>[^=]+)=\s*normal\(\s*(?P<mean>[^,()]+),\s*(?P<deviation>[^,()]+)\)\s*(?P<unit>.*)")
+_EXAMPLE = "such as `gearbox.kt=normal(0.061, 0.002) N*m/A`"
+
+
+@frozen
+class FitAnswer:
+    """What a fit found.
+
+    fit             the numbers;  known: what the logs tell of them at these
+    before, after   of each log its residuals with the deck's and with the fitted numbers
+    predicted       of each log that was not fitted, the same two
+    """
+
+    fit: Fit
+    known: Known
+    before: tuple[Comparison, ...]
+    after: tuple[Comparison, ...]
+    predicted: tuple[tuple[Comparison, Comparison], ...]
+
+
+@frozen
+class FitQuestion:
+    """Parameters to estimate from logs.
+
+    runs       to fit, and to predict alone: `predicted`
+    paths      of the parameters;  start: their values in the deck, SI;  units: those in which the deck writes them
+    priors     of some of them, by path
+    """
+
+    runs: tuple[LoggedRun, ...]
+    predicted: tuple[LoggedRun, ...]
+    paths: tuple[str, ...]
+    start: np.ndarray
+    units: tuple[str, ...]
+    priors: Mapping[str, Prior]
+
+    @cached_property
+    def logs(self) -> LoggedRuns:
+        """The runs and logs that are fitted."""
+        return LoggedRuns(self.runs, self.paths)
+
+    def comparisons(self, values: np.ndarray, runs: Sequence[LoggedRun]) -> tuple[Comparison, ...]:
+        """The residuals of each log with these values, SI, [path]."""
+        found = []
+        for each in runs:
+            joints = [joint.name for joint in each.given.experiment.structure.joints]
+            found.append(compare(each.courses(values), each.columns, joints, each.log))
+        return tuple(found)
+
+    def identifiable(self) -> Known:
+        """What the logs can tell of the parameters at the deck's values, from the noise of the logs alone."""
+        fitter = Fitter(self.logs, self.start, self.priors)
+        return known(fitter.slopes_at_start(noise_of(self.logs)), fitter.size, fitter.held)
+
+    def answer(self, progress: Callable[[int], None]) -> FitAnswer:
+        """Fit the parameters, and say what the fit is worth."""
+        fit = Fitter(self.logs, self.start, self.priors, progress).fit()
+        size = np.where(fit.values != 0.0, np.abs(fit.values), fit.size)
+        predicted = zip(
+            self.comparisons(self.start, self.predicted), self.comparisons(fit.values, self.predicted), strict=True
+        )
+        return FitAnswer(
+            fit,
+            known(fit.slopes, size, fit.held, fit.wider),
+            self.comparisons(self.start, self.runs),
+            self.comparisons(fit.values, self.runs),
+            tuple(predicted),
+        )
+
+
+def fit_question(
+    deck: str,
+    logs: Sequence[str],
+    estimates: Sequence[str],
+    *,
+    priors: Sequence[str] = (),
+    predict: Sequence[str] = (),
+    defines: Sequence[str] = (),
+    include_dirs: Sequence[str] = (),
+    settings: Sequence[str] = (),
+    columns: Sequence[str] = (),
+    zero: float = 0.0,
+) -> FitQuestion:
+    """Read a deck and logs.
+
+    logs, predict  files, each with its run before it where there are several: `slow=slow.csv`
+    estimates      paths as `--set` takes them; `links.*.mass` is of all links
+    priors         `PATH=normal(MEAN, DEVIATION) UNIT`
+    columns, zero  of the logs: `CHANNEL=[FACTOR *] COLUMN [UNIT]`, and the time at which the runs begin, s
+
+    Raises Problem for mistakes in these.
+    """
+    runs: dict[str | None, GivenRun] = {}
+    pairs = [_run_and_log(each) for each in (*logs, *predict)]
+    for run, _ in pairs:
+        if run not in runs:
+            runs[run] = given_run(deck, run, include_dirs=include_dirs, defines=defines, settings=settings)
+    first = runs[pairs[0][0]]
+    paths = _paths(estimates, first)
+    starts = {path: (_start(path, first), first.unit(path) or "1") for path in paths}
+    mapped = [mapped_column(each) for each in columns]
+    read = [LoggedRun.read(runs[run], log, starts, mapped, zero) for run, log in pairs]
+    for path in paths:
+        if not any(path in each.used for each in read[: len(logs)]):
+            _check_varies(path, starts[path], first)
+            raise _wrong(f"`{path}` has no effect in a run that has a log", "leave it out")
+    known_before = dict(_prior(each, starts) for each in priors)
+    return FitQuestion(
+        tuple(read[: len(logs)]),
+        tuple(read[len(logs) :]),
+        tuple(paths),
+        np.array([value for value, _ in starts.values()]),
+        tuple(first.written_in(path)[0] for path in paths),
+        known_before,
+    )
+
+
+def _run_and_log(text: str) -> tuple[str | None, str]:
+    run, equal, log = text.partition("=")
+    return (run, log) if equal and run.isidentifier() else (None, text)
+
+
+def _paths(estimates: Sequence[str], run: GivenRun) -> list[str]:
+    """Paths without wildcards, each once."""
+    found = []
+    for each in estimates:
+        matching = [each]
+        if "*" in each:
+            matching = [path for path in run.experiment.parameters if fnmatchcase(path, each)]
+            if not matching:
+                raise _wrong(f"no parameter of `{run.name}` is like `{each}`", "`met explain` lists them")
+        found += matching
+    return list(dict.fromkeys(found))
+
+
+def _start(path: str, run: GivenRun) -> float:
+    """The deck's value, SI. Raises Problem for a path that has no number."""
+    found = next(explanations_of(run.compiled, path), None)
+    if found is None:
+        run.vary({path: (0.0, "1")})  # which says what is wrong with it
+    if found is None or isinstance(found.value, str):
+        helps = f"`met explain {run.deck.file} {path}` shows it" if found is not None else "`met explain` lists numbers"
+        raise _wrong(f"`{path}` is no number, and a fit moves numbers", helps)
+    return float(found.value) if isinstance(found.value, float) else float(np.mean(found.value))
+
+
+def _check_varies(path: str, start: tuple[float, str], run: GivenRun) -> None:
+    """Raise Problem that says why a parameter cannot vary, where it cannot."""
+    try:
+        run.vary({path: start})
+    except Problem as problem:
+        if any(each.code == "E434" for each in problem.diagnostics):
+            raise _wrong(f"`{path}` decides the program, and a fit moves numbers of one", "leave it out") from None
+        raise
+
+
+def _prior(text: str, starts: Mapping[str, tuple[float, str]]) -> tuple[str, Prior]:
+    match = _PRIOR.fullmatch(text.strip())
+    if match is None:
+        raise _wrong(f"`{text}` is not what is known of a parameter", _EXAMPLE)
+    path = match["path"].strip()
+    if path not in starts:
+        raise _wrong(f"`{path}` is not estimated", f"`--estimate {path}`")
+    try:
+        measure = parse_unit(match["unit"].strip() or "1")
+        mean, deviation = (measure.to_si(float(match[each])) for each in ("mean", "deviation"))
+    except ValueError:
+        raise _wrong(f"`{text}` cannot be read", f"{_EXAMPLE}: two numbers, and a unit") from None
+    if not same(measure.dimension, parse_unit(starts[path][1]).dimension):
+        raise _wrong(f"`{path}` is not in {match['unit'].strip() or '1'}", f"it is in {starts[path][1]}")
+    if not (math.isfinite(mean) and 0.0 < deviation < math.inf):
+        raise _wrong(f"`{text}` is no distribution", "its mean is finite, and its standard deviation above 0")
+    return path, Prior(mean, deviation)
+
+
+def _wrong(message: str, help: str) -> Problem:
+    return Problem(error("E480", message, help=help))

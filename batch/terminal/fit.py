@@ -1,0 +1,235 @@
+"""Output of `met fit`: the fitted numbers, what is known of them, and what is left of the logs."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from batch.fitting.known import Known, correlated
+from batch.fitting.question import FitAnswer, FitQuestion
+from batch.measured.residuals import Comparison
+from batch.queries.summary import finite
+from batch.terminal.chosen_deck import FittedValue
+from batch.terminal.residuals import doubt_lines
+from ic.driver.written_value import WrittenValue
+from ic.printing.columns import columns
+from met.unit_parser import decimals
+
+WORDS: Mapping[str, str] = MappingProxyType({
+    "known": "known",
+    "tied": "tied to others",
+    "unseen": "unseen",
+    "held": "not free: the deck allows no value beside it",
+})  # fmt: skip
+"""What logs tell of a parameter, in words."""
+
+DIGITS = 2
+"""Digits of half an interval, to which a value is rounded."""
+
+
+def rounded(si: float, half: float, unit: str) -> WrittenValue:
+    """A value rounded to the second digit of half its interval. half: SI"""
+    if not (math.isfinite(half) and half > 0.0):
+        return WrittenValue("", float(f"{si:.6g}"), unit)
+    in_unit, half_in_unit = (float(text) for text in decimals([si, half], unit))
+    digits = DIGITS - 1 - math.floor(math.log10(half_in_unit))
+    scale = si / in_unit if in_unit else half / half_in_unit
+    return WrittenValue("", round(in_unit, digits) * scale, unit)
+
+
+def written_values(question: FitQuestion, answer: FitAnswer) -> list[FittedValue]:
+    """The fitted values, rounded to a hundredth of their intervals, to be written into the deck."""
+    logs = ", ".join(Path(each.file).name for each in question.runs)
+    found = []
+    for place, path in enumerate(question.paths):
+        unit, half = question.units[place], float(answer.fit.factor * answer.fit.deviation[place])
+        value = dataclasses.replace(rounded(float(answer.fit.values[place]), half / 10.0, unit), path=path)
+        interval = f", +- {_short(half, unit)}" if math.isfinite(half) else ""
+        found.append(FittedValue(value, f"by a fit to {logs}{interval}"))
+    return found
+
+
+def identifiable_lines(question: FitQuestion, found: Known) -> Iterator[str]:
+    """What the logs can tell before anything is fitted, in lines."""
+    rows = [["", "deck", "standard error", "by itself", ""]]
+    for place, path in enumerate(question.paths):
+        unit = question.units[place]
+        errors = [_short(each, unit) for each in (found.deviation[place], found.alone[place])]
+        rows.append([f"  {path}", _deck_value(question, place), *errors, WORDS[found.verdict[place]]])
+    yield from columns(rows, right=(1, 2, 3))
+    yield ""
+    condition = "infinite" if math.isinf(found.condition) else f"{found.condition:.3g}"
+    many = len(question.paths)
+    yield f"{found.rank} of {many} combinations of these can be known from the logs; condition {condition}"
+    yield from _together(question, found)
+    yield "The errors are those of the logs' noise alone: what the model lacks adds to them."
+
+
+def fit_lines(question: FitQuestion, answer: FitAnswer) -> Iterator[str]:
+    """The fitted numbers, what they are worth, and what is left of the logs, in lines."""
+    fit = answer.fit
+    logs, numbers = ", ".join(each.file for each in question.runs), f"{len(fit.residuals):,} numbers"
+    yield f"{question.runs[0].given.name}, fitted to {numbers} of {logs}"
+    yield ""
+    rows = [["", "deck", "fitted", "95 %", ""]]
+    for place, path in enumerate(question.paths):
+        half, unit = float(fit.factor * fit.deviation[place]), question.units[place]
+        known = answer.known.verdict[place] == "known" and not fit.at_limit[place]
+        value = rounded(float(fit.values[place]), half, unit)
+        interval = f"+- {_short(half, unit)}" if known else ""
+        verdict = answer.known.verdict[place]
+        words = "" if known else "at its limit" if fit.at_limit[place] and verdict != "held" else WORDS[verdict]
+        text = "" if verdict in ("unseen", "held") else value.text
+        prior = question.priors.get(path)
+        if prior is not None and known and fit.deviation[place] > 0.9 * prior.deviation:
+            words = "as it was known: the logs say little of it"
+        rows.append([f"  {path}", _deck_value(question, place), text, interval, words])
+    yield from columns(rows, right=(1, 2))
+    yield from _together(question, answer.known)
+    for one, other, share in correlated(fit.covariance, question.paths):
+        yield f"  note: the errors of {one} and {other} are correlated by {share:.2f}"
+    if fit.outliers:
+        yield f"  note: {fit.outliers:,} numbers are far from all others, and left out"
+    if any(each.thinned for each in question.runs):
+        yield "  note: the logs are longer than what is fitted: instants are left out at even distances"
+    if not fit.converged:
+        yield f"  doubt: after {fit.steps} steps, the fit was still moving: these are not yet its numbers"
+    if fit.rival is not None:
+        texts = [
+            f"{path} = {rounded(value, 0.0, unit).text}"
+            for path, value, unit in zip(question.paths, fit.rival.tolist(), question.units, strict=True)
+        ]
+        yield f"  doubt: other values explain the logs as well: {', '.join(texts)}"
+    for run, before, after in zip(question.runs, answer.before, answer.after, strict=True):
+        yield ""
+        yield from _residual_lines(f"Residuals of {run.file}", before, after)
+    for run, (before, after) in zip(question.predicted, answer.predicted, strict=True):
+        yield ""
+        yield from _residual_lines(f"Predicted, and not fitted: {run.file}", before, after)
+
+
+def sweep_lines(question: FitQuestion, answer: FitAnswer, count: int = 200) -> Iterator[str]:
+    """A sweep over what is known of the fitted parameters, for the deck, in lines."""
+    run = question.runs[0].given.name
+    yield f"sweep fitted of {run} {{"
+    yield f"    sample lhs({count}) {{"
+    for place, path in enumerate(question.paths):
+        unit, value, deviation = question.units[place], answer.fit.values[place], answer.fit.deviation[place]
+        mean, spread = decimals([rounded(value, 0.2 * deviation, unit).si, float(f"{deviation:.2g}")], unit)
+        distribution = f"normal({mean}, {float(spread):.2g})"
+        far = answer.fit.values.copy()
+        far[place] -= 6.0 * deviation
+        if question.logs.refused(far[None, :])[0]:
+            high = decimals([float(f"{value + 6.0 * deviation:.3g}")], unit)[0]
+            distribution = f"truncated({mean}, {float(spread):.2g}, 0, {high})"
+        yield f"        {path} = {distribution}{'' if unit == '1' else f' {unit}'};"
+    yield "    }"
+    yield "}"
+
+
+def as_data(question: FitQuestion, answer: FitAnswer) -> dict[str, Any]:
+    """Plain data; a number that is not finite is null. SI"""
+    fit = answer.fit
+    parameters = [
+        {
+            "path": path,
+            "unit": question.runs[0].given.unit(path) or "1",
+            "deck": float(question.start[place]),
+            "fitted": float(fit.values[place]),
+            "half_interval": float(fit.factor * fit.deviation[place]),
+            "known": answer.known.verdict[place],
+            "at_limit": bool(fit.at_limit[place]),
+        }
+        for place, path in enumerate(question.paths)
+    ]
+    data: dict[str, Any] = {
+        "parameters": parameters,
+        "covariance": fit.covariance.tolist(),
+        "converged": fit.converged,
+        "rival": None if fit.rival is None else fit.rival.tolist(),
+        "together": _as_paths(question, answer.known),
+        "logs": _comparisons(question.runs, zip(answer.before, answer.after, strict=True)),
+        "predicted": _comparisons(question.predicted, answer.predicted),
+    }
+    plain: dict[str, Any] = finite(data)
+    return plain
+
+
+def identifiable_data(question: FitQuestion, found: Known) -> dict[str, Any]:
+    """Plain data; a number that is not finite is null. SI"""
+    parameters = [
+        {"path": path, "deck": float(start), "deviation": float(whole), "alone": float(alone), "known": verdict}
+        for path, start, whole, alone, verdict in zip(
+            question.paths, question.start, found.deviation, found.alone, found.verdict, strict=True
+        )
+    ]
+    data: dict[str, Any] = {
+        "parameters": parameters,
+        "rank": found.rank,
+        "condition": found.condition,
+        "together": _as_paths(question, found),
+    }
+    plain: dict[str, Any] = finite(data)
+    return plain
+
+
+def _comparisons(runs: Sequence[Any], pairs: Any) -> list[dict[str, Any]]:
+    return [
+        {
+            "run": run.given.name,
+            "log": run.file,
+            "before": dataclasses.asdict(before),
+            "after": dataclasses.asdict(after),
+        }
+        for run, (before, after) in zip(runs, pairs, strict=True)
+    ]
+
+
+def _as_paths(question: FitQuestion, found: Known) -> list[dict[str, float]]:
+    return [{question.paths[place]: part for place, part in each.items()} for each in found.together]
+
+
+def _together(question: FitQuestion, found: Known) -> Iterator[str]:
+    for change in found.together:
+        parts = [
+            f"{question.paths[place]} by {WrittenValue('', float(f'{part:.3g}'), question.units[place]).text}"
+            for place, part in change.items()
+        ]
+        yield f"  doubt: a change of all of these leaves no mark in the logs: {', '.join(parts)}"
+        if len(change) == 2:
+            (one, part), (other, by) = change.items()
+            factor = f"{'+' if part * by < 0.0 else '-'} {abs(part / by):.3g}"
+            own, its = (question.runs[0].given.unit(question.paths[place]) for place in (one, other))
+            unit = "" if own == its else f" {own} per {its}"
+            yield f"         only {question.paths[one]} {factor}{unit} * {question.paths[other]} is known"
+
+
+def _residual_lines(title: str, before: Comparison, after: Comparison) -> Iterator[str]:
+    earlier = {each.channel: each for each in before.residuals}
+    rows = [[title, "before", "after", "", "of spread", "", "what is left follows"]]
+    for each in after.residuals:
+        was = earlier.get(each.channel)
+        share = f"{each.rms / each.spread:.3g}" if each.spread else "-"
+        white = "white" if each.white else "" if each.white is None else f"not white ({each.correlation:.2g})"
+        follows = f"{each.explained[0].what}: {each.explained[0].means}" if each.explained else ""
+        unit = "" if each.unit == "1" else each.unit
+        first = "" if was is None else f"{was.rms:.3g}"
+        rows.append([f"  {each.channel}", first, f"{each.rms:.3g}", unit, share, white, follows])
+    yield from columns(rows, right=(1, 2, 4))
+    explained = all(each.white is not False for each in after.residuals)
+    yield from dict.fromkeys([*doubt_lines(after), *([] if explained else doubt_lines(before))])
+
+
+def _deck_value(question: FitQuestion, place: int) -> str:
+    return WrittenValue("", float(f"{question.start[place]:.6g}"), question.units[place]).text
+
+
+def _short(si: float, unit: str) -> str:
+    if not math.isfinite(si):
+        return "unknown"
+    (text,) = decimals([float(f"{si:.2g}")], unit)
+    return f"{float(text):.2g}{'' if unit == '1' else f' {unit}'}"

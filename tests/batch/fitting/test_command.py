@@ -1,0 +1,129 @@
+"""`met fit`: from a log to numbers, to the deck, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ic
+from met import cli
+
+DECK = """deck 2;
+#include <servos/rigid_gearbox.ic>
+
+param mass = 20 kg;
+
+arm swing {
+    link bar { mass = mass;  shape = rod(length = 1 m, along = x); }
+    joint hinge revolute { parent = base;  child = bar;  axis = y; }
+}
+
+servo drive like rigid_gearbox { command = rate(sine(amplitude = 0.15 rad/s, frequency = 0.5 Hz)); }
+
+default run work {
+    arm      = swing;
+    servos   { hinge = drive; }
+    environment { gravity = [0, 0, -9.81] m/s^2; }
+    rates    { dynamics = 500 Hz;  servos = 500 Hz;  record = 100 Hz; }
+    duration = 5 s;
+    record   = [q, servo.motor_torque];
+}
+"""
+
+Say = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The deck, and a log of an arm of 26 kg with f_c = 0.03 N m: `log.csv` with the run's names, `raw.csv` with its
+    own."""
+    place = tmp_path_factory.mktemp("fit")
+    (place / "deck.ic").write_text(DECK)
+    settings = ["--set", "mass=26 kg", "--set", "drive.f_c=0.03 N*m"]
+    assert cli.main(["run", f"{place}/deck.ic", *settings, "-q", "--no-picture", "-o", f"{place}/real.h5"]) == cli.YES
+    assert cli.main(["export", f"{place}/real.h5", "-q", "-o", f"{place}/exact.csv"]) == cli.YES
+    lines = [line for line in (place / "exact.csv").read_text().splitlines() if not line.startswith("#")]
+    rows = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
+    rows[:, 1:] += 0.01 * rows[:, 1:].std(axis=0) * np.random.default_rng(1).standard_normal(rows[:, 1:].shape)
+    write(place / "log.csv", "time [s],hinge.q [rad],hinge.servo.motor_torque [N*m]", rows)
+    raw = np.stack([1000.0 * (rows[:, 0] + 7.0), -np.degrees(rows[:, 1]), rows[:, 2] / 0.061], axis=1)
+    write(place / "raw.csv", "t,angle,current [A]", raw)
+    return place
+
+
+def write(path: Path, head: str, rows: np.ndarray) -> None:
+    path.write_text("\n".join([head, *(",".join(repr(float(each)) for each in row) for row in rows)]) + "\n")
+
+
+RAW = (
+    "--zero", "7 s", "--column", "time=t [ms]", "--column", "hinge.q=-angle [deg]",
+    "--column", "hinge.servo.motor_torque=0.061 * current [N*m]",
+)  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("log", "options"), [("log.csv", ()), ("raw.csv", RAW)])
+def test_numbers_of_the_arm_are_within_their_intervals(
+    folder: Path, capsys: Say, log: str, options: tuple[str, ...]
+) -> None:
+    arguments = ["fit", f"{folder}/deck.ic", f"{folder}/{log}", "--estimate", "mass", "--estimate", "drive.f_c"]
+    assert cli.main([*arguments, *options, "--format", "json"]) == cli.YES
+    found = json.loads(capsys.readouterr().out)
+    for each, truth in zip(found["parameters"], (26.0, 0.03), strict=True):
+        assert each["known"] == "known" and abs(each["fitted"] - truth) <= 1.5 * each["half_interval"] < 0.02 * truth
+    (comparison,) = found["logs"]
+    assert all(each["white"] for each in comparison["after"]["residuals"])
+
+
+@pytest.mark.slow
+def test_fitted_numbers_are_written_into_the_deck_with_their_intervals(folder: Path, capsys: Say) -> None:
+    copy = folder / "fitted.ic"
+    arguments = ["fit", f"{folder}/deck.ic", f"{folder}/log.csv", "--estimate", "mass", "--write", "-o", str(copy)]
+    assert cli.main([*arguments, "--estimate", "drive.f_c"]) == cli.YES
+    said = capsys.readouterr().out
+    assert "// chosen by a fit to log.csv, +- " in copy.read_text() and f"{copy}: written" in said
+    (experiment,) = ic.compile(copy).experiments
+    assert experiment.parameters["links.bar.mass"].value == pytest.approx(26.0, rel=0.01)
+    sweep = said[said.index("sweep fitted of work") : said.index("---")]
+    copy.write_text(copy.read_text() + sweep)
+    assert len(ic.compile(copy, select=["fitted"]).experiments[0].cases.coordinates) == 2
+
+
+@pytest.mark.slow
+def test_what_a_log_cannot_tell_is_said_and_not_written(folder: Path, capsys: Say) -> None:
+    arguments = ["fit", f"{folder}/deck.ic", f"{folder}/log.csv", "--set", "duration=0.3 s"]
+    tied = ["--estimate", "links.bar.mass", "--estimate", "links.bar.com.x", "--estimate", "drive.kt"]
+    assert cli.main([*arguments, *tied, "--identifiable"]) == cli.NO
+    said = capsys.readouterr().out
+    assert "tied to others" in said and "leaves no mark in the logs: links.bar.mass by" in said
+    before = (folder / "deck.ic").read_text()
+    assert cli.main([*arguments[:3], *tied[:4], "--set", "duration=0.05 s", "--diff"]) == cli.NO
+    assert "not all numbers are known, so nothing is written into the deck" in capsys.readouterr().out
+    assert (folder / "deck.ic").read_text() == before
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--estimate", "ms"), "no parameter `ms`"),
+        (("--estimate", "links.*.weight"), "no parameter of `work` is like"),
+        (("--estimate", "duration"), "`duration` decides the program"),
+        (("--estimate", "integrator"), "`integrator` is no number"),
+        (("--estimate", "mass", "--prior", "mass=20"), "is not what is known of a parameter"),
+        (("--estimate", "mass", "--prior", "mass=normal(20, 1) N"), "`mass` is not in N"),
+        (("--estimate", "mass", "--prior", "mass=normal(20, -1) kg"), "is no distribution"),
+        (("--estimate", "mass", "--zero", "9 s"), "has one of the run beside it"),
+        (("--estimate", "mass", "--column", "hinge.q"), "is no column of a log for a channel"),
+        (("--estimate", "mass", "--column", "hinge.w=hinge.q"), "does not record `hinge.w`"),
+        (("--estimate", "mass", "--column", "hinge.q=angle"), "has no column `angle`"),
+        (("--estimate", "mass", "--vary", "mass=[1, 2] kg"), "--vary is for sweeps"),
+        (("--estimate", "mass", "-o", "other.ic"), "-o is the file for --write"),
+    ],
+)
+def test_mistakes_are_refused(folder: Path, capsys: Say, options: tuple[str, ...], message: str) -> None:
+    assert cli.main(["fit", f"{folder}/deck.ic", f"{folder}/log.csv", *options]) == cli.BAD_INPUT
+    assert message in capsys.readouterr().err
