@@ -31,6 +31,10 @@ STARTS, TRIED = 2, 32
 FAR = 0.5
 """Standard deviation of such values: of the logarithm, or in sizes of the parameter."""
 
+LOOSE = 3.0
+"""Standard deviation, in sizes, with which a parameter without a prior is held to the deck's value, so that what the
+logs do not tell does not run away. It counts nowhere else."""
+
 DAMPING = tuple(10.0**power for power in range(-7, 7))
 """Levenberg's and Marquardt's factors that each step tries, of the squares of the scaled slopes."""
 
@@ -147,12 +151,14 @@ class Fitter:
         self._mean = np.array([priors[path].mean if path in priors else 0.0 for path in logs.paths])
         self._pull = np.array([1.0 / priors[path].deviation if path in priors else 0.0 for path in logs.paths])
         self.runs = self.steps = 0
+        self._loose = np.zeros(len(start))
         self._first = self._residuals(start[None, :])[0]
         if not np.isfinite(self._first).all():
             raise _fails(logs, start)
         self._floor = self._least_rms()
         self.weights = self._weighed(self._first)
         self.size = self._sizes()
+        self._loose = np.where(self._pull > 0.0, 0.0, 1.0 / (LOOSE * self.size))
         self._step = self._probed()
 
     def fit(self) -> Fit:
@@ -197,7 +203,8 @@ class Fitter:
         """Half of the weighted squares, priors included, [case]; infinite where a case fails."""
         squares = np.sum((self.weights * residuals) ** 2, axis=1)
         squares = np.where(np.isfinite(squares), squares, np.inf)
-        return np.asarray(0.5 * (squares + np.sum((self._pull * (values - self._mean)) ** 2, axis=1)))
+        pulled = np.sum((self._pull * (values - self._mean)) ** 2 + (self._loose * (values - self.start)) ** 2, axis=1)
+        return np.asarray(0.5 * (squares + pulled))
 
     def _least_rms(self) -> np.ndarray:
         """[signal]"""
@@ -306,8 +313,9 @@ class Fitter:
             self.steps += 1
             residuals, slopes = self._slopes(values)
             cost = float(self._costs(residuals[None, :], values[None, :])[0])
-            pulled = np.concatenate([self.weights * residuals, self._pull * (values - self._mean)])
-            weighted = self._weighted(slopes)
+            pulls = self._pull * (values - self._mean), self._loose * (values - self.start)
+            pulled = np.concatenate([self.weights * residuals, *pulls])
+            weighted = np.vstack([self._weighted(slopes), np.diag(self._loose)])
             scale = np.linalg.norm(weighted, axis=0)
             scale[scale == 0.0] = np.inf
             left, singular, right = np.linalg.svd(weighted / scale, full_matrices=False)

@@ -28,6 +28,7 @@ class Known:
     verdict     of each: "known", "tied" to others, "unseen", or "held" where the deck allows no value beside it
     condition   of the slopes in sizes of the parameters: largest singular value by smallest, infinite for no rank
     rank        number of directions whose standard error is below `UNKNOWN` sizes
+    size        of the parameters, SI, [path]
     together    changes that leave no mark: of each, by position of the parameter, its part in SI; the largest is one
                 size of its parameter, or its sign's
     """
@@ -37,6 +38,7 @@ class Known:
     verdict: tuple[str, ...]
     condition: float
     rank: int
+    size: np.ndarray
     together: tuple[dict[int, float], ...]
 
 
@@ -68,17 +70,19 @@ def known(slopes: np.ndarray, size: np.ndarray, held: np.ndarray, wider: float |
             sign = np.sign(direction[members[0]])
             together.append({int(each): float(sign * direction[each] / largest * size[each]) for each in members})
     rank = int(np.sum(along < UNKNOWN))
-    return Known(deviation * size, alone * size, tuple(verdict), condition, rank, tuple(together))
+    return Known(deviation * size, alone * size, tuple(verdict), condition, rank, size, tuple(together))
 
 
-def correlated(covariance: np.ndarray, paths: Sequence[str], least: float = 0.9) -> list[tuple[str, str, float]]:
-    """Pairs of parameters whose estimates are correlated by `least` or more, with the correlation."""
+def correlated(
+    covariance: np.ndarray, paths: Sequence[str], known: Known, least: float = 0.9
+) -> list[tuple[str, str, float]]:
+    """Pairs of known parameters whose estimates are correlated by `least` or more, with the correlation."""
     deviation = np.sqrt(np.diag(covariance))
     found = []
     for one in range(len(paths)):
         for other in range(one):
             with np.errstate(invalid="ignore", divide="ignore"):
                 share = float(covariance[one, other] / (deviation[one] * deviation[other]))
-            if abs(share) >= least:
+            if abs(share) >= least and known.verdict[one] == known.verdict[other] == "known":
                 found.append((paths[other], paths[one], share))
     return found

@@ -24,6 +24,10 @@ MOST_BYTES = 2**29
 """Largest size of the histories that are in memory at once."""
 
 
+STRETCHES = 24
+"""Least number of stretches of logs by which intervals are judged."""
+
+
 @frozen
 class LoggedRun:
     """A run beside a log of the real arm.
@@ -224,8 +228,8 @@ class LoggedRuns:
 
     @property
     def stretches(self) -> int:
-        """Number of stretches of each log."""
-        return max(2, -(-24 // len(self.runs)))
+        """Number of stretches of each log: in all, three times as many as parameters, and `STRETCHES` at least."""
+        return max(2, -(-max(STRETCHES, 3 * len(self.paths)) // len(self.runs)))
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
         """What was measured less what is computed, [case, number]; not-a-number in cases that fail or are refused.

@@ -149,7 +149,7 @@ def _paths(estimates: Sequence[str], run: GivenRun) -> list[str]:
     found = []
     for each in estimates:
         matching = [each]
-        if "*" in each:
+        if any(letter in each for letter in "*?["):
             matching = [path for path in run.experiment.parameters if fnmatchcase(path, each)]
             if not matching:
                 raise _wrong(f"no parameter of `{run.name}` is like `{each}`", "`met explain` lists them")

@@ -27,6 +27,9 @@ WORDS: Mapping[str, str] = MappingProxyType({
 })  # fmt: skip
 """What logs tell of a parameter, in words."""
 
+SHOWN, MOST_PARTS = 3, 6
+"""Largest number of changes without a mark, and of correlated pairs, that are printed; and of parts of a change."""
+
 DIGITS = 2
 """Digits of half an interval, to which a value is rounded."""
 
@@ -34,7 +37,7 @@ DIGITS = 2
 def rounded(si: float, half: float, unit: str) -> WrittenValue:
     """A value rounded to the second digit of half its interval. half: SI"""
     if not (math.isfinite(half) and half > 0.0):
-        return WrittenValue("", float(f"{si:.6g}"), unit)
+        return WrittenValue("", float(f"{si:.3g}"), unit)
     in_unit, half_in_unit = (float(text) for text in decimals([si, half], unit))
     digits = DIGITS - 1 - math.floor(math.log10(half_in_unit))
     scale = si / in_unit if in_unit else half / half_in_unit
@@ -79,19 +82,22 @@ def fit_lines(question: FitQuestion, answer: FitAnswer) -> Iterator[str]:
     for place, path in enumerate(question.paths):
         half, unit = float(fit.factor * fit.deviation[place]), question.units[place]
         known = answer.known.verdict[place] == "known" and not fit.at_limit[place]
-        value = rounded(float(fit.values[place]), half, unit)
+        value = rounded(float(fit.values[place]), half if known else math.nan, unit)
         interval = f"+- {_short(half, unit)}" if known else ""
         verdict = answer.known.verdict[place]
         words = "" if known else "at its limit" if fit.at_limit[place] and verdict != "held" else WORDS[verdict]
-        text = "" if verdict in ("unseen", "held") else value.text
+        text = "" if verdict == "held" else value.text
         prior = question.priors.get(path)
         if prior is not None and known and fit.deviation[place] > 0.9 * prior.deviation:
             words = "as it was known: the logs say little of it"
         rows.append([f"  {path}", _deck_value(question, place), text, interval, words])
     yield from columns(rows, right=(1, 2))
     yield from _together(question, answer.known)
-    for one, other, share in correlated(fit.covariance, question.paths):
+    pairs = sorted(correlated(fit.covariance, question.paths, answer.known), key=lambda pair: -abs(pair[2]))
+    for one, other, share in pairs[:SHOWN]:
         yield f"  note: the errors of {one} and {other} are correlated by {share:.2f}"
+    if len(pairs) > SHOWN:
+        yield f"  note: so are those of {len(pairs) - SHOWN} more pairs, by 0.9 at least"
     if fit.outliers:
         yield f"  note: {fit.outliers:,} numbers are far from all others, and left out"
     if any(each.thinned for each in question.runs):
@@ -194,18 +200,22 @@ def _as_paths(question: FitQuestion, found: Known) -> list[dict[str, float]]:
 
 
 def _together(question: FitQuestion, found: Known) -> Iterator[str]:
-    for change in found.together:
+    for change in found.together[:SHOWN]:
+        largest = sorted(change, key=lambda place: -abs(change[place] / found.size[place]))[:MOST_PARTS]
         parts = [
-            f"{question.paths[place]} by {WrittenValue('', float(f'{part:.3g}'), question.units[place]).text}"
-            for place, part in change.items()
+            f"{question.paths[place]} by {WrittenValue('', float(f'{change[place]:.3g}'), question.units[place]).text}"
+            for place in sorted(largest)
         ]
-        yield f"  doubt: a change of all of these leaves no mark in the logs: {', '.join(parts)}"
+        more = f" and {len(change) - MOST_PARTS} more" if len(change) > MOST_PARTS else ""
+        yield f"  doubt: a change of all of these leaves no mark in the logs: {', '.join(parts)}{more}"
         if len(change) == 2:
             (one, part), (other, by) = change.items()
             factor = f"{'+' if part * by < 0.0 else '-'} {abs(part / by):.3g}"
             own, its = (question.runs[0].given.unit(question.paths[place]) for place in (one, other))
             unit = "" if own == its else f" {own} per {its}"
             yield f"         only {question.paths[one]} {factor}{unit} * {question.paths[other]} is known"
+    if len(found.together) > SHOWN:
+        yield f"  doubt: {len(found.together) - SHOWN} more such changes leave no mark: estimate fewer numbers"
 
 
 def _residual_lines(title: str, before: Comparison, after: Comparison) -> Iterator[str]:
