@@ -35,7 +35,7 @@ LOOSE = 3.0
 """Standard deviation, in sizes, with which a parameter without a prior is held to the deck's value, so that what the
 logs do not tell does not run away. It counts nowhere else."""
 
-DAMPING = tuple(10.0**power for power in range(-7, 7))
+DAMPING = tuple(10.0**power for power in range(-6, 7, 2))
 """Levenberg's and Marquardt's factors that each step tries, of the squares of the scaled slopes."""
 
 WIDER = (4.0, 16.0)
@@ -60,8 +60,9 @@ CHANGE = 0.5
 PROBED = tuple(10.0**power for power in range(-12, 7))
 """Sizes, SI, that are tried of a parameter that is 0."""
 
-EVENT = 3.0
-"""A slope to one side that is so many times as large as the other has an event on its way, and is left out."""
+SIDES, EVENT = (1.0, -1.0, 0.125, -0.125), 1.5
+"""Differences for a slope, in its step; and by how much the largest of them may exceed the smallest without an event
+on its way."""
 
 ELSEWHERE, AS_GOOD = 25.0, 2.0
 """Change of the squares, as slopes predict it, from which on values are elsewhere; and by how much half of the squares
@@ -170,7 +171,7 @@ class Fitter:
         for _ in range(MOST_ROUNDS):
             before = self.weights
             self.weights = self._weighed(self._residuals(values[None, :])[0], settled=True)
-            values, cost, converged = self._minimised(values)
+            values, cost, converged = self._minimised(values, wider=())
             both = (before > 0.0) & (self.weights > 0.0)
             if np.all(np.abs(before[both] / self.weights[both] - 1.0) < STEADY):
                 break
@@ -266,20 +267,19 @@ class Fitter:
         return step
 
     def _slopes(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The residuals and their slopes, [number], [number, path], by differences to both sides, or to the one that is
-        allowed and without an event. The next differences are by `CHANGE` of the deviations that follow."""
-        moves = np.diag(self._step)
-        found = self._residuals(np.vstack([values, values + moves, values - moves]))
-        middle, count = found[0], len(values)
-        slopes = np.zeros((len(middle), count))
-        for place, step in enumerate(self._step):
-            up, down = found[1 + place], found[1 + count + place]
-            sides = [each for each in ((up - middle) / step, (middle - down) / step) if np.isfinite(each).all()]
-            sizes = [float(np.linalg.norm(self.weights * each)) for each in sides]
-            if len(sides) == 2 and max(sizes) <= EVENT * min(sizes):
-                slopes[:, place] = 0.5 * (sides[0] + sides[1])
-            elif sides:
-                slopes[:, place] = sides[int(np.argmin(sizes))]
+        """The residuals and their slopes, [number], [number, path]: the mean of differences near and far on both sides,
+        without those that are refused or have an event on their way. The next differences are by `CHANGE` of the
+        deviations that follow."""
+        steps = np.outer(SIDES, self._step)
+        found = self._residuals(np.vstack([values, *(values + np.diag(each) for each in steps)]))
+        middle, moved = found[0], found[1:].reshape(len(SIDES), len(values), -1)
+        slopes = np.zeros((len(middle), len(values)))
+        for place in range(len(values)):
+            sides = (moved[:, place] - middle) / steps[:, place, None]
+            sizes = np.linalg.norm(self.weights * sides, axis=1)
+            sides, sizes = sides[np.isfinite(sizes)], sizes[np.isfinite(sizes)]
+            if len(sizes):
+                slopes[:, place] = sides[sizes <= EVENT * sizes.min()].mean(axis=0)
         with np.errstate(divide="ignore"):
             wanted = CHANGE / np.linalg.norm(self._weighted(slopes), axis=0)
         self._step = np.clip(wanted, 1e-7 * self.size, 0.1 * self.size)
@@ -306,7 +306,7 @@ class Fitter:
     def _values_of(self, draws: np.ndarray) -> np.ndarray:
         return np.where(self.start != 0.0, self.start * np.exp(draws), self.size * np.abs(draws))
 
-    def _minimised(self, values: np.ndarray) -> tuple[np.ndarray, float, bool]:
+    def _minimised(self, values: np.ndarray, wider: tuple[float, ...] = WIDER) -> tuple[np.ndarray, float, bool]:
         """The values at the end of a descent, half of their squares, and whether it ended by itself."""
         cost, tries = np.inf, 0
         for _ in range(MOST_STEPS):
@@ -329,8 +329,8 @@ class Fitter:
                 cost, values = float(costs[best]), trials[best]
             if gained >= CONVERGED:
                 tries = 0
-            elif tries < len(WIDER):
-                self._step = np.minimum(WIDER[tries] * self._step, 0.1 * self.size)
+            elif tries < len(wider):
+                self._step = np.minimum(wider[tries] * self._step, 0.1 * self.size)
                 tries += 1
             else:
                 return values, cost, True
