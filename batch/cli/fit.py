@@ -38,6 +38,11 @@ from met.settings import varies
     help="Also compare a log that is not fitted, with the deck's and with the fitted numbers; may be repeated.",
 )
 @click.option("--identifiable", is_flag=True, help="Only say what the logs can tell of these numbers, and fit nothing.")
+@click.option(
+    "--picture",
+    metavar="FILE",
+    help="Draw the first log, or the first predicted one, as measured, and as computed before and after.",
+)
 @click.option("--diff", is_flag=True, help="Show what --write would change in the deck's text.")
 @click.option("--write", is_flag=True, help="Write the fitted values into the deck's text, and show what changed.")
 @click.option(
@@ -51,6 +56,7 @@ def fit(
     logs: tuple[str, ...],
     estimates: tuple[str, ...],
     identifiable: bool,
+    picture: str | None,
     diff: bool,
     write: bool,
     output: str | None,
@@ -66,10 +72,13 @@ def fit(
     import json
 
     from batch.fitting.question import fit_question
+    from batch.plotting import logs as pictures
+    from batch.plotting import output as places
     from batch.terminal import fit as shown
     from batch.terminal.chosen_deck import fitted_deck
     from batch.terminal.progress import Bar
     from met.host.sources import names_archive, names_plan
+    from met.outputs import path_of
 
     if names_plan(deck) or names_archive(deck):
         raise click.UsageError(f"`{deck}` is no deck, of which numbers could be estimated")
@@ -77,8 +86,11 @@ def fit(
         raise click.UsageError("--vary is for sweeps: `--estimate PATH` is what a fit moves")
     if output is not None and not (diff or write):
         raise click.UsageError("-o is the file for --write")
-    if identifiable and (diff or write or options["predict"]):
-        raise click.UsageError("--identifiable fits nothing: leave --diff, --write and --predict out")
+    if identifiable and (diff or write or picture or options["predict"]):
+        raise click.UsageError("--identifiable fits nothing: leave --diff, --write, --picture and --predict out")
+    drawn = None if picture is None else path_of(picture)
+    if drawn is not None:
+        places.check(drawn)
     question = fit_question(deck, logs, estimates, **options)
     if identifiable:
         known = question.identifiable()
@@ -101,6 +113,11 @@ def fit(
             values = shown.written_values(question, answer)
             given = {key: options[key] for key in ("defines", "settings")}
             changed = fitted_deck(deck, values, output, experiment=question.runs[0].given.name, **given)
+    if drawn is not None:
+        run = (*question.predicted, *question.runs)[0]
+        courses = {"deck": run.courses(question.start), "fitted": run.courses(answer.fit.values)}
+        units = {each["channel"]: each["unit"] for each in run.columns}
+        pictures.draw(run.name, pictures.panels(run.log, units, courses), drawn)
     data = shown.as_data(question, answer) if form == "json" else {}
     tell(form, data, lines, changed, asked=diff or write, write=write, why_not="not all numbers are known")
     return YES if certain else NO

@@ -38,10 +38,20 @@ def log_options(face: Face) -> Face:
 @click.argument("log", metavar="LOG")
 @click.option("--run", "run", metavar="NAME", help="This run or sweep of the archive [the first].")
 @click.option("--case", "case", metavar="ID", help="This case: the beginning of its id, or its position, as '#0' [#0].")
+@click.option(
+    "--picture", metavar="FILE", help="Draw each channel as measured and computed, and the rest: .png, .svg or .pdf."
+)
 @log_options
 @format_option
 def residuals(
-    archive: str, log: str, run: str | None, case: str | None, columns: tuple[str, ...], zero: float, form: str
+    archive: str,
+    log: str,
+    run: str | None,
+    case: str | None,
+    picture: str | None,
+    columns: tuple[str, ...],
+    zero: float,
+    form: str,
 ) -> int:
     """Compare a run with LOG, a CSV or MCAP file of the real arm's signals: how far what was measured is from what was
     computed, and whether the rest is noise.
@@ -57,11 +67,17 @@ def residuals(
     from batch.measured.paired import computed
     from batch.measured.residuals import compare
     from batch.modules.description import described_columns
+    from batch.plotting import logs as pictures
+    from batch.plotting import output as places
     from batch.queries.groups import groups_named
     from batch.queries.signals import case_text
     from batch.terminal.residuals import as_data, residual_lines
     from met.diagnostic import Problem, error
+    from met.outputs import path_of
 
+    output = None if picture is None else path_of(picture)
+    if output is not None:
+        places.check(output)
     with ArchiveFile(archive) as file:
         group = groups_named(file, [run] if run is not None else [])[0]
         position = group.recorded_position(case if case is not None else "#0")
@@ -69,12 +85,17 @@ def residuals(
         recorded = described_columns(experiment)
         measured = read_log(log, recorded, [mapped_column(each) for each in columns], zero)
         joints = [joint.name for joint in experiment.structure.joints]
-        found = compare(computed(group, position, recorded), recorded, joints, measured)
+        courses = computed(group, position, recorded)
+        found = compare(courses, recorded, joints, measured)
         if not found.residuals:
             message = f"no number of `{log}` has one of the run beside it"
             raise Problem(
                 error("E478", message, measured.head, help="let its times begin where the run begins, at 0 s")
             )
+        if output is not None:
+            units = {each["channel"]: each["unit"] for each in recorded}
+            title = f"{group.name}, {case_text(group, position)}, and {log}"
+            pictures.draw(title, pictures.panels(measured, units, {"computed": courses}), output)
         if form == "json":
             say(json.dumps({"experiment": group.name, "case": case_text(group, position), **as_data(found)}, indent=1))
         else:

@@ -69,11 +69,14 @@ RAW = (
 def test_numbers_of_the_arm_are_within_their_intervals(
     folder: Path, capsys: Say, log: str, options: tuple[str, ...]
 ) -> None:
+    picture = folder / f"{log}.png"
     arguments = ["fit", f"{folder}/deck.ic", f"{folder}/{log}", "--estimate", "mass", "--estimate", "drive.f_c"]
+    arguments += ["--picture", str(picture)]
     assert cli.main([*arguments, *options, "--format", "json"]) == cli.YES
     found = json.loads(capsys.readouterr().out)
     for each, truth in zip(found["parameters"], (26.0, 0.03), strict=True):
         assert each["known"] == "known" and abs(each["fitted"] - truth) <= 1.5 * each["half_interval"] < 0.02 * truth
+    assert picture.stat().st_size > 10_000
     (comparison,) = found["logs"]
     assert all(each["white"] for each in comparison["after"]["residuals"])
 

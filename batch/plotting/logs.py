@@ -1,0 +1,73 @@
+"""Pictures of logs beside runs: what was measured and computed, and what is left, a row of panels a channel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from batch.measured.mcap_log import MeasuredSignals
+from batch.measured.paired import Course, Pair
+from batch.plotting import output as places
+from batch.plotting.sheet import COLOURS, FAINT, STYLE
+from met.frozen import frozen
+
+MOST_CHANNELS = 16
+"""Largest number of channels in a picture: the first ones."""
+
+
+@frozen
+class MeasuredPanel:
+    """A channel of a log: `measured` at `instants`, s, and what was computed there, by what computed it; in `unit`."""
+
+    channel: str
+    unit: str
+    instants: np.ndarray
+    measured: np.ndarray
+    computed: Mapping[str, np.ndarray]
+
+
+def panels(
+    log: MeasuredSignals, units: Mapping[str, str], courses: Mapping[str, Mapping[str, Course]]
+) -> list[MeasuredPanel]:
+    """The channels of a log, at instants at which there is a computed number. courses: by what computed them, those of
+    channels; units: SI, by channel"""
+    found = []
+    for channel, (instants, measured) in log.signals.items():
+        ways = {name: each[channel] for name, each in courses.items() if channel in each}
+        if ways:
+            pair = Pair.of(instants, measured, next(iter(ways.values())))
+            computed = {name: each.at(pair.instants) for name, each in ways.items()}
+            found.append(MeasuredPanel(channel, units[channel], pair.instants, pair.measured, computed))
+    return found
+
+
+def draw(title: str, panels: Sequence[MeasuredPanel], output: Path) -> None:
+    """Draw what was measured and computed of each channel on the left, and the residuals on the right. Raises Problem
+    for an output that cannot be written."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    style: Any = STYLE
+    with matplotlib.rc_context(style):
+        shown = panels[:MOST_CHANNELS]
+        figure = Figure(figsize=(11.0, 1.5 * len(shown) + 0.9), dpi=144, layout="constrained")
+        more = f", {len(panels) - len(shown)} more channels are not drawn" if len(panels) > len(shown) else ""
+        figure.suptitle(f"{title}{more}", fontsize=10.0)
+        axes = figure.subplots(len(shown), 2, sharex=True, squeeze=False)
+        for panel, (left, right) in zip(shown, axes, strict=True):
+            left.plot(panel.instants, panel.measured, color=FAINT, linewidth=2.6, label="measured")
+            right.axhline(0.0, color=FAINT, linewidth=0.8)
+            colours = COLOURS[: len(panel.computed)][::-1]
+            for (name, computed), colour in zip(panel.computed.items(), colours, strict=True):
+                left.plot(panel.instants, computed, color=colour, linewidth=1.0, label=name)
+                right.plot(panel.instants, panel.measured - computed, color=colour, linewidth=0.8)
+            left.set_title(panel.channel, loc="left", fontsize=8.5)
+            right.set_title("measured - computed", loc="left", fontsize=8.5)
+            left.set_ylabel("" if panel.unit == "1" else panel.unit, fontsize=9.0)
+        axes[0, 0].legend(loc="upper right", fontsize=8.0)
+        for each in axes[-1]:
+            each.set_xlabel("time, s", fontsize=9.0)
+        places.save(figure, output)
