@@ -38,15 +38,16 @@ logs do not tell does not run away. It counts nowhere else."""
 DAMPING = tuple(10.0**power for power in range(-6, 7, 2))
 """Levenberg's and Marquardt's factors that each step tries, of the squares of the scaled slopes."""
 
-WIDER = (4.0, 16.0)
-"""Factors of the differences with which slopes are tried again before a fit ends: events at other ticks make the
-squares rough."""
+POLISHED = (0.5, -0.5, 1.0, -1.0, 2.0, -2.0, 4.0, -4.0)
+"""Moves, in standard deviations along each direction, that are tried before a descent ends: events at other ticks make
+the squares rough, so that slopes alone may end too early."""
 
 MOST_STEPS, MOST_ROUNDS = 40, 12
 """Largest number of steps, and of times that weights are found."""
 
-CONVERGED = 1e-3
-"""Decrease of half the weighted squares below which a fit has converged: a change by a twentieth of what noise does."""
+CONVERGED, ENDED = 1e-3, 0.1
+"""Decrease of half the weighted squares below which slopes have done what they can: a change by a twentieth of what
+noise does; and that by such moves below which a descent ends."""
 
 STEADY = 0.01
 """Change of a signal's rms below which its weight stays."""
@@ -171,7 +172,7 @@ class Fitter:
         for _ in range(MOST_ROUNDS):
             before = self.weights
             self.weights = self._weighed(self._residuals(values[None, :])[0], settled=True)
-            values, cost, converged = self._minimised(values, wider=())
+            values, cost, converged = self._minimised(values)
             both = (before > 0.0) & (self.weights > 0.0)
             if np.all(np.abs(before[both] / self.weights[both] - 1.0) < STEADY):
                 break
@@ -306,9 +307,9 @@ class Fitter:
     def _values_of(self, draws: np.ndarray) -> np.ndarray:
         return np.where(self.start != 0.0, self.start * np.exp(draws), self.size * np.abs(draws))
 
-    def _minimised(self, values: np.ndarray, wider: tuple[float, ...] = WIDER) -> tuple[np.ndarray, float, bool]:
+    def _minimised(self, values: np.ndarray) -> tuple[np.ndarray, float, bool]:
         """The values at the end of a descent, half of their squares, and whether it ended by itself."""
-        cost, tries = np.inf, 0
+        cost = np.inf
         for _ in range(MOST_STEPS):
             self.steps += 1
             residuals, slopes = self._slopes(values)
@@ -321,20 +322,22 @@ class Fitter:
             left, singular, right = np.linalg.svd(weighted / scale, full_matrices=False)
             along = singular * (left.T @ pulled)
             moves = np.array([right.T @ (along / (singular**2 + damping)) / scale for damping in DAMPING])
-            trials = self._allowed(values, values - moves)
-            costs = self._costs(self._residuals(trials), trials)
-            best = int(np.argmin(costs))
-            gained = cost - float(costs[best])
-            if gained > 0.0:
-                cost, values = float(costs[best]), trials[best]
-            if gained >= CONVERGED:
-                tries = 0
-            elif tries < len(wider):
-                self._step = np.minimum(wider[tries] * self._step, 0.1 * self.size)
-                tries += 1
-            else:
-                return values, cost, True
+            before, (values, cost) = cost, self._best(values, cost, values - moves)
+            if before - cost < CONVERGED:
+                known = singular > 1e-9 * singular[0]
+                along_each = [right[known] / singular[known, None] / scale, np.diag(1.0 / scale)]
+                sides = np.vstack([each * move for move in POLISHED for each in along_each])
+                before, (values, cost) = cost, self._best(values, cost, values + sides)
+                if before - cost < ENDED:
+                    return values, cost, True
         return values, cost, False
+
+    def _best(self, values: np.ndarray, cost: float, trials: np.ndarray) -> tuple[np.ndarray, float]:
+        """The best of values and trials, with half of its squares."""
+        trials = self._allowed(values, trials)
+        costs = self._costs(self._residuals(trials), trials)
+        best = int(np.argmin(costs))
+        return (trials[best], float(costs[best])) if costs[best] < cost else (values, cost)
 
     def _allowed(self, values: np.ndarray, trials: np.ndarray) -> np.ndarray:
         """Trials with each number that its parameter cannot have moved towards its value as far as needed, [trial,
