@@ -18,8 +18,8 @@ of outliers."""
 
 
 @frozen
-class Course:
-    """A channel as computed: `values` at the run's `times`, s."""
+class ComputedChannel:
+    """A channel of a run: its computed `values`, at `times`, s."""
 
     times: np.ndarray
     values: np.ndarray
@@ -29,13 +29,13 @@ class Course:
         return np.interp(instants, self.times, self.values, left=np.nan, right=np.nan)
 
     @property
-    def rate(self) -> Course:
+    def rate(self) -> ComputedChannel:
         """Its slope, by central differences."""
         values = np.gradient(self.values, self.times) if len(self.times) > 1 else np.zeros(len(self.times))
-        return Course(self.times, values)
+        return ComputedChannel(self.times, values)
 
 
-def computed(group: ArchiveGroup, position: int, columns: Sequence[Mapping[str, str]]) -> dict[str, Course]:
+def computed(group: ArchiveGroup, position: int, columns: Sequence[Mapping[str, str]]) -> dict[str, ComputedChannel]:
     """The channels of a recorded case as far as they are finite. columns: those of `described_columns`, in order"""
     times = group.values("time")
     signals = list(dict.fromkeys(each["signal"] for each in columns))
@@ -44,7 +44,7 @@ def computed(group: ArchiveGroup, position: int, columns: Sequence[Mapping[str, 
     for each, values in zip(columns, found.T.astype(np.float64), strict=True):
         finite = np.isfinite(values)
         if finite.any():
-            out[each["channel"]] = Course(times[finite], values[finite])
+            out[each["channel"]] = ComputedChannel(times[finite], values[finite])
     return out
 
 
@@ -54,10 +54,10 @@ class Pair:
 
     instants: np.ndarray
     measured: np.ndarray
-    course: Course
+    course: ComputedChannel
 
     @classmethod
-    def of(cls, instants: np.ndarray, measured: np.ndarray, course: Course) -> Pair:
+    def of(cls, instants: np.ndarray, measured: np.ndarray, course: ComputedChannel) -> Pair:
         """The instants at which both have a number."""
         with np.errstate(invalid="ignore"):
             rows = (np.abs(measured) <= LARGEST) & np.isfinite(course.at(instants))

@@ -16,7 +16,7 @@ from scipy import stats
 
 from batch.measured.doubts import LATEST, clock_doubts, column_doubts
 from batch.measured.mcap_log import MeasuredSignals
-from batch.measured.paired import Course, Pair
+from batch.measured.paired import ComputedChannel, Pair
 from met.frozen import frozen
 
 STRETCHES = 16
@@ -54,8 +54,8 @@ LONG_GAP = 1.5
 
 
 @frozen
-class Explanation:
-    """What a residual follows.
+class FollowedCause:
+    """A cause that a residual follows.
 
     what    in the words of `_features`; means: what leaves such a mark in a model
     size    by how much, in `unit`; of a delay by how long, s, above 0 where the log is late; None where there is no
@@ -95,7 +95,7 @@ class Residual:
     outliers: int
     correlation: float
     white: bool | None
-    explained: tuple[Explanation, ...]
+    explained: tuple[FollowedCause, ...]
     too_short: bool
 
 
@@ -125,7 +125,10 @@ class Comparison:
 
 
 def compare(
-    courses: Mapping[str, Course], columns: Sequence[Mapping[str, str]], joints: Sequence[str], log: MeasuredSignals
+    courses: Mapping[str, ComputedChannel],
+    columns: Sequence[Mapping[str, str]],
+    joints: Sequence[str],
+    log: MeasuredSignals,
 ) -> Comparison:
     """Compare a run with a log at the log's instants, as far as both last; between recorded rows, what was computed is
     on straight lines.
@@ -173,7 +176,9 @@ def _clock(times: np.ndarray) -> tuple[float, tuple[tuple[float, float], ...], b
     return usual, tuple((float(times[i]), float(steps[i])) for i in gaps), len(gaps) > UNEVEN * len(steps)
 
 
-def _residual(name: str, pair: Pair, courses: Mapping[str, Course], units: Mapping[str, str], joint: str) -> Residual:
+def _residual(
+    name: str, pair: Pair, courses: Mapping[str, ComputedChannel], units: Mapping[str, str], joint: str
+) -> Residual:
     residual, usual = pair.residual, pair.usual()
     largest = int(np.argmax(np.abs(residual)))
     correlation, white = _whiteness(usual.residual)
@@ -222,7 +227,9 @@ class _Feature:
     at: Callable[[np.ndarray], np.ndarray]
 
 
-def _features(name: str, courses: Mapping[str, Course], units: Mapping[str, str], joint: str) -> list[_Feature]:
+def _features(
+    name: str, courses: Mapping[str, ComputedChannel], units: Mapping[str, str], joint: str
+) -> list[_Feature]:
     own, unit = courses[name], units[name]
     slope, middle = own.rate, float(own.times.mean())
     q, qd, tau = (f"{joint}.{signal}" for signal in ("q", "qd", "tau"))
@@ -263,7 +270,7 @@ def _turned(angles: np.ndarray) -> np.ndarray:
     return np.stack([np.sin(angles), np.cos(angles)], axis=1)
 
 
-def _explained(pair: Pair, features: Sequence[_Feature]) -> tuple[Explanation, ...] | None:
+def _explained(pair: Pair, features: Sequence[_Feature]) -> tuple[FollowedCause, ...] | None:
     """One after the other, the feature that adds most to the share of those before it; None where the log is too
     short."""
     pair = pair.thinned(MOST_INSTANTS)
@@ -295,7 +302,7 @@ def _explained(pair: Pair, features: Sequence[_Feature]) -> tuple[Explanation, .
         np.cumsum([numbers[each].shape[1] for each in chosen])[:-1],
     )
     return tuple(
-        Explanation(each.what, each.means, float(size[0]) if len(size) == 1 else None, each.unit, gain, alike)
+        FollowedCause(each.what, each.means, float(size[0]) if len(size) == 1 else None, each.unit, gain, alike)
         for each, size, (gain, alike) in zip(chosen, sizes, gains, strict=True)
     )
 

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from batch.measured.residuals import FEWEST, Comparison, Explanation, Residual
+from batch.measured.residuals import FEWEST, Comparison, FollowedCause, Residual
 from batch.queries.signals import number_text
 from batch.queries.summary import finite
 from ic.printing.columns import columns
@@ -52,11 +52,11 @@ def _whiteness(residual: Residual) -> str:
     return "white" if residual.white else f"not white ({residual.correlation:.2g})"
 
 
-def _size(explanation: Explanation) -> str:
-    if explanation.size is None:
+def _size(cause: FollowedCause) -> str:
+    if cause.size is None:
         return ""
-    unit = "" if explanation.unit == "1" else f" {explanation.unit}"
-    return f"{explanation.size:+.3g}{unit}"
+    unit = "" if cause.unit == "1" else f" {cause.unit}"
+    return f"{cause.size:+.3g}{unit}"
 
 
 def doubt_lines(found: Comparison) -> Iterator[str]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from batch.measured.mcap_log import MeasuredSignals
-from batch.measured.paired import Course
+from batch.measured.paired import ComputedChannel
 from batch.measured.residuals import Comparison, Residual, compare
 from batch.terminal.residuals import residual_lines
 from met import cli
@@ -41,7 +41,7 @@ def compared(change: Callable[[Numbers], None], noise: float = 0.01, time: np.nd
     draw = np.random.default_rng(4)
     measured = {name: each + noise * each.std() * draw.standard_normal(len(each)) for name, each in run().items()}
     change(measured)
-    courses = {name: Course(TIME, each) for name, each in run().items()}
+    courses = {name: ComputedChannel(TIME, each) for name, each in run().items()}
     log = MeasuredSignals({name: (time, each) for name, each in measured.items()}, [], [])
     return compare(courses, COLUMNS, ["luff", "fold"], log)
 
@@ -158,7 +158,7 @@ def test_a_log_that_goes_on_after_the_run_is_doubted_in_nothing() -> None:
     time = np.concatenate([TIME, TIME + 21.0])
     draw = np.random.default_rng(1).standard_normal(len(TIME))
     log = {name: (time, np.concatenate([each + 0.01 * each.std() * draw, 0.0 * each])) for name, each in run().items()}
-    courses = {name: Course(TIME, each) for name, each in run().items()}
+    courses = {name: ComputedChannel(TIME, each) for name, each in run().items()}
     found = compare(courses, COLUMNS, ["luff", "fold"], MeasuredSignals(log, [], ["other"]))
     assert (found.doubts, found.left_out) == ((), 6 * len(TIME)) and found.log_span[1] > found.run_span[1]
     words = "\n".join(residual_lines(found))
@@ -170,14 +170,14 @@ def test_slow_noise_in_a_short_log_is_not_explained() -> None:
     draw, slow = np.random.default_rng(2), np.zeros(401)
     for i, each in enumerate(draw.standard_normal(400)):
         slow[i + 1] = 0.99 * slow[i] + each
-    courses = {name: Course(time, each[:401]) for name, each in run().items()}
+    courses = {name: ComputedChannel(time, each[:401]) for name, each in run().items()}
     log = MeasuredSignals({"luff.tau": (time, run()["luff.tau"][:401] + slow)}, [], [])
     (found,) = compare(courses, COLUMNS, ["luff", "fold"], log).residuals
     assert found.too_short and not found.explained
 
 
 def test_few_and_huge_numbers_say_nothing_untrue() -> None:
-    courses = {name: Course(TIME, each) for name, each in run().items()}
+    courses = {name: ComputedChannel(TIME, each) for name, each in run().items()}
     time = np.array([0.0, 1.0, 2.0])
     log = {"luff.q": (time, np.array([0.1, 0.1, -0.5])), "fold.q": (time, np.array([0.0, 1e200, np.nan]))}
     found = compare(courses, COLUMNS, ["luff", "fold"], MeasuredSignals(log, [], []))
