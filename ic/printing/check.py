@@ -21,7 +21,7 @@ def notes(plan: Plan) -> Iterator[str]:
 
 
 def left_out(plan: Plan) -> Iterator[str]:
-    """What was not looked at, in one line for all runs of which it is true."""
+    """Yield a line for each reason why a run's step was not checked, with the runs that it holds for."""
     runs: dict[str, list[str]] = {}
     for experiment in plan.experiments:
         for note in experiment.notes:

@@ -61,7 +61,7 @@ def _counted(dropped: Mapping[str, Sequence[object]]) -> str:
 
 
 def remarks(body: ArmEntries) -> Iterator[str]:
-    """What whoever imports the robot should know, a line each."""
+    """Yield remarks for people who import the robot, a line each: what the deck lacks, changes or assumes."""
     attributes = {what: elements for what, elements in body.robot.dropped.items() if " of " in what}
     if attributes:
         yield f"attributes not read, and not in the deck: {_counted(attributes)}"

@@ -157,7 +157,7 @@ class _Along:
         yield from self.largest("velocity products", "computed" if taken else "off", meaning, torques)
 
     def _base(self) -> Iterator[Assumption]:
-        """What a base that is held takes: of the joints on it, the one that gives it most."""
+        """The largest force and moment that a joint exerts on a base that is held."""
         wrenches = reactions(self.tree, self.moving)
         for part, unit, meaning in ((1, "N", "the largest force on it"), (0, "N*m", "the largest moment on it")):
             sizes = {

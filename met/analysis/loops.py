@@ -119,8 +119,8 @@ def _phases(
     gains: Gains | None,
     direct: bool,
 ) -> Iterator[tuple[np.ndarray, tuple[str, ...]]]:
-    """What happens in a frame, one after the other: maps of state, memory, memory at the step's first tick, and the
-    state a step before, each with the joints whose laws tick in it.
+    """Yield the maps of a frame in the order in which they take effect, each with the joints whose laws tick in it. A
+    map is of state, memory, memory at the step's first tick, and the state a step before.
 
     A, n, cells  as of `_over`
     """

@@ -57,7 +57,7 @@ def grapples(run: RunNumbers) -> Iterator[Scale]:
 
 
 def spreads(run: RunNumbers) -> Iterator[Scale]:
-    """What a sweep varies: starts of revolute joints beside a turn, masses beside an inertia that stays."""
+    """Yield how far a sweep varies starts of revolute joints (beside a turn) and masses whose inertia stays."""
     usual = "a turn further the arm stands as before"
     for joint in run.structure.moving:
         path = f"initial.{joint.name}.q"
