@@ -14,7 +14,6 @@ from io import BytesIO
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
-from ic.printing.textmate import grammar
 from met.host.files import open_regular
 
 FOLDER = Path(__file__).parent / "vscode"
@@ -35,7 +34,6 @@ def package() -> dict[str, object]:
 def files() -> dict[str, bytes]:
     """The files of a .vsix, by their names in it."""
     found = {f"extension/{path.name}": path.read_bytes() for path in sorted(FOLDER.iterdir()) if path.is_file()}
-    found["extension/met.tmLanguage.json"] = (json.dumps(grammar(), indent=2) + "\n").encode()
     return {
         MANIFEST: _manifest(package()).encode(),
         "[Content_Types].xml": _content_types().encode(),

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import textmate
 
 import ic
 from ic.formatting.rows import rows
 from ic.meaning.expressions.evaluate import FUNCTIONS
-from ic.printing import textmate
 from ic.text.lexer import NUMBERS, Text
 from met import units
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import textmate
 
 import ic
-from ic.printing import textmate
 from met import cli
 
 ROOT = Path(__file__).parents[2]
@@ -23,7 +23,7 @@ GRAMMAR: dict[str, Any] = json.loads((FOLDER / "met.tmLanguage.json").read_text(
 
 def test_the_files_are_up_to_date() -> None:
     for name, text in textmate.texts().items():
-        assert (FOLDER / name).read_bytes() == text, "write them anew: python -m ic.printing.textmate"
+        assert (FOLDER / name).read_bytes() == text, "write them anew: .venv/bin/python scripts/textmate.py"
     assert plistlib.loads((FOLDER / "met.tmLanguage").read_bytes()) == GRAMMAR
 
 

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from textmate import grammar
 
 from batch.cli.lsp import lsp
 from ic.editor.extension import FOLDER, files, package, vsix
 from ic.language import BLOCKS
-from ic.printing.textmate import grammar
 from met import cli
 from met.host import interpreter
 

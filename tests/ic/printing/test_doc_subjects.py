@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
+import textmate
+from textmate import PARTS, STATEMENTS
 
 from ic.grammar.declared_units import UNIT
 from ic.grammar.parse import LETS
@@ -15,11 +17,10 @@ from ic.language.bodies import JOINT_KINDS
 from ic.meaning.definitions.row_tables import CSV
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
 from ic.meaning.mechanics.shapes import SHAPES
-from ic.printing import codes, textmate
+from ic.printing import codes
 from ic.printing.glossary import entries, meaning
 from ic.printing.models import KINDS
 from ic.printing.requests import SUBJECTS
-from ic.printing.textmate import PARTS, STATEMENTS
 from ic.printing.words import print_word
 from ic.sweeps.designs import DESIGNS, DISTRIBUTIONS
 from ic.text.preprocess import DIRECTIVES

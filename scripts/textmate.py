@@ -1,10 +1,10 @@
-"""The grammar of decks for editors, docs/editors/met.tmLanguage.json, from the language's own tables.
+"""Writes the grammar of decks for editors, docs/editors/met.tmLanguage.json, from the language's own tables.
 
 An editor colours what stands on a line; it knows no meaning. So a word of the language is coloured where its position
 fits: a unit behind a number, a key before `=` or `{`, a function before `(`. The expressions are those that Oniguruma
 and Python read alike.
 
-`python -m ic.printing.textmate` writes the files anew.
+    .venv/bin/python scripts/textmate.py      writes them anew, after a change of the language
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from met.plan import BASE
 from met.plan.channel import COMMAND_UNIT
 
 SCOPE = "source.met"
-FOLDER = Path(__file__).parents[2] / "docs" / "editors"
+FOLDER = Path(__file__).parents[1] / "docs" / "editors"
 NAMES = ("met.tmLanguage.json", "met.tmLanguage")
 
 STATEMENTS = (
