@@ -37,7 +37,7 @@ def checkout() -> Iterator[Path]:
     directory.chmod(0o755)
     for name in ("scripts", "met", "ic", "batch", "hw"):
         shutil.copytree(ROOT / name, directory / name, ignore=shutil.ignore_patterns("__pycache__"))
-    for name in (*LOCKS, "met_arm.py", "setup.cfg", "pyproject.toml", "LICENSE", "README.md"):
+    for name in (*LOCKS, "met_arm.py", "met_conformance.py", "setup.cfg", "pyproject.toml", "LICENSE", "README.md"):
         shutil.copy(ROOT / name, directory)
     yield directory
     shutil.rmtree(directory)

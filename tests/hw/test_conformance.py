@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Iterator
 
 import pytest
 
-from hw import conformance
+import met_conformance as conformance
 from hw.bed import BedDriver
 from hw.beds import emulated
 from hw.beds.emulated import EmulatedBed
@@ -83,3 +84,9 @@ class TestFreeRunningOnAPty(conformance.FreeRunning, conformance.Simulated, OfDe
         self.device = Device(lock_step=False)
         with SerialBed(on_pty(self.device), period=self.period) as bed:
             yield bed
+
+
+def test_the_old_name_of_these_tests_works_with_a_warning() -> None:
+    with pytest.warns(DeprecationWarning, match="`hw.conformance` is now `met_conformance`"):
+        old = importlib.import_module("hw.conformance")
+    assert all(getattr(old, name) is getattr(conformance, name) for name in old.__all__)

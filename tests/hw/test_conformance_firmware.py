@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from hw import conformance
+import met_conformance as conformance
 from hw.bed import BedDriver
 from hw.beds.serial_line import SerialBed
 from hw.boards.build import Config, build, qemu

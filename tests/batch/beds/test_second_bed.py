@@ -16,7 +16,8 @@ import pytest
 
 import batch
 import ic
-from hw import conformance, drivers
+import met_conformance as conformance
+from hw import drivers
 from hw.bed import BedDriver
 from hw.beds import PORTS
 from hw.ports import Opening, Port, PortKind

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from hw import conformance
+import met_conformance as conformance
 from hw.bed import About, BedDriver, BedSample, BedState
 from hw.beds.can_bed import CanBed
 from hw.drives import DIALECTS

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import pytest
 
-from hw import conformance
+import met_conformance as conformance
 from hw.bed import BedDriver
 from hw.boards.pico import pico_image, pico_simulation
 from hw.boards.pico_bench import pico_bench
