@@ -11,8 +11,8 @@ import struct
 import zlib
 from pathlib import Path
 
-from hw.boards.build import Config, build
-from hw.boards.pico_bench import PicoBench, lock_step_wiring, wiring_c
+from hw.boards.build import build
+from hw.boards.pico_bench import PicoBench, wiring_c
 
 FLASH, RAM = 0x1000_0000, 0x2000_0000
 FLASH_BYTES = 2 << 20
@@ -28,12 +28,6 @@ _FAMILY, _MAGIC, _END, _HAS_FAMILY, _PAYLOAD = 0xE48B_FF56, (0x0A32_4655, 0x9E5D
 def pico_image(bench: PicoBench) -> bytes:
     """The flash of a Pico for a bench, from its first byte on. Problem E411: no compiler, or it does not build it."""
     return flash_of(build("pico", bench.config, texts={"wiring.c": wiring_c(bench.wiring)}))
-
-
-def pico_simulation(config: Config, plant_c: str) -> bytes:
-    """The image with a simulated plant in place of pins, for an emulator of the chip. plant_c: as for
-    hw.boards.build.build"""
-    return flash_of(build("pico", config, plant_c, texts={"wiring.c": wiring_c(lock_step_wiring(config.tick_hz))}))
 
 
 def flash_of(elf: Path) -> bytes:

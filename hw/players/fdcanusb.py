@@ -1,25 +1,21 @@
-"""An fdcanusb, as its maker's description has it, and two ends of it: in a simulated time, and on a pseudo-terminal.
+"""An fdcanusb, as its maker's description has it, and its bus's end on a pseudo-terminal.
 
 PlayedFdcanusb       the adapter: takes bytes of its line, and says others
-PlayedFdcanusbLine   the host's end of its line, the bus behind it being a `PlayedLine`
 PlayedFdcanusbPort   the bus's end of it, for `play`, its line being a pseudo-terminal
 """
 
 from __future__ import annotations
 
-import heapq
-import itertools
 import select
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from hw.drives.bench_file import FDCANUSB, SERIAL
 from hw.drives.bus import open_bus
 from hw.drives.frames import CanFrame, CanLine
 from hw.players.odrive_ascii import PlayedOdrivePorts
-from hw.players.player import PlayedLine
 from hw.players.terminal import Terminal
 
 
@@ -78,65 +74,6 @@ class PlayedFdcanusb:
         number = number.rjust(len(number) + len(number) % 2, "0")
         flags = (("e", "E")[frame.extended], ("b", "B")[frame.fd], ("f", "F")[frame.fd], ("r", "R")[frame.remote])
         return f"rcv {number} {frame.data.hex().upper()} {' '.join(flags)} x-1\r\n".encode()
-
-
-SpoilText = Callable[[bytes, bool], list[tuple[float, bytes]]]
-"""A function (a line with its end, whether it comes from the adapter) -> the bytes that arrive in its place, with
-delays in s."""
-
-
-def unspoiled_text(text: bytes, from_adapter: bool) -> list[tuple[float, bytes]]:
-    return [(0.0, text)]
-
-
-class PlayedFdcanusbLine:
-    """The host's end of an adapter's line, whose bus is simulated: bytes in the time of that bus. What is late holds up
-    what comes after it, as a stream does.
-
-    spoil  what becomes of each line of text on its way
-    """
-
-    def __init__(self, bus: PlayedLine, spoil: SpoilText = unspoiled_text) -> None:
-        self.bus, self.spoil, self.adapter = bus, spoil, PlayedFdcanusb()
-        self._waiting: list[tuple[float, int, bytes]] = []
-        self._order, self._last = itertools.count(), 0.0
-
-    @property
-    def closed(self) -> bool:
-        return self.bus.closed
-
-    def now(self) -> float:
-        return self.bus.now()
-
-    def send(self, frame: bytes) -> None:
-        for _, data in self.spoil(frame, False):
-            frames, said = self.adapter.hears(data)
-            for each in frames:
-                self.bus.send(each)
-            self._put(said)
-
-    def receive(self, until: float) -> bytes:
-        while True:
-            if self._waiting and self._waiting[0][0] <= self.now():
-                return heapq.heappop(self._waiting)[2]
-            first = self._waiting[0][0] if self._waiting else until
-            frame = self.bus.receive(min(first, until))
-            if frame is not None:
-                self._put(self.adapter.says(frame))
-            elif self.now() >= until:
-                return b""
-
-    def sleep(self, seconds: float) -> None:
-        self.bus.sleep(seconds)
-
-    def close(self) -> None:
-        self.bus.close()
-
-    def _put(self, said: bytes) -> None:
-        for text in said.splitlines(keepends=True):
-            for later, data in self.spoil(text, True):
-                self._last = max(self._last, self.now() + later)
-                heapq.heappush(self._waiting, (self._last, next(self._order), data))
 
 
 class PlayedFdcanusbPort:

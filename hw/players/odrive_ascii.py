@@ -1,8 +1,6 @@
-"""An ODrive's axis as firmware 0.6 has it on a serial line, and two ends of two such lines: in a simulated time, and on
-pseudo-terminals.
+"""An ODrive's axis as firmware 0.6 has it on a serial line, and two such lines as pseudo-terminals.
 
 PlayedOdriveAscii   the drive: takes the bytes of its line, as they are cut, and answers lines
-PlayedOdriveLines   the host's end of both lines, in a simulated time
 PlayedOdrivePorts   the drives' end of them, for `play`, the lines being pseudo-terminals
 
 Commands alone feed its watchdog. It writes six decimals, as the sources of 0.5 do.
@@ -10,7 +8,6 @@ Commands alone feed its watchdog. It writes six decimals, as the sources of 0.5 
 
 from __future__ import annotations
 
-import heapq
 import math
 import select
 import time
@@ -19,14 +16,11 @@ from typing import Any
 
 from hw.drives.frames import CanFrame
 from hw.players.odrive import PlayedOdrive
-from hw.players.player import PlayedBench, PlayedLine, Spoil, unspoiled
 from hw.players.terminal import Terminal
 
 BUFFER = 256
 """Bytes of a line, of which no drive takes more."""
 
-USB = 2.5e-4
-"""Time that bytes are played to take one way, s. What an ODrive's take was not measured."""
 
 UNKNOWN = "invalid property"
 
@@ -145,21 +139,6 @@ def _float(text: str) -> float:
         return float(text)
     except ValueError:
         return math.nan
-
-
-class PlayedOdriveLines(PlayedLine):
-    """The host's end of two drives' lines in a time of their own: each line keeps its order both ways, so that what is
-    late holds up what comes after it."""
-
-    def __init__(self, bench: PlayedBench, spoil: Spoil = unspoiled) -> None:
-        super().__init__(bench, spoil)
-        self._last: dict[tuple[int, bool], float] = {}
-
-    def _put(self, frame: CanFrame, from_drive: bool, now: float) -> None:
-        for later, each in self.spoil(frame, from_drive):
-            way = each.id, from_drive
-            self._last[way] = max(self._last.get(way, 0.0), now + USB + later)
-            heapq.heappush(self._events, (self._last[way], next(self._order), from_drive, each))
 
 
 class PlayedOdrivePorts:

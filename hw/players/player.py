@@ -1,23 +1,15 @@
-"""Two played drives on a shaft, in a time that whoever plays them gives, and three ways to give it.
-
-PlayedLine    in this process and in no time at all: the bus is simulated with them, bit times and all
-play(...)     in real time, on a bus of python-can: `virtual` within a process, `udp_multicast` or vcan between two
-python -m hw.players BENCH.toml    the same as a program
-"""
+"""Two played drives on a shaft, in a time that whoever plays them gives. `play` gives it real time, on a bus of
+python-can: `virtual` within a process, `udp_multicast` or vcan between two; `python -m hw.players BENCH.toml` is the
+same as a program."""
 
 from __future__ import annotations
 
-import heapq
-import itertools
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from hw.drives.frames import CanFrame, CanLine, on_bus
+from hw.drives.frames import CanFrame, CanLine
 from hw.players.shaft import OFF, Output, PlayedShaft
-
-TURNAROUND = 5e-5
-"""Time in which a played drive answers, s."""
 
 
 class PlayedDrive(ABC):
@@ -84,69 +76,6 @@ class PlayedBench:
     def off(self) -> bool:
         """True where no drive drives."""
         return all(drive.output == OFF or drive.output.kind == "short" for drive in self.drives)
-
-
-Spoil = Callable[[CanFrame, bool], list[tuple[float, CanFrame]]]
-"""A function (frame, whether it comes from a drive) -> the frames that arrive in its place, with delays in s."""
-
-
-def unspoiled(frame: CanFrame, from_drive: bool) -> list[tuple[float, CanFrame]]:
-    return [(0.0, frame)]
-
-
-class PlayedLine:
-    """A bus with two played drives on it, as a line with a clock of its own: time goes on where the host waits for it.
-
-    spoil  what becomes of each frame on its way
-    """
-
-    def __init__(self, bench: PlayedBench, spoil: Spoil = unspoiled) -> None:
-        self.bench, self.spoil = bench, spoil
-        self._now = self._free = bench.ticked
-        self._order = itertools.count()
-        self._events: list[tuple[float, int, bool, CanFrame]] = []
-        self.closed = False
-
-    def now(self) -> float:
-        return self._now
-
-    def send(self, frame: CanFrame) -> None:
-        self._put(frame, False, self._now)
-
-    def receive(self, until: float) -> CanFrame | None:
-        until = max(until, self._now)
-        while True:
-            due = self.bench.ticked + self.bench.shaft.period
-            if self._events and self._events[0][0] <= min(due, until):
-                time, _, from_drive, frame = heapq.heappop(self._events)
-                self._now = max(self._now, time)
-                if from_drive:
-                    return CanFrame(frame.id, frame.data, frame.extended, frame.remote, frame.fd, time)
-                for answer in self.bench.receive(frame, time):
-                    self._put(answer, True, time + TURNAROUND)
-            elif due <= until:
-                for frame in self.bench.tick():
-                    self._put(frame, True, due)
-            else:
-                self._now = until
-                return None
-
-    def sleep(self, seconds: float) -> None:
-        """Let time pass; frames of that time stay on the line."""
-        end, kept = self._now + seconds, []
-        while (frame := self.receive(end)) is not None:
-            kept.append(frame)
-        for frame in kept:
-            heapq.heappush(self._events, (frame.time, next(self._order), True, frame))
-
-    def close(self) -> None:
-        self.closed = True
-
-    def _put(self, frame: CanFrame, from_drive: bool, now: float) -> None:
-        for later, each in self.spoil(frame, from_drive):
-            start = max(self._free, now)
-            self._free = start + on_bus(each)
-            heapq.heappush(self._events, (self._free + later, next(self._order), from_drive, each))
 
 
 def play(line: CanLine, bench: PlayedBench, stopped: Callable[[], bool]) -> None:

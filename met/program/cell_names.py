@@ -6,8 +6,6 @@ here are the engine's own: a colon keeps their names apart from paths.
 
 from __future__ import annotations
 
-import re
-
 from met.frozen import frozen
 
 
@@ -26,10 +24,6 @@ class CellFamily:
 
     def __call__(self, *of: object) -> str:
         return self.pattern.format(*of)
-
-    def matches(self, name: str) -> bool:
-        """True for the name of a cell of this family."""
-        return re.fullmatch(re.escape(self.pattern).replace(r"\{\}", ".+"), name) is not None
 
 
 # Friction, by joint or by a state of its servo.
@@ -91,12 +85,3 @@ QUEUED = CellFamily("{}:queue.{}.{}", "voltage or current asked so many ticks ag
 SENT = CellFamily("{}:sent.{}", "voltage or current that goes over the wire now", "V; A")
 RATE_WANTED = CellFamily("{}:rate_wanted", "rate of the joint that a drive's own rate loop is given", "rad/s (m/s)")
 LOOP_INTEGRAL = CellFamily("{}:loop.integral", "integral of a drive's own rate loop, as it is believed", "rad")
-
-FAMILIES = tuple(each for each in list(globals().values()) if isinstance(each, CellFamily))
-"""All families, in the order above."""
-
-
-def family_of(name: str) -> CellFamily | None:
-    """The family of a cell: among those whose pattern matches its name, the most specific."""
-    found = [family for family in FAMILIES if family.matches(name)]
-    return max(found, key=lambda family: len(family.pattern.replace("{}", "")), default=None)

@@ -67,16 +67,6 @@ class PeriodMap:
     locked: tuple[str, ...] = ()
 
 
-def at_instant(program: PeriodProgram, case: int, tick: int) -> Flow:
-    """A case at an instant, from which a period goes on, as in the run. Raises Problem D371."""
-    from met import run as engine
-
-    (flow,) = at_instants(program, engine.inputs(program.experiment, np.array([case])), tick)
-    if flow is None:
-        raise failed(program.experiment, tick)
-    return flow
-
-
 def at_instants(program: PeriodProgram, given: np.ndarray, tick: int, threads: int | None = None) -> list[Flow | None]:
     """Cases at an instant; None for one that has failed before. given: the program's inputs, [case, input]."""
     prepared = program.prepared

@@ -30,7 +30,7 @@ from hw.driving.driven import LANES, CaseKernel
 from hw.players import PLAYED
 from hw.players.cia402 import PlayedCia402
 from hw.players.odrive import PlayedOdrive, endpoints
-from hw.players.player import PlayedBench, PlayedLine
+from hw.players.player import PlayedBench
 from hw.players.shaft import Output
 from hw.recording.records import ANSWERED, LAYOUT
 from met import models
@@ -38,6 +38,7 @@ from met import run as engine
 from met.plan import Experiment
 from met.plant import Plant, bed_values
 from tests.hw.drives.played import BUS, MORE, host_line, line_of, on_serial_lines
+from tests.hw.drives.simulated_lines import PlayedLine
 
 SLOW = 0.03
 KT, KT_LOAD, RESISTANCE, INERTIA = 0.061, 0.072, 2.05, 6.38e-5

@@ -24,11 +24,11 @@ from hw.drives.bench_file import two_drives
 from hw.drives.frames import CanFrame
 from hw.drives.odrive_lines import summed
 from hw.players.odrive import FIRST, PROPERTIES
-from hw.players.player import PlayedLine
 from met.diagnostic import Problem
 from met.frozen import frozen
 from met.substitution.bed import DriveCommand
 from tests.hw.drives.played import bench_file, host_of, line_of, period_of, played_bench
+from tests.hw.drives.simulated_lines import PlayedLine
 from tests.hw.drives.test_faults import DIALECTS
 
 WAYS = ("rate", "torque", "arm", "disarm", "limit")

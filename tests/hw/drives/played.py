@@ -16,10 +16,10 @@ from hw.drives.frames import CanLine
 from hw.drives.odrive_lines import OdriveLines
 from hw.players import PLAYED
 from hw.players.odrive import endpoints
-from hw.players.odrive_ascii import PlayedOdriveLines
-from hw.players.player import PlayedBench, PlayedLine, Spoil, unspoiled
+from hw.players.player import PlayedBench
 from hw.players.shaft import InertiaShaft
 from met.substitution.bed import DriveCommand
+from tests.hw.drives.simulated_lines import PlayedLine, PlayedOdriveLines, Spoil, unspoiled
 
 KT, RESISTANCE, INERTIA = 0.06, 1.5, 1.3e-4
 

@@ -10,9 +10,10 @@ import pytest
 from hw.drives.bench_file import two_drives
 from hw.drives.frames import CanFrame
 from hw.players.damiao import PlayedDamiao
-from hw.players.player import PlayedBench, PlayedLine
+from hw.players.player import PlayedBench
 from hw.players.robstride import PlayedRobstride
 from tests.hw.drives.played import bench_file, host_of, played_bench
+from tests.hw.drives.simulated_lines import PlayedLine
 
 STEP = 1e-3
 """N m, more than half a step of either dialect's torque."""

@@ -14,9 +14,9 @@ from hw.drives.bench_file import two_drives
 from hw.drives.drive import OWED, REMEMBERED, CanDrive
 from hw.drives.frames import CanFrame
 from hw.drives.odrive import ESTIMATES, OdriveDrive
-from hw.players.player import PlayedLine
 from met.substitution.bed import DriveCommand
 from tests.hw.drives.played import bench_file, host_of, line_of, period_of, played_bench
+from tests.hw.drives.simulated_lines import PlayedLine
 from tests.hw.drives.spoiling import Spoilt, Tally, campaign
 
 LATE = [5e-4 * n for n in range(1, 11)]

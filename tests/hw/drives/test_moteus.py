@@ -15,9 +15,10 @@ from hw.drives.bench_file import two_drives
 from hw.drives.frames import CanFrame
 from hw.drives.moteus import MoteusDrive, answered, asked_for, number, padded, written
 from hw.players.moteus import PlayedMoteus
-from hw.players.player import PlayedBench, PlayedLine
+from hw.players.player import PlayedBench
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import PlayedConformance, bench_file, go, host_of, played_bench
+from tests.hw.drives.simulated_lines import PlayedLine
 
 
 class TestMoteus(PlayedConformance):

@@ -22,6 +22,9 @@ from typing import Any
 import pytest
 
 from hw.beds.wire import WireBed
+from hw.boards.build import Config, build
+from hw.boards.pico import flash_of
+from hw.boards.pico_bench import lock_step_wiring, wiring_c
 from hw.line import BedLine
 
 HERE = Path(__file__).parent
@@ -134,3 +137,9 @@ class PicoBed(WireBed):
 
     def open(self) -> BedLine:
         return EmulatedLine(self.emulator)
+
+
+def pico_simulation(config: Config, plant_c: str) -> bytes:
+    """The image with a simulated plant in place of pins, for an emulator of the chip. plant_c: as for
+    hw.boards.build.build"""
+    return flash_of(build("pico", config, plant_c, texts={"wiring.c": wiring_c(lock_step_wiring(config.tick_hz))}))

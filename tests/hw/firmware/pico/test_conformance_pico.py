@@ -12,10 +12,10 @@ import pytest
 
 import met_conformance as conformance
 from hw.bed import BedDriver
-from hw.boards.pico import pico_image, pico_simulation
+from hw.boards.pico import pico_image
 from hw.boards.pico_bench import pico_bench
 from tests.hw.firmware.line import PLANT, STEPPED
-from tests.hw.firmware.pico.emulated import Emulator, PicoBed, skip_without_tools
+from tests.hw.firmware.pico.emulated import Emulator, PicoBed, pico_simulation, skip_without_tools
 
 pytestmark = [pytest.mark.firmware, pytest.mark.node]
 

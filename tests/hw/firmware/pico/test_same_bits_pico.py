@@ -6,11 +6,10 @@ from typing import Any
 
 import pytest
 
-from hw.boards.pico import pico_simulation
 from met.plant import plant_c
 from tests.hw.firmware import wire
 from tests.hw.firmware.line import PLANT, STEPPED, Line, behind_a_terminal
-from tests.hw.firmware.pico.emulated import EmulatedLine, Emulator, skip_without_tools
+from tests.hw.firmware.pico.emulated import EmulatedLine, Emulator, pico_simulation, skip_without_tools
 from tests.hw.firmware.test_arm import moved
 from tests.substitution.hybrid import compiled, deck
 

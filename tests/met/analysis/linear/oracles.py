@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 import ic
+from met import run as engine
 from met.analysis.linear.flow import Flow
-from met.analysis.linear.jacobian import PeriodMap, at_instant
+from met.analysis.linear.jacobian import PeriodMap, at_instants, failed
 from met.analysis.linear.period import PeriodProgram, is_converter
 from met.backends.reference.interpret import InterpretedBlock
 from met.plan import Experiment
@@ -24,6 +25,14 @@ from met.trace.program import Every, Unless0
 from met.trace.recording import Branch, RecordedControl, RecordSection
 
 DECKS = Path(ic.__file__).parent / "decks"
+
+
+def at_instant(program: PeriodProgram, case: int, tick: int) -> Flow:
+    """A case at an instant, from which a period goes on, as in the run. Raises Problem D371."""
+    (flow,) = at_instants(program, engine.inputs(program.experiment, np.array([case])), tick)
+    if flow is None:
+        raise failed(program.experiment, tick)
+    return flow
 
 
 @functools.cache

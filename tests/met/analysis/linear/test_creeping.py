@@ -8,7 +8,7 @@ import ic
 from batch.terminal.linear import as_data, linear_lines
 from met.analysis.linear.answers import LinearQuestion
 from met.analysis.linear.creeping import CreepingRate, creeping
-from met.analysis.linear.jacobian import at_instant
+from tests.met.analysis.linear.oracles import at_instant
 
 DECK = """\
 #include <servos/rigid_gearbox.ic>

@@ -10,13 +10,14 @@ import pytest
 
 from met import models
 from met.analysis.linear.answers import linear
-from met.analysis.linear.jacobian import PeriodMap, at_instant, period_map
+from met.analysis.linear.jacobian import PeriodMap, period_map
 from met.analysis.linear.period import PeriodProgram
 from met.diagnostic import Problem
 from met.plan import Experiment
 from met.plan.linear_signals import input_signals
 from tests.ic.small_decks import experiment
 from tests.met.analysis.linear.oracles import (
+    at_instant,
     by_complex_step,
     by_differences,
     near,

@@ -12,10 +12,10 @@ from met import run as engine
 from met.analysis.linear import metrics
 from met.analysis.linear.answers import LinearQuestion, of_deck
 from met.analysis.linear.flow import Flow
-from met.analysis.linear.jacobian import at_instant
 from met.analysis.linear.standing import settled
 from met.diagnostic import Problem
 from tests.ic.small_decks import experiment
+from tests.met.analysis.linear.oracles import at_instant
 
 ARM = """\
 arm pair {

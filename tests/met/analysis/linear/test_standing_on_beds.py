@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from met.analysis.linear.answers import of_deck
-from met.analysis.linear.jacobian import at_instant, period_map
+from met.analysis.linear.jacobian import period_map
 from met.analysis.linear.standing import settled
 from met.diagnostic import Problem
 from tests.ic.small_decks import experiment
+from tests.met.analysis.linear.oracles import at_instant
 
 DECK = """\
 #include <servos/rigid_gearbox.ic>
