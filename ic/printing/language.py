@@ -1,22 +1,13 @@
-"""Declared blocks of the deck language as pages of `met doc` and tables of docs/deck.md.
-
-`python -m ic.printing.language` writes the tables of docs/deck.md anew.
-"""
+"""Declared blocks of the deck language as pages of `met doc`."""
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
 from typing import Any
 
-from ic.language import BLOCKS, BlockDeclaration, Entry
+from ic.language import BlockDeclaration, Entry
 from ic.printing.models import range_
-from ic.printing.page import Page, Table, table_in_markdown
+from ic.printing.page import Page, Table
 from ic.text.complaints import with_article
-
-PAGE = Path(__file__).parents[2] / "docs" / "deck.md"
-MARK = "<!-- table of {} -->"
-"""The comment above a generated table of docs/deck.md, with the block's name."""
 
 
 def block_page(block: BlockDeclaration) -> Page:
@@ -72,15 +63,6 @@ def _entry_record(entry: Entry) -> dict[str, Any]:
     }
 
 
-def table(block: BlockDeclaration) -> list[str]:
-    """The block's entries as a table in Markdown."""
-    by_key = block.within and not block.named and not block.statements
-    rows = [(each.name if by_key else each.written, each.doc, each.default) for each in block.entries]
-    head = (f"{'key' if by_key else 'entry'} of {with_article(block.name)}", "is", "default")
-    free = [f"| others | {block.free} | |"] if block.free else []
-    return [*table_in_markdown(Table(head=head, rows=rows)), *free]
-
-
 def type_of(entry: Entry) -> str:
     """The type of an entry's value, in words: `number, kg`, `3 numbers, m`, `on or off`; "" where it has no value."""
     wanted = entry.parameter
@@ -100,22 +82,3 @@ def _path(entry: Entry) -> str:
 
 def _varies(entry: Entry) -> str:
     return "a number" if entry.varies == "number" else "a choice; each choice makes a program of its own"
-
-
-def with_tables(text: str) -> str:
-    """The page with each table that has such a mark generated anew. Raises KeyError where a mark names no block."""
-
-    def made(match: re.Match[str]) -> str:
-        return f"{match[1]}\n" + "".join(f"{line}\n" for line in table(BLOCKS[match[2]]))
-
-    mark = re.escape(MARK).replace(r"\{\}", r"(\w+)")
-    return re.sub(rf"({mark})\n(?:\|.*\n)*", made, text)
-
-
-def main() -> None:
-    PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
-    print(f"wrote {PAGE}")
-
-
-if __name__ == "__main__":
-    main()

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 
+from deck_tables import PAGE, with_tables
+
 from ic.language import BLOCKS
-from ic.printing.language import PAGE, with_tables
 
 
 def test_the_tables_of_the_page_are_up_to_date() -> None:
     text = PAGE.read_text(encoding="utf-8")
-    assert with_tables(text) == text, "run `python -m ic.printing.language`"
+    assert with_tables(text) == text, "run `.venv/bin/python scripts/deck_tables.py`"
 
 
 def test_each_large_block_has_its_table() -> None:
