@@ -6,19 +6,18 @@ what a run sets or varies, a joint that uses it has the same values under its ow
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 from ic.grammar.syntax import Name
 from ic.meaning.definitions.merge import Item
 from ic.meaning.definitions.resolve import Definition
-from ic.meaning.expressions.names import FoundNames
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters.models import word_of
 from ic.meaning.parameters.not_sweepable import NotSweepable
-from ic.meaning.parameters.owner import Settled
 from ic.meaning.parameters.scope import Scope
+from ic.meaning.parameters.shared import SharedEntries
 from ic.text.complaints import Complaints
 from met.frozen import frozen
 from met.plan import Joint
@@ -35,18 +34,12 @@ there is a mistake."""
 class SharedServo:
     """A servo in which nothing is wrong, on the joint `ANY`.
 
-    use  as `Resolve` gives it
-    parameters, auxiliary, known, not_sweepable  as a scope has them that holds nothing but the servo
-    names  what the `let`s that it is made of are worth
+    use    as `Resolve` gives it;  entries: of a scope
     heads  of paths by which a run or a sweep may change it, besides its joint's: the definition, and those it is like
     """
 
     use: Any
-    parameters: Mapping[str, Settled]
-    auxiliary: Mapping[str, Settled]
-    known: Mapping[str, list[str]]
-    not_sweepable: Mapping[str, NotSweepable]
-    names: FoundNames
+    entries: SharedEntries
     heads: tuple[str, ...]
 
 
@@ -60,33 +53,26 @@ def use_shared(scope: Scope, item: Item, arm: ResolvedArm, resolve: Resolve) -> 
     if shared is None or not _is_as_written(scope, shared, item.name):
         return resolve(scope, item, arm)
 
-    here = _renamed(scope, shared, kind or "", item.name)
-    scope.parameters |= here.parameters
-    scope.auxiliary |= here.auxiliary
-    for path, parameters in here.known.items():
-        scope.known.setdefault(path, []).extend(parameters)
-    for path, why in here.not_sweepable.items():
-        scope.not_sweepable.setdefault(path, why)
-    scope.names.take_over(shared.names)
+    _renamed(scope, shared, kind or "", item.name).enter(scope)
     return replace(shared.use, joint=item.name, place=item.place, parameters=dict(shared.use.parameters or {}))
 
 
-def _renamed(scope: Scope, shared: SharedServo, kind: str, joint: str) -> SharedServo:
-    """The servo with the paths that it has on a joint of this kind and name, whichever run has it there."""
-    memo, key = scope.definitions.memo, ("servo on joint", shared.heads[0], kind, joint)
+def _renamed(scope: Scope, shared: SharedServo, kind: str, joint: str) -> SharedEntries:
+    """The servo's entries with their paths on a joint of this kind and name, whichever run has it there."""
+    entries, memo, key = shared.entries, scope.definitions.memo, ("servo on joint", shared.heads[0], kind, joint)
 
     def on_joint(path: str) -> str:
         return path.replace(ANY, joint)
 
     if key not in memo:
         memo[key] = replace(
-            shared,
-            parameters={on_joint(path): settled for path, settled in shared.parameters.items()},
-            auxiliary={on_joint(path): settled for path, settled in shared.auxiliary.items()},
-            known={on_joint(path): list(map(on_joint, parameters)) for path, parameters in shared.known.items()},
-            not_sweepable={on_joint(path): _on_joint(why, on_joint) for path, why in shared.not_sweepable.items()},
+            entries,
+            parameters={on_joint(path): settled for path, settled in entries.parameters.items()},
+            auxiliary={on_joint(path): settled for path, settled in entries.auxiliary.items()},
+            known={on_joint(path): list(map(on_joint, parameters)) for path, parameters in entries.known.items()},
+            not_sweepable={on_joint(path): _on_joint(why, on_joint) for path, why in entries.not_sweepable.items()},
         )
-    found: SharedServo = memo[key]
+    found: SharedEntries = memo[key]
     return found
 
 
@@ -118,30 +104,19 @@ def _alone(scope: Scope, item: Item, kind: str, definition: Definition, resolve:
     use = None
     with complaints.gather():
         use = resolve(alone, replace(item, name=ANY), arm)
-    plain = not (alone.notes or alone.targets or alone.removed or alone.joint_kinds)
-    if use is None or use.parameters is None or not (plain and complaints.is_clear and alone.checks.is_clear):
+    entries = SharedEntries.of(alone)
+    if use is None or use.parameters is None or entries is None or not complaints.is_clear:
         return None
     settled = (*alone.parameters.values(), *alone.auxiliary.values())
     if any(ANY in text for each in settled for text in (each.unit, each.doc, each.origin.note)):
         return None
     heads = (definition.name, *scope.definitions.homes(definition))
-    return SharedServo(
-        use, alone.parameters, alone.auxiliary, alone.known, alone.not_sweepable, alone.names.found, heads
-    )
+    return SharedServo(use, entries, heads)
 
 
 def _is_as_written(scope: Scope, shared: SharedServo, joint: str) -> bool:
     """True where neither a sweep nor a setting of the run or from outside changes a number of the servo, or a name in
     one."""
-    given = {*scope.varied, *scope.settings}
-    if not given:
-        return True
-    named = shared.names.named
     heads = tuple(f"{head}." for head in (joint, *shared.heads))
-    lets = scope.definitions.lets
-    return (
-        given.isdisjoint(named)
-        and not any(f"{path}.".startswith(heads) for path in given)
-        and not any("." in name and name not in lets for name in named)
-        and not any(path.partition(".")[0] in named for path in given)
-    )
+    changed = any(f"{path}.".startswith(heads) for path in (*scope.varied, *scope.settings))
+    return not changed and shared.entries.has_names_as_written(scope)

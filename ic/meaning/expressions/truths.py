@@ -38,6 +38,20 @@ class NumberComparison:
     formulas: Formulas
 
 
+def need_one_dimension(comparison: Binary, left: Value, right: Value) -> None:
+    """Raise Problem D063 where the two sides of a comparison have different dimensions."""
+    if units.same(left.dimension, right.dimension):
+        return
+    helps = Help("both must be of one dimension")
+    for one, other in ((left, right), (right, left)):
+        if one.bare and one.dimension == PURE and not isinstance(one.number, Scalar):
+            told = f"{units.ONE.decimal(one.number)} {units.text(other.dimension)}"
+            helps = write(told, at=one.place, where="value")
+    message = f"`{comparison.operator}` of {in_words(left)} and {in_words(right)}"
+    also = [Label(side.place, in_words(side)) for side in (left, right)]
+    raise Problem(error("D063", message, comparison.place, also=also, help=helps))
+
+
 class Truths:
     """The rows of a table in which conditions hold, piece by piece of the table.
 
@@ -114,15 +128,7 @@ class Truths:
     def _comparison(self, expression: Binary) -> NumberComparison:
         """A parsed comparison of numbers. Raises Problem where its sides cannot be compared."""
         left, right = (evaluate_number(side, self.find) for side in (expression.left, expression.right))
-        if not units.same(left.dimension, right.dimension):
-            helps = Help("both must be of one dimension")
-            for one, other in ((left, right), (right, left)):
-                if one.bare and one.dimension == PURE and not isinstance(one.number, Scalar):
-                    told = f"{units.ONE.decimal(one.number)} {units.text(other.dimension)}"
-                    helps = write(told, at=one.place, where="value")
-            message = f"`{expression.operator}` of {in_words(left)} and {in_words(right)}"
-            also = [Label(side.place, in_words(side)) for side in (left, right)]
-            raise Problem(error("D063", message, expression.place, also=also, help=helps))
+        need_one_dimension(expression, left, right)
         if left.hertz is not None and right.hertz is not None and left.hertz != right.hertz:
             message = f"`{expression.operator}` of Hz and 1/s, which are taken for one"
             helps_hertz = [

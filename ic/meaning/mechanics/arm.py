@@ -13,7 +13,6 @@ from ic.language import HEADS
 from ic.language.bodies import ARM, AT, AXIS, JOINT, JOINT_KINDS, JOINT_LIMITS, LINK, LUMPED, Q_MIN, RPY
 from ic.meaning.definitions.merge import Item, MergedBlock, no_block, with_meant_names
 from ic.meaning.definitions.resolve import Definition, Definitions
-from ic.meaning.expressions.names import FoundNames
 from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.dh import use_dh
 from ic.meaning.mechanics.foreign import how_to_close, refuse_foreign_joint
@@ -21,10 +20,10 @@ from ic.meaning.mechanics.matter import use_matter
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.addresses import in_arm
 from ic.meaning.parameters.models import check_keys, value_place, word_of
-from ic.meaning.parameters.not_sweepable import NotSweepable
-from ic.meaning.parameters.owner import Owner, Settled
+from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_relations, no_direction
 from ic.meaning.parameters.scope import Scope
+from ic.meaning.parameters.shared import SharedEntries
 from ic.text.complaints import Complaints, known_words, where_it_belongs
 from met.diagnostic import Label, Place, did_you_mean, leave_out, meant, write
 from met.frozen import frozen
@@ -60,18 +59,10 @@ class ResolvedArm:
 
 @frozen
 class SharedPart:
-    """A link or a joint without mistakes, resolved without a sweep.
-
-    parameters, auxiliary, known, not_sweepable  as a scope has them that holds nothing but this part
-    names  what the `let`s that it is made of are worth
-    """
+    """A link or a joint without mistakes, resolved without a sweep, and its entries of a scope."""
 
     thing: Link | Joint
-    parameters: Mapping[str, Settled]
-    auxiliary: Mapping[str, Settled]
-    known: Mapping[str, list[str]]
-    not_sweepable: Mapping[str, NotSweepable]
-    names: FoundNames
+    entries: SharedEntries
 
 
 @frozen
@@ -91,7 +82,7 @@ def packed_arm(definitions: Definitions, name: str) -> bytes:
     shared = definitions.memo.get(_memo_key(name))
     if isinstance(shared, bytes):
         return shared
-    plain = shared is not None and all(part.names.is_plain for part in shared.parts)
+    plain = shared is not None and all(part.entries.names.is_plain for part in shared.parts)
     return pickle.dumps(shared, pickle.HIGHEST_PROTOCOL) if plain else b""
 
 
@@ -116,7 +107,7 @@ def resolve_arm(scope: Scope, definition: Definition) -> ResolvedArm | None:
     as_written = [_is_as_written(scope, part) for part in shared.parts]
     if all(as_written):
         for part in shared.parts:
-            _take_over(scope, part)
+            part.entries.enter(scope)
         return replace(shared.arm, free_of_errors=not scope.complaints.errors)
     those = {_name(part.thing): part for part, plain in zip(shared.parts, as_written, strict=True) if plain}
     return _resolved(scope, definition, those)
@@ -124,17 +115,6 @@ def resolve_arm(scope: Scope, definition: Definition) -> ResolvedArm | None:
 
 def _name(thing: Link | Joint) -> tuple[str, str]:
     return "link" if isinstance(thing, Link) else "joint", thing.name
-
-
-def _take_over(scope: Scope, part: SharedPart) -> None:
-    """Enter a shared part in a scope."""
-    scope.parameters |= part.parameters
-    scope.auxiliary |= part.auxiliary
-    for path, parameters in part.known.items():
-        scope.known.setdefault(path, []).extend(parameters)
-    for path, why in part.not_sweepable.items():
-        scope.not_sweepable.setdefault(path, why)
-    scope.names.take_over(part.names)
 
 
 def _shared(scope: Scope, definition: Definition) -> SharedArm | None:
@@ -162,29 +142,20 @@ def _alone(scope: Scope, definition: Definition) -> SharedArm | None:
     arm = _resolved(Scope(definitions, complaints), definition, own_scope=own_scope)
     if not arm or not complaints.is_clear:
         return None
-    for each in scopes:
-        if each.notes or each.targets or each.removed or each.joint_kinds or not each.checks.is_clear:
-            return None
     things: tuple[Link | Joint, ...] = (*arm.links, *arm.joints)
-    parts = (
-        SharedPart(thing, own.parameters, own.auxiliary, own.known, own.not_sweepable, own.names.found)
-        for thing, own in zip(things, scopes, strict=True)
-    )
+    parts = []
+    for thing, own in zip(things, scopes, strict=True):
+        entries = SharedEntries.of(own)
+        if entries is None:
+            return None
+        parts.append(SharedPart(thing, entries))
     return SharedArm(arm, tuple(parts))
 
 
 def _is_as_written(scope: Scope, shared: SharedPart) -> bool:
     """True where neither a sweep nor a setting from outside changes a number of the part, or a name in one."""
-    given = {*scope.varied, *scope.settings}
-    if not given:
-        return True
-    named = shared.names.named
-    if not given.isdisjoint(shared.known) or not given.isdisjoint(named):
-        return False
-    lets = scope.definitions.lets
-    return not any("." in name and name not in lets for name in named) and not any(
-        path.partition(".")[0] in named for path in given
-    )
+    entries = shared.entries
+    return entries.known.keys().isdisjoint((*scope.varied, *scope.settings)) and entries.has_names_as_written(scope)
 
 
 def _resolved(
@@ -215,7 +186,7 @@ def _resolved(
     def part(item: Item) -> Link | Joint | None:
         known = shared.get((item.kind, item.name))
         if known is not None:
-            _take_over(scope, known)
+            known.entries.enter(scope)
             return known.thing
         there = scope if own_scope is None else own_scope()
         return resolve_link(there, item, homes) if item.kind == "link" else _joint(there, item, homes, block, ends)

@@ -16,11 +16,12 @@ from ic.grammar.syntax import Binary, Call, Expression, Name, Unary, Word, child
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.evaluate import evaluate_number
 from ic.meaning.expressions.quantity import Value, ValueList, in_words
+from ic.meaning.expressions.truths import need_one_dimension
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.record import not_one, of_lost
 from ic.text.complaints import known_words
 from met import models, units
-from met.diagnostic import Help, Label, Place, Problem, error, write
+from met.diagnostic import Label, Place, Problem, error
 from met.frozen import frozen
 from met.metrics.metric import Metric
 from met.plan import Structure
@@ -244,15 +245,7 @@ class ChannelTable:
 
     def _comparison(self, comparison: Binary, negated: bool) -> ConditionMargin:
         left, right = (self._number(side) for side in (comparison.left, comparison.right))
-        if not units.same(left.dimension, right.dimension):
-            helps = Help("both must be of one dimension")
-            for one, other in ((left, right), (right, left)):
-                if one.bare and one.dimension == PURE and not isinstance(one.number, Scalar):
-                    told = f"{units.ONE.decimal(one.number)} {units.text(other.dimension)}"
-                    helps = write(told, at=one.place, where="value")
-            message = f"`{comparison.operator}` of {in_words(left)} and {in_words(right)}"
-            also = [Label(side.place, in_words(side)) for side in (left, right)]
-            raise Problem(error("D063", message, comparison.place, also=also, help=helps))
+        need_one_dimension(comparison, left, right)
         below = comparison.operator.startswith("<") != negated
         number = right.number - left.number if below else left.number - right.number
         return ConditionMargin(number, left.dimension, place_of(comparison))
