@@ -10,7 +10,7 @@ import numpy as np
 
 from batch.measured.log import MappedColumn, read_log
 from batch.measured.mcap_log import MeasuredSignals
-from batch.measured.paired import LARGEST, Course
+from batch.measured.paired import LARGEST, ComputedChannel
 from batch.modules.description import described_columns
 from ic.driver.given_values import GivenRun, VariedRun
 from met import run as engine
@@ -147,7 +147,7 @@ class LoggedRun:
             out[some] = self._at_instants(self._histories(own[some]))
         return out
 
-    def courses(self, values: np.ndarray) -> dict[str, Course]:
+    def courses(self, values: np.ndarray) -> dict[str, ComputedChannel]:
         """What one case computes, by channel. values: of `paths`, SI, [path]"""
         own = values[[self.paths.index(path) for path in self.used]]
         history = self._histories(own[None, :])[0]
@@ -155,7 +155,7 @@ class LoggedRun:
         for column, each in enumerate(self.columns):
             finite = np.isfinite(history[:, column])
             if finite.any():
-                courses[each["channel"]] = Course(self._times[finite], history[finite, column])
+                courses[each["channel"]] = ComputedChannel(self._times[finite], history[finite, column])
         return courses
 
     def cause(self, values: np.ndarray) -> str:

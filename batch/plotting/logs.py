@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from batch.measured.mcap_log import MeasuredSignals
-from batch.measured.paired import Course, Pair
+from batch.measured.paired import ComputedChannel, Pair
 from batch.plotting import output as places
 from batch.plotting.sheet import COLOURS, FAINT, STYLE
 from met.frozen import frozen
@@ -30,7 +30,7 @@ class MeasuredPanel:
 
 
 def panels(
-    log: MeasuredSignals, units: Mapping[str, str], courses: Mapping[str, Mapping[str, Course]]
+    log: MeasuredSignals, units: Mapping[str, str], courses: Mapping[str, Mapping[str, ComputedChannel]]
 ) -> list[MeasuredPanel]:
     """The channels of a log, at instants at which there is a computed number. courses: by what computed them, those of
     channels; units: SI, by channel"""
