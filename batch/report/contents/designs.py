@@ -48,6 +48,7 @@ def design_answer(archive: ArchiveFile, pool: Pool) -> DesignAnswer | None:
         command=command,
         notes=tuple(f"{_sentence(note)}." for note in (*answer.stability(), *answer.notes())),
         map=design_map(designs, answer.best),
+        case=next(int(pool.cases[place]) for place in pool.worst_first if designs.of_case[place] == answer.best),
     )
 
 

@@ -140,10 +140,17 @@ def _section(
         for n, group in enumerate(pool.groups[:MOST_STRUCTURES])
         if simulate and group.name in own
     }
-    drawn = _signals(pool, file, before, values, computed)
+    drawn, chosen = _signals(pool, file, before, values, computed), design_answer(file, pool)
+    if drawn is not None and before is None and chosen is not None and chosen.case is not None:
+        drawn = replace(drawn, opens=chosen.case)
     played = None
     if drawn is not None and computed:
-        first = [*drawn.shown, *(case for each in (best_cases, worst_cases) if each is not None for case in each.cases)]
+        opens = [] if drawn.opens is None else [drawn.opens]
+        first = [
+            *drawn.shown,
+            *opens,
+            *(case for each in (best_cases, worst_cases) if each is not None for case in each.cases),
+        ]
         first += [] if before is None else before.most
         played = simulation(pool, own, drawn, first, points, before)
     errors = together(map(figures, pool.groups))
@@ -155,7 +162,7 @@ def _section(
         metrics=metric_rows(pool, before, errors),
         structures=structures(pool, before),
         evidence=evidence_part(pool, archive, several=bool(only)),
-        designs=design_answer(file, pool),
+        designs=chosen,
         best=best_cases,
         worst=worst_cases,
         overview=points,

@@ -117,7 +117,9 @@ def signals(
             shown = [*changed, *shown][:1]
     said = _said(groups, len(known), len(histories), len(names), points, before is not None, again=bool(computed))
     sources = tuple(each.sources(found) for each in groups)
-    return Signals(found, joints, tuple(clocks), histories, tuple(shown), compared, said, changed, worst, sources)
+    return Signals(
+        found, joints, tuple(clocks), histories, tuple(shown), compared, said, changed, worst, compared, sources
+    )
 
 
 def _kept(pool: Pool, before: EarlierCases | None = None) -> list[tuple[int, int]]:

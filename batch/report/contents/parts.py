@@ -306,6 +306,7 @@ class DesignAnswer:
     said, command  how to run it or confirm it;  map: None where no two parameters with an order are chosen
     title, about   what the table is called, and what its numbers are
     heading, link  over all of it, and in the page's menu;  chooses: False where it is the worst case of a search
+    case           number of the design's worst case; None where no design is advised
     progress       of a search: the cases after each look at it, the best value by then, and the cases of a sweep that
                    this was tried with; none of what is none
     """
@@ -324,6 +325,7 @@ class DesignAnswer:
     link: str = "Which design"
     chooses: bool = True
     progress: tuple[tuple[int, float, int], ...] = ()
+    case: int | None = None
 
 
 # Plots
@@ -434,6 +436,7 @@ class Signals:
     most    cases that differ most from the other archive, where one is compared with;  worst  the worst of all
     middle  the case in the middle of the order, to compare the worst with; None where there are few
     said    what was left out, and how lines were thinned
+    opens   case that the arm begins with: that of the design to use, else the middle one; None: the first of `shown`
     sources of each structure, by its place in the pool, the channel of each line of each panel; "" where it has none
     """
 
@@ -446,6 +449,7 @@ class Signals:
     said: tuple[str, ...] = ()
     most: tuple[int, ...] = ()
     worst: int | None = None
+    opens: int | None = None
     sources: tuple[tuple[tuple[str, ...], ...], ...] = ()
 
 

@@ -50,5 +50,6 @@ def search_answer(archive: ArchiveFile, group: ArchiveGroup) -> DesignAnswer | N
         heading="Which design to use" if tunes else "The worst case found",
         link="Which design" if tunes else "The worst case",
         chooses=tunes,
+        case=answer.position,
         progress=tuple((cases, best.value / scale, best.tried) for _, cases, best in looks),
     )

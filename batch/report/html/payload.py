@@ -194,6 +194,7 @@ def _signals(signals: Signals) -> dict[str, Any]:
         "most": list(signals.most),
         "worst": signals.worst if signals.most else None,
         "middle": signals.middle,
+        "opens": signals.opens,
     }
 
 

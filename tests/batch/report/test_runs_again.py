@@ -105,6 +105,20 @@ class TestWhatIsInIt:
         assert section.simulation.said == ("3 of 8 cases can be run again in this page.",)
 
     @pytest.mark.slow
+    def test_begins_with_the_design_to_use_or_with_the_middle_case(self, sent: Path, compared: Path) -> None:
+        many, ways = (gathered(sent / f"{name}.h5").sections[0] for name in ("many", "shoves"))
+        assert many.designs is not None and many.signals is not None and many.simulation is not None
+        with ArchiveFile(sent / "many.h5") as file:
+            met = file.groups[0].values("met")[many.designs.case, 0]
+        assert many.signals.opens == many.designs.case != many.signals.shown[0] and met == 1
+        assert many.signals.opens in many.simulation.structures[0].cases
+        assert ways.designs is None and ways.signals is not None and ways.signals.opens == ways.signals.middle
+        with ArchiveFile(compared / "b.h5") as file, ArchiveFile(compared / "a.h5") as other:
+            before = ComparedArchive(other, batch.diff(compared / "a.h5", compared / "b.h5"))
+            [section] = gather(file, against=before, simulate=True).sections
+        assert section.signals is not None and section.signals.opens is None, "what changed most comes first"
+
+    @pytest.mark.slow
     def test_is_left_out_where_it_is_not_asked_for(self, sent: Path) -> None:
         source = report(sent / "ways.h5", sent / "without.html", simulate=False).read_text(encoding="utf-8")
         assert "unsafe" not in source and "MET.modules" not in source and "No histories were kept." in source
@@ -196,6 +210,27 @@ class TestInTheBrowser:
                     said = page.run(SAID)
                     assert said.startswith(f"Case #{case} has the archive's bits in its metric: run again here"), said
         assert count == 6 * 51 * 7
+        quiet(page)
+        page.close()
+
+    def test_the_arm_begins_with_the_design_to_use(self, chromium: Chromium, sent: Path) -> None:
+        page = opened(chromium, sent / "many.html")
+        page.run("dispatchEvent(new Event('beforeprint'))")
+        page.settle()
+        opens, worst = page.run("(({ opens, shown }) => [opens, shown[0]])(MET.models[0].data.signals)")
+        assert opens != worst and page.run(SAID).startswith(f"Case #{opens} has the archive's bits")
+        page.close()
+
+    def test_a_case_that_it_cannot_begin_with_is_named(self, chromium: Chromium, sent: Path, tmp_path: Path) -> None:
+        text = (sent / "many.html").read_text(encoding="utf-8")
+        changed, count = re.subn(r'("opens":)\d+', r"\g<1>99", text)
+        assert count == 1
+        (tmp_path / "elsewhere.html").write_text(changed, encoding="utf-8")
+        page = opened(chromium, tmp_path / "elsewhere.html")
+        worst = page.run("MET.models[0].data.signals.shown[0]")
+        why = "it is not among those that can be run again in this page"
+        assert page.run(SAID).startswith(f"Case #99 would be shown first, but {why}. Case #{worst} has the archive's")
+        assert page.run("document.querySelector('.stage .told').textContent") == f"case #{worst}"
         quiet(page)
         page.close()
 
@@ -359,6 +394,9 @@ class TestInTheBrowser:
         wild = replace(hostile(replace(section, simulation=None)), simulation=again)
         (tmp_path / "wild.html").write_text(html_page(replace(hostile(found), sections=(wild,))), encoding="utf-8")
         shown = opened(chromium, tmp_path / "wild.html")
+        assert section.signals is not None and section.signals.opens in other.cases
+        why = f"its arm is not drawn, for the run does not record {VISIBLE}"
+        assert shown.run(SAID).startswith(f"Case #{section.signals.opens} would be shown first, but {why}. Case #")
         shown.run("MET.models[0].choose(0)")
         shown.settle()
         assert f"in the archive in {VISIBLE}: run again" in shown.run(SAID)

@@ -113,9 +113,18 @@ MET.posing = (() => {
     model.stage = () => (shown ? shown.stage : null);
     model.seek = (time) => { if (shown && shown.stage) shown.stage.seek(time, true); };
     model.watch(choose);
-    const first = model.data.signals.shown.find(simulation.has);
+    const { opens, shown: drawn } = model.data.signals;
+    const armOf = (case_) => simulation.structures[simulation.structureOf(case_)].arm;
+    const able = [...(opens === null ? [] : [opens]), ...drawn].filter(simulation.has);
+    const first = able.find((case_) => armOf(case_).scene) ?? able[0];
     if (first !== undefined) enter(rooms[simulation.structureOf(first)]);
-    const begin = () => { if (chosen === null && first !== undefined) choose(first); };
+    const begin = () => {
+      if (chosen !== null || first === undefined) return;
+      choose(first);
+      if (opens === null || first === opens) return;
+      const why = simulation.has(opens) ? `its arm is not drawn, for the run does not record ${armOf(opens).lacking.join(", ")}` : "it is not among those that can be run again in this page";
+      said.textContent = `Case #${opens} would be shown first, but ${why}. ${said.textContent}`;
+    };
     new IntersectionObserver((entries, observer) => {
       if (!entries.some((entry) => entry.isIntersecting)) return;
       observer.disconnect();
