@@ -23,7 +23,7 @@ from met.plan import Experiment
 from met.plan.outputs import metric_units
 from met.plan.searches import SHORTEST, Search
 from met.run import DONE
-from met.searches.answer import Answer, answer
+from met.searches.answer import Answer, answer, nearest
 
 OVER_CASES = re.compile(r" in [^<>]* of cases\b[^<>]*$")
 """The words by which a requirement is one over a share of cases."""
@@ -31,6 +31,9 @@ OVER_CASES = re.compile(r" in [^<>]* of cases\b[^<>]*$")
 NEAR_BEST = 0.02
 """Share of a goal by which two starts of a tuning, or two halves of a search, may differ, and are taken to have come to
 the same optimum."""
+
+SLIGHTLY = 0.01
+"""Share of a goal beyond which a candidate counts as worse than the answer of a tuning."""
 
 ROUNDING = 1e-9
 """Share of the largest goal of all cases below which goals differ by rounding."""
@@ -162,7 +165,7 @@ class SearchAnswer:
     def _sureness(self) -> list[str]:
         """Lines about how sure it is that a tuning's optimum is the best: the goals that its starts came to."""
         found, reached = self.found, np.array(self.starts)
-        if not found.serves or not np.isfinite(reached).any():
+        if not np.isfinite(reached).any():
             return []
         if found.left is not None:
             words = "the tuning asks for it only where its cases begin, and the best by the goal does not keep it"
@@ -173,27 +176,51 @@ class SearchAnswer:
         if len(reached) == 1:
             return wrapped("not sure that it is the best: there was one start alone; another `seed` may find better")
         best = np.nanmax(reached) if self.search.largest else np.nanmin(reached)
-        goals = self._given[2][self.search.metric]
-        rounding = ROUNDING * np.abs(goals[np.isfinite(goals)]).max(initial=0.0)
-        near = np.abs(reached - best) <= max(NEAR_BEST * abs(best), rounding)
+        near = np.abs(reached - best) <= max(NEAR_BEST * abs(best), self._rounding)
         if near.sum() > 1:
             share = f"{100.0 * NEAR_BEST:g} %"
             return wrapped(f"{near.sum()} of its {len(reached)} starts came to within {share} of one another")
-        others = [self.goal(value) if np.isfinite(value) else "none that meets all" for value in reached[~near]]
+        others = [
+            self.goal(value).replace(" ", KEPT) if np.isfinite(value) else "none that meets all"
+            for value in reached[~near]
+        ]
         count = f"{len(reached)} starts one alone came to {self.goal(float(best))}, the other{'s' * (len(others) > 1)}"
         return wrapped(f"not sure that it is the best: of {count} to {', '.join(others)}; "
                        "another `seed` or a larger `at_most` may find better")  # fmt: skip
 
     def _border(self) -> list[str]:
-        """The nearest tried candidate that does not meet the requirements, in lines."""
-        miss = self.found.miss
+        """The nearest tried candidates that do not meet the requirements, and that have a worse goal, in lines."""
+        miss, out = self.found.miss, []
         if miss is None:
-            return ["  none of the candidates that were tried misses a requirement"] if self.required else []
-        case = int(self.group.values("case")[miss.case])
-        values = ", ".join(f"{each.path} = {each.text}".replace(" ", KEPT) for each in self.values(miss.case))
-        misses = f"misses {miss.text}" if miss.text else "fails"
-        text = f"nearest tried that {misses}: {100.0 * miss.distance:.2g} % of a range away, case #{case} with {values}"
-        return wrapped(text)
+            out += ["  none of the candidates that were tried misses a requirement"] if self.required else []
+        else:
+            out += self._nearest(f"misses {miss.text}" if miss.text else "fails", miss.case, miss.distance)
+        if (worse := self._worse) is not None and (miss is None or worse[1] != miss.distance):
+            out += self._nearest(f"is worse by more than {100.0 * SLIGHTLY:g} %", *worse)
+        return out
+
+    def _nearest(self, what: str, place: int, distance: float) -> list[str]:
+        case, away = int(self.group.values("case")[place]), f"{100.0 * distance:.2g} % of a range away"
+        values = ", ".join(f"{each.path} = {each.text}".replace(" ", KEPT) for each in self.values(place))
+        return wrapped(f"nearest tried that {what}: {away}, case #{case} with {values}")
+
+    @property
+    def _rounding(self) -> float:
+        """The difference of goals that is of rounding."""
+        goals = self._given[2][self.search.metric]
+        return float(ROUNDING * np.abs(goals[np.isfinite(goals)]).max(initial=0.0))
+
+    @cached_property
+    def _worse(self) -> tuple[int, float] | None:
+        """The case, and the distance as of `nearest`, of the nearest candidate whose goal is worse than the answer's in
+        some plant, so that it is in the worst; None where there is none, or where the answer's goal is 0 but for
+        rounding."""
+        table, done, metrics, _ = self._given
+        goals, value = metrics[self.search.metric], self.found.value
+        loss = value - goals if self.search.largest else goals - value
+        worse = np.flatnonzero(done & (loss > SLIGHTLY * abs(value)))
+        here = abs(value) > self._rounding and len(worse)
+        return nearest(self.search, table, self.found.case, worse) if here else None
 
     @property
     def _cases(self) -> str:
@@ -313,6 +340,9 @@ class SearchAnswer:
                 "requirement": miss.text,
                 "distance": miss.distance,
             },
+            "nearest_worse": None
+            if self.search.kind == "search" or (worse := self._worse) is None
+            else {"case": int(self.group.values("case")[worse[0]]), "distance": worse[1]},
         }
 
 

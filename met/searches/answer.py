@@ -169,12 +169,18 @@ def _nearest_miss(
     bad = np.flatnonzero(~(done & met.all(axis=0)))
     if not len(bad):
         return None
-    shares = np.stack([shares_of_range(each, table[:, at]) for at, each in enumerate(search.parameters)])
-    distances = np.abs(shares[:, bad] - shares[:, [case]]).max(axis=0)
-    first = int(np.argmin(distances))
-    found = int(bad[first])
+    found, distance = nearest(search, table, case, bad)
     missed = [each.text for each, row in zip(requirements, met, strict=True) if not row[found]]
-    return NearestMiss(found, missed[0] if done[found] else "", float(distances[first]))
+    return NearestMiss(found, missed[0] if done[found] else "", distance)
+
+
+def nearest(search: Search, table: np.ndarray, case: int, among: np.ndarray) -> tuple[int, float]:
+    """The first case, among these places of a table, whose candidate is nearest to that of a case; and its distance, as
+    a share of the range of the parameter that is farthest."""
+    shares = np.stack([shares_of_range(each, table[:, at]) for at, each in enumerate(search.parameters)])
+    distances = np.abs(shares[:, among] - shares[:, [case]]).max(axis=0)
+    first = int(np.argmin(distances))
+    return int(among[first]), float(distances[first])
 
 
 def shares_of_range(parameter: SearchedParameter, values: np.ndarray) -> np.ndarray:

@@ -65,6 +65,43 @@ def test_a_tuning_says_how_many_of_its_starts_came_to_its_answer(said: Said) -> 
 
 
 @pytest.mark.slow
+def test_a_tuning_that_is_not_advised_says_too_how_many_starts_came_to_its_answer(said: Said) -> None:
+    """A goal that is not the best is no less so for want of a margin."""
+    best = said()[0].search.starts[0].best
+    unstable = LeastMargins(0.0, 1.0, 0.0, ("slide",), best, 0.0, 1, 5, 15)
+    _, words = said(search_judged=json.dumps(encode(tuple[JudgedDesign, ...], (JudgedDesign(best, unstable),))))
+    assert words.startswith("not advised: ") and "2 of its 3 starts came to within 2 % of one another" in words
+
+
+@pytest.mark.slow
+def test_a_tuning_names_the_nearest_of_its_candidates_that_is_worse_by_one_percent(tuned: Path) -> None:
+    """Found here by a look at one case after another: a goal that is worse with one plant is worse with all."""
+    with ArchiveFile(tuned) as file:
+        group = file.groups[0]
+        answer = SearchAnswer.of(group)
+        assert answer is not None
+        goals, stiffness = group.values("off").tolist(), group.values("environment.held.stiffness").tolist()
+        best, found = stiffness[answer.found.case], answer.as_data()["nearest_worse"]
+        away = [abs(each - best) / (9.0 - 2.0) for each in stiffness]
+        place = min((n for n, goal in enumerate(goals) if goal > 1.01 * answer.found.value), key=lambda n: away[n])
+        assert found == {"case": place, "distance": pytest.approx(away[place], rel=1e-12)} and 0.0 < away[place] < 0.05
+        words = " ".join(" ".join(answer.lines()).split())
+    far = f"{100.0 * away[place]:.2g} % of a range away, case #{place} with environment.held.stiffness = "
+    assert f"nearest tried that is worse by more than 1 %: {far}" in words
+
+
+@pytest.mark.slow
+def test_no_candidate_is_a_percent_worse_than_a_goal_of_nothing(tuned: Path, tmp_path: Path) -> None:
+    shutil.copy(tuned, tmp_path / "zero.h5")
+    with h5py.File(tmp_path / "zero.h5", "r+") as data:
+        data["off"][:] = np.where(data["off"][:] < 0.05, 0.0, data["off"][:])
+    with ArchiveFile(tmp_path / "zero.h5") as file:
+        answer = SearchAnswer.of(file.groups[0])
+        assert answer is not None and answer.found.stands and answer.found.value == 0.0
+        assert answer.as_data()["nearest_worse"] is None and "worse by" not in " ".join(answer.lines())
+
+
+@pytest.mark.slow
 def test_a_search_says_what_the_second_half_of_its_cases_brought(tmp_path: Path) -> None:
     (tmp_path / "d.ic").write_text(DECK)
     path = batch.run(ic.compile(str(tmp_path / "d.ic"), select=["back"]), output=str(tmp_path / "s.h5"), threads=1).path
