@@ -10,6 +10,8 @@
                            also steered by that, else 0
     search_judged  the designs whose stability was judged, as JSON: the fields of `met.plan.searches.JudgedDesign`
     search_starts  where a tuning began, and what it came to, as JSON: the fields of `met.plan.searches.TuningStart`
+    search_confirmation    how its design came out in cases that did not choose it, as JSON: the fields of
+                           `met.plan.searches.Confirmation`
     search_along_slopes    of a tuning that goes by slopes: how many of its cases were tried along them
     search_without_slopes  of such a one: why its metrics had none where they had none last; empty where they had
 
@@ -32,6 +34,7 @@ from met.plan.searches import (
     MOST_PLANTS,
     MOST_SEARCHED,
     SHORTEST,
+    Confirmation,
     JudgedDesign,
     Search,
     SearchedParameter,
@@ -42,10 +45,11 @@ from met.plan.searches import (
 GENERATION = "generation"
 """The variable that says which generation asked for each case."""
 
-LISTS = ("search_judged", "search_starts")
+LISTS = ("search_judged", "search_starts", "search_confirmation")
 WORDS = ("search", "search_of", "search_goal", "search_against", "search_without_slopes", *LISTS)
 Judged = tuple[JudgedDesign, ...]
 Starts = tuple[TuningStart, ...]
+Confirmed = tuple[Confirmation, ...]
 GOALS = {"maximise": True, "minimise": False}
 STEPS = {"equal": False, "ratios": True}
 
@@ -65,6 +69,8 @@ def attributes(search: Search, metric: str) -> dict[str, Any]:
         told["search_starts"] = json.dumps(encode(Starts, search.starts))
         if search.judged:
             told["search_judged"] = json.dumps(encode(Judged, search.judged))
+        if search.confirmation:
+            told["search_confirmation"] = json.dumps(encode(Confirmed, search.confirmation))
         if search.gradients:
             told |= {"search_along_slopes": search.along_slopes, "search_without_slopes": search.without_slopes}
     if search.against:
@@ -120,6 +126,10 @@ def why_unsound(group: StoredGroup) -> str:
             return "attribute `search_judged` is no list of judged designs"
         if not are_starts(_decoded(told, "search_starts", Starts), cases):
             return "attribute `search_starts` is not of its cases"
+        confirmed = _decoded(told, "search_confirmation", Confirmed)
+        for each in confirmed:
+            if min(each.failed, each.missed) < 0 or not each.failed + each.missed <= each.cases <= MOST_PLANTS:
+                return "attribute `search_confirmation` counts what it cannot"
     except (ValueError, RecursionError, Damaged) as reason:
         return f"an attribute of its search is no list of what it should be: {reason}"
     coordinates = list(group.role("coordinate"))
@@ -208,6 +218,7 @@ def search_of(group: StoredGroup) -> Search | None:
         for each in group.role("coordinate")
         if "low" in each.attributes
     ]
+    confirmation = _decoded(told, "search_confirmation", Confirmed)
     return Search(
         kind=told["search"],
         metric=metric,
@@ -224,6 +235,8 @@ def search_of(group: StoredGroup) -> Search | None:
         steers=told.get("search_steers", 0) == 1,
         judged=_decoded(told, "search_judged", Judged),
         starts=_decoded(told, "search_starts", Starts),
+        fresh=((),) * sum(each.cases for each in confirmation[:1]),
+        confirmation=confirmation[:1],
         gradients="search_along_slopes" in told,
         along_slopes=told.get("search_along_slopes", 0),
         without_slopes=told.get("search_without_slopes", ""),

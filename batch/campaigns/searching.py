@@ -15,7 +15,7 @@ from batch.campaigns import shard
 from batch.campaigns.drive import Count, Driver, Stopped
 from batch.campaigns.folder import uncovered
 from batch.campaigns.judging import judged_designs
-from batch.campaigns.points import grown, write_points
+from batch.campaigns.points import grown, with_cases, write_points
 from batch.campaigns.slopes import TuningSlopes
 from batch.campaigns.tasks import CampaignSection, Task
 from batch.queries.search_answers import progress
@@ -24,7 +24,7 @@ from met.analysis.stability import margins_at_start
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Experiment
-from met.plan.searches import Search
+from met.plan.searches import Confirmation, Search
 from met.run import DONE, Run
 from met.searches import search_method, starts_of, steps_of
 from met.searches.answer import Answer, answer, designs_that_stand
@@ -156,8 +156,25 @@ class CampaignSearch:
             if search.steers and not designs:  # none keeps the margin: judge those that meet the requirements
                 designs = designs_that_stand(search, self._table, np.concatenate(self._by_requirements))
             search = replace(search, judged=judged_designs(prepared, search, designs))
+        self.search = search
+        if search.fresh and self.answer.stands:
+            self.search = search = replace(search, confirmation=(self._confirmation(self.answer),))
         experiment = replace(prepared.experiment, search=search)
         self.section = replace(self.section, prepared=prepared.of_cases(experiment))
+
+    def _confirmation(self, best: Answer) -> Confirmation:
+        """How the answer comes out in the cases that did not choose it."""
+        search, prepared = self.search, self.section.prepared
+        chosen = self._table[best.case, : len(search.parameters)]
+        table = np.array([[*chosen, *plant] for plant in search.fresh])
+        program = prepared.of_cases(with_cases(prepared.experiment, table))
+        rows = np.arange(len(table))
+        run = engine.results(program, rows, None, engine.compute(program, rows, record=False)[1], {})
+        done = run.status == DONE
+        worth, goals = self._served(run, done, self._requirements, run.metrics), run.metrics[search.metric][done]
+        known = goals[~np.isnan(goals)]
+        worst = float(known.min() if search.largest else known.max()) if len(known) else np.nan
+        return Confirmation(search.confirms, len(table), int((~done).sum()), int((done & (worth >= MET)).sum()), worst)
 
 
 def run_search(driver: Driver, search: CampaignSearch, sections: dict[int, CampaignSection]) -> None:

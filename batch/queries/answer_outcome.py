@@ -132,7 +132,12 @@ def _of_tuning(answer: SearchAnswer, found: tuple[AnswerRequirement, ...]) -> st
     if best.stability is not None and best.stability.margins is not None and not best.serves:
         margins = f"disk margin of {best.stability.margins.disk:.3g} is below the least, {answer.search.least_margin:g}"
         return f"The answer {_all(answer)}{(of := _cases(answer)) and f' in {of}'}, but its {margins}"
-    return f"The answer {_all(answer)}{(of := _cases(answer)) and f' in {of}'}"
+    text = f"The answer {_all(answer)}{(of := _cases(answer)) and f' in {of}'}"
+    for each in answer.search.confirmation:
+        text += (
+            "" if each.withstood else f", but not in {each.failed + each.missed:,} of {each.cases:,} of {each.against}"
+        )
+    return text
 
 
 def _of_worst(answer: SearchAnswer, found: tuple[AnswerRequirement, ...]) -> str:

@@ -6,7 +6,7 @@ import math
 import re
 import textwrap
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cached_property
 from typing import Any
 
@@ -21,7 +21,7 @@ from batch.queries.stability_words import KEPT, WIDTH, margin_words, stability_d
 from ic.driver.written_value import WrittenValue
 from met.plan import Experiment
 from met.plan.outputs import metric_units
-from met.plan.searches import SHORTEST, Search
+from met.plan.searches import SHORTEST, Confirmation, Search
 from met.run import DONE
 from met.searches.answer import Answer, answer, nearest
 
@@ -106,7 +106,7 @@ class SearchAnswer:
         """True if a tuning's result meets all requirements; for a search, if it found no case that fails or misses
         one."""
         if self.search.kind == "tune":
-            return self.found.serves
+            return self.found.serves and all(each.withstood for each in self.search.confirmation)
         return bool((self.group.values("status") == DONE).all() and (outcomes(self.group) == 1).all())
 
     def values(self, case: int | None = None) -> list[WrittenValue]:
@@ -144,7 +144,17 @@ class SearchAnswer:
             out.append(f"  nearest to its limit: {found.rooms[0].text}, {100.0 * found.rooms[0].share:.3g} % inside")
         beyond = "worse" if search.kind == "search" else "better"
         out += [f"  {path} is at the {end} end of its range: beyond it may be {beyond}" for path, end in found.ends]
+        out += [line for each in search.confirmation for line in self._confirmed(each)]
         return out + (self._border() if found.serves and search.kind == "tune" else [])
+
+    def _confirmed(self, found: Confirmation) -> list[str]:
+        """Lines about the answer of a tuning in cases that did not choose it."""
+        worst = f"{self.search.metric} is {self.goal(found.worst)} in the worst"
+        of = f"{found.cases:,} cases of {found.against}"
+        if found.withstood:
+            return wrapped(f"confirmed by all {of}, which did not choose it: {worst}")
+        bad = [f"{n:,} {what}" for n, what in ((found.failed, "failed"), (found.missed, "missed a requirement")) if n]
+        return wrapped(f"not confirmed: of {of}, which did not choose it, {' and '.join(bad)}; {worst}")
 
     def _by_slopes(self) -> list[str]:
         """Lines about a tuning along exact slopes: its steps, and why there were no more."""
@@ -246,13 +256,13 @@ class SearchAnswer:
     def _tuned(self) -> list[str]:
         found, search = self.found, self.search
         none = f"none of the {self._tried} is found to meet all that is required; nearest: {self._chosen}"
-        out = [f"use {self._chosen}" if found.serves else f"not advised: {self._chosen}" if found.stands else none]
+        out = [f"use {self._chosen}" if self.ok else f"not advised: {self._chosen}" if found.stands else none]
         if found.failed:
             out += [f"  case #{self.position} of it fails; {self._cases}", *self._cause]
         else:
             among = f" in the worst of {found.tried} cases of {search.against}" if found.all > 1 else ""
             out.append(f"  {search.metric} is {self.value()}{among}; {self._cases}")
-        if found.confirmed and not found.stands and search.at_most - self.group.count < SHORTEST * found.all:
+        if found.confirmed and not found.stands and search.budget - self.group.count < SHORTEST * found.all:
             out.append(f"  its cases are spent, of {search.at_most:,} at most; a larger `at_most` goes on")
         if not found.stands and search.steers:
             out.append(f"  `least_margin = {search.least_margin:g};` is required too: without it more may be found")
@@ -330,6 +340,7 @@ class SearchAnswer:
             "missed": list(found.missed),
             "nearest": [{"requirement": room.text, "inside": room.share} for room in found.rooms],
             "at_ends": [{"path": path, "end": end} for path, end in found.ends],
+            "confirmation": [asdict(each) for each in self.search.confirmation],
             "starts": self.starts if self.search.kind == "tune" else None,
             "along_slopes": self.search.along_slopes if self.search.gradients else None,
             "without_slopes": self.search.without_slopes or None,

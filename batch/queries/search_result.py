@@ -67,7 +67,10 @@ def _commands(archive: ArchiveFile, group: ArchiveGroup, answer: SearchAnswer) -
     command = f"met run {quoted(how['deck'])} {quoted(name)} {' '.join(words)}"
     found = [("its worst case again:", again), ("run it:", f"{command} -o chosen.h5")]
     if answer.draws:
-        seed = f"--set seed={answer.search.drawn_with + 1}"
+        confirmed = len(answer.search.confirmation)
+        seed = f"--set seed={answer.search.drawn_with + 1 + confirmed}"
         said = "these cases chose it, so they flatter it: other draws confirm it or not:"
-        found[1] = (said, f"{command} {seed} -o confirmed.h5")
+        found[1] = ("with yet other draws:" if confirmed else said, f"{command} {seed} -o confirmed.h5")
+    elif answer.search.against:
+        found[1] = (f"nothing was drawn in {name}, so that no other draws confirm it; run it:", found[1][1])
     return found

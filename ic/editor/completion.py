@@ -37,7 +37,7 @@ from met.units import ALL_UNITS
 
 GOALS = ("minimise", "maximise")
 
-_PATHS = ("record", "of", "against", "choose", "signal")
+_PATHS = ("record", "of", "against", "confirm", "choose", "signal")
 
 _VARIED = ("vary", "with", "exclude")
 """Words that are followed by paths of parameters, not signals, which have no value before a case has run."""
@@ -332,7 +332,7 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
         return
     where = around.kind if around is not None else ""
     call = open_call(texts)
-    if key == "against" and around is not None:
+    if key in ("against", "confirm") and around is not None:
         yield from _sweeps_of(around.word_behind("of"), names)
         return
     if where == "joint" and texts in (["axis", "="], ["axis", "=", "-"]):

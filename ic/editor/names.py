@@ -312,4 +312,6 @@ def _wanted(token: Token, entry: TextEntry | None) -> Sequence[str]:
         return (*_OF_KEY[key], "let", "macro", "metric", "signal") if key in _OF_KEY else _VALUES
     if entry.kind in ("require", "exclude", "maximise", "minimise"):
         return ("metric", *_VALUES)
-    return _VALUES if "=" in entry.texts or "(" in entry.texts or before in ("against", "macro") else ("macro",)
+    return (
+        _VALUES if "=" in entry.texts or "(" in entry.texts or before in ("against", "confirm", "macro") else ("macro",)
+    )

@@ -321,6 +321,9 @@ TUNE = BlockDeclaration(
               doc="a parameter to tune, and its range; `logbetween` takes equal ratios as equal steps"),
         Entry(name="against", form="statement", written="against SWEEP;", default="the run itself",
               doc="a sweep of the same run; candidates are judged by the worst of its cases"),
+        Entry(name="confirm", form="statement", written="confirm SWEEP;", default="none",
+              doc="a sweep of the same run that draws what `against` varies: when the design is chosen, it is run with "
+                  "these cases too, and the answer says how it came out"),
         Entry(name="minimise", form="statement", written="minimise METRIC;", default="needed, this or `maximise`",
               doc="the goal: the smallest value of a metric among the candidates that meet all requirements"),
         Entry(name="maximise", form="statement", written="maximise METRIC;", default="needed, this or `minimise`",

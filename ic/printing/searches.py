@@ -30,6 +30,8 @@ def search_lines(experiment: Experiment, search: Search) -> Iterator[str]:
     if search.against:
         borne = [coordinate.path for coordinate in experiment.cases.coordinates[len(search.parameters) :]]
         yield f"  against {count(len(search.plants), 'case')} of {search.against}: {', '.join(borne)}"
+    if search.fresh:
+        yield f"  confirmed by {count(len(search.fresh), 'case')} of {search.confirms}"
     if search.kind == "tune" and experiment.requirements:
         required = ", ".join(requirement.text for requirement in experiment.requirements)
         yield f"  with a margin of {100.0 * search.margin:g} % to the limits of {required}"

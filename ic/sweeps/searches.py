@@ -39,7 +39,7 @@ from met.trace import Graph, Scalar
 RANGES = {"between": False, "logbetween": True}
 """Words for bounds; True where equal ratios between them are equal steps."""
 
-CHOOSE, AGAINST, GRADIENTS = "choose", "against", "gradients"
+CHOOSE, AGAINST, CONFIRM, GRADIENTS = "choose", "against", "confirm", "gradients"
 SWITCHED = {"on": True, "off": False}
 GOALS = {"maximise": True, "minimise": False}
 MOST_CORNERS = 8
@@ -80,10 +80,17 @@ def read_search(
         reader.check(complaints.error_count > before)
     empty = Sweep(definition.name, (), (), None, None, 1, None, definition.place)
     against: Sweep | None = None
-    if reader.against is not None:
+    fresh: tuple[tuple[float, ...], ...] = ()
+    name = reader.sweeps.get(AGAINST)
+    if name is not None:
         with complaints.gather():
-            against = _against(definitions, complaints, reader, graph, noise_seed, fixed)
-    if complaints.error_count > before or (reader.against is not None and against is None):
+            against = _against(definitions, complaints, reader, name, graph, noise_seed, fixed)
+    if (confirm := reader.sweeps.get(CONFIRM)) is not None and complaints.error_count == before:
+        with complaints.gather():
+            # its draws are others than those of the sweep that it may share with `against`
+            others = _against(definitions, complaints, reader, confirm, graph, noise_seed + 1, fixed)
+            fresh = _fresh(against, others, confirm)
+    if complaints.error_count > before or (name is not None and against is None):
         return empty
     chosen = [each for each in reader.chosen if each.parameter.path not in fixed]
     if not chosen:
@@ -102,15 +109,18 @@ def read_search(
         against=against.name if against is not None else "",
         plants=plants,
         drawn_with=0 if against is None else noise_seed if against.seed is None else against.seed,
+        confirms=confirm.text if confirm is not None else "",
+        fresh=fresh,
         margin=reader.margin,
         least_margin=reader.least_margin,
         steers="least_margin" in reader.written and reader.least_margin > 0.0,
         gradients=reader.gradients,
         place=reader.goal_place,
     )
-    least = len(plants) + SHORTEST
+    least = len(plants) + len(fresh) + SHORTEST
     if search.kind == "tune" and search.at_most < least:
         of = f"{len(plants)} to try the best with each case of `{search.against}`, and " if plants else ""
+        of = f"{len(fresh)} to confirm it, {of}" if fresh else of
         complaints.error(
             "D363",
             f"{search.at_most} cases are too few to tune anything",
@@ -149,7 +159,7 @@ class _SearchReader:
         self.at_most = self.seed = 0
         self.margin = float(MARGIN.default) if self.tunes and isinstance(MARGIN.default, float) else 0.0
         self.least_margin = LEAST_MARGIN
-        self.against: Name | None = None
+        self.sweeps: dict[str, Name] = {}
         self.gradients = self.tunes
         self.goal_place = self.at_most_place = definition.place
         self.written: dict[str, Place] = {}
@@ -178,14 +188,13 @@ class _SearchReader:
                 self._choose(entry)
             case Statement() if words in ([each] for each in GOALS):
                 self._goal(entry, words[0])
-            case Statement() if words == [AGAINST] and self.tunes:
-                self._once(AGAINST, entry.place)
+            case Statement() if words in ([AGAINST], [CONFIRM]) and self.tunes:
+                [word] = words
+                self._once(word, entry.place)
                 if not isinstance(entry.value, Name) or len(entry.value.path) > 1:
-                    help_ = "write `against SWEEP;`"
-                    raise Problem(
-                        error("D364", "`against` takes the name of a sweep", place_of(entry.value), help=help_)
-                    )
-                self.against = entry.value
+                    message = f"`{word}` takes the name of a sweep"
+                    raise Problem(error("D364", message, place_of(entry.value), help=f"write `{word} SWEEP;`"))
+                self.sweeps[word] = entry.value
             case Statement() if words[:1] == [ALLOW]:
                 pass  # read with those of the run
             case _:
@@ -351,14 +360,13 @@ def _against(
     definitions: Definitions,
     complaints: Complaints,
     reader: _SearchReader,
+    name: Name,
     graph: Graph,
     seed: int,
     fixed: Collection[str],
 ) -> Sweep | None:
-    """The sweep against which a tuning is judged; None where it has mistakes, which are reported. Raises Problem D364
-    where it is unsuitable."""
-    name = reader.against
-    assert name is not None
+    """The sweep against which a tuning is judged, or by which it is confirmed; None where it has mistakes, which are
+    reported. Raises Problem D364 where it is unsuitable."""
     known, place = definitions.of_kind("sweep"), name.place
     if name.text not in known:
         helps = [*did_you_mean(name.text, known), known_words("sweeps of this deck", known)]
@@ -407,6 +415,29 @@ def _against(
     return sweep
 
 
+def _fresh(against: Sweep | None, drawn: Sweep | None, name: Name) -> tuple[tuple[float, ...], ...]:
+    """The cases of a sweep by which a tuning is confirmed, as those of `_plants` of the one that it is against. Raises
+    Problem D364 where they are no others."""
+    if drawn is None:
+        return ()
+    first, paths = _plants(against), [column.path for column in drawn.varied]
+    wanted = [column.path for column in against.varied] if against is not None else []
+    own = "a sweep that writes no `seed` is drawn anew for `confirm`, even the one that the tuning is against"
+    if sorted(paths) != sorted(wanted):
+        message = f"`{name.text}` does not vary what the tuning is against"
+        held = f"write a sample of {', '.join(f'`{path}`' for path in wanted)}" if wanted else "write `against SWEEP;`"
+        raise Problem(error("D364", message, name.place, help=held))
+    order = [paths.index(path) for path in wanted]
+    rows = tuple(tuple(row[at] for at in order) for row in _plants(drawn))
+    if not _draws(drawn):
+        message = f"nothing is drawn in `{name.text}`, so that it confirms nothing"
+        raise Problem(error("D364", message, name.place, help=["write a sample in it", own]))
+    if not set(rows).isdisjoint(first):
+        message = f"cases of `{name.text}` are among those that choose the design"
+        raise Problem(error("D364", message, name.place, help=own))
+    return rows
+
+
 def _draws(sweep: Sweep) -> bool:
     return any(axis.design for axis in sweep.axes)
 
@@ -440,7 +471,7 @@ def with_corners(search: Search, columns: Mapping[str, CaseValues]) -> tuple[dic
         corners += [(*low[:n], end[1], *low[n + 1 :]) for n, end in enumerate(ends)]
     plants = search.plants or ((),)
     rows = [(*corner, *plants[number % len(plants)]) for number, corner in enumerate(corners)]
-    rows += [(*corners[0], *plant) for plant in plants[1:]]
+    rows += [(*corners[0], *plant) for plant in (*plants[1:], *search.fresh)]
     more = np.array(rows)
     table = {path: np.concatenate([np.asarray(own), more[:, n]]) for n, (path, own) in enumerate(columns.items())}
     return table, len(next(iter(table.values())))

@@ -33,6 +33,12 @@ def check_search(experiment: Experiment, search: Search, where: str) -> None:
         raise Damaged(f"{where}.starts", "a tuning alone that has run has starts")
     if not are_starts(search.starts, experiment.cases.count):
         raise Damaged(f"{where}.starts", "they should rise, and lie among the cases")
+    if search.confirmation and not (search.fresh and search.complete):
+        raise Damaged(f"{where}.confirmation", "a tuning alone that has run is confirmed, by cases that it has")
+    for each in search.confirmation:
+        check_whole(each.cases, len(search.fresh), len(search.fresh), f"{where}.confirmation.cases")
+        check_whole(each.failed, 0, each.cases, f"{where}.confirmation.failed")
+        check_whole(each.missed, 0, each.cases - each.failed, f"{where}.confirmation.missed")
     check_whole(search.along_slopes, 0, search.at_most, f"{where}.along_slopes")
     if search.gradients and search.kind != "tune":
         raise Damaged(f"{where}.gradients", "a tuning alone goes by slopes")
@@ -45,7 +51,7 @@ def check_search(experiment: Experiment, search: Search, where: str) -> None:
             check_whole(count, 1, MOST_SEARCHED, f"{where}.generations[{index}]")
         if sum(search.generations) != experiment.cases.count:
             raise Damaged(f"{where}.generations", f"they are not of the {experiment.cases.count} cases")
-    if experiment.cases.count > search.at_most:
+    if experiment.cases.count > search.budget:
         raise Damaged(f"{where}.at_most", f"there are {experiment.cases.count} cases")
     cases = experiment.cases
     if cases.choices or cases.repeats is not None or cases.positions is not None or cases.seeds != "common":
@@ -78,9 +84,14 @@ def _check_plants(experiment: Experiment, search: Search, where: str) -> None:
         raise Damaged(where, "they should be of the coordinates that are not chosen, and of a sweep")
     if (search.plants or search.margin) and search.kind != "tune":
         raise Damaged(where, "a tuning alone is held against something")
-    check_whole(len(search.plants), 0, MOST_PLANTS, where)
-    for index, plant in enumerate(search.plants):
+    if bool(search.fresh) != bool(search.confirms) or (search.fresh and not search.plants):
+        raise Damaged(f"{where[: -len('plants')]}fresh", "they should be of a sweep, beside the plants of another")
+    check_whole(max(len(search.plants), len(search.fresh)), 0, MOST_PLANTS, where)
+    for index, plant in enumerate((*search.plants, *search.fresh)):
         if len(plant) != more or not all(map(math.isfinite, plant)):
             raise Damaged(f"{where}[{index}]", f"it should be {more} finite numbers")
-    if search.kind == "tune" and search.at_most < len(search.plants) + SHORTEST:
-        raise Damaged(f"{where[: -len('plants')]}at_most", f"it should be at least {len(search.plants) + SHORTEST}")
+    if search.kind == "tune" and search.budget < len(search.plants) + SHORTEST:
+        raise Damaged(
+            f"{where[: -len('plants')]}at_most",
+            f"it should be at least {len(search.plants) + len(search.fresh) + SHORTEST}",
+        )

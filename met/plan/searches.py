@@ -109,6 +109,27 @@ class TuningStart:
     best: int
 
 
+@frozen
+class Confirmation:
+    """How the design of a tuning came out in cases that did not choose it.
+
+    against  the sweep that drew them
+    failed   cases that failed;  missed: others that miss a requirement, or have no value of one or of the goal
+    worst    of the goal in those that have one, SI; not-a-number where none has
+    """
+
+    against: str
+    cases: int
+    failed: int
+    missed: int
+    worst: float
+
+    @property
+    def withstood(self) -> bool:
+        """True where the design meets all requirements in all of them."""
+        return not self.failed and not self.missed
+
+
 def are_starts(starts: tuple[TuningStart, ...], cases: int) -> bool:
     """True if a tuning of so many cases can have had these starts."""
     ends = [start.first for start in starts[1:]] + [cases]
@@ -139,6 +160,9 @@ class Search:
     along_slopes  how many of its cases were tried along slopes, and `without_slopes`: why there were none where there
                  were none last, in words, empty where there were; as found when it has run
     starts       of a tuning that has run: where it began, and what it came to from there
+    confirms     the sweep with whose cases the design of a tuning is run in the end, "" for none; fresh: these, as
+                 `plants`; they count among `at_most`, but are not in the case table
+    confirmation  what came of it, of a tuning that has run and found a design that stands; one at most
     judged       the designs whose stability was judged when it had run, the best by its goal first, until one keeps the
                  least margin; none of a search, or of one that was run before MET judged it
     """
@@ -162,12 +186,20 @@ class Search:
     least_margin: float = LEAST_MARGIN
     steers: bool = False
     judged: tuple[JudgedDesign, ...] = ()
+    confirms: str = ""
+    fresh: tuple[tuple[float, ...], ...] = ()
+    confirmation: tuple[Confirmation, ...] = ()
     place: Place | None = None
 
     @property
     def complete(self) -> bool:
         """True where the case table holds all of its cases, and not only its first generation."""
         return bool(self.generations)
+
+    @property
+    def budget(self) -> int:
+        """The largest number of cases of its table."""
+        return self.at_most - len(self.fresh)
 
     def advises(self, design: JudgedDesign) -> bool:
         """True where a judged design keeps the least margin, or has none that could be judged."""

@@ -58,7 +58,7 @@ class RobustTuning:
     def __init__(self, search: Search, source: SlopeSource | None = None) -> None:
         self._search, self._plants = search, search.plants or ((),)
         self.steps = None if source is None else SlopeSteps(search, source)
-        self._left = search.at_most
+        self._left = search.budget
         self._points: dict[Candidate, np.ndarray] = {}
         self._known: dict[Candidate, dict[int, float]] = {}
         self._active, self._turn = [0], 0
@@ -81,7 +81,7 @@ class RobustTuning:
             self._wanted = self._next()
             if self._wanted:
                 if self._begins_afresh:
-                    self.beginnings.append(self._search.at_most - self._left)
+                    self.beginnings.append(self._search.budget - self._left)
                     self._begins_afresh = False
                 self._left -= len(self._wanted)
                 return np.array([[*np.frombuffer(each), *self._plants[plant]] for each, plant in self._wanted])

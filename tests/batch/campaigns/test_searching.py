@@ -406,7 +406,8 @@ def test_it_is_said_beforehand_and_afterwards(here: Path, capsys: pytest.Capture
     answer = answers(here / "d.still.h5")["still"]
     assert f"\nuse environment.held.stiffness = {answer.exact}\n" in said
     assert " in the worst of 5 cases of loads; " in said
-    assert f"run it: met run d.ic loads --set 'environment.held.stiffness={answer.exact}' -o chosen.h5\n" in said
+    assert "\nnothing was drawn in loads, so that no other draws confirm it; run it:\n  met run d.ic loads " in said
+    assert f"  met run d.ic loads --set 'environment.held.stiffness={answer.exact}' -o chosen.h5\n" in said
     assert "demonstrated" not in said
     assert main(["show", "d.still.h5"]) == 0
     assert f"\nuse environment.held.stiffness = {answer.exact}" in capsys.readouterr().out

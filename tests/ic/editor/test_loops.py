@@ -96,7 +96,8 @@ def test_names_that_a_loop_makes_are_offered_and_those_with_braces_in_the_loop_a
 def test_what_words_alone_may_stand_is_offered_alone(tmp_path: Path, editor: Editor) -> None:
     deck = opened(tmp_path, editor)
     sweeps = CHAIN + "run other like swing { }\nsweep a of swing { }\nsweep b of other { }\nsweep both = a + b;\n"
-    assert words(editor, deck, sweeps + "tune t of swing { against |") == ["a", "both"]
+    for word in ("against", "confirm"):
+        assert words(editor, deck, sweeps + f"tune t of swing {{ {word} |") == ["a", "both"]
     assert words(editor, deck, 'let bodies = csv("bodies.csv", rows = |);\n' + CHAIN) == ["all"]
     assert words(editor, deck, CHAIN.replace("j_1.q = 0.1 rad", "j_1.q = |"))[0] == "command"
     watched = CHAIN.replace("    record ", "    metric size = peak { of = abs(j_1.q); }\n    record ")

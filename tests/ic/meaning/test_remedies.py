@@ -115,7 +115,7 @@ TOLD = [
      "write `linear hinge_servo_voltage { open = hinge.servo.voltage; }` in the run, and `of = hinge_servo_voltage;` "
      "here"),
     (OWN + "tune t of hold { choose drive.kp = between(0.1, 1) V*s/rad; goal = top; }\n",
-     "a tune has: choose, against, minimise, maximise, margin, least_margin, gradients, at_most, seed, allow"),
+     "a tune has: choose, against, confirm, minimise, maximise, margin, least_margin, gradients, at_most, seed, allow"),
 ]  # fmt: skip
 
 

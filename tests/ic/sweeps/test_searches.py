@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,9 @@ from met.diagnostic import Problem
 from met.messages.render import render
 from met.plan import Plan
 from met.plan import file as plan_file
-from met.plan.searches import Search, SearchedParameter
+from met.plan.checked_searches import check_search
+from met.plan.codec import Damaged
+from met.plan.searches import Confirmation, Search, SearchedParameter
 from met.searches import search_method
 
 DECK = """#include <servos/rigid_gearbox.ic>
@@ -288,6 +291,83 @@ def test_a_tuning_that_is_none_is_refused(tmp_path: Path, old: str, new: str, me
     assert old in TUNE
     found = lines(said(tmp_path, TUNE.replace(old, new), "gains"))
     assert found[: len(message)] == message
+
+
+DRAWN = """
+sweep drawn of hold { sample random(4) { links.bar.mass = uniform(1, 3) kg;  drive.kt = uniform(0.05, 0.06) N*m/A; } }
+sweep fresh of hold { sample random(7) { drive.kt = uniform(0.05, 0.06) N*m/A;  links.bar.mass = uniform(1, 3) kg; } }
+sweep seeded of hold {
+    seed = 3;  sample random(4) { links.bar.mass = uniform(1, 3) kg;  drive.kt = uniform(0.05, 0.06) N*m/A; }
+}
+"""
+OWN = "a sweep that writes no `seed` is drawn anew for `confirm`, even the one that the tuning is against"
+
+
+def confirmed(by: str, against: str = "against drawn;", at_most: int = 90) -> str:
+    words = f"{against}  confirm {by};".lstrip()
+    return DRAWN + TUNE.replace("against loads;", words).replace("at_most = 90", f"at_most = {at_most}")
+
+
+@pytest.mark.parametrize("by", ["fresh", "drawn"])
+def test_a_tuning_is_confirmed_by_what_its_sweep_draws_with_the_next_seed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], by: str
+) -> None:
+    """In the order of what it is against; these cases are none that it may spend before."""
+    [experiment] = plan(tmp_path, confirmed(by), "gains").experiments
+    search = experiment.search
+    assert search is not None and search.confirms == by and search.budget == 90 - len(search.fresh)
+    again = ic.compile(tmp_path / "d.ic", select=[by], set={"seed": 1}).experiments[0].cases.coordinates
+    columns = {each.path: np.asarray(each.values) for each in again}
+    assert search.fresh == tuple(zip(columns["links.bar.mass"].tolist(), columns["drive.kt"].tolist(), strict=True))
+    plan_file.write(ic.compile(tmp_path / "d.ic", select=["gains"]), tmp_path / "p.json")
+    assert plan_file.read(tmp_path / "p.json").experiments[0].search == search
+    assert main(["plan", str(tmp_path / "d.ic"), "gains"]) == 0
+    assert f"\n  confirmed by {len(search.fresh)} cases of {by}\n" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (confirmed("3"), ["error[D364]: `confirm` takes the name of a sweep", "= help: write `confirm SWEEP;`"]),
+        (confirmed("fresh;  confirm drawn"), ["error[D040]: `confirm` is written twice", "= help: leave one out"]),
+        (confirmed("fresh", ""), [
+            "error[D364]: `fresh` does not vary what the tuning is against", "= help: write `against SWEEP;`"]),
+        (confirmed("loads"), [
+            "error[D364]: `loads` does not vary what the tuning is against",
+            "= help: write a sample of `links.bar.mass`, `drive.kt`"]),
+        (confirmed("loads", "against loads;"), [
+            "error[D364]: nothing is drawn in `loads`, so that it confirms nothing",
+            "= help: write a sample in it", f"= help: {OWN}"]),
+        (confirmed("seeded", "against seeded;"), [
+            "error[D364]: cases of `seeded` are among those that choose the design", f"= help: {OWN}"]),
+        (confirmed("fresh", at_most=20), [
+            "error[D363]: 20 cases are too few to tune anything",
+            "= help: 21 at least: 7 to confirm it, 4 to try the best with each case of `drawn`, and 10 to choose "
+            "among; a thousand are no luxury"]),
+    ],
+)  # fmt: skip
+def test_a_tuning_is_confirmed_by_cases_that_did_not_choose_it(tmp_path: Path, text: str, message: list[str]) -> None:
+    found = lines(said(tmp_path, text, "gains"))
+    assert found[: len(message)] == message
+
+
+def test_a_case_that_confirms_is_one_that_can_be_run(tmp_path: Path) -> None:
+    wrong = confirmed("fresh").replace("uniform(1, 3) kg; } }\nsweep seeded", "uniform(-3, -1) kg; } }\nsweep seeded")
+    assert "mass" in said(tmp_path, wrong, "gains")
+
+
+@pytest.mark.parametrize(
+    ("change", "where"),
+    [
+        ({"confirms": ""}, "fresh"), ({"fresh": ()}, "fresh"), ({"fresh": ((1.0,),)}, r"plants\[4\]"),
+        ({"at_most": 20}, "at_most"), ({"confirmation": (Confirmation("fresh", 7, 0, 0, 1.0),)}, "confirmation"),
+    ],
+)  # fmt: skip
+def test_a_plan_that_is_confirmed_by_no_cases_is_refused(tmp_path: Path, change: dict[str, object], where: str) -> None:
+    [experiment] = plan(tmp_path, confirmed("fresh"), "gains").experiments
+    assert experiment.search is not None
+    with pytest.raises(Damaged, match=rf"search\.{where}: "):
+        check_search(experiment, replace(experiment.search, **change), "search")  # type: ignore[arg-type]
 
 
 def test_a_sweep_that_varies_nothing_is_refused_once(tmp_path: Path) -> None:
