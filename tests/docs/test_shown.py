@@ -20,7 +20,7 @@ from tests.docs.pages import Page, differs
         ("fit", 3),
         ("linear", 15),
         ("residuals", 6),
-        ("search", 6),
+        ("search", 8),
         ("sensitivity", 2),
     ],
 )
