@@ -67,7 +67,7 @@ def fit(
 
     LOG is compared with the deck's only run, the one marked `default`, or RUN; several logs are fitted together.
 
-    Exit status: 0 all numbers are known; 1 the logs cannot tell some of them; 2 the input is wrong.
+    Exit status: 0 all numbers are known; 1 the logs cannot tell some of them, or are doubtful; 2 the input is wrong.
     """
     import json
 
@@ -103,12 +103,11 @@ def fit(
     bar.begin(f"fit of {question.runs[0].given.name}", 0)
     answer = question.answer(bar.advance)
     bar.end()
-    certain = set(answer.known.verdict) == {"known"} and answer.fit.converged and answer.fit.rival is None
+    certain = shown.is_certain(answer)
     lines = list(shown.fit_lines(question, answer))
     changed = None
     if certain:
-        head = "What is known of the arm, as a sweep of the deck:"
-        lines += ["", head, "", *shown.sweep_lines(question, answer)]
+        lines += ["", *shown.sweep_lines(question, answer)]
         if diff or write:
             values = shown.written_values(question, answer)
             given = {key: options[key] for key in ("defines", "settings")}
@@ -119,5 +118,13 @@ def fit(
         units = {each["channel"]: each["unit"] for each in run.columns}
         pictures.draw(run.name, pictures.panels(run.log, units, courses), drawn)
     data = shown.as_data(question, answer) if form == "json" else {}
-    tell(form, data, lines, changed, asked=diff or write, write=write, why_not="not all numbers are known")
+    tell(
+        form,
+        data,
+        lines,
+        changed,
+        asked=diff or write,
+        write=write,
+        why_not="not all numbers are known, or a log is doubtful",
+    )
     return YES if certain else NO

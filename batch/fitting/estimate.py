@@ -55,6 +55,9 @@ STEADY = 0.01
 LEAST_RMS = 1e-6
 """Least rms of a residual that weights count with, as a share of the signal's largest number."""
 
+LEAST_NOISE = 1e-3
+"""Least rms of a signal's noise, as a share of its spread, with which errors are foretold."""
+
 CHANGE = 0.5
 """Size of the differences that slopes are made of, in standard deviations of the parameter by itself."""
 
@@ -120,15 +123,15 @@ class Fit:
 
 
 def noise_of(logs: LoggedRuns) -> np.ndarray:
-    """The rms of the noise of each signal, by its second differences (von Neumann), [signal]. A smooth signal that is
-    sampled often has none of its own there."""
+    """The rms of the noise of each signal, by its second differences (von Neumann), [signal]; `LEAST_NOISE` of its
+    spread at least, for of a smooth or filtered signal these tell nothing."""
     found = []
     for run in logs.runs:
         for number in range(len(run.channels)):
             measured = run.measured[run.channel_of == number]
             curved = np.diff(measured, 2)
             rms = float(np.sqrt(np.mean(curved**2) / 6.0)) if len(curved) else 0.0
-            found.append(max(rms, LEAST_RMS * float(np.abs(measured).max(initial=0.0)), 1e-300))
+            found.append(max(rms, LEAST_NOISE * float(np.std(measured)), 1e-300))
     return np.array(found)
 
 

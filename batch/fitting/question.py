@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -79,7 +80,7 @@ class FitQuestion:
     def answer(self, progress: Callable[[int], None]) -> FitAnswer:
         """Fit the parameters, and say what the fit is worth."""
         fit = Fitter(self.logs, self.start, self.priors, progress).fit()
-        size = np.where(fit.values != 0.0, np.abs(fit.values), fit.size)
+        size = np.maximum(np.abs(fit.values), fit.size)
         predicted = zip(
             self.comparisons(self.start, self.predicted), self.comparisons(fit.values, self.predicted), strict=True
         )
@@ -120,52 +121,65 @@ def fit_question(
         if run not in runs:
             runs[run] = given_run(deck, run, include_dirs=include_dirs, defines=defines, settings=settings)
     first = runs[pairs[0][0]]
-    paths = _paths(estimates, first)
-    starts = {path: (_start(path, first), first.unit(path) or "1") for path in paths}
+    paths = _paths(estimates, list(runs.values()))
+    starts = {path: _start(path, list(runs.values())) for path in paths}
     mapped = [mapped_column(each) for each in columns]
     read = [LoggedRun.read(runs[run], log, starts, mapped, zero) for run, log in pairs]
     for path in paths:
         if not any(path in each.used for each in read[: len(logs)]):
             _check_varies(path, starts[path], first)
             raise _wrong(f"`{path}` has no effect in a run that has a log", "leave it out")
-    known_before = dict(_prior(each, starts) for each in priors)
+    given = [_prior(each, starts) for each in priors]
+    twice = next((path for path, _ in given if [each for each, _ in given].count(path) > 1), None)
+    if twice is not None:
+        raise _wrong(f"`{twice}` has two priors", "give one")
     return FitQuestion(
         tuple(read[: len(logs)]),
         tuple(read[len(logs) :]),
         tuple(paths),
         np.array([value for value, _ in starts.values()]),
-        tuple(first.written_in(path)[0] for path in paths),
-        known_before,
+        tuple(_owner(path, list(runs.values())).written_in(path)[0] for path in paths),
+        dict(given),
     )
 
 
 def _run_and_log(text: str) -> tuple[str | None, str]:
     run, equal, log = text.partition("=")
-    return (run, log) if equal and run.isidentifier() else (None, text)
+    return (run, log) if equal and run.isidentifier() and not Path(text).exists() else (None, text)
 
 
-def _paths(estimates: Sequence[str], run: GivenRun) -> list[str]:
+def _paths(estimates: Sequence[str], runs: Sequence[GivenRun]) -> list[str]:
     """Paths without wildcards, each once."""
     found = []
     for each in estimates:
         matching = [each]
         if any(letter in each for letter in "*?["):
-            matching = [path for path in run.experiment.parameters if fnmatchcase(path, each)]
+            matching = [path for run in runs for path in run.experiment.parameters if fnmatchcase(path, each)]
             if not matching:
-                raise _wrong(f"no parameter of `{run.name}` is like `{each}`", "`met explain` lists them")
+                raise _wrong(f"no parameter of `{runs[0].name}` is like `{each}`", "`met explain` lists them")
         found += matching
     return list(dict.fromkeys(found))
 
 
-def _start(path: str, run: GivenRun) -> float:
-    """The deck's value, SI. Raises Problem for a path that has no number."""
-    found = next(explanations_of(run.compiled, path), None)
-    if found is None:
-        run.vary({path: (0.0, "1")})  # which says what is wrong with it
-    if found is None or isinstance(found.value, str):
-        helps = f"`met explain {run.deck.file} {path}` shows it" if found is not None else "`met explain` lists numbers"
+def _owner(path: str, runs: Sequence[GivenRun]) -> GivenRun:
+    """The first run that has a parameter, else the first of all."""
+    return next((run for run in runs if run.unit(path) is not None), runs[0])
+
+
+def _start(path: str, runs: Sequence[GivenRun]) -> tuple[float, str]:
+    """The deck's value, SI, and its unit. Raises Problem for a path that has no number, or one each in several runs."""
+    owner = _owner(path, runs)
+    found = {run.name: next(explanations_of(run.compiled, path), None) for run in runs}
+    values = {name: each.value for name, each in found.items() if each is not None}
+    if not values:
+        owner.vary({path: (0.0, "1")})  # which says what is wrong with it
+    if not values or not all(isinstance(each, float) for each in values.values()):
+        helps = f"`met explain {owner.deck.file} {path}` shows it" if values else "`met explain` lists numbers"
         raise _wrong(f"`{path}` is no number, and a fit moves numbers", helps)
-    return float(found.value) if isinstance(found.value, float) else float(np.mean(found.value))
+    if len(set(values.values())) > 1:
+        several = " and ".join(f"{value:g} in `{name}`" for name, value in values.items())
+        raise _wrong(f"`{path}` is {several} (SI), and a fit gives all runs one", "fit the logs apart")
+    return float(next(iter(values.values()))), owner.unit(path) or "1"  # type: ignore[arg-type]
 
 
 def _check_varies(path: str, start: tuple[float, str], run: GivenRun) -> None:

@@ -30,6 +30,9 @@ WORDS: Mapping[str, str] = MappingProxyType({
 SHOWN, MOST_PARTS = 3, 6
 """Largest number of changes without a mark, and of correlated pairs, that are printed; and of parts of a change."""
 
+DRAWN_APART = 0.7
+"""Correlation of errors from which on independent draws are too wide, by 1.4 times."""
+
 DIGITS = 2
 """Digits of half an interval, to which a value is rounded."""
 
@@ -119,11 +122,22 @@ def fit_lines(question: FitQuestion, answer: FitAnswer) -> Iterator[str]:
 
 
 def sweep_lines(question: FitQuestion, answer: FitAnswer, count: int = 200) -> Iterator[str]:
-    """A sweep over what is known of the fitted parameters, for the deck, in lines."""
+    """A sweep over what is known of the fitted parameters, for the deck, in lines; none where all are at their limits,
+    or errors go together so much that independent draws would be of arms that the logs exclude."""
+    free = [place for place in range(len(question.paths)) if not answer.fit.at_limit[place]]
+    if not free:
+        return
+    if pairs := correlated(answer.fit.covariance, question.paths, answer.known, DRAWN_APART):
+        one, other, share = pairs[0]
+        yield f"no sweep: the errors of {one} and {other} are correlated by {share:.2f}, and a sweep draws them apart"
+        return
+    yield "What is known of the arm, as a sweep of the deck:"
+    yield ""
     run = question.runs[0].given.name
     yield f"sweep fitted of {run} {{"
     yield f"    sample lhs({count}) {{"
-    for place, path in enumerate(question.paths):
+    for place in free:
+        path = question.paths[place]
         unit, value, deviation = question.units[place], answer.fit.values[place], answer.fit.deviation[place]
         mean, spread = decimals([rounded(value, 0.2 * deviation, unit).si, float(f"{deviation:.2g}")], unit)
         distribution = f"normal({mean}, {float(spread):.2g})"
@@ -230,12 +244,23 @@ def _residual_lines(title: str, before: Comparison, after: Comparison) -> Iterat
         first = "" if was is None else f"{was.rms:.3g}"
         rows.append([f"  {each.channel}", first, f"{each.rms:.3g}", unit, share, white, follows])
     yield from columns(rows, right=(1, 2, 4))
-    explained = all(each.white is not False for each in after.residuals)
-    yield from dict.fromkeys([*doubt_lines(after), *([] if explained else doubt_lines(before))])
+    yield from _doubts(before, after)
 
 
 def _deck_value(question: FitQuestion, place: int) -> str:
     return WrittenValue("", float(f"{question.start[place]:.6g}"), question.units[place]).text
+
+
+def _doubts(before: Comparison, after: Comparison) -> list[str]:
+    """What makes a log doubtful: after the fit, and before it unless the fit left noise alone."""
+    explained = all(each.white is not False for each in after.residuals)
+    return list(dict.fromkeys([*doubt_lines(after), *([] if explained else doubt_lines(before))]))
+
+
+def is_certain(answer: FitAnswer) -> bool:
+    """Whether all numbers are known, the only ones, and of logs without a doubt."""
+    known = set(answer.known.verdict) == {"known"} and answer.fit.converged and answer.fit.rival is None
+    return known and not any(map(_doubts, answer.before, answer.after))
 
 
 def _short(si: float, unit: str) -> str:

@@ -96,6 +96,23 @@ def test_fitted_numbers_are_written_into_the_deck_with_their_intervals(folder: P
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("column", "doubt"),
+    [
+        ("hinge.servo.motor_torque=-hinge.servo.motor_torque", "sign turned"),
+        ("hinge.servo.motor_torque=1000*hinge.servo.motor_torque", "1,000"),
+        ("hinge.q=57.29577951308232*hinge.q", "deg"),
+        ("time=1.02*time", "times divided by 1.0"),
+    ],
+)
+def test_a_doubtful_log_writes_nothing(folder: Path, capsys: Say, column: str, doubt: str) -> None:
+    arguments = ["fit", f"{folder}/deck.ic", f"{folder}/log.csv", "--estimate", "mass", "--column", column, "--diff"]
+    assert cli.main(arguments) == cli.NO
+    said = capsys.readouterr().out
+    assert "doubt: " in said and doubt in said and "so nothing is written into the deck" in said
+
+
+@pytest.mark.slow
 def test_what_a_log_cannot_tell_is_said_and_not_written(folder: Path, capsys: Say) -> None:
     arguments = ["fit", f"{folder}/deck.ic", f"{folder}/log.csv", "--set", "duration=0.3 s"]
     tied = ["--estimate", "links.bar.mass", "--estimate", "links.bar.com.x", "--estimate", "drive.kt"]
@@ -104,7 +121,10 @@ def test_what_a_log_cannot_tell_is_said_and_not_written(folder: Path, capsys: Sa
     assert "tied to others" in said and "leaves no mark in the logs: links.bar.mass by" in said
     before = (folder / "deck.ic").read_text()
     assert cli.main([*arguments[:3], *tied[:4], "--set", "duration=0.05 s", "--diff"]) == cli.NO
-    assert "not all numbers are known, so nothing is written into the deck" in capsys.readouterr().out
+    assert (
+        "not all numbers are known, or a log is doubtful, so nothing is written into the deck"
+        in capsys.readouterr().out
+    )
     assert (folder / "deck.ic").read_text() == before
 
 
@@ -119,6 +139,8 @@ def test_what_a_log_cannot_tell_is_said_and_not_written(folder: Path, capsys: Sa
         (("--estimate", "mass", "--prior", "mass=20"), "is not what is known of a parameter"),
         (("--estimate", "mass", "--prior", "mass=normal(20, 1) N"), "`mass` is not in N"),
         (("--estimate", "mass", "--prior", "mass=normal(20, -1) kg"), "is no distribution"),
+        (("--estimate", "mass", *("--prior", "mass=normal(20, 1) kg") * 2), "`mass` has two priors"),
+        (("--estimate", "links.bar.com"), "`links.bar.com`"),
         (("--estimate", "mass", "--zero", "9 s"), "has one of the run beside it"),
         (("--estimate", "mass", "--column", "hinge.q"), "is no column of a log for a channel"),
         (("--estimate", "mass", "--column", "hinge.w=hinge.q"), "does not record `hinge.w`"),
