@@ -61,6 +61,11 @@ def _of_joint(scope: Scope, use: ServoUse, name: str) -> Bounds:
         limit = number(f"{head}.{each.limit}") if each.limit and name == f"servo.{each.name}" else None
         if limit is not None:
             return Bounds(-limit, limit, (f"{head}.{each.limit}",))
+    if use.model == "rigid_gearbox" and name == "tau" and number(f"{head}.f_v") == 0.0:
+        ratio, most, friction = number(f"{head}.ratio"), number(f"{head}.tau_max"), number(f"{head}.f_c")
+        if ratio is not None and most is not None and friction is not None and f"{head}.f_s" not in scope.parameters:
+            torque = ratio * (most + friction)
+            return Bounds(-torque, torque, tuple(f"{head}.{each}" for each in ("ratio", "tau_max", "f_c")))
     if use.model == "locked" and number(f"{head}.release") == math.inf and name in ("q", "qd", "qdd"):
         at = number(f"initial.{use.joint}.q") if name == "q" else 0.0
         return Bounds() if at is None else Bounds(at, at, (head,))

@@ -62,6 +62,7 @@ def test_what_is_told(tmp_path: Path, text: str, expected: list[str]) -> None:
 
 
 VOLTS = "metric volts = peak { of = hinge.servo.voltage; } metric low = min { of = *.servo.voltage; } "
+EFFORT = "metric effort = peak { of = hinge.tau; } "
 OFF = "metric off = rms { of = 2 * abs(hinge.servo.voltage) - hinge.servo.voltage; } "
 """Channels that the amplifier keeps within 24 V, and an expression that it keeps within -24 V and 72 V."""
 
@@ -80,12 +81,20 @@ OFF = "metric off = rms { of = 2 * abs(hinge.servo.voltage) - hinge.servo.voltag
         (OFF + "require off < 72 V;", ""),
         ("metric room = max { of = hinge.servo.voltage * hinge.qd; } require room < 1e9 V*rad/s;", ""),
         ("require always(abs(hinge.servo.voltage) < 25 V);", "missed: "),
+        (EFFORT + "require effort < 101 N*m;", "missed: `effort` is never above 100 by `hinge.servo.ratio`, "),
+        (EFFORT + "require effort < 100 N*m;", ""),
     ],
 )
 def test_a_limit_beyond_what_a_servo_can_give(tmp_path: Path, text: str, said: str) -> None:
     found = check(tmp_path, ARM, SERVO, requiring(text)).diagnostics
     assert [each.code for each in found] == ["D340"] * bool(said)
     assert all(f" cannot be {said}" in each.message for each in found)
+
+
+def test_friction_that_grows_with_the_rate_leaves_a_torque_unbounded(tmp_path: Path) -> None:
+    run = requiring(EFFORT + "require effort < 103 N*m;")
+    for friction, expected in (("f_c = 0.02 N*m", ["D340"]), ("f_c = 0.05 N*m", []), ("f_v = 1e-5 N*m*s/rad", [])):
+        assert codes(tmp_path, ARM, changed(SERVO, ("j_m =", f"{friction}; j_m =")), run) == expected
 
 
 def test_a_limit_on_a_joint_that_is_locked(tmp_path: Path) -> None:
