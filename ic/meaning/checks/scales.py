@@ -368,7 +368,7 @@ def _gravities(run: RunNumbers) -> Iterator[Scale]:
         if use.model == "gravity":
             path = f"environment.{use.name}.g"
             size, other = run.length(path), "that on the Earth"
-            yield Scale("gravity", path, size, "m/s^2", EARTH, other, 0.0, 30.0, usual, meant="m/s^2")
+            yield Scale("gravity", path, size, "m/s^2", EARTH, other, 0.0, 30.0, usual, meant="m/s^2", typical=1.0)
 
 
 SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (

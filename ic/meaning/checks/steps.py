@@ -87,13 +87,18 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
         def find_usual() -> list[str]:
             return usual_number(scope, experiment, lambda changed: not step_size(changed, rows).loops)
 
-        any_told = any(not experiment.allows("D320" if loop.ticks else "D322") for loop in found.loops)
-        blamed = memo.answer("usual number", experiment, find_usual, rows) if any_told else []
+        told = [loop for loop in found.loops if not experiment.allows("D320" if loop.ticks else "D322")]
+        far = any(loop.parameters or loop.gain is None or not NEAR < loop.gain < 1.0 / NEAR for loop in told)
+        blamed = memo.answer("usual number", experiment, find_usual, rows) if far else []
         for loop in found.loops:
             start = at_the_start(experiment, loop.case)
             warning = loop_warning(experiment, loop, scope.rate_place, f"as it stands {start}")
             complaints.pass_on(replace(warning, help=(*blamed, *warning.help)))
     return replace(experiment, notes=(*experiment.notes, *_note(experiment, found)))
+
+
+NEAR = 0.3
+"""Share of their gain from which on loops are so near to be stable that no other number is looked for."""
 
 
 def _is_told(

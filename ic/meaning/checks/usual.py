@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from ic.meaning.checks.scale import Scale
+from ic.meaning.checks.scale import OTHER_UNITS, Scale
 from ic.meaning.parameters.scope import Scope
 from met.diagnostic import Problem
 from met.plan import Experiment
@@ -23,7 +23,7 @@ def usual_number(scope: Scope, experiment: Experiment, is_free: Callable[[Experi
     is free of a finding; none where there is no such number. is_free: whether an experiment is"""
     odd = [scale for scale in scope.scales if _distance(scale) > math.log(FAR)]
     for scale in sorted(odd, key=_distance, reverse=True)[:MOST]:
-        factor = float((scale.typical / scale.multiple) ** (1.0 / scale.power))
+        factor = _factor(scale)
         changed = _changed(experiment, scale.path, factor)
         try:
             free = changed is not None and is_free(changed)
@@ -33,6 +33,13 @@ def usual_number(scope: Scope, experiment: Experiment, is_free: Callable[[Experi
             times = f"{1.0 / factor:,.0f} times less" if factor < 1.0 else f"{factor:,.0f} times more"
             return [f"`{scale.path}` {scale.words}: with {times}, which is usual, this would not be so"]
     return []
+
+
+def _factor(scale: Scale) -> float:
+    """The factor of the number that makes it usual: that of the first other unit that does, else to the typical one."""
+    units = [factor for _, factor in OTHER_UNITS.get(scale.meant, ())]
+    needed = float((scale.typical / scale.multiple) ** (1.0 / scale.power))
+    return next((each for each in units if each < FAR * needed and needed < FAR * each), needed)
 
 
 def _distance(scale: Scale) -> float:
