@@ -20,8 +20,6 @@ def grapples(run: RunNumbers) -> Iterator[Scale]:
     then; of one beyond the arm's reach there is D339."""
     structure = run.structure
     motions = {use.joint: run.motion(use) for use in run.uses}
-    named = [use.name for use in structure.environment if use.model == "gravity"]
-    g = sum((run.vector(f"environment.{name}.g") for name in named), np.zeros(3))
     for payload in structure.payloads:
         head, known = f"payloads.{payload.name}", grapple_numbers(structure, payload, run.settled)
         t = run.numbers.get(f"{head}.grapple", math.inf)
@@ -32,7 +30,7 @@ def grapples(run: RunNumbers) -> Iterator[Scale]:
             motion = motions.get(joint)
             q[joint] = math.nan if motion is None else float(np.interp(t, run.instants, motion[0]))
         turned, at, _ = run.poses(q)
-        flown = run.vector(f"{head}.position") + run.vector(f"{head}.velocity") * t + 0.5 * t * t * g
+        flown = run.vector(f"{head}.position") + run.vector(f"{head}.velocity") * t + 0.5 * t * t * run.gravity
         place = at[payload.link] + turned[payload.link] @ run.vector(f"{head}.at")
         apart = float(np.linalg.norm(flown - place))
         loose = run.extent(head) + run.length(f"{head}.com") * (2.0 + run.length(f"{head}.rate") * t)

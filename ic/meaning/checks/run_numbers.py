@@ -49,6 +49,7 @@ class RunNumbers:
             self.by_unit[each.unit].append((path, each))
         self.moved = {link.name for link in structure.links} - {BASE, *structure.ground}
         """The links that move against the base."""
+        self.lumped = {link.name for link in structure.links if link.lumped}
         self.kinds = {joint.name: joint.kind for joint in structure.moving}
         self.offsets = {joint.name: self.length(f"{joint.name}.at") for joint in structure.joints}
         self.extents = {link.name: self.extent(f"links.{link.name}") for link in structure.links}
@@ -102,6 +103,24 @@ class RunNumbers:
         centre[axis] = half[axis]
         return float(np.linalg.norm(np.maximum(np.abs(point - centre) - half, 0.0)))
 
+    def beside_link(self, link: str, point: np.ndarray) -> float:
+        """The distance of a point of a link's frame from the nearer of its shape and the box about its joint and those
+        that it carries, m."""
+        joints = [self.vector(f"{joint.name}.at") for joint in self.structure.joints if joint.parent == link]
+        own = np.array([np.zeros(3), *joints])
+        far = np.linalg.norm(np.maximum(np.maximum(own.min(axis=0) - point, point - own.max(axis=0)), 0.0))
+        shape = self.beside_shape(f"links.{link}", point)
+        return float(far) if shape is None else min(float(far), shape)
+
+    def slender(self, head: str) -> tuple[float, float]:
+        """Length and largest width of a cylinder or a box along its axis, m; 0 and 0 of another body."""
+        along, size = self.settled.get(f"{head}.shape.along"), self.vector(f"{head}.shape.size")
+        if along is None:
+            return 0.0, 0.0
+        axis = XYZ.index(str(along.value))
+        wide = max(np.delete(size, axis).max(), 2.0 * self.numbers.get(f"{head}.shape.radius", 0.0))
+        return float(size[axis] or self.numbers.get(f"{head}.shape.length", 0.0)), float(wide)
+
     @property
     def reach(self) -> float:
         """The longest way from a joint on the base over joints to the end of a shape, m; where it is 0 the distance of
@@ -139,11 +158,16 @@ class RunNumbers:
         least = min(limits, key=lambda each: each[1], default=None)
         return least if least is not None and least[1] > 0.0 else None
 
+    @property
+    def gravity(self) -> np.ndarray:
+        """The acceleration of free fall, m/s^2, in the world's axes; zeros without gravity."""
+        named = [use.name for use in self.structure.environment if use.model == "gravity"]
+        return sum((self.vector(f"environment.{name}.g") for name in named), np.zeros(3))
+
     def loads(self) -> dict[str, float]:
         """The torque (force) of gravity about (along) each moving joint's axis where the run begins, N m (N); none on a
         base that moves, or without gravity."""
-        named = [use.name for use in self.structure.environment if use.model == "gravity"]
-        g = sum((self.vector(f"environment.{name}.g") for name in named), np.zeros(3))
+        g = self.gravity
         if self.structure.base is not None or not g.any():
             return {}
         begins = {joint.name: self.numbers.get(f"initial.{joint.name}.q", 0.0) for joint in self.structure.moving}

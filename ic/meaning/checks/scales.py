@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from ic.meaning.checks.asked import grapples, spreads, targets
+from ic.meaning.checks.bodies import centres, forgotten, held, masses
 from ic.meaning.checks.magnitudes import LENGTHS, MASSES, MEANT, SMALLEST_GYRATION
 from ic.meaning.checks.run_numbers import BEARING_NOTHING, RunNumbers
 from ic.meaning.checks.scale import TURN, Scale
@@ -27,6 +28,7 @@ from met.plan import BASE, Structure
 from met.plan.channel import JOINT_LIMITS
 from met.plan.defaults import INERTIA
 from met.servos.motor import RATIO
+from met.vectors import rotation_rpy
 
 EARTH = 9.80665
 """Acceleration of free fall on the Earth, m/s^2."""
@@ -42,7 +44,7 @@ MOST_CASES = 16
 
 
 def _turns(run: RunNumbers) -> Iterator[Scale]:
-    """Positions of revolute joints at the start, and of their commands."""
+    """Positions of revolute joints at the start, and of the commands of all joints."""
     usual = "joints of published arms turn by at most 1.6 turns"
     for joint in run.structure.moving:
         if joint.kind == "revolute":
@@ -54,6 +56,10 @@ def _turns(run: RunNumbers) -> Iterator[Scale]:
                 in_rad = unit_written([run.settled[path]], "rad")[1] == 1.0  # else it was not meant in degrees
                 high = max(3.0 if in_rad else 1e4, own / TURN)
                 yield Scale("angle of a joint", path, abs(angle), "rad", TURN, "a turn", 0.0, high, usual, meant="rad")
+        elif run.is_placed(joint.name) and run.reach > 0.0:
+            for path, way in run.largest(f"{joint.name}.servo.command", "m").items():
+                other, of_rails = run.reach_words, "a rail is seldom as long as 300 of its arms"
+                yield Scale("way of a joint", path, abs(way), "m", run.reach, other, 0.0, 300.0, of_rails, meant="m")
 
 
 def _centres(run: RunNumbers) -> Iterator[Scale]:
@@ -79,17 +85,20 @@ def _offsets(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _touches(run: RunNumbers) -> Iterator[Scale]:
-    """Joints, and payloads, which may hang, beside the rod, box or cylinder of the link that carries them. A ball is a
-    mass, and not a shape."""
+    """Joints, and payloads, which may hang, beside the rod, box or cylinder of the link that carries them, and payloads
+    beside the joints of one without. A ball is a mass, and not a shape."""
     usual = "a joint is usually on its link, or in it"
     points = [(f"{joint.name}.at", joint.parent, 0.25, usual) for joint in run.structure.joints]
     usual = "a payload is usually at its link, or hangs from it"
     points += [(f"payloads.{payload.name}.at", payload.link, 1.0, usual) for payload in run.structure.payloads]
     for path, link, high, usual in points:
-        far = run.beside_shape(f"links.{link}", run.vector(path))
+        point, hangs, verb = run.vector(path), high == 1.0, f"is beside the shape of `{link}` by"
+        far = run.beside_shape(f"links.{link}", point)
+        if far is None and hangs:
+            far, high, verb = run.beside_link(link, point), 5.0, f"is beside the joints of `{link}` by"
         if far is not None and link != BASE and run.reach > 0.0:
-            verb = f"is beside the shape of `{link}` by"
-            yield Scale("place beside a shape", path, far, "m", run.reach, run.reach_words, 0.0, high, usual, verb=verb)
+            what, typical = "place beside a link", 0.1 if hangs else 0.0
+            yield Scale(what, path, far, "m", run.reach, run.reach_words, 0.0, high, usual, verb=verb, typical=typical)
 
 
 def _gyrations(run: RunNumbers) -> Iterator[Scale]:
@@ -133,6 +142,37 @@ def _levers(run: RunNumbers) -> Iterator[Scale]:
             if each.name in ("point", "at") and each.unit == "m" and run.reach > 0.0:
                 far, other = run.length(path), run.reach_words
                 yield Scale("point of a load", path, far, "m", run.reach, other, 0.0, 10.0, usual, meant="m")
+
+
+def _pushes(run: RunNumbers) -> Iterator[Scale]:
+    """Torques of wrenches about the joints that carry their link, where the run begins, beside the motors'. Blows,
+    which act for less than a tenth of the run, are left out."""
+    usual = "a motor that meets more gives way"
+    begins = {joint.name: run.numbers.get(f"initial.{joint.name}.q", 0.0) for joint in run.structure.moving}
+    wrenches = [use.name for use in run.structure.environment if use.model == "wrench" and _lasts(run, use.name)]
+    motors = {use.joint: use for use in run.uses}
+    turned, at, lines = run.poses(begins) if wrenches else ({}, {}, {})
+    for name in wrenches:
+        head, link = f"environment.{name}", str(run.settled[f"environment.{name}.link"].value)
+        point = at.get(link, np.zeros(3)) + turned.get(link, np.eye(3)) @ run.vector(f"{head}.point")
+        own = turned.get(link, np.eye(3)) if str(run.settled[f"{head}.axes"].value) == "link" else np.eye(3)
+        force, moment = own @ run.vector(f"{head}.force"), own @ run.vector(f"{head}.moment")
+        while (joint := next((each for each in run.structure.joints if each.child == link), None)) is not None:
+            link, use = joint.parent, motors.get(joint.name)
+            limit, ratio = (run.largest_torque(use), run.of_motor(use, RATIO.name)) if use is not None else (None, None)
+            if limit is not None and ratio is not None:
+                axis, through = lines[joint.name]
+                turning = np.cross(point - through, force) + moment if joint.kind == "revolute" else force
+                most, unit = ratio * limit[1], "N*m" if joint.kind == "revolute" else "N"
+                path, other = f"{head}.force", f"the motor's largest at joint `{joint.name}`, {most:.4g} {unit}"
+                verb, size = "loads a joint by", abs(float(axis @ turning))
+                yield Scale("load of a wrench", path, size, unit, most, other, 0.0, 20.0, usual, verb)
+
+
+def _lasts(run: RunNumbers, name: str) -> bool:
+    """True of a model of the environment that acts for a tenth of the run, or longer."""
+    begins, ends = (run.numbers.get(f"environment.{name}.{end}", math.nan) for end in ("from", "until"))
+    return min(ends, run.duration) - max(begins, 0.0) >= 0.1 * run.duration
 
 
 def _gears(run: RunNumbers) -> Iterator[Scale]:
@@ -322,9 +362,8 @@ def _bands(run: RunNumbers) -> Iterator[Scale]:
 
 def _payloads(run: RunNumbers) -> Iterator[Scale]:
     arm = sum(run.numbers.get(f"links.{link}.mass", 0.0) for link in run.moved)
-    weights = [run.length(f"environment.{use.name}.g") for use in run.structure.environment if use.model == "gravity"]
     high, typical, usual = 200.0, 0.2, "industrial robots lift a tenth to a third of their mass"
-    if not any(weights):
+    if not run.gravity.any():
         high, typical, usual = 1e4, 70.0, "the arm of the Space Station is made for 116 t, some 70 times its mass"
     for payload in run.structure.payloads:
         path, other = f"payloads.{payload.name}.mass", f"the mass of the moved links, {arm:.4g} kg"
@@ -369,6 +408,12 @@ def _gravities(run: RunNumbers) -> Iterator[Scale]:
             path = f"environment.{use.name}.g"
             size, other = run.length(path), "that on the Earth"
             yield Scale("gravity", path, size, "m/s^2", EARTH, other, 0.0, 30.0, usual, meant="m/s^2", typical=1.0)
+            up, feet = run.vector(path)[2], [each for each in run.structure.joints if each.parent == BASE]
+            upright = all(rotation_rpy(*run.vector(f"{joint.name}.rpy"))[2][2] > -0.5 for joint in feet)
+            if 0.0 < size <= up and run.structure.base is None and upright:
+                said, cure = f"leads up: its z is {up:.4g} m/s^2", f"where z is up, its z is -{up:.4g} m/s^2"
+                where = "z is up in most decks and robots' files"
+                yield Scale("upward gravity", path, up, "m/s^2", EARTH, other, 0.0, 1e-3, where, said=said, cure=cure)
 
 
 SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
@@ -376,11 +421,16 @@ SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
     _centres,
     _offsets,
     _touches,
+    masses,
+    centres,
+    forgotten,
+    held,
     grapples,
     spreads,
     targets,
     _gyrations,
     _levers,
+    _pushes,
     _gears,
     _speeds,
     _limits,

@@ -81,8 +81,8 @@ PUSH = "push = wrench { link = fore; point = [0.4, 0, 0] m; force = [0, 0, 1] N;
         (("point = [0.4, 0, 0] m", "point = [400, 0, 0] m"),
          "`environment.push.point` is 400 m, 666.7 times the arm's reach, 0.6 m; what acts on an arm acts on it, or on "
          "what it carries", ("in mm it would be 0.667 times, in cm it would be 6.67 times the arm's reach, 0.6 m: is the unit another?", "at most 6 m is usual")),
-        (("ratio = 100", "ratio = 0.01"),
-         "`shoulder.servo.ratio` is 0.01; 1 more is so; gears of arms slow their motor down, by 1 to some 3,000",
+        (("ratio = 100", "ratio = 0.1"),
+         "`shoulder.servo.ratio` is 0.1; 1 more is so; gears of arms slow their motor down, by 1 to some 3,000",
          ("at least 0.2 is usual",)),
         (("max_rate = 0.8 rad/s, max_acceleration = 2", "max_rate = 8 rad/s, max_acceleration = 200"),
          "`shoulder.servo.command` asks for 8 rad/s, 1.667 times the rate at which the motor's back-EMF is all of `v_max`, "
@@ -159,6 +159,26 @@ def test_a_joint_far_from_the_shape_that_carries_it_is_told() -> None:
     hangs = ("tool { on = fore; at = [0.4, 0, 0] m", "tool { on = fore; at = [0.4, 0, -2] m")
     assert remarks(rod, hangs) == []
     assert remarks((body, "shape = sphere(radius = 0.02 m);")) == []
+    far = ("tool { on = fore; at = [0.4, 0, 0] m", "tool { on = fore; at = [0.4, 0, -4] m")
+    assert [each for each, _ in remarks(far)] == [
+        "`payloads.tool.at` is beside the joints of `fore` by 4.02 m, 6.7 times the arm's reach, 0.6 m; a payload is "
+        "usually at its link, or hangs from it"
+    ]
+
+
+def test_a_prismatic_joint_that_goes_far_for_its_arm_is_told() -> None:
+    elbow = "joint elbow revolute { parent = upper; child = fore; axis = y;"
+    slide = (elbow, elbow.replace("revolute", "prismatic").replace("axis = y", "axis = x"))
+    way = "trapezoid(to = 300 UNIT, max_rate = 20 mm/s, max_acceleration = 1 m/s^2)"
+    drive = (
+        f"elbow = drive {{ ratio = 1 rad/mm; command = position({way}); sensor q = encoder {{ step = 10 um; }} }}; }}"
+    )
+    late = ("    metric late = settling_time(of = elbow.q, target = 60 deg, band = 2 %);\n", "")
+    of_mm, of_m = (("elbow = drive; }", drive.replace("UNIT", unit)) for unit in ("mm", "m"))
+    assert remarks((PUSH, ""), slide, late, of_mm) == []
+    assert [each for each, _ in remarks((PUSH, ""), slide, late, of_m)] == [
+        "`elbow.servo.command.to` is 300 m, 500 times the arm's reach, 0.6 m; a rail is seldom as long as 300 of its arms"
+    ]
 
 
 def test_a_free_base_that_falls_under_gravity_is_told() -> None:

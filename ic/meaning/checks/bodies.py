@@ -1,0 +1,96 @@
+"""Scales of bodies: masses beside their sizes and beside what carries them, and centres beside what they belong to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from ic.meaning.checks.run_numbers import RunNumbers
+from ic.meaning.checks.scale import Scale
+from met.plan import BASE
+from met.plan.defaults import INERTIA
+
+WATER = 1000.0
+"""Density of water, kg/m^3."""
+
+
+def masses(run: RunNumbers) -> Iterator[Scale]:
+    """Masses of links beside water in a cube as long as the link, and beside all links that carry it. Those with a
+    shape, of which D298 judges the density, and those with equal moments, which stand for points, are only blamed by
+    the first."""
+    usual = "of 982 links of published robots none is above 7.2"
+    behind = "of 985 links of published robots none is above 23" if run.gravity.any() else "in space an arm moves ships"
+    carriers = {BASE: 0.0}
+    for joint in run.outward:
+        link, head = joint.child, f"links.{joint.child}"
+        mass, carrying = run.numbers.get(f"{head}.mass", 0.0), carriers.get(joint.parent, 0.0)
+        carriers[link] = carrying + (mass if link in run.moved else 0.0)
+        if link not in run.moved or link in run.lumped or not mass > 0.0:
+            continue
+        turned = (12.0 * run.gyration(head) ** 2 * mass / WATER) ** 0.2  # the cube with this inertia
+        long = max(run.extents[link], 2.0 * run.length(f"{head}.com"), turned)
+        long = max([long, *(run.offsets[each.name] for each in run.structure.joints if each.parent == link)])
+        moments = {run.numbers.get(f"{head}.inertia.{part}") for part in INERTIA[:3]}
+        water, most = WATER * long**3, 20.0 if not run.extents[link] and len(moments) > 1 else 1e9
+        if water > 0.0:
+            other = f"that of water in a cube as long as it, {water:.4g} kg"
+            yield Scale(
+                "mass of a link", f"{head}.mass", mass, "kg", water, other, 0.0, most, usual, meant="kg", typical=0.05
+            )
+        if carrying > 0.0:
+            other, most = f"the mass of the links that carry it, {carrying:.4g} kg", 100.0 if run.gravity.any() else 1e4
+            yield Scale("mass on links", f"{head}.mass", mass, "kg", carrying, other, 0.0, most, behind, meant="kg")
+
+
+def centres(run: RunNumbers) -> Iterator[Scale]:
+    """Written centres of mass beside the shape and the joints of their link. A link that carries no joint and has no
+    rod, box or cylinder may have its mass anywhere; a shape may stand for one that leads the other way."""
+    usual = "of 721 links of published robots none is further from its joints than 0.23"
+    carrying = {joint.parent for joint in run.structure.joints}
+    for link in sorted(run.moved - run.lumped):
+        path, head = f"links.{link}.com", f"links.{link}"
+        shaped = run.beside_shape(head, np.zeros(3)) is not None
+        if run.is_written(path) and (shaped or link in carrying) and run.reach > 0.0:
+            large, centre = 10.0 * run.gyration(head), run.vector(path)
+            far = min(run.beside_link(link, side * centre) for side in ((1.0, -1.0) if shaped else (1.0,)))
+            most, other = max((run.reach, run.reach_words), (large, f"10 times its radius of gyration, {large:.4g} m"))
+            if shaped:
+                most = run.extents[link]
+                other = f"the size of its shape, {most:.4g} m"
+            verb = f"is beside the shape and the joints of `{link}` by"
+            yield Scale("centre beside a link", path, far, "m", most, other, 0.0, 0.25, usual, verb=verb)
+
+
+def forgotten(run: RunNumbers) -> Iterator[Scale]:
+    """Joints that turn, or are fixed, without an `at` on a link whose shape leads away from its own joint."""
+    usual = "without `at` both joints of a link are in one place"
+    for joint in run.structure.joints:
+        long, wide = run.slender(f"links.{joint.parent}")
+        given = run.is_written(f"{joint.name}.at") or any(path.startswith(f"{joint.name}.dh.") for path in run.settled)
+        if joint.parent in run.moved and joint.kind != "prismatic" and not given and wide > 0.0:
+            said = f"is not written, and `{joint.parent}`, which carries the joint, is {long:.4g} m long"
+            cure = "write where it is, or `at = [0, 0, 0] m` if it is meant so"
+            path, other = f"{joint.name}.at", "its width"
+            yield Scale("joint without a place", path, long, "m", wide, other, 0.0, 2.0, usual, said=said, cure=cure)
+
+
+def held(run: RunNumbers) -> Iterator[Scale]:
+    """Loads at the start of joints that turn: of those without a servo that begin at 0 unwritten, on an arm with
+    motors, and by the turns by which they wind up springs."""
+    loads, servos = run.loads(), {use.joint for use in run.uses}
+    motors = any(run.of_motor(use, "kt") is not None for use in run.uses)
+    weight = float(np.linalg.norm(run.gravity)) * sum(run.numbers.get(f"links.{link}.mass", 0.0) for link in run.moved)
+    for joint in [name for name in loads if run.kinds[name] == "revolute" and not run.is_helped(name)]:
+        load, most, stiffness = abs(loads[joint]), weight * run.reach, run.numbers.get(f"{joint}.servo.stiffness")
+        begins = run.settled.get(f"initial.{joint}.q")
+        if joint not in servos and motors and begins is not None and begins.origin.place is None and most > 0.0:
+            said = f"has no servo, and gravity loads it by {load:.4g} N*m at the start"
+            cure = f"write `{joint} = SERVO;` in `servos`, of model `passive` if it is to be free, or where it begins"
+            other, usual = f"the moved links' weight at the arm's reach, {most:.4g} N*m", "what nothing holds sinks in"
+            yield Scale("free joint", joint, load, "N*m", most, other, 0.0, 0.01, usual, said=said, cure=cure)
+        elif stiffness and f"{joint}.servo.kt" not in run.numbers:
+            path, other, usual = f"{joint}.servo.stiffness", "half a turn", "springs bend by less than that"
+            verb = "lets the load at the start wind it up by"
+            yield Scale("load of a spring", path, load / stiffness, "rad", math.pi, other, 0.0, 1.0, usual, verb)
