@@ -105,7 +105,7 @@ def targets(run: RunNumbers) -> Iterator[Scale]:
         of_both = f"{joint}.servo.command", f"{head}.{name}"
         if any(least < most and path.startswith(of_both) for path, (least, most) in run.ranges.items()):
             continue  # a sweep over commands may judge all by one target
-        asked = np.append(motions[joint][k], begins)
+        asked, rates = np.append(motions[joint][k], begins), motions[joint][1]
         away = max(float(asked.min()) - target, target - float(asked.max()), 0.0)
         band = run.numbers.get(f"{head}.band", 0.0) * abs(target) + run.numbers.get(f"{head}.within", 0.0)
         band = max(band, 0.02 * abs(target - begins))
@@ -119,6 +119,7 @@ def targets(run: RunNumbers) -> Iterator[Scale]:
                 else "look at the joint that is meant"
             )
             lead = f"from {low} to {high}" if low != high else f"to {low}"
+            wait = "let the run last longer" if rates[-1] else "wait for what this one's leads to"
             said = f"is {target / scale:.4g} {unit}, and what `{joint}` is asked for leads {lead} {unit}"
             other = f"the band of metric `{metric.name}`"
             yield Scale(
@@ -132,5 +133,5 @@ def targets(run: RunNumbers) -> Iterator[Scale]:
                 1.0,
                 usual,
                 said=said,
-                cure=f"{cure}, or wait for what this one's leads to",
+                cure=f"{cure}, or {wait}",
             )

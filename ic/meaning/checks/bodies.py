@@ -55,7 +55,7 @@ def centres(run: RunNumbers) -> Iterator[Scale]:
         if run.is_written(path) and (shaped or link in carrying) and run.reach > 0.0:
             large, centre = 10.0 * run.gyration(head), run.vector(path)
             far = min(run.beside_link(link, side * centre) for side in ((1.0, -1.0) if shaped else (1.0,)))
-            most, other = max((run.reach, run.reach_words), (large, f"10 times its radius of gyration, {large:.4g} m"))
+            most, other = max((run.span, run.reach_words), (large, f"10 times its radius of gyration, {large:.4g} m"))
             if shaped:
                 most = run.extents[link]
                 other = f"the size of its shape, {most:.4g} m"

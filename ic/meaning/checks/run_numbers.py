@@ -122,12 +122,16 @@ class RunNumbers:
         return float(size[axis] or self.numbers.get(f"{head}.shape.length", 0.0)), float(wide)
 
     @property
-    def reach(self) -> float:
-        """The longest way from a joint on the base over joints to the end of a shape, m; where it is 0 the distance of
-        the farthest centre of mass."""
+    def span(self) -> float:
+        """The longest way from a joint on the base over joints to the end of a shape, m."""
         chains = [self.beyond.get(joint.child, 0.0) for joint in self.structure.joints if joint.parent == BASE]
+        return max(chains, default=0.0)
+
+    @property
+    def reach(self) -> float:
+        """The span, m; where it is 0 the distance of the farthest centre of mass."""
         coms = [self.length(f"links.{link.name}.com") for link in self.structure.links]
-        return max(chains, default=0.0) or max(coms, default=0.0)
+        return self.span or max(coms, default=0.0)
 
     @property
     def reach_words(self) -> str:

@@ -10,6 +10,16 @@ from met.frozen import frozen
 TURN = 2.0 * math.pi
 
 
+def inside(bound: float, share: float, digits: int) -> str:
+    """A bound in a few digits, rounded to the side on which the finding holds: down where the share is below 1, else
+    up, in size."""
+    if not bound or not math.isfinite(bound):
+        return f"{bound:g}"
+    step = 10.0 ** (math.floor(math.log10(abs(bound))) + 1 - digits)
+    whole = (math.floor if share < 1.0 else math.ceil)(abs(bound) / step)
+    return f"{math.copysign(whole * step, bound):.{digits}g}"
+
+
 @frozen
 class Scale:
     """A number of a run as a multiple of another.
@@ -21,7 +31,8 @@ class Scale:
     low     smallest usual multiple;  high: the largest;  usual: where these are from, in words
     meant   unit of the parameter where another may have been meant, "" where it may not;  power: the multiple goes as
             this power of the parameter
-    said    what is so, in words, where the multiple does not say it;  cure: its remedy
+    said    what is so, in words, where the multiple does not say it;  cure: its remedy, where another than to be
+            within the usual range
     typical  a multiple in the middle of what is usual, of a number on which the motion depends; 0: none is known
     """
 
@@ -38,7 +49,7 @@ class Scale:
     meant: str = ""
     power: float = 1.0
     said: str = ""
-    cure: str = "ask for less, or move the limit"
+    cure: str = ""
     typical: float = 0.0
 
     @property
@@ -70,14 +81,14 @@ class Scale:
     @property
     def remedies(self) -> list[str]:
         """Other units of the parameter with which the multiple would be usual, if there are any, and what is usual."""
-        if self.said:
-            return [self.cure]
+        if self.said or self.cure:
+            return [self.cure or "ask for less, or move the limit"]
         multiples = [(unit, self.multiple * factor**self.power) for unit, factor in OTHER_UNITS.get(self.meant, ())]
         usual = [(unit, each) for unit, each in multiples if max(self.low, 1e-2 * self.high) <= each <= self.high]
         usual.sort(key=lambda each: abs(math.log(each[1] / (0.1 * self.high))))
         found = ", ".join(f"in {unit} it would be {multiple:.3g} times" for unit, multiple in usual[:2])
-        end, word = (self.low, "least") if self.multiple < self.low else (self.high, "most")
-        limit = f"at {word} {end * self.beside:.3g} {self.unit}".rstrip() + " is usual"
+        end, word, side = (self.low, "least", 2.0) if self.multiple < self.low else (self.high, "most", 0.5)
+        limit = f"at {word} {inside(end * self.beside, side, 3)} {self.unit}".rstrip() + " is usual"
         return [*([f"{found} {self.other}: is the unit another?"] if found else []), limit]
 
 

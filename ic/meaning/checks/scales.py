@@ -20,7 +20,7 @@ from ic.meaning.checks.asked import grapples, spreads, targets
 from ic.meaning.checks.bodies import centres, forgotten, held, masses
 from ic.meaning.checks.magnitudes import LENGTHS, MASSES, MEANT, SMALLEST_GYRATION
 from ic.meaning.checks.run_numbers import BEARING_NOTHING, RunNumbers
-from ic.meaning.checks.scale import TURN, Scale
+from ic.meaning.checks.scale import TURN, Scale, inside
 from ic.meaning.control.servos import Use, unit_written
 from ic.meaning.parameters.scope import Scope
 from met import models
@@ -273,7 +273,10 @@ def _loads(run: RunNumbers) -> Iterator[Scale]:
             most = ratio * (limit[1] + (friction or 0.0))
             path, other = f"{use.joint}.servo.{limit[0]}", f"what it holds at the joint, {most:.4g} {unit}"
             load = abs(loads[use.joint])
-            yield Scale("load at the start", path, load, unit, most, other, 0.0, 1.0, usual, verb="meets a load of")
+            torque = load / ratio - (friction or 0.0)  # of the motor
+            enough = inside(run.numbers[path] * torque / limit[1], 2.0, 4)
+            verb, cure = "meets a load of", f"{enough} {run.settled[path].unit} would hold it"
+            yield Scale("load at the start", path, load, unit, most, other, 0.0, 1.0, usual, verb, cure=cure)
             constant, current, scale = (run.numbers.get(f"{use.joint}.bed.{name}") for name in LOAD_MOTOR)
             if constant is not None and current is not None:
                 path, most = f"{use.joint}.bed.i_max", ratio * constant * current * (1.0 if scale is None else scale)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from ic.meaning.checks.scale import inside
 from ic.meaning.control.schedule import hz
 from ic.text.complaints import known_words
 from met.diagnostic import Diagnostic, Label, Place
@@ -93,7 +94,7 @@ def _fitting(experiment: Experiment, loop: Unstable) -> str:
         return "how much of the gain is stable was not searched for: the arm is too large"
     if share is None:
         return "no share of the gain is stable"
-    share = float(_inside(share * EDGE if share < 1.0 else share / EDGE, share, 2))
+    share = float(inside(share * EDGE if share < 1.0 else share / EDGE, share, 2))
     gains = [
         _value_of(experiment, loop.case, path, share)
         for path in (f"{joint}.servo.{name}" for name in ("kp", "ki"))
@@ -111,17 +112,7 @@ def _bound(experiment: Experiment, case: int, path: str, share: float) -> str:
 def _value_of(experiment: Experiment, case: int, path: str, share: float) -> str:
     """A share of a parameter's value in a case, in a deck's notation."""
     value, parameter = float(_value(experiment, path, case)) * share, experiment.parameters[path]
-    return f"{path.rpartition('.')[2]} = {_inside(value, share, 3)} {parameter.unit}"
-
-
-def _inside(bound: float, share: float, digits: int) -> str:
-    """A bound in a few digits, rounded to the side on which the finding holds: down where the share is below 1, else
-    up, in size."""
-    if not bound or not math.isfinite(bound):
-        return f"{bound:g}"
-    step = 10.0 ** (math.floor(math.log10(abs(bound))) + 1 - digits)
-    whole = (math.floor if share < 1.0 else math.ceil)(abs(bound) / step)
-    return f"{math.copysign(whole * step, bound):.{digits}g}"
+    return f"{path.rpartition('.')[2]} = {inside(value, share, 3)} {parameter.unit}"
 
 
 def _gain_places(experiment: Experiment, loop: Unstable) -> Iterator[Label]:

@@ -82,6 +82,17 @@ def test_a_centre_beside_the_shape_and_the_joints_of_its_link_is_told(
     assert [each.startswith(told) for each in found] == ([True] if beside else [])
 
 
+def test_what_is_said_to_be_usual_is_not_told(tmp_path: Path) -> None:
+    """What was found: of a limit of 0.0351 rad, rounded, 0.0351 rad and more was told again."""
+    volts = changed(DECK, ("v_max = 12 V", "v_max = 11.7 V"), ("max_rate = 60 deg/s", "max_rate = 20 rad/s"))
+    faster = changed(volts, ("max_acceleration = 200 deg/s^2", "max_acceleration = 9000 rad/s^2"))
+    [first, *_] = [each for each in check(tmp_path, faster, select="all").diagnostics if each.code == "D297"]
+    most = first.help[0].removeprefix("at most ").removesuffix(" is usual")
+    assert most == "7.67 rad/s"  # 11.7/(0.006 * 254) = 7.677
+    mended = changed(faster, ("max_rate = 20 rad/s", f"max_rate = {most}"))
+    assert [each for each in check(tmp_path, mended, select="all").diagnostics if each.code == "D297"] == []
+
+
 def test_a_joint_without_a_place_on_a_long_link_is_told(tmp_path: Path) -> None:
     without = ("axis = -y;  at = [80, 0, 0] mm;", "axis = -y;")
     assert said(tmp_path, BARE, without) == [
