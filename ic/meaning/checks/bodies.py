@@ -31,7 +31,7 @@ def masses(run: RunNumbers) -> Iterator[Scale]:
             continue
         turned = (12.0 * run.gyration(head) ** 2 * mass / WATER) ** 0.2  # the cube with this inertia
         long = max(run.extents[link], 2.0 * run.length(f"{head}.com"), turned)
-        long = max([long, *(run.offsets[each.name] for each in run.structure.joints if each.parent == link)])
+        long = max([long, *(run.offsets[each] for each in run.carried[link])])
         moments = {run.numbers.get(f"{head}.inertia.{part}") for part in INERTIA[:3]}
         water, most = WATER * long**3, 20.0 if not run.extents[link] and len(moments) > 1 else 1e9
         if water > 0.0:
@@ -48,11 +48,10 @@ def centres(run: RunNumbers) -> Iterator[Scale]:
     """Written centres of mass beside the shape and the joints of their link. A link that carries no joint and has no
     rod, box or cylinder may have its mass anywhere; a shape may stand for one that leads the other way."""
     usual = "of 721 links of published robots none is further from its joints than 0.23"
-    carrying = {joint.parent for joint in run.structure.joints}
     for link in sorted(run.moved - run.lumped):
         path, head = f"links.{link}.com", f"links.{link}"
         shaped = run.beside_shape(head, np.zeros(3)) is not None
-        if run.is_written(path) and (shaped or link in carrying) and run.reach > 0.0:
+        if run.is_written(path) and (shaped or run.carried[link]) and run.reach > 0.0:
             large, centre = 10.0 * run.gyration(head), run.vector(path)
             far = min(run.beside_link(link, side * centre) for side in ((1.0, -1.0) if shaped else (1.0,)))
             most, other = max((run.span, run.reach_words), (large, f"10 times its radius of gyration, {large:.4g} m"))
@@ -65,11 +64,11 @@ def centres(run: RunNumbers) -> Iterator[Scale]:
 
 def forgotten(run: RunNumbers) -> Iterator[Scale]:
     """Joints that turn, or are fixed, without an `at` on a link whose shape leads away from its own joint."""
-    usual = "without `at` both joints of a link are in one place"
+    usual, by_dh = "without `at` both joints of a link are in one place", {x.partition(".dh.")[0] for x in run.settled}
     for joint in run.structure.joints:
         long, wide = run.slender(f"links.{joint.parent}")
-        given = run.is_written(f"{joint.name}.at") or any(path.startswith(f"{joint.name}.dh.") for path in run.settled)
-        if joint.parent in run.moved and joint.kind != "prismatic" and not given and wide > 0.0:
+        given = joint.name in by_dh or joint.kind == "prismatic" or joint.parent not in run.moved
+        if wide > 0.0 and not given and not run.is_written(f"{joint.name}.at"):
             said = f"is not written, and `{joint.parent}`, which carries the joint, is {long:.4g} m long"
             cure = "write where it is, or `at = [0, 0, 0] m` if it is meant so"
             path, other = f"{joint.name}.at", "its width"
@@ -79,7 +78,7 @@ def forgotten(run: RunNumbers) -> Iterator[Scale]:
 def held(run: RunNumbers) -> Iterator[Scale]:
     """Loads at the start of joints that turn: of those without a servo that begin at 0 unwritten, on an arm with
     motors, and by the turns by which they wind up springs."""
-    loads, servos = run.loads(), {use.joint for use in run.uses}
+    loads, servos = run.loads, {use.joint for use in run.uses}
     motors = any(run.of_motor(use, "kt") is not None for use in run.uses)
     weight = float(np.linalg.norm(run.gravity)) * sum(run.numbers.get(f"links.{link}.mass", 0.0) for link in run.moved)
     for joint in [name for name in loads if run.kinds[name] == "revolute" and not run.is_helped(name)]:

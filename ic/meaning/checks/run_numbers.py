@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from graphlib import TopologicalSorter
 from types import SimpleNamespace
 
@@ -57,6 +58,9 @@ class RunNumbers:
         links = TopologicalSorter({child: [joint.parent] for child, joint in by_child.items()}).static_order()
         self.outward = tuple(by_child[link] for link in links if link in by_child)
         """The joints, each behind those between it and the base."""
+        self.carried = defaultdict[str, list[str]](list)  # by each link: joints
+        for joint in structure.joints:
+            self.carried[joint.parent].append(joint.name)
         self.depths = {BASE: 0.0}  # of each link: length of the way from the base to its joint
         for joint in self.outward:
             self.depths[joint.child] = self.depths.get(joint.parent, 0.0) + self.offsets[joint.name]
@@ -106,7 +110,7 @@ class RunNumbers:
     def beside_link(self, link: str, point: np.ndarray) -> float:
         """The distance of a point of a link's frame from the nearer of its shape and the box about its joint and those
         that it carries, m."""
-        joints = [self.vector(f"{joint.name}.at") for joint in self.structure.joints if joint.parent == link]
+        joints = [self.vector(f"{joint}.at") for joint in self.carried[link]]
         own = np.array([np.zeros(3), *joints])
         far = np.linalg.norm(np.maximum(np.maximum(own.min(axis=0) - point, point - own.max(axis=0)), 0.0))
         shape = self.beside_shape(f"links.{link}", point)
@@ -121,13 +125,13 @@ class RunNumbers:
         wide = max(np.delete(size, axis).max(), 2.0 * self.numbers.get(f"{head}.shape.radius", 0.0))
         return float(size[axis] or self.numbers.get(f"{head}.shape.length", 0.0)), float(wide)
 
-    @property
+    @cached_property
     def span(self) -> float:
         """The longest way from a joint on the base over joints to the end of a shape, m."""
         chains = [self.beyond.get(joint.child, 0.0) for joint in self.structure.joints if joint.parent == BASE]
         return max(chains, default=0.0)
 
-    @property
+    @cached_property
     def reach(self) -> float:
         """The span, m; where it is 0 the distance of the farthest centre of mass."""
         coms = [self.length(f"links.{link.name}.com") for link in self.structure.links]
@@ -162,12 +166,13 @@ class RunNumbers:
         least = min(limits, key=lambda each: each[1], default=None)
         return least if least is not None and least[1] > 0.0 else None
 
-    @property
+    @cached_property
     def gravity(self) -> np.ndarray:
         """The acceleration of free fall, m/s^2, in the world's axes; zeros without gravity."""
         named = [use.name for use in self.structure.environment if use.model == "gravity"]
         return sum((self.vector(f"environment.{name}.g") for name in named), np.zeros(3))
 
+    @cached_property
     def loads(self) -> dict[str, float]:
         """The torque (force) of gravity about (along) each moving joint's axis where the run begins, N m (N); none on a
         base that moves, or without gravity."""

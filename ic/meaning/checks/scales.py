@@ -265,7 +265,7 @@ def _loads(run: RunNumbers) -> Iterator[Scale]:
     """The load of gravity at the start beside what motor and friction hold at the joint, and what the load motor of a
     bed can make there."""
     usual = "a motor that cannot hold its arm lets it fall"
-    loads = run.loads()
+    loads = run.loads
     for use in run.uses:
         ratio, friction, limit = run.of_motor(use, RATIO.name), run.of_motor(use, "f_c"), run.largest_torque(use)
         if use.joint in loads and ratio is not None and limit is not None and not run.is_helped(use.joint):

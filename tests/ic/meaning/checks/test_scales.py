@@ -215,7 +215,7 @@ def test_loads_of_gravity_are_those_of_pinocchio(tmp_path: Path, seed: int) -> N
     q = [numbers[f"initial.{joint.name}.q"] for joint in experiment.structure.moving]
     zero = np.zeros(len(q))
     wanted = pinocchio(experiment, gravity=g.tolist()).torques(q, zero, zero, {})
-    np.testing.assert_allclose(list(run.loads().values()), -wanted, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(list(run.loads.values()), -wanted, rtol=1e-9, atol=1e-9)
 
 
 def test_all_scales_are_shown_and_given_to_programs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
