@@ -94,6 +94,11 @@ def _exchanged(a: str, b: str, pairs: Mapping[str, Pair], residuals: Mapping[str
     return [f"`{a}` and `{b}` of the log fit when they change places: {_left(after, now)}"]
 
 
+LONG_GAP, MOST_JUMPS = 1.5, 5
+"""A step of a log's time that is longer than this many usual ones is a gap; and the largest number of gaps that are
+tried as jumps of its clock."""
+
+
 def clock_doubts(pairs: Mapping[str, Pair]) -> list[str]:
     """A log that fits with another beginning of its time, or another rate of its clock, and not as it is; but none that
     fits best at the largest change that is tried."""
@@ -102,11 +107,13 @@ def clock_doubts(pairs: Mapping[str, Pair]) -> list[str]:
     if not moving:
         return []
 
-    def share(delay: float = 0.0, rate: float = 0.0) -> float:
-        """Geometric mean over the columns: one of which the model knows little does not hide the others."""
+    def share(delay: float = 0.0, rate: float = 0.0, jump: tuple[float, float] = (math.inf, 0.0)) -> float:
+        """Geometric mean over the columns: one of which the model knows little does not hide the others. jump: an
+        instant, s, and by how much later ones come earlier"""
         found = []
         for pair in moving:
-            residual = pair.measured - pair.course.at(pair.instants / (1.0 + rate) - delay)
+            instants = pair.instants - np.where(pair.instants > jump[0], jump[1], 0.0)
+            residual = pair.measured - pair.course.at(instants / (1.0 + rate) - delay)
             residual = residual[np.isfinite(residual)]
             if 2 * len(residual) < len(pair.instants):
                 return math.inf
@@ -115,6 +122,11 @@ def clock_doubts(pairs: Mapping[str, Pair]) -> list[str]:
 
     now, (delay, late), (rate, fast) = share(), _best(share, LATEST), _best(lambda each: share(rate=each), FASTEST)
     longest = max((pair.instants for pair in moving), key=len)
+    jumps = _jumps(max((pair.instants for pair in pairs.values()), key=len))
+    if jumps:
+        left, (instant, length) = min((share(jump=each), each) for each in jumps)
+        if left <= min(LATE * now, late, fast):
+            return [f"the log fits best with its times after {instant:.4g} s {length:.3g} s less: {_left(left, now)}"]
     span, step = float(longest[-1] - longest[0]), float(np.median(np.diff(longest)))
     edge, shift = (abs(delay) / LATEST, abs(delay)) if late <= fast else (abs(rate) / FASTEST, abs(rate) * span)
     if edge > 0.98 or shift < step or min(late, fast) > LATE * now:
@@ -125,6 +137,14 @@ def clock_doubts(pairs: Mapping[str, Pair]) -> list[str]:
     times, factor = ("divided by", 1.0 + rate) if rate > 0.0 else ("multiplied by", 1.0 / (1.0 + rate))
     digits = max(3, math.ceil(math.log10(span / step)) + 1)
     return [f"the log fits best with its times {times} {round(factor, digits)}: {_left(fast, now)}"]
+
+
+def _jumps(instants: np.ndarray) -> list[tuple[float, float]]:
+    """Gaps of a log's time, if they are few: when each begins, and by how much it is longer than a usual step, s."""
+    steps = np.diff(instants)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    gaps = np.flatnonzero(steps > LONG_GAP * usual)
+    return [(float(instants[i]), float(steps[i]) - usual) for i in gaps] if len(gaps) <= MOST_JUMPS else []
 
 
 def _best(score: Callable[[float], float], largest: float) -> tuple[float, float]:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy import stats
 
-from batch.measured.doubts import LATEST, clock_doubts, column_doubts
+from batch.measured.doubts import LATEST, LONG_GAP, clock_doubts, column_doubts
 from batch.measured.mcap_log import MeasuredSignals
 from batch.measured.paired import ComputedChannel, Pair
 from met.frozen import frozen
@@ -48,9 +48,6 @@ MOST_INSTANTS = 20_000
 
 UNEVEN = 0.05
 """Share of gaps among a log's steps from which on its time is uneven."""
-
-LONG_GAP = 1.5
-"""A step of a log's time that is longer than this many usual ones is a gap."""
 
 
 @frozen

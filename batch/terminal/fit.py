@@ -14,7 +14,7 @@ from batch.fitting.question import FitAnswer, FitQuestion
 from batch.measured.residuals import Comparison
 from batch.queries.summary import finite
 from batch.terminal.chosen_deck import FittedValue
-from batch.terminal.residuals import doubt_lines
+from batch.terminal.residuals import doubt_lines, note_lines
 from ic.driver.written_value import WrittenValue
 from ic.printing.columns import columns
 from met.unit_parser import decimals
@@ -244,7 +244,7 @@ def _residual_lines(title: str, before: Comparison, after: Comparison) -> Iterat
         first = "" if was is None else f"{was.rms:.3g}"
         rows.append([f"  {each.channel}", first, f"{each.rms:.3g}", unit, share, white, follows])
     yield from columns(rows, right=(1, 2, 4))
-    yield from _doubts(before, after)
+    yield from dict.fromkeys([*_doubts(before, after), *note_lines(after)])
 
 
 def _deck_value(question: FitQuestion, place: int) -> str:

@@ -40,7 +40,7 @@ def residual_lines(found: Comparison) -> Iterator[str]:
                 name = "" if i else f"  {each.channel}"
                 rows.append([name, one.what, _size(one), f"{one.share:.0%}", f"{one.means}{alike}"])
         yield from columns(rows, right=(2, 3))
-    notes = list(_notes(found))
+    notes = list(note_lines(found))
     if notes:
         yield ""
         yield from notes
@@ -69,7 +69,8 @@ def doubt_lines(found: Comparison) -> Iterator[str]:
         yield f"  doubt: {what}: is the log of this run?"
 
 
-def _notes(found: Comparison) -> Iterator[str]:
+def note_lines(found: Comparison) -> Iterator[str]:
+    """What makes a log doubtful, and what else is to be known of it, in lines."""
     yield from doubt_lines(found)
     if found.left_out:
         spans = " s, and the run from ".join(

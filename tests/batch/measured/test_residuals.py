@@ -226,3 +226,14 @@ def test_the_command_reads_a_log_in_its_units(
     assert "not in the log: luff.qd" in capsys.readouterr().out
     assert cli.main(["residuals", "crane.h5", "late.csv"]) == 2
     assert "has one of the run beside it" in capsys.readouterr().err
+
+
+def test_a_clock_that_jumped_is_told_from_instants_that_are_missing() -> None:
+    (doubt,) = compared(untouched, time=np.where(TIME > 10.0, TIME + 0.05, TIME)).doubts
+    assert doubt.startswith("the log fits best with its times after 10 s 0.05 s less: ")
+
+    def forget(measured: Numbers) -> None:
+        for name in measured:
+            measured[name][1000:1005] = np.nan
+
+    assert not compared(forget).doubts
