@@ -49,6 +49,7 @@ class FitQuestion:
 
     runs       to fit, and to predict alone: `predicted`
     paths      of the parameters;  start: their values in the deck, SI;  units: those in which the deck writes them
+    si_units   of the same
     priors     of some of them, by path
     """
 
@@ -57,6 +58,7 @@ class FitQuestion:
     paths: tuple[str, ...]
     start: np.ndarray
     units: tuple[str, ...]
+    si_units: tuple[str, ...]
     priors: Mapping[str, Prior]
 
     @cached_property
@@ -139,6 +141,7 @@ def fit_question(
         tuple(paths),
         np.array([value for value, _ in starts.values()]),
         tuple(_owner(path, list(runs.values())).written_in(path)[0] for path in paths),
+        tuple(unit for _, unit in starts.values()),
         dict(given),
     )
 

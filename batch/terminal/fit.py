@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+
+import numpy as np
 
 from batch.fitting.known import Known, correlated
 from batch.fitting.question import FitAnswer, FitQuestion
@@ -29,6 +32,9 @@ WORDS: Mapping[str, str] = MappingProxyType({
 
 SHOWN, MOST_PARTS = 3, 6
 """Largest number of changes without a mark, and of correlated pairs, that are printed; and of parts of a change."""
+
+REMOVED = 0.5
+"""Share of a channel's residual below which a fit has removed what made it doubtful."""
 
 DRAWN_APART = 0.7
 """Correlation of errors from which on independent draws are too wide, by 1.4 times."""
@@ -141,11 +147,12 @@ def sweep_lines(question: FitQuestion, answer: FitAnswer, count: int = 200) -> I
         unit, value, deviation = question.units[place], answer.fit.values[place], answer.fit.deviation[place]
         mean, spread = decimals([rounded(value, 0.2 * deviation, unit).si, float(f"{deviation:.2g}")], unit)
         distribution = f"normal({mean}, {float(spread):.2g})"
-        far = answer.fit.values.copy()
-        far[place] -= 6.0 * deviation
-        if question.logs.refused(far[None, :])[0]:
-            high = decimals([float(f"{value + 6.0 * deviation:.3g}")], unit)[0]
-            distribution = f"truncated({mean}, {float(spread):.2g}, 0, {high})"
+        ladder = np.tile(answer.fit.values, (121, 1))
+        ladder[:, place] += deviation * np.linspace(-6.0, 6.0, 121)
+        allowed = ladder[~question.logs.refused(ladder), place]
+        if len(allowed) < len(ladder):
+            low, high = (f"{float(text):.4g}" for text in decimals([allowed.min(), allowed.max()], unit))
+            distribution = f"truncated({mean}, {float(spread):.2g}, {low}, {high})"
         yield f"        {path} = {distribution}{'' if unit == '1' else f' {unit}'};"
     yield "    }"
     yield "}"
@@ -157,7 +164,7 @@ def as_data(question: FitQuestion, answer: FitAnswer) -> dict[str, Any]:
     parameters = [
         {
             "path": path,
-            "unit": question.runs[0].given.unit(path) or "1",
+            "unit": question.si_units[place],
             "deck": float(question.start[place]),
             "fitted": float(fit.values[place]),
             "half_interval": float(fit.factor * fit.deviation[place]),
@@ -167,6 +174,8 @@ def as_data(question: FitQuestion, answer: FitAnswer) -> dict[str, Any]:
         for place, path in enumerate(question.paths)
     ]
     data: dict[str, Any] = {
+        "certain": is_certain(answer),
+        "doubts": [line.strip() for pair in zip(answer.before, answer.after, strict=True) for line in _doubts(*pair)],
         "parameters": parameters,
         "covariance": fit.covariance.tolist(),
         "converged": fit.converged,
@@ -225,7 +234,7 @@ def _together(question: FitQuestion, found: Known) -> Iterator[str]:
         if len(change) == 2:
             (one, part), (other, by) = change.items()
             factor = f"{'+' if part * by < 0.0 else '-'} {abs(part / by):.3g}"
-            own, its = (question.runs[0].given.unit(question.paths[place]) for place in (one, other))
+            own, its = question.si_units[one], question.si_units[other]
             unit = "" if own == its else f" {own} per {its}"
             yield f"         only {question.paths[one]} {factor}{unit} * {question.paths[other]} is known"
     if len(found.together) > SHOWN:
@@ -252,9 +261,17 @@ def _deck_value(question: FitQuestion, place: int) -> str:
 
 
 def _doubts(before: Comparison, after: Comparison) -> list[str]:
-    """What makes a log doubtful: after the fit, and before it unless the fit left noise alone."""
-    explained = all(each.white is not False for each in after.residuals)
-    return list(dict.fromkeys([*doubt_lines(after), *([] if explained else doubt_lines(before))]))
+    """What makes a log doubtful: after the fit; and before it, unless the fit removed most of what was left of the
+    channels that a doubt names, or of all."""
+    sizes = {each.channel: each.rms for each in before.residuals}
+    left = {each.channel for each in after.residuals if each.rms > REMOVED * sizes.get(each.channel, 0.0)}
+    left -= {each.channel for each in after.residuals if each.white}
+    found = {doubt.rpartition(": ")[0]: doubt for doubt in doubt_lines(after)}
+    for doubt in doubt_lines(before):
+        named = set(re.findall("`([^`]+)`", doubt)) & sizes.keys() or set(sizes)
+        if named & left:
+            found.setdefault(doubt.rpartition(": ")[0], doubt)
+    return list(found.values())
 
 
 def is_certain(answer: FitAnswer) -> bool:

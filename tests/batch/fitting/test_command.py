@@ -77,6 +77,7 @@ def test_numbers_of_the_arm_are_within_their_intervals(
     for each, truth in zip(found["parameters"], (26.0, 0.03), strict=True):
         assert each["known"] == "known" and abs(each["fitted"] - truth) <= 1.5 * each["half_interval"] < 0.02 * truth
     assert picture.stat().st_size > 10_000
+    assert found["certain"] and not found["doubts"]
     (comparison,) = found["logs"]
     assert all(each["white"] for each in comparison["after"]["residuals"])
 
