@@ -39,6 +39,13 @@ from met.settings import varies
 )
 @click.option("--identifiable", is_flag=True, help="Only say what the logs can tell of these numbers, and fit nothing.")
 @click.option(
+    "--motion",
+    "motions",
+    multiple=True,
+    metavar="RUN",
+    help="With --identifiable: also say what a log of this run, as noisy as LOG, would add; may be repeated.",
+)
+@click.option(
     "--picture",
     metavar="FILE",
     help="Draw the first log, or the first predicted one, as measured, and as computed before and after.",
@@ -91,13 +98,15 @@ def fit(
     drawn = None if picture is None else path_of(picture)
     if drawn is not None:
         places.check(drawn)
+    if options["motions"] and not identifiable:
+        raise click.UsageError("--motion is for --identifiable: a run without a log cannot be fitted")
     question = fit_question(deck, logs, estimates, **options)
     if identifiable:
-        known = question.identifiable()
+        known, promised = question.identifiable(), question.promised()
         if form == "json":
-            say(json.dumps(shown.identifiable_data(question, known), indent=1))
+            say(json.dumps(shown.identifiable_data(question, known, promised), indent=1))
         else:
-            say("\n".join(map(line, shown.identifiable_lines(question, known))))
+            say("\n".join(map(line, shown.identifiable_lines(question, known, promised))))
         return YES if set(known.verdict) == {"known"} else NO
     bar = Bar()
     bar.begin(f"fit of {question.runs[0].given.name}", 0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -65,6 +65,23 @@ class LoggedRun:
             message = f"no number of `{file}` has one of the run beside it"
             raise Problem(error("E478", message, log.head, help="let its times begin where the run begins, at 0 s"))
         return logged
+
+    @classmethod
+    def imagined(
+        cls, given: GivenRun, starts: Mapping[str, tuple[float, str]], start: np.ndarray, measured: Collection[str]
+    ) -> LoggedRun:
+        """A run as if it had been logged: with what it computes at its recorded rows, of channels that are `measured`.
+        Raises Problem E480 where there is none.
+
+        starts, start  values of the parameters, by path with their units, and SI alone, [path]
+        """
+        varied, _ = given.vary_most(starts)
+        courses = cls(given, "", MeasuredSignals({}, [], []), tuple(starts), varied).courses(start)
+        signals = {name: (each.times, each.values) for name, each in courses.items() if name in measured}
+        if not signals:
+            message = f"`{given.name}` records nothing that a log has, or fails at its start"
+            raise Problem(error("E480", message, given.experiment.place, help="let it record what was logged"))
+        return cls(given, given.name, MeasuredSignals(signals, [], []), tuple(starts), varied)
 
     @property
     def name(self) -> str:

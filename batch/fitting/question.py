@@ -47,7 +47,7 @@ class FitAnswer:
 class FitQuestion:
     """Parameters to estimate from logs.
 
-    runs       to fit, and to predict alone: `predicted`
+    runs       to fit, and to predict alone: `predicted`;  motions: those that might be logged
     paths      of the parameters;  start: their values in the deck, SI;  units: those in which the deck writes them
     si_units   of the same
     priors     of some of them, by path
@@ -55,6 +55,7 @@ class FitQuestion:
 
     runs: tuple[LoggedRun, ...]
     predicted: tuple[LoggedRun, ...]
+    motions: tuple[LoggedRun, ...]
     paths: tuple[str, ...]
     start: np.ndarray
     units: tuple[str, ...]
@@ -79,6 +80,19 @@ class FitQuestion:
         fitter = Fitter(self.logs, self.start, self.priors)
         return known(fitter.slopes_at_start(noise_of(self.logs)), fitter.size, fitter.held)
 
+    def promised(self) -> dict[str, Known]:
+        """By the name of each motion, what the logs and one of it could tell, as noisy as the logs are."""
+        noises = noise_of(self.logs)
+        channels = [channel for run in self.runs for channel in run.channels]
+        noise = {name: max(noises[np.array([each == name for each in channels])]) for name in channels}
+        found = {}
+        for motion in self.motions:
+            logs = LoggedRuns((*self.runs, motion), self.paths)
+            fitter = Fitter(logs, self.start, self.priors)
+            both = np.array([*noises, *(noise[channel] for channel in motion.channels)])
+            found[motion.given.name] = known(fitter.slopes_at_start(both), fitter.size, fitter.held)
+        return found
+
     def answer(self, progress: Callable[[int], None]) -> FitAnswer:
         """Fit the parameters, and say what the fit is worth."""
         fit = Fitter(self.logs, self.start, self.priors, progress).fit()
@@ -102,6 +116,7 @@ def fit_question(
     *,
     priors: Sequence[str] = (),
     predict: Sequence[str] = (),
+    motions: Sequence[str] = (),
     defines: Sequence[str] = (),
     include_dirs: Sequence[str] = (),
     settings: Sequence[str] = (),
@@ -112,6 +127,7 @@ def fit_question(
 
     logs, predict  files, each with its run before it where there are several: `slow=slow.csv`
     estimates      paths as `--set` takes them; `links.*.mass` is of all links
+    motions        names of runs that might be logged, too
     priors         `PATH=normal(MEAN, DEVIATION) UNIT`
     columns, zero  of the logs: `CHANNEL=[FACTOR *] COLUMN [UNIT]`, and the time at which the runs begin, s
 
@@ -119,7 +135,7 @@ def fit_question(
     """
     runs: dict[str | None, GivenRun] = {}
     pairs = [_run_and_log(each) for each in (*logs, *predict)]
-    for run, _ in pairs:
+    for run in [*(each for each, _ in pairs), *motions]:
         if run not in runs:
             runs[run] = given_run(deck, run, include_dirs=include_dirs, defines=defines, settings=settings)
     first = runs[pairs[0][0]]
@@ -135,11 +151,14 @@ def fit_question(
     twice = next((path for path, _ in given if [each for each, _ in given].count(path) > 1), None)
     if twice is not None:
         raise _wrong(f"`{twice}` has two priors", "give one")
+    start = np.array([value for value, _ in starts.values()])
+    measured = {channel for each in read[: len(logs)] for channel in each.channels}
     return FitQuestion(
         tuple(read[: len(logs)]),
         tuple(read[len(logs) :]),
+        tuple(LoggedRun.imagined(runs[run], starts, start, measured) for run in motions),
         tuple(paths),
-        np.array([value for value, _ in starts.values()]),
+        start,
         tuple(_owner(path, list(runs.values())).written_in(path)[0] for path in paths),
         tuple(unit for _, unit in starts.values()),
         dict(given),

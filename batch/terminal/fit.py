@@ -65,8 +65,8 @@ def written_values(question: FitQuestion, answer: FitAnswer) -> list[FittedValue
     return found
 
 
-def identifiable_lines(question: FitQuestion, found: Known) -> Iterator[str]:
-    """What the logs can tell before anything is fitted, in lines."""
+def identifiable_lines(question: FitQuestion, found: Known, promised: Mapping[str, Known]) -> Iterator[str]:
+    """What the logs can tell before anything is fitted, and what they could with a log of other runs, in lines."""
     rows = [["", "deck", "standard error", "by itself", ""]]
     for place, path in enumerate(question.paths):
         unit = question.units[place]
@@ -78,6 +78,14 @@ def identifiable_lines(question: FitQuestion, found: Known) -> Iterator[str]:
     many = len(question.paths)
     yield f"{found.rank} of {many} combinations of these can be known from the logs; condition {condition}"
     yield from _together(question, found)
+    if promised:
+        yield ""
+        rows = [["standard errors with a log of", *promised]]
+        for place, path in enumerate(question.paths):
+            errors = [_short(each.deviation[place], question.units[place]) for each in promised.values()]
+            rows.append([f"  {path}", *errors])
+        yield from columns(rows, right=tuple(range(1, len(promised) + 1)))
+        yield ""
     yield "The errors are those of the logs' noise alone: what the model lacks adds to them."
 
 
@@ -188,7 +196,7 @@ def as_data(question: FitQuestion, answer: FitAnswer) -> dict[str, Any]:
     return plain
 
 
-def identifiable_data(question: FitQuestion, found: Known) -> dict[str, Any]:
+def identifiable_data(question: FitQuestion, found: Known, promised: Mapping[str, Known]) -> dict[str, Any]:
     """Plain data; a number that is not finite is null. SI"""
     parameters = [
         {"path": path, "deck": float(start), "deviation": float(whole), "alone": float(alone), "known": verdict}
@@ -200,6 +208,7 @@ def identifiable_data(question: FitQuestion, found: Known) -> dict[str, Any]:
         "parameters": parameters,
         "rank": found.rank,
         "condition": found.condition,
+        "motions": {name: each.deviation.tolist() for name, each in promised.items()},
         "together": _as_paths(question, found),
     }
     plain: dict[str, Any] = finite(data)

@@ -17,7 +17,7 @@ from tests.docs.pages import Page, differs
         ("bench", 4),
         ("best", 5),
         ("evidence", 2),
-        ("fit", 6),
+        ("fit", 7),
         ("linear", 15),
         ("residuals", 6),
         ("search", 8),

@@ -114,6 +114,17 @@ def test_a_doubtful_log_writes_nothing(folder: Path, capsys: Say, column: str, d
 
 
 @pytest.mark.slow
+def test_a_second_log_of_the_same_motion_would_make_errors_smaller_by_the_root_of_two(
+    folder: Path, capsys: Say
+) -> None:
+    arguments = ["fit", f"{folder}/deck.ic", f"{folder}/log.csv", "--estimate", "mass", "--identifiable"]
+    assert cli.main([*arguments, "--motion", "work", "--format", "json"]) == cli.YES
+    found = json.loads(capsys.readouterr().out)
+    (error,), (with_it,) = [each["deviation"] for each in found["parameters"]], found["motions"]["work"]
+    assert with_it == pytest.approx(error / 2.0**0.5, rel=0.03)
+
+
+@pytest.mark.slow
 def test_what_a_log_cannot_tell_is_said_and_not_written(folder: Path, capsys: Say) -> None:
     arguments = ["fit", f"{folder}/deck.ic", f"{folder}/log.csv", "--set", "duration=0.3 s"]
     tied = ["--estimate", "links.bar.mass", "--estimate", "links.bar.com.x", "--estimate", "drive.kt"]
@@ -147,6 +158,8 @@ def test_what_a_log_cannot_tell_is_said_and_not_written(folder: Path, capsys: Sa
         (("--estimate", "mass", "--column", "hinge.w=hinge.q"), "does not record `hinge.w`"),
         (("--estimate", "mass", "--column", "hinge.q=angle"), "has no column `angle`"),
         (("--estimate", "mass", "--vary", "mass=[1, 2] kg"), "--vary is for sweeps"),
+        (("--estimate", "mass", "--motion", "work"), "--motion is for --identifiable"),
+        (("--estimate", "mass", "--identifiable", "--motion", "wok"), "no run `wok` in this deck"),
         (("--estimate", "mass", "-o", "other.ic"), "-o is the file for --write"),
     ],
 )
