@@ -3,8 +3,8 @@
 A run is simulated with its controllers, friction and delays, and what it computes is compared with what was measured.
 The numbers are moved by Levenberg's and Marquardt's steps until the weighted squares are least. Slopes are differences
 of runs to both sides, over half of what the logs can tell: so decisions at ticks, such as breaking away, count by what
-they change on average. A signal's weight is the inverse of its residual's rms, and smaller where the
-residual is alike for long; it is found again until it stays.
+they change on average. A signal's weight is the inverse of its residual's rms, and smaller where the residual is alike
+for long; it is found again until it stays.
 
 Intervals come from the scores of stretches of the logs (White, Econometrica 48, 1980; Liang and Zeger, Biometrika 73,
 1986), so that they also hold where residuals are correlated in time or over signals, and are at least those of white
@@ -21,7 +21,7 @@ import numpy as np
 from scipy import stats
 
 from batch.fitting.logged import LoggedRuns
-from batch.measured.paired import OUTLIERS, OUTLYING
+from batch.measured.paired import autocorrelation, usual_rows
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 
@@ -229,11 +229,9 @@ class Fitter:
                 continue
             alike = 1.0
             if settled:
-                low, high = np.quantile(own, [0.05, 0.95])
-                usual = np.abs(own - 0.5 * (low + high)) <= OUTLYING * 0.5 * (high - low)
-                if np.mean(~usual) <= OUTLIERS:
-                    rows, own = rows[usual], own[usual]
-                alike = _alike_for(own)
+                usual = usual_rows(own)
+                rows, own = rows[usual], own[usual]
+                alike = _memory(own)
             weights[rows] = 1.0 / (max(float(np.sqrt(np.mean(own**2))), floor) * math.sqrt(alike))
         return weights
 
@@ -417,16 +415,13 @@ class Fitter:
         )
 
 
-def _alike_for(residuals: np.ndarray) -> float:
+def _memory(residuals: np.ndarray) -> float:
     """Number of residuals that count as one: their integrated autocorrelation, up to the first lag at which there is
     none (Geyer, Statistical Science 7, 1992); 1 of white noise."""
-    centred = residuals - residuals.mean()
-    spectrum = np.fft.rfft(centred, 2 * len(centred))
-    correlation = np.fft.irfft(spectrum * spectrum.conj())[: len(centred)]
-    if not correlation[0] > 0.0:
+    correlation = autocorrelation(residuals)
+    if correlation[-1] == 1.0:
         return 1.0
-    correlation = correlation / correlation[0]
-    none = np.flatnonzero(correlation < 2.0 / math.sqrt(len(centred)))
+    none = np.flatnonzero(correlation < 2.0 / math.sqrt(len(residuals)))
     return max(1.0, 2.0 * float(np.sum(correlation[: int(none[0]) if len(none) else None])) - 1.0)
 
 

@@ -110,8 +110,7 @@ class LoggedRun:
     @cached_property
     def _rows(self) -> list[np.ndarray]:
         """By channel, the log's instants that are fitted, as positions."""
-        schedule = self.given.experiment.structure.schedule
-        last = (schedule.rows - 1) * schedule.record / schedule.base_hz
+        last = self._times[-1]
         usable = []
         for channel in self.channels:
             instants, measured = self.log.signals[channel]

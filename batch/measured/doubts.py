@@ -122,8 +122,9 @@ def clock_doubts(pairs: Mapping[str, Pair]) -> list[str]:
 
     now, (delay, late), (rate, fast) = share(), _best(share, LATEST), _best(lambda each: share(rate=each), FASTEST)
     longest = max((pair.instants for pair in moving), key=len)
-    jumps = _jumps(max((pair.instants for pair in pairs.values()), key=len))
-    if jumps:
+    usual, gaps = gaps_of(max((pair.instants for pair in pairs.values()), key=len))
+    jumps = [(instant, length - usual) for instant, length in gaps]
+    if 0 < len(jumps) <= MOST_JUMPS:
         left, (instant, length) = min((share(jump=each), each) for each in jumps)
         if left <= min(LATE * now, late, fast):
             return [f"the log fits best with its times after {instant:.4g} s {length:.3g} s less: {_left(left, now)}"]
@@ -139,12 +140,12 @@ def clock_doubts(pairs: Mapping[str, Pair]) -> list[str]:
     return [f"the log fits best with its times {times} {round(factor, digits)}: {_left(fast, now)}"]
 
 
-def _jumps(instants: np.ndarray) -> list[tuple[float, float]]:
-    """Gaps of a log's time, if they are few: when each begins, and by how much it is longer than a usual step, s."""
+def gaps_of(instants: np.ndarray) -> tuple[float, tuple[tuple[float, float], ...]]:
+    """The usual step of a log's time, s, and its gaps: when each begins, and how long it is, s."""
     steps = np.diff(instants)
     usual = float(np.median(steps)) if len(steps) else 0.0
     gaps = np.flatnonzero(steps > LONG_GAP * usual)
-    return [(float(instants[i]), float(steps[i]) - usual) for i in gaps] if len(gaps) <= MOST_JUMPS else []
+    return usual, tuple((float(instants[i]), float(steps[i])) for i in gaps)
 
 
 def _best(score: Callable[[float], float], largest: float) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from batch.measured.mcap_log import MeasuredSignals, mcap_signals
-from ic.meaning.definitions.csv_files import CsvTable, read_csv
+from ic.meaning.definitions.csv_files import CsvColumn, CsvTable, read_csv
 from met.diagnostic import Label, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.messages.visible import visible
@@ -140,8 +140,14 @@ def _csv_signals(
 def _with_names(table: CsvTable, mapped: Sequence[MappedColumn], channels: Sequence[str]) -> CsvTable:
     """The table with columns under the names of channels, too. channels: what the run records, and `time`."""
     head = table.columns[0].place
-    added = []
+    added: list[CsvColumn] = []
     for each in mapped:
+        if any(each.channel == one.name for one in added):
+            message = f"`{visible(each.channel)}` has two columns"
+            raise Problem(error("E478", message, help="leave one of them out"))
+        if each.channel == TIME and each.factor < 0.0:
+            message = f"times of `{visible(each.column)}` would fall"
+            raise Problem(error("E478", message, head, help="the factor of `time` is above 0"))
         if each.channel not in channels:
             helps = did_you_mean(each.channel, channels) or f"it records {_listed(channels[1:])}"
             raise Problem(error("E478", f"the run does not record `{visible(each.channel)}`", help=helps))

@@ -17,6 +17,21 @@ OUTLYING, OUTLIERS = 5.0, 0.01
 of outliers."""
 
 
+def usual_rows(residual: np.ndarray) -> np.ndarray:
+    """True for each residual that is no outlier; for all where outliers are not few, [number]."""
+    low, high = np.quantile(residual, [0.05, 0.95])
+    usual = np.abs(residual - 0.5 * (low + high)) <= OUTLYING * 0.5 * (high - low)
+    return usual if np.mean(~usual) <= OUTLIERS else np.ones(len(residual), dtype=bool)
+
+
+def autocorrelation(residual: np.ndarray) -> np.ndarray:
+    """The correlation of residuals with those so many instants later, 1 at 0, [lag]; all 1 where they are constant."""
+    centred = residual - residual.mean()
+    spectrum = np.fft.rfft(centred, 2 * len(centred))
+    correlation = np.fft.irfft(spectrum * spectrum.conj())[: len(centred)]
+    return correlation / correlation[0] if correlation[0] > 0.0 else np.ones(len(centred))
+
+
 @frozen
 class ComputedChannel:
     """A channel of a run: its computed `values`, at `times`, s."""
@@ -70,12 +85,8 @@ class Pair:
 
     def usual(self) -> Pair:
         """The pair without its outliers, as long as they are few."""
-        residual = self.residual
-        low, high = np.quantile(residual, [0.05, 0.95])
-        rows = np.abs(residual - 0.5 * (low + high)) <= OUTLYING * 0.5 * (high - low)
-        if rows.all() or np.mean(~rows) > OUTLIERS:
-            return self
-        return Pair(self.instants[rows], self.measured[rows], self.course)
+        rows = usual_rows(self.residual)
+        return self if rows.all() else Pair(self.instants[rows], self.measured[rows], self.course)
 
     def thinned(self, most: int) -> Pair:
         """The pair with so many instants at most."""

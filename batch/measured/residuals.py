@@ -9,14 +9,15 @@ explains nothing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy import stats
 
-from batch.measured.doubts import LATEST, LONG_GAP, clock_doubts, column_doubts
+from batch.measured.doubts import LATEST, clock_doubts, column_doubts, gaps_of
 from batch.measured.mcap_log import MeasuredSignals
-from batch.measured.paired import ComputedChannel, Pair
+from batch.measured.paired import ComputedChannel, Pair, autocorrelation
 from met.frozen import frozen
 
 STRETCHES = 16
@@ -143,12 +144,13 @@ def compare(
     usual = {name: pair.usual() for name, pair in pairs.items()}
     white = {each.channel for each in residuals if each.white}
     times = [log.signals[name][0] for name in pairs]
-    step, gaps, uneven = _clock(max(times, key=len, default=np.empty(0)))
+    longest = max(times, key=len, default=np.empty(0))
+    step, gaps = gaps_of(longest)
     return Comparison(
         tuple(residuals),
         (*column_doubts(usual, kinds, white), *clock_doubts(usual)),
         gaps,
-        uneven,
+        len(gaps) > UNEVEN * (len(longest) - 1),
         step,
         max((float(np.median(np.diff(each.times))) for each in courses.values() if len(each.times) > 1), default=0.0),
         _span(times),
@@ -162,15 +164,6 @@ def compare(
 def _span(times: Sequence[np.ndarray]) -> tuple[float, float]:
     found = [each for each in times if len(each)]
     return (min(float(each[0]) for each in found), max(float(each[-1]) for each in found)) if found else (0.0, 0.0)
-
-
-def _clock(times: np.ndarray) -> tuple[float, tuple[tuple[float, float], ...], bool]:
-    """The usual step of a log's time, s; its gaps, when and how long; and whether so many steps are gaps that its time
-    is uneven."""
-    steps = np.diff(times)
-    usual = float(np.median(steps)) if len(steps) else 0.0
-    gaps = np.flatnonzero(steps > LONG_GAP * usual)
-    return usual, tuple((float(times[i]), float(steps[i])) for i in gaps), len(gaps) > UNEVEN * len(steps)
 
 
 def _residual(
@@ -313,10 +306,8 @@ def _told(feature: _Feature, numbers: np.ndarray, residual: np.ndarray) -> bool:
 
 def _alike_for(residual: np.ndarray) -> int:
     """Number of instants after which a residual's correlation with itself is below 1/e."""
-    centred = residual - residual.mean()
-    spectrum = np.fft.rfft(centred, 2 * len(centred))
-    correlation = np.fft.irfft(spectrum * spectrum.conj())[: len(centred)]
-    below = np.flatnonzero(correlation < correlation[0] / np.e)
+    correlation = autocorrelation(residual)
+    below = np.flatnonzero(correlation < math.exp(-1.0))
     return int(below[0]) if len(below) else len(residual)
 
 

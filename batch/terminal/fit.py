@@ -66,7 +66,7 @@ def written_values(question: FitQuestion, answer: FitAnswer) -> list[FittedValue
 
 
 def identifiable_lines(question: FitQuestion, found: Known, promised: Mapping[str, Known]) -> Iterator[str]:
-    """What the logs can tell before anything is fitted, and what they could with a log of other runs, in lines."""
+    """Lines about the numbers that the logs can tell before anything is fitted, and with a log of other runs."""
     rows = [["", "deck", "standard error", "by itself", ""]]
     for place, path in enumerate(question.paths):
         unit = question.units[place]
@@ -270,8 +270,8 @@ def _deck_value(question: FitQuestion, place: int) -> str:
 
 
 def _doubts(before: Comparison, after: Comparison) -> list[str]:
-    """What makes a log doubtful: after the fit; and before it, unless the fit removed most of what was left of the
-    channels that a doubt names, or of all."""
+    """The reasons to doubt a log: those after the fit, and those before it unless the fit removed most of what was left
+    of the channels that a doubt names, or of all."""
     sizes = {each.channel: each.rms for each in before.residuals}
     left = {each.channel for each in after.residuals if each.rms > REMOVED * sizes.get(each.channel, 0.0)}
     left -= {each.channel for each in after.residuals if each.white}

@@ -60,7 +60,7 @@ def _size(cause: FollowedCause) -> str:
 
 
 def doubt_lines(found: Comparison) -> Iterator[str]:
-    """What makes a log doubtful, in lines."""
+    """Lines that say why a log is doubtful."""
     for each in found.doubts:
         yield f"  doubt: {each}"
     far = [each.channel for each in found.residuals if each.spread and each.rms > each.spread]
@@ -70,7 +70,7 @@ def doubt_lines(found: Comparison) -> Iterator[str]:
 
 
 def note_lines(found: Comparison) -> Iterator[str]:
-    """What makes a log doubtful, and what else is to be known of it, in lines."""
+    """Lines that say why a log is doubtful, where its time has gaps, and what is not used of it."""
     yield from doubt_lines(found)
     if found.left_out:
         spans = " s, and the run from ".join(

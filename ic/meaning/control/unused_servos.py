@@ -43,7 +43,7 @@ def _within(item: Item) -> Iterable[Item]:
 
 
 def _values(entries: Iterable[Entry]) -> Iterator[Expression]:
-    """What entries choose among, such as `vary hinge.servo = [first, second];`, through blocks."""
+    """The expressions that entries choose among, such as `vary hinge.servo = [first, second];`, through blocks."""
     for entry in entries:
         value = getattr(entry, "value", None)
         yield from value.items if isinstance(value, List) else ()

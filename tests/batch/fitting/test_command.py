@@ -156,6 +156,8 @@ def test_what_a_log_cannot_tell_is_said_and_not_written(folder: Path, capsys: Sa
         (("--estimate", "mass", "--zero", "9 s"), "has one of the run beside it"),
         (("--estimate", "mass", "--column", "hinge.q"), "is no column of a log for a channel"),
         (("--estimate", "mass", "--column", "hinge.w=hinge.q"), "does not record `hinge.w`"),
+        (("--estimate", "mass", "--column", "time=-time"), "times of `time` would fall"),
+        (("--estimate", "mass", *("--column", "hinge.q=-hinge.q") * 2), "`hinge.q` has two columns"),
         (("--estimate", "mass", "--column", "hinge.q=angle"), "has no column `angle`"),
         (("--estimate", "mass", "--vary", "mass=[1, 2] kg"), "--vary is for sweeps"),
         (("--estimate", "mass", "--motion", "work"), "--motion is for --identifiable"),
