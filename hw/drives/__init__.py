@@ -1,7 +1,7 @@
 """The host's side of drives on a CAN bus or on serial lines, one dialect a file.
 
 To add one: write its file with a `CanDrive` (hw/drives/drive.py), add that to `DIALECTS`, and write the drive's side
-of it in hw/players, which the tests of every dialect are derived from.
+of it in tests/hw/players, which the tests of every dialect are derived from.
 """
 
 from collections.abc import Mapping, Sequence

@@ -14,7 +14,7 @@ from hw.drives.bench_file import FIGURES, two_drives
 from hw.drives.frames import CanFrame
 from hw.drives.odrive_lines import on_lines
 from hw.drives.side import APART, SKEW
-from hw.players import PLAYED
+from tests.hw.players import PLAYED
 
 PAGE = (Path(__file__).parents[2] / "docs" / "drives.md").read_text()
 

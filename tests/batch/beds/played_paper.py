@@ -2,9 +2,9 @@
 
     python -m tests.batch.beds.played_paper      the table of docs/drives.md
 
-The drives' sides of hw/players turn the shaft of the deck's own bed model, told torques: its friction and inertia, and
-no faults but the dialect's steps, latency and bus. Host, bus and drives are in one process, in a simulated time, so
-that figures are the same each time.
+The drives' sides of tests/hw/players turn the shaft of the deck's own bed model, told torques: its friction and
+inertia, and no faults but the dialect's steps, latency and bus. Host, bus and drives are in one process, in a simulated
+time, so that figures are the same each time.
 """
 
 from __future__ import annotations
@@ -27,11 +27,6 @@ from hw.drives.bench_file import two_drives
 from hw.driving import loop
 from hw.driving.case import pace_of
 from hw.driving.driven import LANES, CaseKernel
-from hw.players import PLAYED
-from hw.players.cia402 import PlayedCia402
-from hw.players.odrive import PlayedOdrive, endpoints
-from hw.players.player import PlayedBench
-from hw.players.shaft import Output
 from hw.recording.records import ANSWERED, LAYOUT
 from met import models
 from met import run as engine
@@ -39,6 +34,11 @@ from met.plan import Experiment
 from met.plant import Plant, bed_values
 from tests.hw.drives.played import BUS, MORE, host_line, line_of, on_serial_lines
 from tests.hw.drives.simulated_lines import PlayedLine
+from tests.hw.players import PLAYED
+from tests.hw.players.cia402 import PlayedCia402
+from tests.hw.players.odrive import PlayedOdrive, endpoints
+from tests.hw.players.player import PlayedBench
+from tests.hw.players.shaft import Output
 
 SLOW = 0.03
 KT, KT_LOAD, RESISTANCE, INERTIA = 0.061, 0.072, 2.05, 6.38e-5

@@ -23,13 +23,13 @@ from hw.drives import cia402, damiao, moteus, robstride
 from hw.drives.bench_file import two_drives
 from hw.drives.frames import CanFrame
 from hw.drives.odrive_lines import summed
-from hw.players.odrive import FIRST, PROPERTIES
 from met.diagnostic import Problem
 from met.frozen import frozen
 from met.substitution.bed import DriveCommand
 from tests.hw.drives.played import bench_file, host_of, line_of, period_of, played_bench
 from tests.hw.drives.simulated_lines import PlayedLine
 from tests.hw.drives.test_faults import DIALECTS
+from tests.hw.players.odrive import FIRST, PROPERTIES
 
 WAYS = ("rate", "torque", "arm", "disarm", "limit")
 PERIOD, JITTER = 0.01, 0.001

@@ -14,12 +14,12 @@ from hw.drives import DIALECTS
 from hw.drives.bench_file import TwoDrives, two_drives
 from hw.drives.frames import CanLine
 from hw.drives.odrive_lines import OdriveLines
-from hw.players import PLAYED
-from hw.players.odrive import endpoints
-from hw.players.player import PlayedBench
-from hw.players.shaft import InertiaShaft
 from met.substitution.bed import DriveCommand
 from tests.hw.drives.simulated_lines import PlayedLine, PlayedOdriveLines, Spoil, unspoiled
+from tests.hw.players import PLAYED
+from tests.hw.players.odrive import endpoints
+from tests.hw.players.player import PlayedBench
+from tests.hw.players.shaft import InertiaShaft
 
 KT, RESISTANCE, INERTIA = 0.06, 1.5, 1.3e-4
 

@@ -13,8 +13,8 @@ import itertools
 from collections.abc import Callable
 
 from hw.drives.frames import CanFrame, on_bus
-from hw.players.fdcanusb import PlayedFdcanusb
-from hw.players.player import PlayedBench
+from tests.hw.players.fdcanusb import PlayedFdcanusb
+from tests.hw.players.player import PlayedBench
 
 TURNAROUND = 5e-5
 """Time in which a played drive answers, s."""

@@ -12,8 +12,8 @@ from hw.bed import BedSample, BedState, Fault
 from hw.beds.can_bed import CanBed
 from hw.drives.frames import CanFrame
 from hw.drives.side import SKEW
-from hw.players.player import PlayedBench
 from met.diagnostic import Problem
+from tests.hw.players.player import PlayedBench
 
 SHARE = 0.05
 """Share of frames that a fault befalls."""

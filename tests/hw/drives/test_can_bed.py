@@ -14,13 +14,13 @@ from hw.bed import BedState, Capability, Fault
 from hw.beds.can_bed import CanBed
 from hw.drivers import check_model, opened
 from hw.drives.bench_file import two_drives
-from hw.players.odrive import PlayedOdrive
-from hw.players.player import PlayedBench
 from hw.ports import Port
 from met.substitution.bed import DriveCommand
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import INERTIA, KT, RESISTANCE, bench_file, host_of, played_bench
 from tests.hw.drives.simulated_lines import PlayedLine
+from tests.hw.players.odrive import PlayedOdrive
+from tests.hw.players.player import PlayedBench
 
 
 class Bench:

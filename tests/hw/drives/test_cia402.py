@@ -11,11 +11,11 @@ from hw.bed import BedDriver, BedState, Fault
 from hw.beds.can_bed import CanBed
 from hw.drives.bench_file import two_drives
 from hw.drives.frames import CanFrame
-from hw.players.cia402 import PlayedCia402
-from hw.players.player import PlayedBench
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import PlayedConformance, bench_file, host_of, played_bench
 from tests.hw.drives.simulated_lines import PlayedLine
+from tests.hw.players.cia402 import PlayedCia402
+from tests.hw.players.player import PlayedBench
 
 
 class TestCia402(PlayedConformance):

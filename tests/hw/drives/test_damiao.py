@@ -11,11 +11,11 @@ from hw.bed import BedDriver, BedState, Fault
 from hw.beds.can_bed import CanBed
 from hw.drives.bench_file import two_drives
 from hw.drives.mit import STEPS_12, STEPS_16, count_of, packed, value_of
-from hw.players.damiao import PlayedDamiao
-from hw.players.player import PlayedBench
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import HalfStepConformance, bench_file, go, host_of, played_bench
 from tests.hw.drives.simulated_lines import PlayedLine
+from tests.hw.players.damiao import PlayedDamiao
+from tests.hw.players.player import PlayedBench
 
 
 class TestDamiao(HalfStepConformance):

@@ -17,14 +17,14 @@ from hw.drives.bench_file import two_drives
 from hw.drives.bus import open_bus
 from hw.drives.fdcanusb import LONGEST_LINE, FdcanusbLine, frame_of
 from hw.drives.frames import CanFrame
-from hw.players.fdcanusb import PlayedFdcanusb, PlayedFdcanusbPort
-from hw.players.player import play
 from hw.ports import Opening, Port
 from met.diagnostic import Problem
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import PlayedConformance, bench_file, host_on, played_bench
 from tests.hw.drives.simulated_lines import PlayedFdcanusbLine, PlayedLine
 from tests.hw.drives.spoiling import SHARE, Tally, campaign
+from tests.hw.players.fdcanusb import PlayedFdcanusb, PlayedFdcanusbPort
+from tests.hw.players.player import play
 
 SETTINGS = {"interface": "fdcanusb", "channel": "PORT"}
 Spoilt = list[tuple[float, bytes]]

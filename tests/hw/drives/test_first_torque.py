@@ -9,11 +9,11 @@ import pytest
 
 from hw.drives.bench_file import two_drives
 from hw.drives.frames import CanFrame
-from hw.players.damiao import PlayedDamiao
-from hw.players.player import PlayedBench
-from hw.players.robstride import PlayedRobstride
 from tests.hw.drives.played import bench_file, host_of, played_bench
 from tests.hw.drives.simulated_lines import PlayedLine
+from tests.hw.players.damiao import PlayedDamiao
+from tests.hw.players.player import PlayedBench
+from tests.hw.players.robstride import PlayedRobstride
 
 STEP = 1e-3
 """N m, more than half a step of either dialect's torque."""

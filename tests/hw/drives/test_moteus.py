@@ -14,11 +14,11 @@ from hw.beds.can_bed import CanBed
 from hw.drives.bench_file import two_drives
 from hw.drives.frames import CanFrame
 from hw.drives.moteus import MoteusDrive, answered, asked_for, number, padded, written
-from hw.players.moteus import PlayedMoteus
-from hw.players.player import PlayedBench
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import PlayedConformance, bench_file, go, host_of, played_bench
 from tests.hw.drives.simulated_lines import PlayedLine
+from tests.hw.players.moteus import PlayedMoteus
+from tests.hw.players.player import PlayedBench
 
 
 class TestMoteus(PlayedConformance):

@@ -11,11 +11,11 @@ import pytest
 from hw.bed import BedDriver
 from hw.drives.bench_file import two_drives
 from hw.drives.frames import CanFrame
-from hw.players.odrive import PlayedOdrive, endpoints
-from hw.players.player import PlayedBench
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import PlayedConformance, bench_file, host_of, played_bench
 from tests.hw.drives.simulated_lines import PlayedLine
+from tests.hw.players.odrive import PlayedOdrive, endpoints
+from tests.hw.players.player import PlayedBench
 
 
 class TestOdrive(PlayedConformance):

@@ -17,14 +17,14 @@ from hw.beds.can_bed import PORT, CanBed
 from hw.drives.bench_file import two_drives
 from hw.drives.frames import CanFrame
 from hw.drives.odrive_lines import OWED, USB_ANSWER, OdriveLines, checked, on_lines, summed
-from hw.players.odrive_ascii import PlayedOdriveAscii, PlayedOdrivePorts
-from hw.players.player import PlayedBench, play
 from hw.ports import Opening, Port
 from met.diagnostic import Problem
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import PlayedConformance, bench_file, host_line, host_of, line_of, period_of, played_bench
 from tests.hw.drives.spoiling import Tally, campaign
 from tests.hw.drives.test_fdcanusb import TEXT_FAULTS, TextSpoiler
+from tests.hw.players.odrive_ascii import PlayedOdriveAscii, PlayedOdrivePorts
+from tests.hw.players.player import PlayedBench, play
 
 ASCII = "odrive_ascii"
 

@@ -14,9 +14,6 @@ from hw.beds.can_deck import BelievedLoop, loop_warning
 from hw.drivers import check_model, opened
 from hw.drives import DIALECTS
 from hw.drives.bench_file import two_drives
-from hw.players.cia402 import PlayedCia402
-from hw.players.odrive import PlayedOdrive
-from hw.players.player import PlayedBench
 from hw.ports import Port
 from met.messages.render import render
 from met.plan import Experiment
@@ -24,6 +21,9 @@ from tests.hw.conftest import refusal
 from tests.hw.drives.played import KT, bench_file, host_of, line_of, period_of, played_bench
 from tests.hw.drives.simulated_lines import PlayedLine
 from tests.hw.drives.spoiling import FAULTS, Spoiler, Tally, campaign
+from tests.hw.players.cia402 import PlayedCia402
+from tests.hw.players.odrive import PlayedOdrive
+from tests.hw.players.player import PlayedBench
 
 TOLD = [name for name, each in DIALECTS.items() if each.takes_rates]
 """Dialects that are told rates."""

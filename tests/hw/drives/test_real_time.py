@@ -24,12 +24,12 @@ from hw.bed import BedState
 from hw.beds.can_bed import CanBed
 from hw.drives.bench_file import two_drives
 from hw.drives.bus import open_bus
-from hw.players.fdcanusb import played_bus
-from hw.players.player import play
 from hw.realtime import put_first
 from met.substitution.bed import DriveCommand
 from tests.hw.drives.driving import driving_command
 from tests.hw.drives.played import bench_file, host_on, played_bench
+from tests.hw.players.fdcanusb import played_bus
+from tests.hw.players.player import play
 
 pytestmark = pytest.mark.alone
 
@@ -115,7 +115,7 @@ def stopped_after(folder: Path, dialect: str) -> float:
     """The time from the death of a host to the last of the drives being off, both processes of their own, s; below 0
     where the bed had stopped by itself before."""
     path = file_for(folder, dialect, "udp_multicast", GROUP)
-    player = subprocess.Popen([sys.executable, "-m", "hw.players", str(path)], stdout=subprocess.PIPE, text=True)
+    player = subprocess.Popen([sys.executable, "-m", "tests.hw.players", str(path)], stdout=subprocess.PIPE, text=True)
     put_first(player.pid)
     assert player.stdout is not None
     host = None

@@ -15,11 +15,11 @@ from hw.drives.bench_file import DriveEntry, two_drives
 from hw.drives.frames import CanFrame
 from hw.drives.mit import STEPS_16
 from hw.drives.robstride import RobstrideDrive
-from hw.players.player import PlayedBench
-from hw.players.robstride import PlayedRobstride
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import HalfStepConformance, bench_file, go, host_of, played_bench
 from tests.hw.drives.simulated_lines import PlayedLine
+from tests.hw.players.player import PlayedBench
+from tests.hw.players.robstride import PlayedRobstride
 
 
 class TestRobstride(HalfStepConformance):

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from hw.drives.frames import CanFrame
-from hw.players.player import PlayedDrive
-from hw.players.shaft import OFF, Output
+from tests.hw.players.player import PlayedDrive
+from tests.hw.players.shaft import OFF, Output
 
 PROPERTIES = (
     ("vbus_voltage", "float"),

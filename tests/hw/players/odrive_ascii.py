@@ -15,8 +15,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hw.drives.frames import CanFrame
-from hw.players.odrive import PlayedOdrive
-from hw.players.terminal import Terminal
+from tests.hw.players.odrive import PlayedOdrive
+from tests.hw.players.terminal import Terminal
 
 BUFFER = 256
 """Bytes of a line, of which no drive takes more."""

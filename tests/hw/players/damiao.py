@@ -6,8 +6,8 @@ import struct
 from collections.abc import Sequence
 
 from hw.drives.frames import CanFrame
-from hw.players.player import PlayedDrive
-from hw.players.shaft import OFF, Output
+from tests.hw.players.player import PlayedDrive
+from tests.hw.players.shaft import OFF, Output
 
 
 class PlayedDamiao(PlayedDrive):

@@ -6,13 +6,13 @@ may be wrong alike: what a maker's firmware does is known once one was there.
 
 from collections.abc import Callable, Mapping
 
-from hw.players.cia402 import PlayedCia402
-from hw.players.damiao import PlayedDamiao
-from hw.players.moteus import PlayedMoteus
-from hw.players.odrive import PlayedOdrive
-from hw.players.odrive_ascii import PlayedOdriveAscii
-from hw.players.player import PlayedDrive
-from hw.players.robstride import PlayedRobstride
+from tests.hw.players.cia402 import PlayedCia402
+from tests.hw.players.damiao import PlayedDamiao
+from tests.hw.players.moteus import PlayedMoteus
+from tests.hw.players.odrive import PlayedOdrive
+from tests.hw.players.odrive_ascii import PlayedOdriveAscii
+from tests.hw.players.player import PlayedDrive
+from tests.hw.players.robstride import PlayedRobstride
 
 PLAYED: Mapping[str, Callable[[int, int], PlayedDrive]] = {
     "odrive": PlayedOdrive,

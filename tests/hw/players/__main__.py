@@ -1,4 +1,4 @@
-"""Two played drives on a real bus in real time: `python -m hw.players BENCH.toml`, until it is interrupted.
+"""Two played drives on a real bus in real time: `python -m tests.hw.players BENCH.toml`, until it is interrupted.
 
 It plays the drive and the load of the bench file, on a shaft with a little friction. It prints `ready`, and each time
 that all drives have stopped, `off` with the time, s of the monotonic clock.
@@ -11,12 +11,12 @@ import sys
 import time
 
 from hw.drives.bench_file import TwoDrives, two_drives
-from hw.players import PLAYED
-from hw.players.fdcanusb import played_bus
-from hw.players.player import PlayedBench, play
-from hw.players.shaft import InertiaShaft
 from met.diagnostic import Problem
 from met.messages.render import render
+from tests.hw.players import PLAYED
+from tests.hw.players.fdcanusb import played_bus
+from tests.hw.players.player import PlayedBench, play
+from tests.hw.players.shaft import InertiaShaft
 
 F_C, F_V = 0.002, 2e-4
 """Friction of the played shaft: as shares of the torque that the drive under test may give, and of that a rad/s."""
@@ -66,4 +66,4 @@ def main(path: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]) if len(sys.argv) == 2 else "python -m hw.players BENCH.toml")
+    sys.exit(main(sys.argv[1]) if len(sys.argv) == 2 else "python -m tests.hw.players BENCH.toml")

@@ -7,8 +7,8 @@ import struct
 from collections.abc import Sequence
 
 from hw.drives.frames import CanFrame
-from hw.players.player import PlayedDrive
-from hw.players.shaft import OFF, Output
+from tests.hw.players.player import PlayedDrive
+from tests.hw.players.shaft import OFF, Output
 
 _FORMATS = {0x7005: "<B", 0x700B: "<f", 0x701C: "<f", 0x7028: "<I"}
 _ANGLE = 0x7019

@@ -1,6 +1,6 @@
 """Two played drives on a shaft, in a time that whoever plays them gives. `play` gives it real time, on a bus of
-python-can: `virtual` within a process, `udp_multicast` or vcan between two; `python -m hw.players BENCH.toml` is the
-same as a program."""
+python-can: `virtual` within a process, `udp_multicast` or vcan between two. `python -m tests.hw.players BENCH.toml` is
+the same as a program."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from hw.drives.frames import CanFrame, CanLine
-from hw.players.shaft import OFF, Output, PlayedShaft
+from tests.hw.players.shaft import OFF, Output, PlayedShaft
 
 
 class PlayedDrive(ABC):

@@ -7,8 +7,8 @@ import struct
 from collections.abc import Sequence
 
 from hw.drives.frames import CanFrame
-from hw.players.player import PlayedDrive
-from hw.players.shaft import OFF, Output
+from tests.hw.players.player import PlayedDrive
+from tests.hw.players.shaft import OFF, Output
 
 _KINDS = {0: ("b", 1), 1: ("h", 2), 2: ("i", 4), 3: ("f", 4)}
 
