@@ -57,26 +57,22 @@ def check_overwrite(
     code: str,
     because: str,
     remedy: str = "remove the file",
-    option: str = "-o",
 ) -> None:
     """Refuse to overwrite a file with contents, unless it is one that MET may replace without asking.
 
     is_own   True for such a file
     because  the rest of "`output` exists ...", as "and is no report of MET"
     remedy   what to do besides giving another name
-    option   the one that gives the name
 
     Raises Problem, OSError.
     """
     if output.exists() and output.stat().st_size > 0 and not is_own(output):
-        raise Problem(not_overwritten(output, code=code, because=because, remedy=remedy, option=option))
+        raise Problem(not_overwritten(output, code=code, because=because, remedy=remedy))
 
 
-def not_overwritten(
-    output: Path, *, code: str, because: str, remedy: str = "remove the file", option: str = "-o"
-) -> Any:
+def not_overwritten(output: Path, *, code: str, because: str, remedy: str = "remove the file") -> Any:
     """The error that `output` exists and is left unchanged, with arguments as in `check_overwrite`."""
-    helps = f"give another name with `{option}`, or {remedy}"
+    helps = f"give another name with `-o`, or {remedy}"
     return error(code, f"{output} exists{because}: it is not written over", help=helps)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -14,8 +13,6 @@ if TYPE_CHECKING:
     from ic.editor.lenses import LastRun
 
 from met.diagnostic import Problem, error
-from met.host.files import whole_file
-from met.outputs import cannot_write, check_overwrite, check_place, quoted
 
 
 @click.command(short_help="Serve an editor: messages as you type, completion, meanings of words.")
@@ -33,21 +30,12 @@ from met.outputs import cannot_write, check_overwrite, check_place, quoted
 @click.option(
     "--stdio", is_flag=True, help="Standard input and output, as editors ask for them; there is no other way."
 )
-@click.option(
-    "--vscode",
-    metavar="FILE.vsix",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="Write the extension for VS Code to this file, and end.",
-)
-def lsp(include_dirs: tuple[str, ...], defines: tuple[str, ...], stdio: bool, vscode: Path | None) -> None:
+def lsp(include_dirs: tuple[str, ...], defines: tuple[str, ...], stdio: bool) -> None:
     """Serve an editor by the Language Server Protocol, on standard input and output.
 
     The editor starts this command; docs/editors.md has settings for Neovim, Helix, Emacs and VS Code. The command needs
     the package pygls, which MET's extra `editor` installs.
     """
-    if vscode is not None:
-        write_extension(vscode)
-        return
     from importlib.util import find_spec
 
     if find_spec("pygls") is None:
@@ -57,20 +45,6 @@ def lsp(include_dirs: tuple[str, ...], defines: tuple[str, ...], stdio: bool, vs
     from ic.editor.server import serve
 
     serve(include_dirs, defines, _last_runs)
-
-
-def write_extension(path: Path) -> None:
-    """Write the extension for VS Code, and say how it is installed. Raises Problem E305."""
-    from ic.editor.extension import is_extension, vsix
-
-    try:
-        check_place(path, code="E305")
-        check_overwrite(path, is_extension, code="E305", because=" and is no extension of MET", option="--vscode")
-        with whole_file(path) as file:
-            file.write(vsix())
-    except OSError as reason:
-        raise cannot_write(path, reason, code="E305") from reason
-    click.echo(f"{path} is the extension for VS Code; `code --install-extension {quoted(path)}` installs it")
 
 
 def _last_runs(deck: str) -> Mapping[str, LastRun]:

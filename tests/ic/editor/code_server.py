@@ -24,7 +24,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ic.editor.extension import vsix
+from vsix import vsix
+
 from met.host import interpreter
 from tests.batch.report.browser import Page
 

@@ -11,16 +11,14 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from textmate import grammar
+from vsix import FOLDER, files, main, package, vsix
 
-from batch.cli.lsp import lsp
-from ic.editor.extension import FOLDER, files, package, vsix
 from ic.language import BLOCKS
-from met import cli
 from met.host import interpreter
 
 ROOT = Path(__file__).parents[3]
+SCRIPT = ROOT / "scripts" / "vsix.py"
 DECK = """\
 #include <two_link.ic>
 servo motor like gearbox { kp = 0.01 V*s/rad; }
@@ -34,8 +32,8 @@ ENDS = {"json", "js", "vsixmanifest"}
 
 def test_a_package_has_all_that_it_names(tmp_path: Path) -> None:
     target = tmp_path / "met.vsix"
-    done = CliRunner().invoke(lsp, ["--vscode", str(target)])
-    assert done.exit_code == 0 and f"code --install-extension {target}" in done.output
+    done = subprocess.run([SCRIPT, target], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "") and f"code --install-extension {target}" in done.stdout
     with zipfile.ZipFile(target) as archive:
         assert archive.testzip() is None
         found = {name: archive.read(name) for name in archive.namelist()}
@@ -47,26 +45,19 @@ def test_a_package_has_all_that_it_names(tmp_path: Path) -> None:
     assert vsix() == target.read_bytes(), "equal versions make equal bytes"
 
 
-def test_only_an_extension_of_met_is_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    target = tmp_path / "met.vsix"
-    assert cli.main(["lsp", "--vscode", str(target)]) == cli.main(["lsp", "--vscode", str(target)]) == 0
-    foreign = tmp_path / "other.vsix"
-    with zipfile.ZipFile(foreign, "w") as archive:
-        archive.writestr("extension.vsixmanifest", '<Identity Id="other" Version="1"/>')
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("mine.txt", "{} exists: it is not written over; give another name, or remove it\n"),
+        ("none/met.vsix", "cannot write {}: No such file or directory\n"),
+    ],
+)
+def test_a_package_is_a_new_file(tmp_path: Path, name: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
     mine = tmp_path / "mine.txt"
     mine.write_text("what I wrote")
-    capsys.readouterr()
-    for path in (mine, foreign):
-        before = path.read_bytes()
-        assert cli.main(["lsp", "--vscode", str(path)]) == 2
-        assert path.read_bytes() == before
-        assert capsys.readouterr() == (
-            "",
-            f"error[E305]: {path} exists and is no extension of MET: it is not written over\n"
-            " = help: give another name with `--vscode`, or remove the file\n\n1 error\n",
-        )
-    assert cli.main(["lsp", "--vscode", str(tmp_path / "none" / "met.vsix")]) == 2
-    assert "error[E305]: cannot write" in capsys.readouterr().err
+    assert main(tmp_path / name) == 2
+    assert mine.read_text() == "what I wrote"
+    assert capsys.readouterr() == ("", message.format(tmp_path / name))
 
 
 def test_a_manifest_says_what_the_package_says() -> None:

@@ -1,26 +1,25 @@
-"""The extension for VS Code as one file, `met lsp --vscode FILE.vsix`: made without a network, from MET's own files.
+#!/usr/bin/env python3
+"""Packs the extension for VS Code, ic/editor/vscode, into one file that VS Code installs without a network.
+
+    scripts/vsix.py met.vsix      writes a new file
+    code --install-extension met.vsix
 
 A .vsix is a ZIP file: the extension in the folder `extension`, its manifest, and the types of the files in it
-(github.com/microsoft/vscode-vsce). Equal versions of MET make equal bytes.
+(github.com/microsoft/vscode-vsce). Equal versions of MET make equal bytes. Only the standard library is used here.
 """
 
 from __future__ import annotations
 
 import json
+import sys
 import zipfile
-import zlib
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
-from met.host.files import open_regular
-
-FOLDER = Path(__file__).parent / "vscode"
+FOLDER = Path(__file__).resolve().parents[1] / "ic" / "editor" / "vscode"
 DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a ZIP file can hold: a build's clock is no part of it
-
-MANIFEST = "extension.vsixmanifest"
-MOST_OF_MANIFEST = 20_000  # number of its bytes that are searched
 
 _TYPES = {"json": "application/json", "js": "application/javascript", "vsixmanifest": "text/xml"}
 
@@ -33,34 +32,24 @@ def package() -> dict[str, object]:
 
 def files() -> dict[str, bytes]:
     """The files of a .vsix, by their names in it."""
-    found = {f"extension/{path.name}": path.read_bytes() for path in sorted(FOLDER.iterdir()) if path.is_file()}
+    extension = {f"extension/{path.name}": path.read_bytes() for path in sorted(FOLDER.iterdir()) if path.is_file()}
     return {
-        MANIFEST: _manifest(package()).encode(),
+        "extension.vsixmanifest": _manifest(package()).encode(),
         "[Content_Types].xml": _content_types().encode(),
-        **found,
+        **extension,
     }
 
 
 def vsix() -> bytes:
     """The whole extension."""
-    made = BytesIO()
-    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+    packed = BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in files().items():
             entry = zipfile.ZipInfo(name, DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, data)
-    return made.getvalue()
-
-
-def is_extension(path: Path) -> bool:
-    """True for a file of this extension, of any version of MET. Raises OSError."""
-    own = f"Id={quoteattr(str(package()['name']))} "
-    try:
-        with open_regular(path) as file, zipfile.ZipFile(file) as archive, archive.open(MANIFEST) as manifest:
-            return own.encode() in manifest.read(MOST_OF_MANIFEST)
-    except (zipfile.BadZipFile, zlib.error, KeyError, RuntimeError, NotImplementedError):
-        return False  # not a ZIP file, without a manifest, or unreadable
+    return packed.getvalue()
 
 
 def _manifest(described: Mapping[str, object]) -> str:
@@ -97,3 +86,22 @@ def _content_types() -> str:
         '<?xml version="1.0" encoding="utf-8"?>\n'
         f'<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">{types}</Types>\n'
     )
+
+
+def main(path: Path) -> int:
+    """Write the extension to a new file. Returns the exit status: 2 where it cannot be written or exists."""
+    try:
+        with path.open("xb") as file:
+            file.write(vsix())
+    except FileExistsError:
+        print(f"{path} exists: it is not written over; give another name, or remove it", file=sys.stderr)
+        return 2
+    except OSError as reason:
+        print(f"cannot write {path}: {reason.strerror}", file=sys.stderr)
+        return 2
+    print(f"{path} is the extension for VS Code; `code --install-extension {path}` installs it")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])) if len(sys.argv) == 2 and sys.argv[1][0] != "-" else "scripts/vsix.py FILE.vsix")
