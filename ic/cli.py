@@ -345,7 +345,7 @@ def dump(
 ) -> None:
     """Show the output of one stage on the way from a deck to machine code.
 
-    STAGE is tokens, syntax, model, plan, program, kernel or assembly.
+    STAGE is tokens, syntax, model, plan, program or kernel.
     """
     from ic.printing.dump import WRITTEN, DumpRequest, find_stage
 

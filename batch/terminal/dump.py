@@ -1,4 +1,4 @@
-"""The stages of `met dump` after the plan: the recorded program, its code, and the processor's code."""
+"""The stages of `met dump` after the plan: the recorded program, and its code."""
 
 from __future__ import annotations
 
@@ -27,14 +27,6 @@ def kernel(asked: DumpRequest) -> Iterator[str]:
 
     for _, recording in _recorded(asked):
         yield backends.find().emit(recording)
-
-
-def assembly(asked: DumpRequest) -> Iterator[str]:
-    """The machine code of the program as assembly for this processor."""
-    from met import backends
-
-    for _, recording in _recorded(asked):
-        yield backends.find().listing(recording)
 
 
 def _recorded(asked: DumpRequest) -> Iterator[tuple[Experiment, Recording]]:

@@ -1,7 +1,7 @@
 """The result of each stage, as text: `met dump STAGE deck.ic`.
 
 A stage is a function from `DumpRequest` to lines, offered as an entry point in the group `met.stages` by the lowest
-package that may import all it needs: tokens, syntax, model and plan from here, program, kernel and assembly from
+package that may import all it needs: tokens, syntax, model and plan from here, program and kernel from
 batch/terminal/dump.py.
 """
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from met.plan import Plan
 
 GROUP = "met.stages"
-ORDER = ("tokens", "syntax", "model", "plan", "program", "kernel", "assembly")  # others come after
+ORDER = ("tokens", "syntax", "model", "plan", "program", "kernel")  # others come after
 WRITTEN = ("tokens", "syntax", "model")  # stages before anything is set from outside of the deck
 
 

@@ -114,9 +114,6 @@ class Backend(Protocol):
     def emit(self, recording: Recording) -> str:
         """The program as text, as `load` would compile it here; for people, and for `met dump kernel`."""
 
-    def listing(self, recording: Recording) -> str:
-        """The processor's code as text, for `met dump assembly`; `emit`'s text where a back end has no other."""
-
     def load(self, recording: Recording, *, lanes: int | None = None, inline: bool = True) -> Kernel:
         """The program, ready to run. inline: False where the time of each section alone is measured."""
 

@@ -25,9 +25,6 @@ class C:
 
         return emit(recording).text
 
-    def listing(self, recording: Recording) -> str:
-        return self.emit(recording)
-
     def load(self, recording: Recording, *, lanes: int | None = None, inline: bool = True) -> Kernel:
         """The program, compiled by `cc`. Raises RuntimeError where there is no `cc`, or it fails."""
         from met.backends.c.library import Library

@@ -27,11 +27,6 @@ class Llvm:
 
         return kernel.written(recording, machine.machine())[1]
 
-    def listing(self, recording: Recording) -> str:
-        from met.backends.llvm import machine
-
-        return machine.listing(self.emit(recording), machine.machine())
-
     def load(self, recording: Recording, *, lanes: int | None = None, inline: bool = True) -> Kernel:
         from met.backends.llvm import kernel
 

@@ -25,9 +25,6 @@ class Reference:
 
         return "\n".join([*lines(recording), ""])
 
-    def listing(self, recording: Recording) -> str:
-        return self.emit(recording)
-
     def load(self, recording: Recording, *, lanes: int | None = None, inline: bool = True) -> Kernel:
         from met.backends.reference.interpret import Interpreter
 

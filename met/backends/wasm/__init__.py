@@ -26,12 +26,6 @@ class Wasm:
 
         return text(recording)
 
-    def listing(self, recording: Recording) -> str:
-        """The code in the WebAssembly text of LLVM's assembler."""
-        from met.backends.llvm import machine
-
-        return machine.listing(self.emit(recording), machine.wasm32())
-
     def load(self, recording: Recording, *, lanes: int | None = None, inline: bool = True) -> Kernel:
         """The program, compiled, always with two lanes; running it raises RuntimeError where there is no node."""
         from met.backends.wasm.module import compiled

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import assembly
 import numpy as np
 import pytest
 
@@ -63,7 +64,14 @@ def test_each_writes_the_program_as_text(name: str) -> None:
     backend = backends.find(name)
     assert backend.name == name and backend.version >= 1
     assert len(backend.emit(recording).splitlines()) > 500
-    assert len(backend.listing(recording).splitlines()) > 500
+
+
+@pytest.mark.slow
+def test_a_script_prints_the_instructions_of_a_run(capsys: pytest.CaptureFixture[str]) -> None:
+    assert assembly.main("two_link.ic", ["nominal"]) == 0
+    assert capsys.readouterr().out.count("\n") > 500
+    assert assembly.main("two_link.ic", ["nominl"]) == 2
+    assert "did you mean `nominal`?" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", NAMES)
