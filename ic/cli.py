@@ -298,9 +298,8 @@ def explain(
 
 @click.command()
 @click.argument("words", nargs=-1, metavar="[KIND] [MODEL]")
-@click.option("--markdown", is_flag=True, help="Print all of MET's own models as one page, docs/reference.md.")
 @format_option
-def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
+def doc(words: tuple[str, ...], form: str) -> None:
     """Show the models, and everything that each of them declares.
 
     KIND is a kind of model, such as `servo`; MODEL is the name of one model. Other words are the blocks of a deck, as
@@ -314,13 +313,6 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
 
     if len(words) > 2:
         raise click.UsageError("at most a kind and a model")
-    if markdown:
-        from ic.printing.reference import page
-
-        if words or form == "json":
-            raise click.UsageError("--markdown is the whole page: it takes neither words nor --format")
-        _print(page())
-        return
     pages = requested_pages(words)
     if form == "text":
         _print_text(separated(in_terminal(each, terminal_width()) for each in pages))

@@ -8,8 +8,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from reference import table_in_markdown
+
 from ic.language import BLOCKS, BlockDeclaration
-from ic.printing.page import Table, table_in_markdown
+from ic.printing.page import Table
 from ic.text.complaints import with_article
 
 PAGE = Path(__file__).parents[1] / "docs" / "deck.md"

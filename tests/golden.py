@@ -85,7 +85,7 @@ def write(folder: Path, sweeps: int, only: str) -> None:
     if only in "doc":
         subjects = [(name, ["doc", name]) for name in (*SUBJECTS, *KINDS)]
         programs = ("language-json", ["doc", "language", "--format", "json"])
-        others = [("markdown", ["doc", "--markdown"]), ("doc", ["doc"]), ("help", ["--help"]), programs]
+        others = [("doc", ["doc"]), ("help", ["--help"]), programs]
         carry_out(folder / "doc", [*others, *subjects])
 
 

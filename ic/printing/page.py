@@ -1,8 +1,7 @@
-"""A page of `met doc` as data, made once from declarations, and its writers: for a terminal, as Markdown, for JSON."""
+"""A page of `met doc` as data, made once from declarations, and its writers: for a terminal, and for programs."""
 
 from __future__ import annotations
 
-import re
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
@@ -57,7 +56,7 @@ def separated(sections: Iterable[Iterable[str]]) -> Iterator[str]:
 def in_terminal(page: Page, width: int | None) -> Iterator[str]:
     """The lines of a page for a terminal of this width; None: every row of a table is one line."""
     head = f"{page.subject}: {page.summary}" if page.summary else page.title
-    prose = paragraphs(_dedented(page.prose), width=None if width is None else width - 2)
+    prose = paragraphs(textwrap.dedent(page.prose).strip(), width=None if width is None else width - 2)
     usage = f"In a deck: {page.usage}" if page.usage else ""
     return separated(
         [
@@ -77,53 +76,6 @@ def _part_in_terminal(part: str | Table, width: int | None) -> list[str]:
     return [*lines, *(f"  {line}" for line in below)] if part.rows else []
 
 
-def in_markdown(page: Page, level: int) -> Iterator[str]:
-    """The lines of a page in Markdown, under a heading of this level."""
-    code, comma, place = page.usage.partition(", in a")
-    summary = f"{page.summary[:1].upper()}{page.summary[1:].removesuffix('.')}." if page.summary else ""
-    prose = _dedented(page.prose).splitlines()
-    return separated(
-        [
-            [f"{'#' * level} {page.title}"],
-            [_escaped(summary)],
-            [line if line.startswith("    ") else _escaped(line) for line in prose],
-            [f"In a deck: `{code}`{comma}{place}" if code else ""],
-            *([_escaped(fact)] for fact in page.facts),
-            *(section for part in page.parts for section in _part_in_markdown(part)),
-        ]
-    )
-
-
-def _part_in_markdown(part: str | Table) -> list[list[str]]:
-    if isinstance(part, str):
-        return [[_escaped(part)]]
-    words = [f"`{word}`: {_escaped(meaning)}" for word, meaning in part.words]
-    sections = [
-        [f"{_escaped(part.caption)}:" if part.caption else ""],
-        table_in_markdown(part),
-        *([_escaped(note)] for note in part.notes),
-        [f"{'. '.join(words)}." if words else ""],
-    ]
-    return sections if part.rows else []
-
-
-def table_in_markdown(table: Table) -> list[str]:
-    """The head and the rows of a table in Markdown."""
-    rows = [(f"`{first}`", *(_escaped(cell).replace("|", "\\|") for cell in cells)) for first, *cells in table.rows]
-    head, *lines = (f"| {' | '.join(row)} |" for row in (table.head, *rows))
-    return [head, f"|{'---|' * len(table.head)}", *lines]
-
-
 def in_json(pages: Sequence[Page]) -> object:
     """The records of pages, for programs: those of the only one, or of all in one list."""
     return pages[0].records if len(pages) == 1 else [record for page in pages for record in page.records]
-
-
-def _dedented(doc: str) -> str:
-    return textwrap.dedent(doc).strip()
-
-
-def _escaped(text: str) -> str:
-    """Text without accidental Markdown marks, except code between backticks."""
-    parts = re.split(r"(`[^`]*`)", text)
-    return "".join(part if part.startswith("`") else re.sub(r"([*<\[\]])", r"\\\1", part) for part in parts)

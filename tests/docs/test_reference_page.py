@@ -6,24 +6,24 @@ import re
 from pathlib import Path
 
 import pytest
+from reference import main, page
 
 from ic.meaning.expressions.evaluate import CONSTANTS
 from ic.printing.models import default
-from ic.printing.reference import page
-from met import cli, models, units
+from met import models, units
 from met.plan import channel
 
 PAGE = (Path(__file__).parents[2] / "docs" / "reference.md").read_text(encoding="utf-8")
 
 
 def test_the_page_is_up_to_date() -> None:
-    assert PAGE.splitlines() == "\n".join(page()).splitlines(), "write it anew: met doc --markdown > docs/reference.md"
+    assert PAGE.splitlines() == "\n".join(page()).splitlines(), "write it anew: .venv/bin/python scripts/reference.py"
 
 
-def test_the_command_prints_the_page(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["doc", "--markdown"]) == 0
-    assert capsys.readouterr().out == PAGE
-    assert cli.main(["doc", "servo", "--markdown"]) == 2
+def test_the_script_writes_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("reference.FILE", tmp_path / "reference.md")
+    main()
+    assert (tmp_path / "reference.md").read_text(encoding="utf-8") == PAGE
 
 
 def test_every_model_parameter_unit_and_channel_is_on_it() -> None:

@@ -6,8 +6,9 @@ import re
 from collections import Counter
 
 import pytest
+from reference import in_markdown
 
-from ic.printing.page import Page, Table, in_json, in_markdown, in_terminal
+from ic.printing.page import Page, Table, in_json, in_terminal
 from ic.printing.requests import SUBJECTS
 
 PAGE = Page(
