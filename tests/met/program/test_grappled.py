@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from met import run as engine
+from met.backends.reference.plain import execute
 from met.plan.outputs import GRAPPLE_FIGURES
+from met.program.build import build
 from tests.ic.small_decks import changed, experiment
 from tests.met.program.free_flyers import ARM
 from tests.met.program.payload_decks import RUN
@@ -65,3 +67,34 @@ def test_a_body_without_mass_has_no_size(tmp_path: Path) -> None:
     assert found["p.distance"][0] == pytest.approx(0.02)
     assert found["p.near"][0] == pytest.approx(1.5 * math.sqrt(0.03) + 0.05 * 1.0)  # the hand is its place, at 1 m
     assert found["p.energy"][0] == 0.0
+
+
+CART = """\
+arm cart {
+    link block { mass = 3 kg;  shape = sphere(radius = 0.1 m); }
+    joint slide prismatic { parent = base;  child = block;  axis = x; }
+}
+servo geared {
+    model = rigid_gearbox;  ratio = 10 rad/m;  kp = 0 V*s/rad;  ki = 0 V/rad;  v_max = 1 V;  resistance = 1 ohm;
+    kt = 1e-9 N*m/A;  tau_max = 1 N*m;  j_m = 0.02 kg*m^2;  f_c = 0 N*m;  f_v = 0 N*m*s/rad;  command = torque(0 N);
+}
+run catch {
+    arm = cart;  servos { slide = geared; }
+    payload ball { mass = 1 kg;  inertia = [1, 1, 1] kg*m^2;  on = block;  position = [-0.06, 0, 0] m;
+                   velocity = [6, 0, 0] m/s;  grapple = 0.004 s;  release = 0.009 s; }
+    payload box { mass = 2 kg;  inertia = [1, 1, 1] kg*m^2;  on = block;  position = [1, 0, 0] m;
+                   velocity = [-2, 0, 0] m/s;  grapple = 0.007 s; }
+    rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 1 kHz; }  duration = 0.012 s;
+    record = [qd, payloads.ball.carried, payloads.box.carried];
+}
+"""
+
+
+def test_a_cart_that_catches_two_payloads_keeps_momentum_with_its_motors_share(tmp_path: Path) -> None:
+    """Of 3 kg, and 2 kg by its rotor; each time at the very instant, and what is not released stays."""
+    found = experiment(tmp_path, CART)
+    rows, _ = execute(build(found), {}, found.structure.schedule.ticks)
+    rates = [0.0] * 4 + [1.0 * 6.0 / (5.0 + 1.0)] * 3 + [(6.0 * 1.0 - 2.0 * 2.0) / (6.0 + 2.0)] * 6
+    np.testing.assert_allclose(rows[:, 0], rates, rtol=1e-12, atol=1e-15)
+    assert rows[:, 1].tolist() == [0.0] * 4 + [1.0] * 5 + [0.0] * 4
+    assert rows[:, 2].tolist() == [0.0] * 7 + [1.0] * 6
