@@ -6,7 +6,6 @@ import math
 import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -177,13 +176,6 @@ def test_the_truth_is_in_its_interval(faults: str) -> None:
     assert not any(missed(3, faults).values())
 
 
-def test_each_group_of_moves_has_all_kinds() -> None:
-    moves = guided(100.0)
-    its = groups(moves)
-    kinds = {move.name for move in moves}
-    assert all({move.name for move, group in zip(moves, its, strict=True) if group == one} == kinds for one in set(its))
-
-
 @pytest.mark.release
 def test_moves_keep_within_their_peaks_and_slews_and_end_at_rest() -> None:
     _, _, told = moved(experiment(hidden(1), "typical"), 1)
@@ -193,33 +185,6 @@ def test_moves_keep_within_their_peaks_and_slews_and_end_at_rest() -> None:
     assert np.abs(volts).max() > 19.0 and np.abs(amperes).max() > 1.5 and np.abs(rates).max() > 150.0
     assert not volts[-50:].any() and not amperes[-50:].any() and np.abs(rates[-50:]).max() < 2.0
     assert len(told) < 70_000
-
-
-def test_a_slew_that_is_small_is_kept(tmp_path: Path) -> None:
-    guide = MoveGuide(guided(100.0), Peaks(10.0, 1.0, 500.0), 1e-3, (500.0, 50.0))
-    told, before = [[0.0, 0.0]], (0.0, 0.0)
-    for e in range(3000):
-        guide(e, [0.0], told)
-        assert abs(told[0][0] - before[0]) <= 0.5 + 1e-12 and abs(told[0][1] - before[1]) <= 0.05 + 1e-12
-        before = (told[0][0], told[0][1])
-    assert before != (0.0, 0.0)
-
-
-def test_a_move_is_over_where_the_shaft_is_too_fast() -> None:
-    guide = MoveGuide(guided(100.0), Peaks(10.0, 1.0, 50.0), 1e-3, (1e5, 1e5))
-    told = [[0.0, 0.0]]
-    for e in range(81):
-        guide(e, [0.0], told)
-    assert told == [[1.5, 0.0]]
-    guide(81, [50.1], told)
-    assert told == [[0.0, 0.0]]
-
-
-def test_a_shaft_that_does_not_come_to_rest_is_found_out() -> None:
-    guide = MoveGuide(guided(100.0), Peaks(10.0, 1.0, 50.0), 1e-3, (1e5, 1e5))
-    for e in range(3001):
-        guide(e, [3.0], [[0.0, 0.0]])
-    assert guide.stuck and not guide.began
 
 
 @pytest.mark.release
