@@ -12,7 +12,7 @@ from met.dynamics.recursion import reactions, solve
 from met.dynamics.tree import Body, Tree
 from tests.met.dynamics.passes import CLOSE, forest, passed, pinocchio, stand
 from tests.oracles.dense import DenseArm, rotation
-from tests.oracles.random_tree import RandomArm
+from tests.oracles.random_tree import RandomArm, random_tree
 from tests.oracles.two_link_lagrange import Rods, mass_matrix, velocity_torque
 from tests.oracles.worst import Worst, relative
 
@@ -77,6 +77,15 @@ def test_cutting_a_link_in_two_at_a_fixed_joint_changes_nothing_beyond_rounding(
     motion.below(CLOSE)
     torques.below(CLOSE)
     borne.below(CLOSE)
+
+
+def test_without_velocity_products_an_arm_moves_as_one_at_rest() -> None:
+    arm = random_tree(5, 6)
+    tree = Tree.build(arm.bodies)
+    without = passed(arm, arm.mode, tree, velocity_products=False)
+    still = passed(replace(arm, qd=(0.0,) * arm.n), arm.mode, tree)
+    assert (without.qdd, without.tau) == (still.qdd, still.tau)
+    assert relative(passed(arm, arm.mode, tree).qdd, still.qdd) > 1e-3
 
 
 @pytest.mark.slow

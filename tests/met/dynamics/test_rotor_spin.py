@@ -15,13 +15,14 @@ import pytest
 
 from met.dynamics.effective_inertia import effective_inertia
 from met.dynamics.energy import energy
-from met.dynamics.recursion import FreeRotor, Solved, solve
+from met.dynamics.recursion import FreeRotor, Solved, reactions, solve
 from met.dynamics.tree import Body, Tree
+from tests.met.dynamics import passes
 from tests.met.dynamics.passes import CLOSE
 from tests.met.dynamics.test_free_base import Flight, flight, floated, passed, pose, vector, whole
 from tests.oracles import dense
 from tests.oracles.pinocchio_floating import FloatingPinocchio
-from tests.oracles.random_tree import RandomArm, random_trees
+from tests.oracles.random_tree import RandomArm, random_tree, random_trees
 from tests.oracles.worst import Worst, relative
 
 
@@ -178,3 +179,36 @@ def test_a_spin_is_refused_nowhere_and_felt_on_a_base_that_is_given() -> None:
     solved = solve(Tree.build(bodies), (0.0, 0.0), (0.0, 0.0), tau=(0.0, 2.0), spin=(0.0, 0.5), rotor=(0.0, 5.0))
     # (2, 1 + 0.5; 1 + 0.5, 1 + 5) qdd = (0, 2)
     assert np.allclose(solved.qdd, np.linalg.solve([[2.0, 1.5], [1.5, 6.0]], [0.0, 2.0]), rtol=1e-15)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 4])
+def test_on_a_base_at_rest_rotors_are_bodies_of_their_own_to_plain_linear_algebra(seed: int) -> None:
+    """In mixed modes; those behind elastic gears turn by themselves. What a joint bears is its load."""
+    bare, random = random_tree(seed, 5), np.random.default_rng(seed)
+    ratio, J = random.choice([-1.0, 1.0], 5) * random.uniform(1.0, 30.0, 5), random.uniform(0.01, 0.1, 5)
+    torque, rate, elastic = random.normal(0.0, 3.0, 5), random.normal(0.0, 20.0, 5), np.arange(5) == seed
+    moving = [body for body in bare.bodies if body.kind != "fixed"]
+    spare = [rotor(body, i, float(J[i])) for i, body in enumerate(moving)]
+    theirs = dense.DenseArm((*bare.bodies, *spare), bare.gravity, wrenches=bare.wrenches)
+    # columns of G: the joints, with the rotors that turn with them; then the elastic ones
+    G = np.vstack([np.eye(5, 6), np.hstack([np.diag(np.where(elastic, 0.0, ratio)), np.eye(5)[:, elastic]])])
+    q, qd = (*bare.q, *(0.0,) * 5), G @ (*bare.qd, *rate[elastic])
+    M, h = G.T @ theirs.mass_matrix(q) @ G, G.T @ theirs.bias(q, qd)
+    arm = replace(
+        bare,
+        bodies=(*bare.bodies, *(replace(body, kind="fixed") for body in spare)),
+        rotor=tuple(np.where(elastic, 0.0, ratio * ratio * J)),
+    )
+    spin = tuple(map(float, np.where(elastic, 0.0, ratio * J)))
+    rotors = [FreeRotor(J[i], torque[i], J[i] * rate[i]) if elastic[i] else None for i in range(5)]
+    tree = Tree.build(arm.bodies)
+    for mode in ((True,) * 5, (False,) * 5, arm.mode):
+        given = np.array((*arm.tau, *torque[elastic])), np.array((*arm.qdd, 0.0))
+        qdd, tau = dense.mixed(M, h, *given, (*mode, True))
+        ours = passes.passed(arm, mode, tree, spin=spin, free_rotors=rotors)
+        assert relative(ours.qdd, qdd[:5]) < CLOSE and relative(ours.tau, tau[:5]) < CLOSE
+        assert (torque / J - ours.about)[elastic] == pytest.approx(float(qdd[5]), rel=1e-10)
+        for i, (body, (moment, force)) in enumerate(zip(moving, reactions(tree, ours), strict=True)):
+            own = np.dot(body.axis, moment if body.kind == "revolute" else force)
+            load = ours.tau_load[i] - spin[i] * ours.about[i]  # the rest is what turns the rotor along with its link
+            assert abs(own - load) < CLOSE * max(map(abs, (*moment, *force)))
