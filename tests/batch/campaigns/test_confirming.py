@@ -19,26 +19,24 @@ from met import cli
 from met.diagnostic import Problem
 from met.plan import Plan
 from met.plan.searches import Confirmation
+from tests.batch.slider import swing
 
-DECK = """
-arm slider {
-    link block { mass = 2 kg;  shape = sphere(radius = 0.1 m); }
-    joint slide prismatic { parent = base;  child = block;  axis = x; }
-}
-run swing {
-    arm = slider;  initial { q = 0.1 m; }
-    environment { held = spring { link = block;  stiffness = 40 N/m; } }
-    rates { dynamics = 200 Hz;  record = 10 Hz; }  integrator = rk4;  duration = 1 s;  record = [q];
-    metric off = final { of = abs(slide.q); }
-    metric top = max { of = abs(slide.qd); }
-    require top < LIMIT m/s;
-}
+RUN = swing(
+    "integrator = rk4;",
+    "metric off = final { of = abs(slide.q); }",
+    "metric top = max { of = abs(slide.qd); }",
+    "require top < LIMIT m/s;",
+)
+DECK = (
+    RUN
+    + """\
 sweep loads of swing { sample random(4) { links.block.mass = uniform(1.5, 2.5) kg; } }
 sweep fresh of swing { sample random(30) { links.block.mass = uniform(1, 3) kg; } }
 tune still of swing {
     choose environment.held.stiffness = between(2, 9) N/m;  against loads;  CONFIRM minimise off;  at_most = AT_MOST;
 }
 """
+)
 
 
 def compiled(

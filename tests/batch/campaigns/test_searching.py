@@ -28,29 +28,20 @@ from met.plan import Plan
 from met.plan import file as plan_file
 from met.searches.answer import Answer
 from tests.batch import whole
+from tests.batch.slider import FAR, MASS, swing
 
-MASS, FAR, AT_MOST, TUNED = 2.0, 0.1, 160, 300
+AT_MOST, TUNED = 160, 300
 
-# A block on a spring: far = 0.1 m cos(t sqrt(k/m)) after t = 1 s, least where k = m pi^2.
-DECK = f"""
-arm slider {{
-    link block {{ mass = {MASS} kg;  shape = sphere(radius = 0.1 m); }}
-    joint slide prismatic {{ parent = base;  child = block;  axis = x; }}
-}}
-run swing {{
-    arm = slider;
-    initial {{ q = {FAR} m; }}
-    environment {{ held = spring {{ link = block;  stiffness = 40 N/m; }} }}
-    rates {{ dynamics = 200 Hz;  record = 10 Hz; }}
-    integrator = rk4;
-    duration = 1 s;
-    record = [q];
-    metric far = final {{ of = slide.q; }}
-    metric off = final {{ of = abs(slide.q); }}
-    metric top = max {{ of = slide.qd; }}
-    require far > -0.05 m;
-    require top < 1 m/s;
-}}
+# far is least where k = m pi^2.
+RUN = swing(
+    "integrator = rk4;",
+    "metric far = final { of = slide.q; }",
+    "metric off = final { of = abs(slide.q); }",
+    "metric top = max { of = slide.qd; }",
+    "require far > -0.05 m;",
+    "require top < 1 m/s;",
+)
+DECK = f"""{RUN}\
 search back of swing {{
     minimise far;
     environment.held.stiffness = between(5, 79) N/m;

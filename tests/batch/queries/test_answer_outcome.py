@@ -19,28 +19,21 @@ from batch.queries.search_answers import SearchAnswer
 from batch.queries.summary import summary_of
 from batch.report import report
 from met.cli import main
+from tests.batch.slider import swing
 
-# A block on a spring: far = 0.1 m cos(t sqrt(k/m)) after t = 1 s, and top = 0.1 m sqrt(k/m) from half a turn on.
-DECK = """
-arm slider {
-    link block { mass = 2 kg;  shape = sphere(radius = 0.1 m); }
-    joint slide prismatic { parent = base;  child = block;  axis = x; }
-}
-run swing {
-    arm = slider;
-    initial { q = 0.1 m; }
-    environment { held = spring { link = block;  stiffness = 40 N/m; } }
-    rates { dynamics = 200 Hz;  record = 10 Hz; }
-    integrator = rk4;
-    duration = 1 s;
-    record = [q];
-    metric far = final { of = slide.q; }
-    metric off = final { of = abs(slide.q); }
-    metric top = max { of = slide.qd; }
-    require far > -0.05 m in 95 % of cases with 60 % confidence;
-    require far > -0.05 m;
-    require top < 1 m/s;
-}
+# far = 0.1 m cos(t sqrt(k/m)) after t = 1 s, and top = 0.1 m sqrt(k/m) from half a turn on.
+RUN = swing(
+    "integrator = rk4;",
+    "metric far = final { of = slide.q; }",
+    "metric off = final { of = abs(slide.q); }",
+    "metric top = max { of = slide.qd; }",
+    "require far > -0.05 m in 95 % of cases with 60 % confidence;",
+    "require far > -0.05 m;",
+    "require top < 1 m/s;",
+)
+DECK = (
+    RUN
+    + """\
 sweep loads of swing { sample random(5) { links.block.mass = uniform(1, 3) kg; } }
 tune still of swing {
     choose environment.held.stiffness = between(2, 9) N/m;  against loads;  minimise off;  at_most = 120;
@@ -53,6 +46,7 @@ search back of swing { minimise far;  environment.held.stiffness = between(5, 79
 search quick of swing { maximise top;  environment.held.stiffness = between(5, 78) N/m;  at_most = 60; }
 search calm of swing { maximise off;  environment.held.stiffness = between(2, 5) N/m;  at_most = 60; }
 """
+)
 NAMES = ("still", "poor", "alone", "back", "quick", "calm")
 
 

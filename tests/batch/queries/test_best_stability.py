@@ -26,6 +26,7 @@ from batch.report.contents.searches import search_answer
 from met.cli import main
 from met.plan.codec import encode
 from met.plan.searches import JudgedDesign, LeastMargins
+from tests.batch.slider import swing
 
 # A servo whose motor turns the rotor of its gearbox through a spring: from 0.75 V s/rad on it is unstable.
 DECK = """
@@ -115,20 +116,10 @@ def test_where_stability_is_not_judged_the_best_is_used_and_it_is_said() -> None
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The archive of a tuning whose joint has no servo."""
-    deck = """
-    arm slider {
-        link block { mass = 2 kg;  shape = sphere(radius = 0.1 m); }
-        joint slide prismatic { parent = base;  child = block;  axis = x; }
-    }
-    run swing {
-        arm = slider;  initial { q = 0.1 m; }
-        environment { held = spring { link = block;  stiffness = 40 N/m; } }
-        rates { dynamics = 200 Hz;  record = 10 Hz; }  duration = 1 s;  record = [];
-        metric far = final { of = slide.q; }
-        require far > -0.05 m;
-    }
-    tune still of swing { choose environment.held.stiffness = between(2, 9) N/m;  maximise far;  at_most = 12; }
-    """
+    deck = swing("metric far = final { of = slide.q; }", "require far > -0.05 m;", record="")
+    deck += (
+        "tune still of swing { choose environment.held.stiffness = between(2, 9) N/m;  maximise far;  at_most = 12; }"
+    )
     folder = tmp_path_factory.mktemp("judged")
     return batch.run(ic.compile(text=deck, select=["still"]), output=folder / "a.h5", threads=1).path
 

@@ -16,26 +16,17 @@ from batch.report import report
 from batch.report.contents.parts import DesignAnswer, TextTable
 from batch.report.contents.searches import search_answer
 from batch.report.html.designs import HIGH, WIDE, designs
+from tests.batch.slider import swing
 
-DECK = """
-arm slider {
-    link block { mass = 2 kg;  shape = sphere(radius = 0.1 m); }
-    joint slide prismatic { parent = base;  child = block;  axis = x; }
-}
-run swing {
-    arm = slider;
-    initial { q = 0.1 m; }
-    environment { held = spring { link = block;  stiffness = 40 N/m; } }
-    rates { dynamics = 200 Hz;  record = 10 Hz; }
-    duration = 1 s;
-    record = [q];
-    metric far = final { of = slide.q; }
-    require far > -0.05 m;
-}
+RUN = swing("metric far = final { of = slide.q; }", "require far > -0.05 m;")
+DECK = (
+    RUN
+    + """\
 search slowest of swing { minimise far;  environment.held.stiffness = between(5, 79) N/m;  at_most = 60; }
 search wild of swing { minimise far;  environment.held.stiffness = logbetween(1, 1e9) N/m;  at_most = 64; }
 tune still of swing { choose environment.held.stiffness = between(2, 9) N/m;  maximise far;  at_most = 60; }
 """
+)
 
 
 @pytest.fixture(scope="module")
