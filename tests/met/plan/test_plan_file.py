@@ -5,6 +5,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ import pytest
 from met.diagnostic import Expansion, Place, Problem
 from met.plan import Experiment, Origin, Plan, Quantity
 from met.plan import file as plan_file
-from met.plan.codec import decode, encode
+from met.plan.codec import Damaged, decode, encode
+from met.trace.graph import Formulas
 from tests.batch import plans
 
 
@@ -78,6 +80,29 @@ def test_the_origin_of_a_value_keeps_its_macros_and_includes() -> None:
     plan = plans.plan(replace(experiment, parameters=parameters))
     back = plan_file.loads(plan_file.dumps(plan)).experiments[0].parameters["links.upper.mass"].origin
     assert back == origin
+
+
+NODES = [["const", 0.5], ["input", "x"]]
+
+
+@pytest.mark.parametrize("node", [
+    ["bit", 2, 0], ["bit", 2, 63], ["flip", 0, 2, 0], ["flip", 0, 2, 63], ["philox", *[0, 2] * 3, 0],
+    ["philox", *[0, 2] * 3, 3], ["gather", 2, [1.0]], ["gather", 2, [1.0, 2.0, 3.0]], ["add", 0, 3], ["const", "nan"],
+])  # fmt: skip
+def test_a_formula_s_node_has_what_its_operation_needs_behind_its_operands(node: list[Any]) -> None:
+    back = decode(Formulas, {"inputs": ["x"], "nodes": [*NODES, node], "outputs": [4]})
+    assert encode(Formulas, back)["nodes"][-1] == node
+
+
+@pytest.mark.parametrize("node", [
+    ["bit", 2], ["bit", 2, -1], ["bit", 2, 64], ["bit", 2, 1.0], ["bit", 2, 0, 0], ["flip", 0, 2], ["flip", 0, 2, 64],
+    ["philox", *[0, 2] * 3], ["philox", *[0, 2] * 3, -1], ["philox", *[0, 2] * 3, 4], ["philox", *[0, 2] * 3, 1.0],
+    ["philox", *[0, 2] * 3, 0, 0], ["gather", 2], ["gather", 2, []], ["gather", 2, 1.0], ["gather", 2, ["x"]],
+    ["gather", 2, [1.0], 0], ["add", 0, 3, 0], ["const", "x"], ["const", 1.0, 2.0], ["input", 1], ["input", "x", "y"],
+])  # fmt: skip
+def test_a_formula_s_node_with_anything_else_behind_its_operands_is_damage(node: list[Any]) -> None:
+    with pytest.raises(Damaged, match=r"nodes\[2\]: it is not a formula's node"):
+        decode(Formulas, {"inputs": ["x"], "nodes": [*NODES, node], "outputs": [4]}, "formulas")
 
 
 def test_formulas_replay_as_before() -> None:
