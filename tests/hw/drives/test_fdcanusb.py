@@ -187,6 +187,38 @@ def test_what_it_says_in_pieces_and_between_garbage_is_taken_line_by_line() -> N
     assert last is not None and last.id == 0x400
 
 
+FRAME = b"rcv 0100 24 e B F r x-1\r\n"
+
+
+def test_what_the_bus_carries_while_it_is_opened_is_no_answer() -> None:
+    wire = Wire(FRAME + b"what\r\nOK\r\n")
+    FdcanusbLine(wire, SETTINGS)
+    assert wire.sent[-1] == b"can on\n"
+
+
+def test_a_frame_before_the_ok_of_a_command_answers_the_one_before() -> None:
+    """It came soon after the last OK, however late it is read."""
+    wire = Wire(b"OK\r\n")
+    line = FdcanusbLine(wire, SETTINGS)
+    line.send(CanFrame(1, b"1"))
+    assert line.receive(wire.time) is None
+    answered, wire.answer = wire.time, b""
+    wire.sleep(5e-3)
+    line.send(CanFrame(1, b"1"))
+    wire.coming = [FRAME]
+    found = line.receive(wire.time + 1e-3)
+    assert found is not None and found.time == pytest.approx(answered + 7e-4, abs=1e-9)
+
+
+def test_a_frame_is_read_to_its_end_and_no_empty_reading_ends_the_wait() -> None:
+    wire = Wire(b"OK\r\n")
+    line = FdcanusbLine(wire, SETTINGS)
+    wire.coming = [b"", FRAME]
+    assert line.receive(wire.time + 1e-3) is not None, "before the end of the wait"
+    wire.coming = [FRAME[:9], FRAME[9:]]
+    assert line.receive(wire.time) is not None, "whose beginning has come in time"
+
+
 def test_an_adapter_that_was_switched_on_anew_ends_the_run(tmp_path: Path) -> None:
     wire = Wire(b"OK\r\n")
     line = FdcanusbLine(wire, SETTINGS)
