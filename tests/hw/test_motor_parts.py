@@ -104,6 +104,7 @@ def test_what_a_bench_needs_besides_has_a_kind_and_a_source(tmp_path: Path) -> N
         ('load = "mine"', 'load = "yours"', "bench `two of mine`: there is no motor `yours` in this file", 12),
         ("[[bench]]", "[[benches]]", "no `benches` belongs here", 9),
         ("[[motor]]", "[motor]", "`motor` is no list of tables", 2),
+        ("[[motor]]", "part = [3]\n[[motor]]", "`part` is no list of tables", 2),
         ("[[bench]]", '[[motor]]\nname = "mine"\nsource = "x"\n[[bench]]', "motor `mine` is there twice", 9),
     ],
 )
