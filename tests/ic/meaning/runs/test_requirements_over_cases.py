@@ -109,6 +109,13 @@ def test_what_cannot_be_is_told(tmp_path: Path, requirement: str, code: str, par
     assert said.startswith(f"error[{code}") and part in said and said.endswith("\n1 error\n"), said
 
 
+def test_a_share_that_no_campaign_shows_is_underlined(tmp_path: Path) -> None:
+    share = "99.99999999999 %"
+    said = shown(tmp_path, f"require top < 2 rad/s in {share} of cases with 90 % confidence;").splitlines()
+    (line,) = (number for number, text in enumerate(said) if share in text and "|" in text)
+    assert said[line + 1].index("^") == said[line].index(share) and said[line + 1].count("^") == len(share)
+
+
 CONFIDENT = "require top < 2 rad/s in 99 % of cases with 90 % confidence;"
 
 
