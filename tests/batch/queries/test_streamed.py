@@ -89,6 +89,8 @@ def test_tallies_of_blocks_of_any_size_are_those_of_all_cases(
     assert said["variance"][0] == pytest.approx(values[finite].var(ddof=1), rel=1e-12)
     assert (said["least"][0], said["most"][0]) == (values[finite].min(), values[finite].max())
     assert said["least_case"] == [100 + int(np.flatnonzero(values == values[finite].min())[0]), -1]
+    cases_that_stand_out = (said[name] for name in ("least_case", "most_case", "judged_worst_case", "cause_first"))
+    assert {place + 100 for place in found.named()} == {case for each in cases_that_stand_out for case in each} - {-1}
     if spoilt:
         assert said["cause"] == ["a at 0 s", "b at 15 s", tallies.OTHERS]
         assert (said["cause_cases"], said["cause_first"]) == ([3, 3, 6], [100, 115, 130])
