@@ -162,10 +162,13 @@ def solve(
     wrenches    by link's name: moment about the link frame's origin and force on the link, link axes, N m and N
     velocity_products  False leaves out Coriolis, centrifugal and gyroscopic terms: M qdd + g(q) = tau + J'f
 
-    Where the base moves freely (`Tree.floating`) its acceleration is solved, not given, and no velocity product is
-    left out.
+    Where the base moves freely (`Tree.floating`) its acceleration is solved, not given, and velocity products are left
+    out only at rest.
     """
-    if tree.floating is not None and (base_acceleration != (ZERO, ZERO) or not velocity_products):
+    if tree.floating is not None and (
+        base_acceleration != (ZERO, ZERO)
+        or (not velocity_products and any(not is_zero(rate) for rate in (*qd, *base_rate)))
+    ):
         raise ValueError("a free base is given no acceleration, and moves with all velocity products")
     joints = tree.joints
     n = len(joints)
