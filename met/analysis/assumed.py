@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -17,6 +18,7 @@ from met.backends.reference.plain import PlainTape, follow
 from met.dynamics.recursion import Solved, reactions, solve
 from met.dynamics.spatial import ZERO, Vector
 from met.frozen import frozen
+from met.integrators.integrator import Motion
 from met.plan import Experiment, Joint
 from met.program.build import Builder
 from met.program.system import Actuator, System
@@ -71,6 +73,12 @@ class _Along:
         self.t = np.linspace(0.0, experiment.structure.schedule.duration, INSTANTS)
         motions = [self._course(each, joint) for each, joint in zip(self.system.actuators, self.names, strict=True)]
         self.q, self.qd, self.qdd = ([each[k] for each in motions] for k in range(3))
+        moving, turning = (
+            self.system.followed(tape.read, Motion(tuple(self.q), tuple(rates)))  # type: ignore[arg-type]
+            for rates in (self.qd, self.qdd)
+        )
+        self.q, self.qd, self.qdd = list(moving.q), list(moving.qd), list(turning.qd)  # type: ignore[arg-type]
+        self.ratios = self.system.ratios(tape.read)
 
     @property
     def names(self) -> list[str]:
@@ -94,7 +102,7 @@ class _Along:
     def solved(self, *, gravity: Vector = ZERO, rates: bool = False, accelerations: bool = False) -> Solved:
         """Inverse dynamics with these of its parts, at all instants."""
         still, of_start = [np.zeros(INSTANTS)] * len(self.q), self.derivative.solved
-        return solve(
+        solved = solve(
             self.tree,
             self.q,  # type: ignore[arg-type]
             self.qd if rates else still,  # type: ignore[arg-type]
@@ -105,6 +113,14 @@ class _Along:
             gravity=gravity,
             velocity_products=rates,
         )
+        return replace(solved, tau=tuple(self._at_leaders(solved.tau, i) for i in range(len(self.q))))
+
+    def _at_leaders(self, torques: Sequence[Any], joint: int) -> Any:
+        """A joint's torque, with those of all that follow it, as it feels them; none of a follower."""
+        if self.ratios[joint]:
+            return sum((row[joint] * torque for row, torque in zip(self.ratios, torques, strict=True) if joint in row),
+                       np.zeros(INSTANTS))  # fmt: skip
+        return torques[joint]
 
     def largest(self, subject: str, assumed: str, meaning: str, torques: Sequence[Any]) -> Iterator[Assumption]:
         """An assumption with the largest of these torques by joint, over all instants; one with forces besides."""
@@ -123,7 +139,7 @@ class _Along:
             if structure.base is None:
                 yield from self._base()
         for i, (joint, actuator) in enumerate(zip(self.system.joints, self.system.actuators, strict=True)):
-            if not structure.free:
+            if not structure.free and not joint.follows:
                 yield from self._drive(i, joint, actuator)
         yield from self._zeros()
 

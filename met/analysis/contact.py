@@ -52,9 +52,9 @@ def contacts(experiment: Experiment, case: int = 0) -> tuple[Contact, ...]:
             joint, stiffness = (system.value(f"environment.{name}.{part}", tape.read) for part in model.springs)
             number = next(i for i, each in enumerate(system.joints) if each.name == joint)
             actuator = system.actuators[number]
-            if actuator is not None and actuator.gives:
+            if (actuator is not None and actuator.gives) or system.joints[number].follows:
                 continue
-            inertia = float(arm.effective[number][0] + arm.derivative.solved.rotor[number])
+            inertia = float(arm.effective(number)[0] + arm.derivative.solved.rotor[number])
             if not inertia > 0.0:  # masses so small that the inertia is 0 after rounding
                 continue
             lasts = math.pi * math.sqrt(inertia / stiffness) if stiffness > 0.0 else math.inf

@@ -19,10 +19,12 @@ from typing import Any
 import numpy as np
 
 from met.backends.reference.plain import PlainTape, follow
+from met.dynamics.coupling import Ratios
 from met.dynamics.kinematics import fixed_motion, joint_rates, link_motions
 from met.dynamics.spatial import ZERO, Vector, add, apply_symmetric, cross, scale, sub
 from met.dynamics.tree import Tree
 from met.frozen import frozen
+from met.integrators.integrator import Motion
 from met.plan import Experiment
 from met.program.build import Builder
 from met.program.system import System
@@ -117,13 +119,28 @@ def _posed(
         elif joint.kind == "revolute":
             low[i], high[i], end[i] = start[i] - math.pi, start[i] + math.pi, start[i] - math.pi
     poses = np.vstack([start, low, end, low + (high - low) * _spread(len(start))])
-    q = np.array(list(dict.fromkeys(map(tuple, poses.tolist()))))
+    placed: Any = system.followed(tape.read, Motion(tuple(poses.T), tuple(poses.T))).q
+    q = np.array(list(dict.fromkeys(zip(*(each.tolist() for each in placed), strict=True)))) if placed else poses[:1]
     tree = system.tree(tape.read).each(lambda _, value: float(value))
     columns, qd, base = _unit_velocities(tree, q)
     motions = link_motions(tree, columns, qd, base_velocity=base)
     lumped = [link.name for link in system.structure.links if link.lumped]
     turns = {link: _stacked(motions[link].w, (len(q), _size(tree))) for link in lumped}
-    return q, mass_matrices(tree, q, *(list(map(float, each)) for each in (solved.rotor, solved.spin))), turns
+    matrices = mass_matrices(tree, q, *(list(map(float, each)) for each in (solved.rotor, solved.spin)))
+    free = _independent(system.ratios(tape.read), _size(tree))
+    return q, free.T @ matrices @ free, {link: free.T @ turn for link, turn in turns.items()}
+
+
+def _independent(ratios: Ratios, size: int) -> np.ndarray:
+    """The velocities of a free base and of all joints, [velocity, independent one], for unit velocities of the base and
+    of the joints that follow none. size: number of all"""
+    rows = np.eye(size)
+    before = size - len(ratios)
+    for i, row in enumerate(ratios):
+        if row:
+            rows[before + i] = 0.0
+            rows[before + i, [before + j for j in row]] = [float(ratio) for ratio in row.values()]
+    return rows[:, [j for j in range(size) if j < before or not ratios[j - before] or j - before in ratios[j - before]]]
 
 
 def _spread(joints: int) -> np.ndarray:

@@ -14,6 +14,8 @@ Parameters are named by paths, the ones a deck uses inside a run:
     <joint>.axis.x|y|z                     unit vector in the joint frame
     <joint>.pivot.x|y|z                    m, joint frame: a point of a revolute joint's axis; not there: the origin
     <joint>.q_min|q_max|qd_max|tau_max     rad, rad/s, N m (m, m/s, N): limits of the joint, those that it has
+    <joint>.ratio  <joint>.offset          of a joint that follows another: q = ratio times the other's + offset
+    <joint>.ratio.<other>                  of one that follows several, to each of them
     <joint>.servo.<parameter>              as the servo declares
     <joint>.servo.command.<parameter>      as the command declares
     <joint>.servo.sensor.<of>.<parameter>  as the sensor declares through which the servo's law sees a quantity
@@ -120,8 +122,11 @@ class Link:
 
 @frozen
 class Joint:
-    """Connects `parent` (a link or the base) to `child`, along or about its axis. limits: those of `q_min`, `q_max`,
-    `qd_max` and `tau_max` that the joint has."""
+    """Connects `parent` (a link or the base) to `child`, along or about its axis.
+
+    limits   those of `q_min`, `q_max`, `qd_max` and `tau_max` that the joint has
+    follows  the joints whose positions give its own
+    """
 
     name: str
     kind: JointKind
@@ -129,6 +134,13 @@ class Joint:
     child: str
     place: Place | None = keyed("never", default=None)
     limits: tuple[str, ...] = keyed("where set", default=())
+    follows: tuple[str, ...] = keyed("where set", default=())
+
+    @property
+    def ratio_paths(self) -> dict[str, str]:
+        """By each joint that it follows, the path of the parameter that is its ratio to that joint."""
+        several = len(self.follows) > 1
+        return {name: f"{self.name}.ratio.{name}" if several else f"{self.name}.ratio" for name in self.follows}
 
 
 @frozen
@@ -412,6 +424,11 @@ class Structure:
     def moving(self) -> tuple[Joint, ...]:
         """The moving joints, in the order of `joints`: the order of every `joint` dimension."""
         return tuple(joint for joint in self.joints if joint.kind != "fixed")
+
+    @property
+    def independent(self) -> tuple[Joint, ...]:
+        """The moving joints that follow no other, in the order of `joints`."""
+        return tuple(joint for joint in self.moving if not joint.follows)
 
 
 def ground(links: Iterable[Link], joints: Iterable[Joint]) -> tuple[str, ...]:

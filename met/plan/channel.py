@@ -170,6 +170,12 @@ def joint_unit(unit: str, joint: Joint, command: str | None = None) -> str:
     return _unit_of(unit, joint.kind == "prismatic", command)
 
 
+def ratio_unit(kind: str, of: str) -> str:
+    """The unit of a ratio of the position of a joint of one kind to that of a joint `of` another."""
+    units = {"prismatic": "m", "revolute": "rad"}
+    return "1" if kind == of else f"{units.get(kind, '1')}/{units.get(of, '1')}"
+
+
 @lru_cache(maxsize=4096)
 def _unit_of(unit: str, slides: bool, command: str | None) -> str:
     replacements = SLIDING if slides else TURNING
@@ -240,6 +246,8 @@ def _channels(structure: Structure, names: list[str], *, all_owners: bool) -> di
         for name, unit, doc in MOTION:
             add(f"{joint.name}.{name}", joint_unit(unit, joint), doc, dynamics, joint.name, JOINT_AXIS)
         for name, unit, doc, components, frame in (*OF_JOINT, *([LIMIT_MARGIN] if joint.limits else [])):
+            if joint.follows and name in ("J_eff", "b"):
+                continue
             derive(f"{joint.name}.{name}", joint_unit(unit, joint), doc, components, frame, joint.name)
         use = servos.get(joint.name)
         if use is None:
@@ -301,13 +309,16 @@ def _channels(structure: Structure, names: list[str], *, all_owners: bool) -> di
 
 
 def _carrying(structure: Structure, link: str) -> list[Joint]:
-    """The moving joints between a link and the base, in the order of `moving`."""
+    """The moving joints between a link and the base, in the order of `moving`; those that lead in place of those that
+    follow them."""
     holds = {joint.child: joint for joint in structure.joints}
     chain: set[str] = set()
     while link in holds and holds[link].name not in chain:  # a broken tree is reported elsewhere
         chain.add(holds[link].name)
         link = holds[link].parent
-    return [joint for joint in structure.moving if joint.name in chain]
+    for joint in reversed(structure.moving):  # leaders of leaders, in whatever order the deck has them
+        chain |= {name for each in structure.moving if each.name in chain for name in each.follows} & {joint.name}
+    return [joint for joint in structure.independent if joint.name in chain]
 
 
 def carries(structure: Structure, link: str, joint: str) -> bool:

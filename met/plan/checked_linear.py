@@ -26,8 +26,8 @@ def check_linear(experiment: Experiment, where: str) -> None:
         names.append(use.name)
         if not 0.0 <= use.at <= structure.schedule.duration:
             raise Damaged(f"{place}.at", f"it should be between 0 and {structure.schedule.duration:g} s")
-        if use.pose and len(use.pose) != len(structure.moving):
-            raise Damaged(f"{place}.pose", f"it should be of {len(structure.moving)} joints")
+        if use.pose and len(use.pose) != len(structure.independent):
+            raise Damaged(f"{place}.pose", f"it should be of {len(structure.independent)} joints")
         if use.pose is not None and (use.at != 0.0 or not all(map(math.isfinite, use.pose))):
             raise Damaged(f"{place}.pose", "its numbers should be finite, and the instant 0")
         for field, paths in (("inputs", use.inputs), ("opened", use.opened), ("outputs", use.outputs)):

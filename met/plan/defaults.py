@@ -8,7 +8,7 @@ from met import models
 from met.diagnostic import Place, nearest
 from met.parameter import Parameter, under
 from met.plan import COMPONENTS, Course, Experiment, Joint, Origin, Quantity, Structure
-from met.plan.channel import JOINT_LIMITS, channels, joint_unit, watched_unit
+from met.plan.channel import JOINT_LIMITS, channels, joint_unit, ratio_unit, watched_unit
 from met.plan.uses import quantities, sensor_parts, servo_parts
 from met.substitution import bed_scale
 
@@ -101,6 +101,10 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
     for joint in structure.moving:
         for limit in joint.limits:
             yield f"{joint.name}.{limit}", joint_unit(JOINT_LIMITS[limit], joint), None, None
+        for leader, path in joint.ratio_paths.items():
+            yield path, ratio_unit(joint.kind, kinds[leader].kind), None, None
+        if joint.follows:
+            yield f"{joint.name}.offset", joint_unit("joint", joint), None, None
         yield f"initial.{joint.name}.q", joint_unit("joint", joint), None, None
         yield f"initial.{joint.name}.qd", joint_unit("joint/s", joint), None, None
     yield from _of_base(structure)

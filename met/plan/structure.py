@@ -69,6 +69,7 @@ def _check_arm(structure: Structure, where: str) -> None:
     for index, name in enumerate(links):
         if name not in parents and name != BASE:
             raise Damaged(f"{where}.links[{index}]", f"no joint holds link `{name}`")
+    _check_followers(structure, f"{where}.joints")
     standing = {BASE}
     for joint_index, joint in enumerate(structure.joints):
         passed: set[str] = set()
@@ -79,6 +80,25 @@ def _check_arm(structure: Structure, where: str) -> None:
             passed.add(at)
             at = parents[at]
         standing |= passed
+
+
+def _check_followers(structure: Structure, where: str) -> None:
+    """Check that joints follow moving joints, none of them itself by way of others."""
+    joints = {joint.name: joint for joint in structure.moving}
+    for index, joint in enumerate(structure.joints):
+        path, passed, ahead = f"{where}[{index}].follows", {joint.name}, list(joint.follows)
+        if (joint.follows and joint.kind == "fixed") or len(set(joint.follows)) < len(joint.follows):
+            raise Damaged(path, "it is fixed, or follows a joint twice")
+        while ahead:
+            leader = joints.get(ahead.pop())
+            if leader is None or leader.name == joint.name:
+                raise Damaged(path, "it should follow moving joints, and not itself")
+            ahead += [name for name in leader.follows if name not in passed]
+            passed.add(leader.name)
+    servos = {use.joint: models.find("servo", use.model, use.place) for use in structure.servos}
+    for index, joint in enumerate(structure.joints):
+        if joint.follows and joint.name in servos and not servos[joint.name].is_passive:
+            raise Damaged(f"{where}[{index}].follows", "its servo drives it")
 
 
 def _check_base(structure: Structure, where: str) -> None:

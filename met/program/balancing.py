@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.program import friction
-from met.program.evaluation import Derivative, brake_levels, derivative, servo_response
+from met.program.evaluation import Derivative, brake_levels, derivative, followers_level, servo_response
 from met.program.sticking import Sticking, sticking
 from met.program.system import Actuator, System
 from met.program.values import NamedValues, answer, returned
@@ -118,6 +118,8 @@ def _level(system: System, tape: Tape, y: Motion, each: Sticking, held: Sequence
     """The level of dry friction at a joint, its servo's and its brakes', N m (N)."""
     on_joints = brake_levels(system, tape.read, y, 0.0, 0.0)
     level = on_joints.get(each.name, 0.0)
+    if each.followers:
+        level = level + followers_level(system, tape.read, y, each.followers, on_joints, 0.0, 0.0)
     if each.actuator is None:
         return level
     return level + servo_response(system, each.actuator, tape.read, y, held[each.number], 0.0, 0.0).drive.dry

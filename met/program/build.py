@@ -67,6 +67,7 @@ class Builder:
         held, at_rows = derived(self.system)
         tick: list[Control] = [
             Unless0((Every(instant, (*self.limits.counting(), *self.step.finish())),)),
+            *self.step.follow(),
             *self.step.grapple.events(),
         ]
         tick += self.step.beds.before_servos()
@@ -154,6 +155,7 @@ class Builder:
                 tape.write(f"{joint}.{name}", self.system.value(f"initial.{joint}.{name}", tape.read))
         base.start(self.system, tape)
         payloads.start(self.system, tape)
+        self.step.keep_followers(tape)
         guiding.start(self.system, tape)
         link_sensors.start(self.system, tape, lambda y: gravity(self.system, tape.read, y, 0.0))
         return {actuator.use.joint: self._begin_servo(tape, actuator) for actuator in self.system.working}

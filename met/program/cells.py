@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from met.integrators.integrator import Motion
 from met.trace import Real, Truth, where
 from met.trace.program import Tape
 
 
-def state(tape: Tape, joints: Sequence[str], states: Sequence[str], copy: str = "") -> Motion:
-    """The arm's state, or its copy under this prefix."""
+def state(
+    tape: Tape, joints: Sequence[str], states: Sequence[str], copy: str = "", without: Collection[str] = ()
+) -> Motion:
+    """The arm's state, or its copy under this prefix. without: joints whose cells are not read, but taken as 0."""
     return Motion(
-        tuple(tape.read(f"{copy}{joint}.q") for joint in joints),
-        tuple(tape.read(f"{copy}{joint}.qd") for joint in joints),
+        tuple(0.0 if joint in without else tape.read(f"{copy}{joint}.q") for joint in joints),
+        tuple(0.0 if joint in without else tape.read(f"{copy}{joint}.qd") for joint in joints),
         tuple(tape.read(f"{copy}{name}") for name in states),
     )
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
+from met.dynamics.coupling import inertia_at, solve_coupled
 from met.dynamics.linearised import tell
 from met.dynamics.recursion import Solved, solve
 from met.dynamics.tree import Tree
@@ -22,7 +24,7 @@ from met.program.motion.world import ArmWorld, environment_values
 from met.program.system import Actuator, ReadCell, System
 from met.program.values import NamedValues, answer, returned
 from met.servos.servo import Control, Drive, JointMotion, Seen, Setpoint
-from met.trace import Real, Truth, both, not_, where
+from met.trace import Real, Truth, absolute, both, not_, sign, where
 from met.vectors import Vector
 
 
@@ -45,6 +47,7 @@ class Derivative:
     out_of_range  of each moving joint, whether a state of its servo is where it can never be
     loads    what each moving joint would have to be driven with to move so, N m (N): what the arm takes less what the
              environment gives
+    felt     where joints follow others: the inertia of the arm at a joint, by its number (`J_eff`)
     """
 
     slope: Slope
@@ -58,6 +61,7 @@ class Derivative:
     angular_momenta: tuple[Real, ...]
     out_of_range: tuple[Truth, ...]
     loads: tuple[Real, ...]
+    felt: Callable[[int], Real] | None = None
 
 
 def derivative(
@@ -91,12 +95,13 @@ def derivative(
         loads = _environment(system, tree, read, y, base, time, begin)
         wrenches, on_payloads = split_wrenches(system, read, loads.wrenches)
 
-    prescribed_qdd = prescribed_qdd or {}
+    prescribed_qdd, ratios = prescribed_qdd or {}, system.ratios(read)
     given_qdd: list[Real] = []
     mode: list[Truth] = []
     dry: list[Real] = []
     for i, drive in enumerate(drives):
-        s = friction.get(system.joints[i].name)
+        leader = min(ratios[i], default=i)
+        s = friction.get(system.joints[leader].name)
         if i in prescribed_qdd:
             mode.append(False)
             given_qdd.append(prescribed_qdd[i])
@@ -109,7 +114,11 @@ def derivative(
             in_torque_mode = s != 0.0
         mode.append(in_torque_mode)
         given_qdd.append(drive.qdd if drive is not None else 0.0)
-        dry.append(0.0 if s is None else s * level_of(system, i, drive, loads))
+        if s is None or (leader != i and drive is None and system.joints[i].name not in loads.dry):
+            dry.append(0.0)
+        else:
+            level = s * level_of(system, i, drive, loads)
+            dry.append(level if leader == i else sign(ratios[i][leader]) * level)
 
     smooth = [
         loads.torques[i] + (0.0 if drive is None or i in prescribed_qdd else drive.torque)
@@ -135,8 +144,11 @@ def derivative(
             "wrenches": wrenches,
             "velocity_products": system.structure.velocity_products,
         }
-        solved = solve(tree, **given)
-        tell(tree, given, solved)
+        if any(ratios):
+            solved = solve_coupled(tree, ratios, **given)
+        else:
+            solved = solve(tree, **given)
+            tell(tree, given, solved)
     if turning is None:
         of_states, state_needs = _slopes(system, driven, friction)
     else:
@@ -173,6 +185,7 @@ def derivative(
         angular_momenta=() if turning is None else turning.momenta(y.qd),
         out_of_range=tuple(False if drive is None else drive.state_out_of_range for drive in drives),
         loads=tuple(a - b for a, b in zip(solved.tau_load, loads.torques, strict=True)),
+        felt=partial(inertia_at, tree, ratios, given) if any(ratios) else None,
     )
 
 
@@ -296,6 +309,29 @@ def gravity(system: System, read: ReadCell, y: Motion, time: Real) -> Vector:
     """Uniform gravity of all environment models at state y, world axes, m/s^2."""
     base = base_of(system, read, y, time)
     return _environment(system, tree_with_payloads(system, read), read, y, base, time, time).gravity
+
+
+def followers_level(
+    system: System,
+    read: ReadCell,
+    y: Motion,
+    followers: Sequence[int],
+    on_joints: Mapping[str, Real],
+    time: Real,
+    begin: Real,
+) -> Real:
+    """The dry friction of joints that follow one joint, as that one feels it, N m (N). on_joints: that of brakes, by
+    joint."""
+    ratios = system.ratios(read)
+    total: Real = 0.0
+    for i in followers:
+        level, actuator = on_joints.get(system.joints[i].name, 0.0), system.actuators[i]
+        if actuator is not None:
+            held = NamedValues(actuator.owner, {})
+            level = level + servo_response(system, actuator, read, y, held, time, begin).drive.dry
+        (ratio,) = ratios[i].values()
+        total = total + absolute(ratio) * level
+    return total
 
 
 def brake_levels(system: System, read: ReadCell, y: Motion, time: Real, begin: Real) -> dict[str, Real]:

@@ -9,7 +9,9 @@ elastic gear on a free base: the rotor goes on turning as it did, and the link t
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
+from met.dynamics.coupling import solve_coupled
 from met.dynamics.payload import momentum, raised, twist_against
 from met.dynamics.recursion import Wrench, solve
 from met.dynamics.spatial import ZERO, add, choose, compose, inverse, turn_vector
@@ -35,12 +37,17 @@ class Grapple:
 
     state  gives the state at an instant
     held   gives what a servo's computer holds there
+    keep_followers  puts joints that follow others where those that lead are
     """
 
     def __init__(
-        self, system: System, state: Callable[[Tape], Motion], held: Callable[[Tape, Actuator], NamedValues]
+        self,
+        system: System,
+        state: Callable[[Tape], Motion],
+        held: Callable[[Tape, Actuator], NamedValues],
+        keep_followers: Callable[[Tape], None],
     ) -> None:
-        self.system, self._state, self._held = system, state, held
+        self.system, self._state, self._held, self._keep_followers = system, state, held, keep_followers
         self.watch = GrappleWatch(system, state)
 
     def events(self) -> tuple[Control, ...]:
@@ -120,10 +127,11 @@ class Grapple:
         on_beds = {actuator.index for actuator, _, _ in system.mounted}
         body = free_base(system)
         turning = None if body is None else rotors.of(system, drives, y, (0.0,) * len(system.states), {}, on_beds)
-        solved = solve(
-            payloads.tree_with_payloads(system, tape.read),
-            y.q[:n],
-            (0.0,) * n,
+        ratios, tree = system.ratios(tape.read), payloads.tree_with_payloads(system, tape.read)
+        solver = partial(solve_coupled, tree, ratios) if any(ratios) else partial(solve, tree)
+        solved = solver(
+            q=y.q[:n],
+            qd=(0.0,) * n,
             mode=tuple(False if i in on_beds else _yields(drive) for i, drive in enumerate(drives)),
             rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
             spin=None if turning is None else turning.spin,
@@ -140,6 +148,7 @@ class Grapple:
             cells.keep(tape, jumping, f"{name}.qd", tape.read(f"{name}.qd") + jump)
         for i, channel in ({} if turning is None else turning.states).items():
             cells.keep(tape, jumping, channel, tape.read(channel) - solved.about[i])
+        self._keep_followers(tape)
 
     def _drive(self, tape: Tape, actuator: Actuator | None, y: Motion) -> Drive | None:
         if actuator is None:

@@ -6,9 +6,10 @@ the program, which compute the derivative anew: so no bit of another channel dep
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property, reduce
 
+from met.dynamics.coupling import at_leaders
 from met.dynamics.effective_inertia import effective_inertia
 from met.dynamics.energy import Energy, energy
 from met.dynamics.kinematics import LinkMotion, jacobian
@@ -58,7 +59,7 @@ class Observed:
         n = len(self.joints)
         self.tree, self.q, self.qd, self.base = system.tree(read), y.q[:n], y.qd[:n], base
         self._found = found
-        self._jacobians: dict[str, tuple[tuple[Vector, Vector], ...]] = {}
+        self._jacobians: dict[str, Sequence[tuple[Vector, Vector]]] = {}
 
     def value(self, channel: Channel) -> Real:
         """The value of a derived channel, in its unit; not for orientations, whose sign depends on former instants."""
@@ -82,9 +83,9 @@ class Observed:
             case ["tau_load"]:
                 return solved.tau_load[i]
             case ["J_eff"]:
-                return self.effective[i][0]
+                return self.effective(i)[0]
             case ["b"]:
-                return self.effective[i][1]
+                return self.effective(i)[1]
             case ["mode"]:
                 return choose(solved.mode[i], 1.0, 0.0)
             case ["reaction", kind, axis]:
@@ -133,17 +134,26 @@ class Observed:
         ]
         return reduce(minimum, shares)
 
-    def _jacobian(self, link: str) -> tuple[tuple[Vector, Vector], ...]:
+    def _jacobian(self, link: str) -> Sequence[tuple[Vector, Vector]]:
         if link not in self._jacobians:
-            self._jacobians[link] = jacobian(self.tree, self.q, link, base=self.base.pose)
+            columns = jacobian(self.tree, self.q, link, base=self.base.pose)
+            self._jacobians[link] = at_leaders(self.system.ratios(self.read), columns)
         return self._jacobians[link]
 
     @cached_property
     def derivative(self) -> Derivative:
         return self._found()
 
+    def effective(self, joint: int) -> tuple[Real, Real]:
+        """J_eff and b of a joint, by its number."""
+        found = self.derivative
+        if found.felt is None:
+            return self._effective[joint]
+        inertia = found.felt(joint)
+        return inertia, found.solved.tau_load[joint] - inertia * found.solved.qdd[joint]
+
     @cached_property
-    def effective(self) -> tuple[tuple[Real, Real], ...]:
+    def _effective(self) -> tuple[tuple[Real, Real], ...]:
         return effective_inertia(self.tree, self.derivative.solved)
 
     @cached_property

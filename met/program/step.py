@@ -13,12 +13,15 @@ stops at the next one.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
+from operator import add
 
+from met.dynamics.spatial import choose
 from met.integrators.integrator import Motion, Slope
 from met.program import cell_names, cells, friction
 from met.program.asking import Question, advance_with, changed_count, question_count
 from met.program.control.substituted import Substituted
-from met.program.evaluation import Derivative, brake_levels, derivative, servo_response
+from met.program.evaluation import Derivative, brake_levels, derivative, followers_level, servo_response
 from met.program.grapple import Grapple
 from met.program.motion import base, bodies
 from met.program.observe import Observed
@@ -53,8 +56,11 @@ class StepPhases:
         self.joints = tuple(joint.name for joint in system.joints)
         self.coordinates = bodies.coordinates(system)
         self.states = system.states
+        self._followers = frozenset(joint.name for joint in system.followers)
         self.sticking = sticking(system)
-        self.grapple = Grapple(system, self.state, lambda tape, actuator: self._held(tape, actuator, 1.0))
+        self.grapple = Grapple(
+            system, self.state, lambda tape, actuator: self._held(tape, actuator, 1.0), self.keep_followers
+        )
         self._questions = question_count(system.integrator, len(self.coordinates), len(self.states), self.schedule.step)
         self._derive = CallPhase(Phase("derive", self.derive))
         self._slope = CallPhase(Phase("slope", self.slope))
@@ -72,6 +78,22 @@ class StepPhases:
         self._needs = tuple(dict.fromkeys((*gives, *(each.name for each in self.sticking))))
         self._may_leave_range = [actuator for actuator in self.system.working if actuator.may_leave_range]
         self._split = WhileAny("crossing", 1, (RunPhase(Phase("split", self.split)),))
+
+    def follow(self) -> tuple[Control, ...]:
+        """The phase at the begin of an instant that puts followers where their leaders are."""
+        if not self._followers:
+            return ()
+        return (Every(self.schedule.dynamics, (RunPhase(Phase("follow", self.keep_followers)),)),)
+
+    def keep_followers(self, tape: Tape) -> None:
+        """Write positions and rates of joints that follow others."""
+        if not self._followers:
+            return
+        y = self.state(tape)
+        for i, joint in enumerate(self.joints):
+            if joint in self._followers:
+                tape.write(f"{joint}.q", y.q[i])
+                tape.write(f"{joint}.qd", y.qd[i])
 
     def begin(self) -> tuple[Control, ...]:
         """Phases at an instant once the servos have ticked: modes, then the step's first stage."""
@@ -119,8 +141,8 @@ class StepPhases:
         for each, level in zip(self.sticking, self._levels(tape), strict=True):
             rate = tape.read(each.cell)
             has_friction = level > 0.0
-            if not isinstance(has_friction, bool):
-                cells.keep(tape, active, cell_names.HAS_FRICTION(each.name), where(has_friction, 1.0, 0.0))
+            if each.level is None:
+                cells.keep(tape, active, cell_names.HAS_FRICTION(each.name), choose(has_friction, 1.0, 0.0))
             # without friction at rest it moves freely; a level that rises later in the step opposes the motion at once
             cells.keep(
                 tape,
@@ -146,7 +168,9 @@ class StepPhases:
                 own.append(drive.friction[each.state] if each.state else drive.dry)
             if each.name in on_joints:
                 own.append(on_joints[each.name])
-            found.append(own[0] if len(own) == 1 else own[0] + own[1])
+            if each.followers:
+                own.append(followers_level(self.system, tape.read, y, each.followers, on_joints, time, begin))
+            found.append(reduce(add, own))
         return found
 
     def has_dry_friction(self, tape: Tape, name: str) -> Truth:
@@ -437,7 +461,8 @@ class StepPhases:
 
     def state(self, tape: Tape, copy: str = "") -> Motion:
         """The state, or a copy of it: with its turns at a stage, without them where a (sub)step begins."""
-        y = cells.state(tape, self.coordinates, self.states, copy)
+        y = cells.state(tape, self.coordinates, self.states, copy, self._followers)
+        y = self.system.followed(tape.read, y)
         return y if copy == STAGE else bodies.with_zero_turn(self.system, y)
 
     def _friction(self, tape: Tape) -> dict[str, Real]:

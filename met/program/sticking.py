@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.integrators.integrator import Motion
+from met.plan import Joint
 from met.program.system import Actuator, System
 from met.trace import Real
 
@@ -18,6 +20,7 @@ class Sticking:
     state     name of the state; "" where it is the joint
     number    of the joint in `Motion.qd`; of the state in `Motion.x`
     level     of its friction, where it is the same at all times and for all cases; None where it varies
+    followers  numbers of joints with dry friction that follow it: all of them stick and slide with it
     """
 
     name: str
@@ -26,6 +29,7 @@ class Sticking:
     state: str
     number: int
     level: float | None
+    followers: tuple[int, ...] = ()
 
     def rate(self, y: Motion) -> Real:
         return y.x[self.number] if self.state else y.qd[self.number]
@@ -35,12 +39,25 @@ def sticking(system: System) -> tuple[Sticking, ...]:
     """Joints first, then states; none of a joint whose motor is on a bed: its friction is the bed's."""
     on_bed = [actuator.index for actuator, _, _ in system.mounted]
     free = [actuator for actuator in system.working if actuator.index not in on_bed]
+    own = [
+        None if joint.name in system.braked else 0.0 if actuator is None else actuator.level
+        for joint, actuator in zip(system.joints, system.actuators, strict=True)
+    ]
+    followers: dict[int, tuple[int, ...]] = {}
+    for joint in system.followers:
+        i = system.joints.index(joint)
+        if own[i] != 0.0:
+            leaders = _leaders(system, joint)
+            if len(leaders) > 1:
+                message = f"joint `{joint.name}` has dry friction, and follows more than one joint"
+                help = "put the friction on the joints that lead"
+                raise Problem(error("E219", message, joint.place, help=help))
+            followers[leaders[0]] = (*followers.get(leaders[0], ()), i)
     joints = []
     for i, (joint, actuator) in enumerate(zip(system.joints, system.actuators, strict=True)):
-        own = 0.0 if actuator is None else actuator.level
-        level = None if joint.name in system.braked else own
-        if i not in on_bed and level != 0.0:
-            joints.append(Sticking(joint.name, f"{joint.name}.qd", actuator, "", i, level))
+        level = None if i in followers else own[i]
+        if i not in on_bed and level != 0.0 and not joint.follows:
+            joints.append(Sticking(joint.name, f"{joint.name}.qd", actuator, "", i, level, followers.get(i, ())))
     names = system.states
     states = [
         Sticking(f"{a.path}.{name}", f"{a.path}.{name}", a, name, names.index(f"{a.path}.{name}"), level)
@@ -49,3 +66,11 @@ def sticking(system: System) -> tuple[Sticking, ...]:
         if level != 0.0
     ]
     return (*joints, *states)
+
+
+def _leaders(system: System, joint: Joint) -> list[int]:
+    """The numbers of the joints that lead a follower, by way of others too."""
+    if not joint.follows:
+        return [system.joints.index(joint)]
+    known = {each.name: each for each in system.joints}
+    return sorted({number for name in joint.follows for number in _leaders(system, known[name])})

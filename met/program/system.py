@@ -14,11 +14,12 @@ from typing import Any
 from met import models
 from met.commands.profile import Profile
 from met.diagnostic import Problem, error
+from met.dynamics.coupling import Ratios
 from met.dynamics.spatial import Six
 from met.dynamics.tree import Body, Tree
 from met.environments.environment import Environment
 from met.frozen import frozen
-from met.integrators.integrator import Integrator
+from met.integrators.integrator import Integrator, Motion
 from met.metrics.furthest import furthest
 from met.metrics.metric import Metric
 from met.parameter import Memory, Parameter, State
@@ -131,6 +132,48 @@ class System:
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
         return self.structure.moving
+
+    @cached_property
+    def followers(self) -> tuple[Joint, ...]:
+        """The joints that follow others."""
+        return tuple(joint for joint in self.joints if joint.follows)
+
+    def ratios(self, read: ReadCell) -> Ratios:
+        """The ratios of the joints to those that lead them; followers of followers to the first that lead."""
+        numbers = {joint.name: i for i, joint in enumerate(self.joints)}
+
+        def row(joint: Joint) -> dict[int, Real]:
+            if not joint.follows:
+                return {numbers[joint.name]: 1.0}
+            found: dict[int, Real] = {}
+            for name, path in joint.ratio_paths.items():
+                for leader, ratio in row(self.joints[numbers[name]]).items():
+                    found[leader] = found.get(leader, 0.0) + self.value(path, read) * ratio
+            return found
+
+        rows = {numbers[joint.name]: row(joint) for joint in self.followers}
+        leaders = {leader for each in rows.values() for leader in each}
+        return tuple(rows.get(i, {i: 1.0} if i in leaders else {}) for i in numbers.values())
+
+    def followed(self, read: ReadCell, y: Motion) -> Motion:
+        """The motion with positions and rates of followers as those of their leaders give them."""
+        if not self.followers:
+            return y
+        q, qd = list(y.q), list(y.qd)
+        numbers = {joint.name: i for i, joint in enumerate(self.joints)}
+
+        def place(joint: Joint) -> int:
+            i = numbers[joint.name]
+            if joint.follows:
+                ratios = [(place(self.joints[numbers[each]]), self.value(path, read)) for each, path in
+                          joint.ratio_paths.items()]  # fmt: skip
+                q[i] = sum((ratio * q[j] for j, ratio in ratios), self.value(f"{joint.name}.offset", read))
+                qd[i] = sum((ratio * qd[j] for j, ratio in ratios), 0.0)
+            return i
+
+        for joint in self.followers:
+            place(joint)
+        return Motion(tuple(q), tuple(qd), y.x)
 
     @cached_property
     def channels(self) -> dict[str, Channel]:
@@ -346,6 +389,9 @@ class System:
                 message = f"{bare.owner} gives an acceleration, and a brake is on the joint"
             help = "a joint that is told its acceleration has no use for friction"
             raise Problem(error("E219", message, use.place, help=help))
+        if drive.given is not None and self.joints[index].follows:
+            message = f"{bare.owner} gives an acceleration, and the joint follows another"
+            raise Problem(error("E219", message, use.place, help="put the servo on the joint that leads"))
         if level != 0.0 and any(model.decoupling is not None for _, model in self.failing.get(use.joint, ())):
             level = None  # brakes come and go
         return replace(

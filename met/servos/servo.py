@@ -188,6 +188,11 @@ class Servo:
     rate_wanted: Callable[[Any, Real, Setpoint], Real] | None = None
     at_rest: Callable[[Any], Truth] | None = None
 
+    @property
+    def is_passive(self) -> bool:
+        """True where it takes no command, has no law and holds no joint: it may be on a joint that follows another."""
+        return self.control is None and not self.commands and self.at_rest is None
+
     @cached_property
     def parts_by_words(self) -> dict[tuple[tuple[tuple[str, str], ...], bool], Parts]:
         """The results of `parts`, by words and whether the law is continuous."""

@@ -38,8 +38,8 @@ Reason = str
 
 
 def standing(experiment: Experiment, q: Sequence[float] = ()) -> Experiment:
-    """The experiment begun at rest at these positions of its moving joints, rad (m), in their order; by default those
-    that it begins with. Servos are asked to stay; guides, and signals made of them, are removed."""
+    """The experiment begun at rest at these positions of its joints that follow none, rad (m), in their order; by
+    default those that it begins with. Servos are asked to stay; guides, and signals made of them, are removed."""
     structure = experiment.structure
     lost = tuple(f"guides.{each.name}." for each in structure.guides)
     servos = tuple(
@@ -48,8 +48,8 @@ def standing(experiment: Experiment, q: Sequence[float] = ()) -> Experiment:
     )
     commanded = tuple(f"{use.joint}.servo.command." for use in servos if use.command is not None)
     parameters = {path: of for path, of in experiment.parameters.items() if not path.startswith((*commanded, *lost))}
-    places = dict(zip((joint.name for joint in structure.moving), q, strict=True)) if q else {}
-    for joint in structure.moving:
+    places = dict(zip((joint.name for joint in structure.independent), q, strict=True)) if q else {}
+    for joint in structure.independent:
         at = parameters[f"initial.{joint.name}.q"]
         at = replace(at, value=places[joint.name]) if q else at
         still = replace(parameters[f"initial.{joint.name}.qd"], value=0.0)

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 from met import models
+from met.dynamics.coupling import at_leaders
 from met.dynamics.generalized import base_answers
 from met.dynamics.kinematics import jacobian
 from met.dynamics.spatial import (
@@ -68,11 +69,12 @@ def tick(system: System, tape: Tape, use: GuideUse) -> None:
     y, stands = _state(system, tape, tape.time)
     number = {joint.name: i for i, joint in enumerate(system.joints)}
     q = [positions.get(joint.name, y.q[i]) for i, joint in enumerate(system.joints)]
+    asked = Motion((*q, *y.q[len(q) :]), y.qd, y.x)
     sight = Sight(
         time=tape.time,
         slides=tuple(system.joints[number[joint]].kind == "prismatic" for joint in use.joints),
         arm=_ArmAt(system, use, tape.read, y, stands),
-        asked=_ArmAt(system, use, tape.read, Motion((*q, *y.q[len(q) :]), y.qd, y.x), stands),
+        asked=_ArmAt(system, use, tape.read, system.followed(tape.read, asked), stands),
         wanted=_wanted(system, tape, use),
     )
     found = answer(owner(use), guide.steer, *own(system, use, tape.read), sight)
@@ -104,7 +106,8 @@ class _ArmAt:
         self._own = [names.index(joint) for joint in use.joints]
         point = tuple(system.value(f"guides.{use.name}.point.{axis}", read) for axis in "xyz")
         link = system.value(f"guides.{use.name}.link", read)
-        self._moves = jacobian(tree, self._q, link, point, stands.pose)
+        self._ratios = system.ratios(read)
+        self._moves = at_leaders(self._ratios, jacobian(tree, self._q, link, point, stands.pose))
         at_rest = [0.0] * n
         frame = base.motions(tree, self._q, at_rest, BaseMotion(stands.pose))[link]
         self._R, self._p = frame.pose.R, frame.position(point)
@@ -135,7 +138,7 @@ class _ArmAt:
         """The reaction of a free base to joint rates: the frame's angular velocity and velocity for each unit of each
         rate; with the payloads that the links carry at this time."""
         arm = sub(self._p, self._base.pose.p)
-        found = base_answers(self._loaded_tree, self._q, self._base.pose)
+        found = at_leaders(self._ratios, base_answers(self._loaded_tree, self._q, self._base.pose))
         return [(w, add(v, cross(w, arm))) for w, v in found]
 
 
