@@ -64,6 +64,13 @@ TAU_MAX = Parameter(
 JOINT_LIMITS = (Q_MIN, Q_MAX, QD_MAX, TAU_MAX)
 """Limits that a joint should stay within: every run monitors them, and none of them affects the motion."""
 
+RATIO = Parameter(
+    name="ratio", unit="1", default=1.0, doc="position of the joint for each unit of the joint that it follows"
+)
+OFFSET = Parameter(
+    name="offset", unit="joint", default=0.0, doc="position of the joint where all that it follows are at 0"
+)
+
 JOINT_KINDS = ("revolute", "prismatic", "fixed")
 
 JOINT = BlockDeclaration(
@@ -97,6 +104,13 @@ JOINT = BlockDeclaration(
         Entry(name="tau_max", written="tau_max = 87 N*m;", parameter=TAU_MAX, varies="number", path="JOINT.tau_max",
               default="none",
               doc="largest torque of the servo on the joint in either direction; a run warns of a higher one"),
+        Entry(name="follows", written="follows = JOINT;", default="none",
+              doc="the joint that this one follows, as by gears, or several, `[JOINT, ...]`: its position is their "
+                  "positions times `ratio`, plus `offset`; all move as one, and what acts on one acts on all"),
+        Entry(name="ratio", written="ratio = -1;", parameter=RATIO, varies="number", path="JOINT.ratio", default="1",
+              doc="position of the joint for each unit of the joint that it follows; a list, one for each of several"),
+        Entry(name="offset", written="offset = 5 mm;", parameter=OFFSET, varies="number", path="JOINT.offset",
+              default="0", doc="position of the joint where all that it follows are at 0"),
     ),
 )  # fmt: skip
 

@@ -161,6 +161,9 @@ def _arm(experiment: Experiment) -> Iterator[str]:
         if use is not None:
             asked = f": {use.command.kind}, {use.command.model or use.command.guide}" if use.command else ""
             servo = f"{use.definition} ({use.model}){asked}"
+        if joint.follows:
+            ratios = [f"{values.shown(path)} {leader}" for leader, path in joint.ratio_paths.items()]
+            servo = f"follows {', '.join(ratios)}" + (f"; {servo}" if use is not None else "")
         at = values.vector(f"{joint.name}.at")
         place = "varies" if at is None else vector(at, "m") if any(at) else ""
         mass = values.shown(f"links.{joint.child}.mass")
@@ -253,9 +256,9 @@ def _given(experiment: Experiment, prefix: str, parameters: Iterable[Parameter])
 
 
 def passive(structure: Structure) -> list[str]:
-    """The moving joints without a servo."""
+    """The moving joints without a servo that follow no other."""
     driven = {use.joint for use in structure.servos}
-    return [joint.name for joint in structure.moving if joint.name not in driven]
+    return [joint.name for joint in structure.independent if joint.name not in driven]
 
 
 def _moves(joint: Joint, values: _Values) -> str:

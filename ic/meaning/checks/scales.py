@@ -46,7 +46,7 @@ MOST_CASES = 16
 def _turns(run: RunNumbers) -> Iterator[Scale]:
     """Positions of revolute joints at the start, and of the commands of all joints."""
     usual = "joints of published arms turn by at most 1.6 turns"
-    for joint in run.structure.moving:
+    for joint in run.structure.independent:
         if joint.kind == "revolute":
             own = max(abs(run.numbers.get(f"{joint.name}.{end}", 0.0)) for end in ("q_min", "q_max"))
             angles = run.largest(f"initial.{joint.name}.q", "rad")

@@ -12,7 +12,8 @@ from met.diagnostic import leave_out
 
 
 def with_other_joints(body: MergedBlock, arm: ResolvedArm, complaints: Complaints) -> MergedBlock:
-    """The servos, with an entry for each moving joint, in the arm's order; `*` stands for those that have none.
+    """The servos, with an entry for each moving joint that follows no other, in the arm's order; `*` stands for those
+    that have none.
 
     An entry that only changes its servo, `lift { kp = ...; }`, changes that of `*`.
     """
@@ -21,7 +22,7 @@ def with_other_joints(body: MergedBlock, arm: ResolvedArm, complaints: Complaint
         return body
     others = {key: item for key, item in body.items.items() if item is not every}
     items, used = {}, False
-    for joint in arm.moving:
+    for joint in arm.independent:
         own = others.pop(joint.name, None)
         if own is None:
             items[joint.name] = replace(every, name=joint.name)
@@ -29,7 +30,7 @@ def with_other_joints(body: MergedBlock, arm: ResolvedArm, complaints: Complaint
             items[joint.name] = own if own.value is not None else _changed(every, own, complaints)
         used = used or own is None or own.value is None
     taken_over = len(every.homes) > 1  # from a run that needs it itself
-    if not used and arm.moving and not arm.failed and not taken_over:
+    if not used and arm.independent and not arm.failed and not taken_over:
         complaints.remark(
             "D287",
             "`*` stands for no joint: each of them has a servo of its own",

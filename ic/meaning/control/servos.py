@@ -19,6 +19,7 @@ from ic.meaning.control.shared_servos import use_shared
 from ic.meaning.definitions.merge import Item, MergedBlock, no_block, overlay, refuse_block
 from ic.meaning.expressions.quantity import measure_of
 from ic.meaning.mechanics.arm import ResolvedArm
+from ic.meaning.mechanics.following import leaders_in_words
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import (
     check_keys,
@@ -169,6 +170,15 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
         return None
     servo = find_bare_model(scope, "servo", model, MODEL_NOT_COMMAND)
     if servo is None:
+        return None
+    leaders = next((joint.follows for joint in arm.joints if joint.name == item.name), ())
+    if leaders and not servo.is_passive:
+        scope.complaints.error(
+            "D213",
+            f"joint `{item.name}` follows {leaders_in_words(leaders)}, so no `{servo.name}` drives it",
+            item.place,
+            help=[f"write `{leaders[0]} = ...;`: what drives that joint moves both", leave_out("leave this servo out")],
+        )
         return None
     sensed, block = list(block.of_kind("sensor")), without_sensors(block)
     parameters = use_model(scope, owner, servo.parameters, block, NOT_PARAMETERS)

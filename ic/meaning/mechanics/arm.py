@@ -15,6 +15,7 @@ from ic.meaning.definitions.merge import Item, MergedBlock, no_block, with_meant
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.dh import use_dh
+from ic.meaning.mechanics.following import check_followers, use_follows
 from ic.meaning.mechanics.foreign import how_to_close, refuse_foreign_joint
 from ic.meaning.mechanics.matter import use_matter
 from ic.meaning.parameters import not_sweepable
@@ -32,7 +33,10 @@ from met.trace import Scalar, sqrt
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 LIMITS = "limits of a joint are `q_min`, `q_max`, `qd_max` and `tau_max`; what stops it is a `joint_stop` of a run"
-NOT_OF_A_JOINT = dict.fromkeys(("limit", "limits", "range", "stops"), LIMITS)
+NOT_OF_A_JOINT = {
+    **dict.fromkeys(("limit", "limits", "range", "stops"), LIMITS),
+    "mimic": "a joint that follows another has `follows = JOINT;`, and where they are needed `ratio` and `offset`",
+}
 
 
 @frozen
@@ -55,6 +59,11 @@ class ResolvedArm:
     @property
     def moving(self) -> tuple[Joint, ...]:
         return tuple(joint for joint in self.joints if joint.kind != "fixed")
+
+    @property
+    def independent(self) -> tuple[Joint, ...]:
+        """The moving joints that follow no other."""
+        return tuple(joint for joint in self.moving if not joint.follows)
 
 
 @frozen
@@ -204,6 +213,7 @@ def _resolved(
         )
     complete = len(joints) == len(made) and not scope.complaints.is_known_to_lack(definition.place, "joint")
     check_tree(scope, definition.name, links, joints, complete=complete)
+    check_followers(scope, joints)
     free_of_errors = not scope.complaints.errors
     written = {item.name for kind in ARM.named for item in block.of_kind(kind)}
     failed = frozenset(written - {link.name for link in links} - {joint.name for joint in joints})
@@ -315,9 +325,10 @@ def _joint(
     limits = _limits(scope, replace(owner, joint=kind), body)  # type: ignore[arg-type]  # a kind of joint by now
     for end in ("parent", "child"):
         scope.not_sweepable[f"{item.name}.{end}"] = not_sweepable.COMPILED_ALONE
-    if parent is None or child is None:
+    follows = use_follows(scope, replace(owner, joint=kind), body, block)  # type: ignore[arg-type]
+    if parent is None or child is None or follows is None:
         return None
-    return Joint(item.name, kind, parent, child, item.place, limits)  # type: ignore[arg-type]
+    return Joint(item.name, kind, parent, child, item.place, limits, follows)  # type: ignore[arg-type]
 
 
 def _limits(scope: Scope, owner: Owner, body: MergedBlock) -> tuple[str, ...]:

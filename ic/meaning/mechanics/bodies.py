@@ -15,6 +15,7 @@ import numpy as np
 from ic.grammar.places import place_of
 from ic.meaning.definitions.merge import Item
 from ic.meaning.expressions.conditions import in_pieces
+from ic.meaning.mechanics.following import all_led_by
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from met.plan import BASE, Joint, Link, Payload
@@ -106,8 +107,8 @@ def _not_a_body(values: np.ndarray, kind: str, *, lumped: bool) -> tuple[np.ndar
 
 
 def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint], payloads: Sequence[Payload] = ()) -> None:
-    """Check that every moving joint carries a link with mass, a lumped one, or a permanent payload, in every case;
-    behind one that does not, none is reported.
+    """Check that every moving joint that follows no other carries a link with mass, a lumped one, or a permanent
+    payload, in every case, or that one that follows it does; behind one that does not, none is reported.
 
     The joints make a tree.
     """
@@ -136,13 +137,14 @@ def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint], pa
         before = above[joint.child] = above[joint.parent]
         if (
             joint.kind == "fixed"
+            or joint.follows
             or heavy[joint.child]
             or joint.place is None
             or any(scope.checks.failed(path) for path in before)
         ):
             continue
         above[joint.child] = (*before, f"{joint.name}.moved")
-        names = [joint.child]
+        names = [joint.child, *(each.child for each in all_led_by(joint, joints))]
         for name in names:
             names += [each.child for each in carried.get(name, ())]
         values = [value for name in names if (value := masses.get(name)) is not None]

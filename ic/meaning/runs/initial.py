@@ -10,6 +10,7 @@ from ic.meaning.control.servos import Use
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.quantity import Value, ValueList
 from ic.meaning.mechanics.arm import ResolvedArm
+from ic.meaning.mechanics.following import begin_followers, leaders_in_words
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.base import INITIAL_OF_BASE
@@ -23,10 +24,13 @@ from met.units import PURE
 
 
 def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Sequence[Use]) -> None:
-    """Settle the initial state of all joints. uses: their servos, whose commands may give it"""
+    """Settle the initial state of all joints; those that follow others begin where these put them.
+
+    uses  their servos, whose commands may give it
+    """
     servos = {use.joint: use for use in uses}
     known = dict.fromkeys(("q", "qd"), "")
-    known |= {f"{joint.name}.{name}": "" for joint in arm.moving for name in ("q", "qd")}
+    known |= {f"{joint.name}.{name}": "" for joint in arm.independent for name in ("q", "qd")}
     known |= dict.fromkeys(INITIAL.keys, "")
     of_base = dict.fromkeys(INITIAL_OF_BASE if any(link.name == BASE for link in arm.links) else (), "")
     for item in body.items.values():
@@ -34,11 +38,15 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
             continue
         if item.kind or item.name not in (*known, *INITIAL_OF_BASE):
             there = (*known, *of_base)
+            first = item.name.partition(".")[0]
+            follows = next((joint.follows for joint in arm.moving if joint.name == first), ())
             scope.complaints.error(
                 "D114",
                 f"no initial `{item.name}`",
                 item.place,
-                help=[*did_you_mean(item.name, there), known_words("there is", there)],
+                help=f"`{first}` begins where {leaders_in_words(follows)} would have it: set that"
+                if follows
+                else [*did_you_mean(item.name, there), known_words("there is", there)],
             )
     for name, unit in (("q", "joint"), ("qd", "joint/s")):
         wanted = Parameter(name=name, unit=unit, default=0.0, doc=f"initial {name}")
@@ -46,7 +54,7 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
         listed: ValueList | None = None
         commanded = is_from_command(scope, general)
         if general is not None and commanded:
-            alone = [joint for joint in arm.moving if body.get(f"{joint.name}.{name}") is None]
+            alone = [joint for joint in arm.independent if body.get(f"{joint.name}.{name}") is None]
             report_others(scope, name, general, alone, servos)
         elif general is not None:
             with scope.complaints.gather():
@@ -54,14 +62,14 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
                 listed = found if isinstance(found, ValueList) else None
             if listed is not None and arm.failed:
                 continue
-            if listed is not None and len(listed.items) != len(arm.moving):
-                given, moving = len(listed.items), len(arm.moving)
+            if listed is not None and len(listed.items) != len(arm.independent):
+                given, moving = len(listed.items), len(arm.independent)
                 message = f"{given} number{'s' * (given != 1)} for {moving} joint{'s' * (moving != 1)}"
-                names = ", ".join(joint.name for joint in arm.moving)
+                names = ", ".join(joint.name for joint in arm.independent)
                 helps = f"one for each moving joint, in the arm's order, or one for all: {names}"
                 scope.complaints.error("D071", message, listed.place, help=helps)
                 continue
-        for n, joint in enumerate(arm.moving):
+        for n, joint in enumerate(arm.independent):
             own = body.get(f"{joint.name}.{name}")
             owner = Owner(
                 f"joint `{joint.name}`",
@@ -86,6 +94,7 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
             if general is not None and own is None and listed is None and _mixed(scope, owner, wanted, general, arm):
                 break
             scope.number(owner, wanted, written, value=value)
+    begin_followers(scope, arm.joints)
 
 
 def check_balanced(scope: Scope, item: Item | None, uses: Sequence[Use], structure: Structure) -> None:
@@ -113,7 +122,7 @@ def check_balanced(scope: Scope, item: Item | None, uses: Sequence[Use], structu
 def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: ResolvedArm) -> bool:
     """Return True, with an error, if the value for all joints lacks this joint's unit, since others move
     differently."""
-    if len({joint.kind for joint in arm.moving}) < 2:
+    if len({joint.kind for joint in arm.independent}) < 2:
         return False
     with scope.complaints.gather():
         found = scope.evaluate(general)

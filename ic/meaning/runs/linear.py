@@ -93,8 +93,8 @@ def _is_equilibrium(expression: Expression | None) -> bool:
 
 
 def _pose(scope: Scope, owner: Owner, item: Item, structure: Structure) -> tuple[float, ...]:
-    """The positions of `equilibrium(q = [...])`, rad (m), of each moving joint; none for the run's first."""
-    body, joints = item.body or MergedBlock(), structure.moving
+    """The positions of `equilibrium(q = [...])`, rad (m), of each joint that follows none; none for the run's first."""
+    body, joints = item.body or MergedBlock(), structure.independent
     if refuse_values(scope, item.value, ["q"]):
         return ()
     check_keys(scope, body, ["q"], replace(owner, label=f"`{EQUILIBRIUM}` of {owner.label}"))
@@ -106,7 +106,7 @@ def _pose(scope: Scope, owner: Owner, item: Item, structure: Structure) -> tuple
         given = scope.evaluate(entry)
         values = given.items if isinstance(given, ValueList) else (given,)
         if len(values) != len(joints) or any(isinstance(each, ValueList) for each in values):
-            message = f"`q` of an {EQUILIBRIUM} is a position of each moving joint, {len(joints)} in all"
+            message = f"`q` of an {EQUILIBRIUM} is a position of each joint that follows none, {len(joints)} in all"
             helps = f"write `q = [...] deg`, in the order {', '.join(joint.name for joint in joints)}"
             raise Problem(error("D375", message, given.place, help=helps))
         found = tuple(

@@ -47,11 +47,19 @@ def test_an_entry_is_declared_whole(of: tuple[BlockDeclaration, Entry]) -> None:
 
 
 LIMITED = ARM.replace("axis = z;", "axis = z; q_min = -9 rad; q_max = 9 rad; qd_max = 9 rad/s; tau_max = 99 N*m;")
-"""The arm with everything that a joint may have."""
+FOLLOWED = (
+    LIMITED.removesuffix("}\n")
+    + """\
+    link led { mass = 1 kg;  shape = sphere(radius = 1 cm); }
+    joint after revolute { parent = base;  child = led;  axis = z;  follows = hinge; }
+}
+"""
+)
+"""The arm with everything that its joints may have."""
 
 
 def experiment(more: str = "") -> Experiment:
-    return ic.compile(text=LIMITED + SERVO + RUN + more, select=["hold"]).experiments[0]
+    return ic.compile(text=FOLLOWED + SERVO + RUN + more, select=["hold"]).experiments[0]
 
 
 @pytest.mark.slow
@@ -62,14 +70,16 @@ def test_numbers_of_arms_vary_by_their_declared_paths(of: tuple[BlockDeclaration
     _, entry = of
     known = experiment().parameters
     structure = experiment().structure
-    head = entry.path.replace("LINK", structure.links[0].name).replace("JOINT", structure.moving[0].name)
+    head = entry.path.replace("LINK", structure.links[0].name).replace(
+        "JOINT", structure.moving[entry.name in ("ratio", "offset")].name
+    )
     path = next(each for each in known if each == head or each.startswith(f"{head}."))
     value = known[path].value
     assert isinstance(value, float)
     written = f"{value!r} {known[path].unit}".removesuffix(" 1")
     sweep = f"sweep some of hold {{ vary {path} = [{written}]; }}"
     # one value in the place of itself; of some, such as the place of a hinge at the origin, nothing here depends
-    told = ic.check(text=LIMITED + SERVO + RUN + sweep, select=["some"]).diagnostics
+    told = ic.check(text=FOLLOWED + SERVO + RUN + sweep, select=["some"]).diagnostics
     assert {each.code for each in told if each.severity == "error"} <= {"D137"}
 
 

@@ -164,7 +164,7 @@ error[D141]: joint `hinge` has no `limit`
 3 |     joint hinge revolute { parent = base; child = bar; axis = z; limit = [-1, 1] rad; }
   |                                                                  ^^^^^
   = help: limits of a joint are `q_min`, `q_max`, `qd_max` and `tau_max`; what stops it is a `joint_stop` of a run
-  = help: it has: parent, child, at, rpy, axis, dh, q_min, q_max, qd_max, tau_max
+  = help: it has: parent, child, at, rpy, axis, dh, q_min, q_max, qd_max, tau_max, follows, ratio, offset
 """
     )
 
