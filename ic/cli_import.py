@@ -18,9 +18,9 @@ from met.messages.visible import say
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")
 @click.option(
     "--mimic",
-    type=click.Choice(["free", "fixed"]),
-    help="Joints that follow other joints in the file: make them `free` to move, or `fixed` where "
-    "those put them at the start.",
+    type=click.Choice(["follow", "free", "fixed"]),
+    help="Joints that follow other joints in the file: let them `follow`, as they do without this option, make them "
+    "`free` to move, or `fixed` where those put them at the start.",
 )
 @loudness_options
 def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet: bool, verbose: bool) -> None:

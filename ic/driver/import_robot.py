@@ -32,14 +32,14 @@ def import_with_remarks(path: str, mimic: Treatment | None = None) -> tuple[str,
     try:
         found = FoundFile(path, os.path.normpath(path))
         made = load(found.name, files.text(found, kind=KIND, most=MOST_URDF_BYTES))
-        if mimic is not None:
+        if mimic in ("free", "fixed"):
             made = arm_entries(without_mimics(made.robot, mimic))
         made = _checked(made)
     except Problem as problem:
         sources = tuple(files.read_so_far.values())
         raise Problem(in_order(problem.diagnostics, sources), {each.name: each.text for each in sources}) from None
     (source,) = files.read_so_far.values()
-    option = f" --mimic {mimic}" if mimic is not None else ""
+    option = f" --mimic {mimic}" if mimic in ("free", "fixed") else ""
     name = os.path.basename(path)
     title = f"made by `met import {name}{option}` from a file with the SHA-256 {source.sha256[:16]}..."
     lines = print_deck(made, title)

@@ -164,12 +164,13 @@ def _runs(body: ArmEntries, arm: str) -> Iterator[str]:
     yield "default run hold {"
     yield f"    arm         = {arm};"
     yield "    servos      {"
-    for name in joints:
+    driven = [name for name, joint in joints.items() if joint.mimic is None]
+    for name in driven:
         servo, at = slide if name in slides else held, _at(poses[name], name in slides)
         own = f" {{ command = position({at}); }}" if poses[name] else ""
         yield f"        {name} = {servo}{own};" + ("  // the middle of its range, which 0 is not in" if own else "")
     yield "    }"
-    moved = [f"{name}.q = {_at(poses[name], name in slides)};" for name in joints if poses[name]]
+    moved = [f"{name}.q = {_at(poses[name], name in slides)};" for name in driven if poses[name]]
     yield from (["    initial {", *(f"        {each}" for each in moved), "    }"] if moved else [])
     yield "    environment { gravity = [0, 0, -9.81] m/s^2; }"
     yield "    rates       { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }"

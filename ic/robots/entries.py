@@ -18,6 +18,7 @@ from ic.robots.robot import MOVING, Inertial, Joint, Link, Numbers, Robot, Writt
 from met.diagnostic import Place
 from met.frozen import frozen
 from met.plan import BASE
+from met.plan.channel import ratio_unit
 
 AXES = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
 UNITS = {
@@ -25,6 +26,8 @@ UNITS = {
     "m": (("m", 1),),
     "rad": (("rad", 1),),
     "kg*m^2": (("kg", 1), ("m", 2)),
+    "m/rad": (("m", 1), ("rad", -1)),
+    "rad/m": (("rad", 1), ("m", -1)),
     "m/s": (("m", 1), ("s", -1)),
     "rad/s": (("rad", 1), ("s", -1)),
     "N": (("N", 1),),
@@ -74,7 +77,8 @@ class ArmEntries:
 def arm_entries(robot: Robot) -> ArmEntries:
     names = deck_names(robot)
     links = tuple(RobotEntry(link, _link(link, names.links[link.name.text])) for link in robot.carried)
-    joints = tuple(RobotEntry(joint, _joint(joint, names)) for joint in robot.joints)
+    kinds = {joint.name.text: _kind(joint) for joint in robot.joints}
+    joints = tuple(RobotEntry(joint, _joint(joint, names, kinds)) for joint in robot.joints)
     base = None if robot.root.inertial is None else RobotEntry(robot.root, _link(robot.root, BASE))
     return ArmEntries(robot, names, base, links, joints, dict(_notes(robot)))
 
@@ -142,8 +146,13 @@ def _turn(angle: float) -> tuple[float, float]:
     return (0.0 if abs(c) < NOISE else c), (0.0 if abs(s) < NOISE else s)
 
 
-def _joint(joint: Joint, names: DeckNames) -> Group:
-    kind = "revolute" if joint.type.text == "continuous" else joint.type.text
+def _kind(joint: Joint) -> str:
+    """The kind of the joint in a deck."""
+    return "revolute" if joint.type.text == "continuous" else joint.type.text
+
+
+def _joint(joint: Joint, names: DeckNames, kinds: Mapping[str, str]) -> Group:
+    kind = _kind(joint)
     settings = [_end("parent", joint.parent, names), _end("child", joint.child, names)]
     if joint.at is not None and not joint.at.nothing:
         settings.append(_vector("at", joint.at, "m"))
@@ -157,8 +166,14 @@ def _joint(joint: Joint, names: DeckNames) -> Group:
     for name, limit in limits(joint).items():
         settings.append(_setting(LIMITS[name], _signed(limit.values[0], units[name], limit.place), limit.place))
     if joint.mimic is not None:
-        followed = joint.mimic.joint
-        settings.append(_setting("mimic", _name(names.joints[followed.text], followed.place), followed.place))
+        leader, multiplier, offset = joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset
+        settings.append(_setting("follows", _name(names.joints[leader.text], leader.place), leader.place))
+        if multiplier != 1.0:
+            unit = ratio_unit(kind, kinds[leader.text])
+            ratio = _signed(multiplier, unit, leader.place) if unit in UNITS else _plain(multiplier, leader.place)
+            settings.append(_setting("ratio", ratio, leader.place))
+        if offset:
+            settings.append(_setting("offset", _signed(offset, way, leader.place), leader.place))
     return _group("joint", names.joints[joint.name.text], Word(kind, joint.type.place), settings, joint.name.place)
 
 
@@ -211,6 +226,10 @@ def _vector(key: str, numbers: Numbers, unit: str) -> Setting:
 
 def _number(value: float, unit: str, place: Place) -> Number:
     return Number(value, _unit(unit, place), place, spelled(value))
+
+
+def _plain(value: float, place: Place) -> Expression:
+    return _bare(value, place) if value >= 0.0 else Unary("-", _bare(-value, place), place)
 
 
 def _signed(value: float, unit: str, place: Place) -> Expression:

@@ -1,4 +1,4 @@
-"""Joints that follow others in a URDF file, freed or held: a deck has none that follows.
+"""Joints that follow others in a URDF file, freed or held in a deck that is not to have them follow.
 
 A follower is at `multiplier` times the position of its leader plus `offset`, and the leader is where the deck's first
 run holds it (`hold_position`): at 0, or in the middle of a range that 0 is not in.
@@ -13,7 +13,7 @@ from typing import Literal
 from ic.robots.entries import limits, rotation, spelled
 from ic.robots.robot import MOVING, Joint, Numbers, Robot
 
-Treatment = Literal["free", "fixed"]
+Treatment = Literal["follow", "free", "fixed"]
 PARALLEL = 1e-9  # sine of the angle to a right one below which a pitch leaves roll and yaw alike
 
 

@@ -35,7 +35,7 @@ def body(path: Path) -> ArmEntries:
 def made_from(path: Path, folder: Path) -> Experiment:
     """A run of the arm that is made from the file, its joints that follow others let go."""
     read = body(path)
-    free = "".join(f"{read.names.joints[joint.name.text]} {{ remove mimic; }} "
+    free = "".join(f"{read.names.joints[joint.name.text]} {{ remove follows; }} "
                    for joint in read.robot.joints if joint.mimic is not None)  # fmt: skip
     deck = folder / "made_from.ic"
     deck.write_text(f'arm it from urdf("{path}") {{ {free}}}\n' + RUN.format(arm="it"), encoding="utf-8")

@@ -24,7 +24,7 @@ OTHER_KINDS = {
 
 
 def refuse_foreign_joint(scope: Scope, item: Item, arm: str, block: MergedBlock) -> bool:
-    """Return True, with an error, if a joint is of a kind that MET does not have, or follows another joint.
+    """Return True, with an error, if a joint is of a kind that MET does not have.
 
     arm, block: the name of its arm, and all that this holds
     """
@@ -48,19 +48,6 @@ def refuse_foreign_joint(scope: Scope, item: Item, arm: str, block: MergedBlock)
             f"joint `{item.name}` is {kind}, and joints are revolute, prismatic or fixed",
             item.detail[0].place,
             help=helps,
-        )
-        return True
-    mimic = item.body.get("mimic") if item.body is not None else None
-    if mimic is not None:
-        other = f"`{mimic.value.text}`" if isinstance(mimic.value, Name) else "another"
-        free = "leave `mimic` out: the joint then moves by itself"
-        if there:
-            free = f"{there}`{item.name} {{ remove mimic; }}` lets it move by itself"
-        held = f"`remove {item.name};  joint {item.name} fixed {{ ... }}` holds it"
-        if there:
-            held = "`met import --mimic fixed` prints the joint held where it is in the file"
-        scope.complaints.error(
-            "D213", f"joint `{item.name}` follows {other}, which is not in this version", mimic.place, help=[free, held]
         )
         return True
     return False

@@ -187,11 +187,19 @@ def check_file(folder: Path, deck: str) -> Path:
     return folder / "deck.ic"
 
 
-def test_a_joint_that_follows_another_moves_by_itself_once_its_mimic_is_removed(tmp_path: Path) -> None:
-    robot = changed(TWO, ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><mimic joint="other"/>'), ("</robot>", OTHER))
-    assert (
-        made(tmp_path, robot, changed(DECK, ("{ }", "{ hinge { remove mimic; } }"))).structure.moving[0].name == "hinge"
+def test_a_joint_follows_another_as_in_the_file_or_moves_by_itself_once_that_is_removed(tmp_path: Path) -> None:
+    mimic = '<axis xyz="0 0 1"/><mimic joint="other" multiplier="-2.5" offset="0.3"/>'
+    robot = changed(TWO, ('<axis xyz="0 0 1"/>', mimic), ("</robot>", OTHER.replace("fixed", "revolute")))
+    follows = made(tmp_path, robot, DECK)
+    assert follows.structure.moving[0].follows == ("other",)
+    assert [follows.parameters[f"hinge.{name}"].value for name in ("ratio", "offset")] == [-2.5, 0.3]
+    free = made(
+        tmp_path,
+        robot,
+        changed(DECK, ("{ }", "{ hinge { remove follows; }  tip { mass = 1 kg;  shape = sphere(radius = 1 cm); } }")),
     )
+    assert free.structure.independent[0].name == "hinge"
+    robot = robot.replace('"other" type="revolute"', '"other" type="fixed"')
     fixed = "{ remove hinge;  joint hinge fixed { parent = base;  child = bar; }  link tip { mass = 1 kg; shape = sphere(radius = 1 cm); }  joint turn revolute { parent = bar; child = tip; axis = z; } }"
     fixed = fixed.replace("tip", "end")
     assert [joint.kind for joint in made(tmp_path, robot, changed(DECK, ("{ }", fixed))).structure.joints] == [

@@ -71,7 +71,7 @@ def rows() -> Iterator[str]:
         except Problem:
             moving, mimics = "", 0
         if mimics and not why:
-            why = f"{mimics} {'follows another joint' if mimics == 1 else 'follow other joints'}: `remove mimic`"
+            why = f"{mimics} {'follows another joint' if mimics == 1 else 'follow other joints'}"
             yield f"| `{shown(path)}` | {moving} | yes | {why} |"
         else:
             yield f"| `{shown(path)}` | {moving} | {'no' if why else 'yes'} | {why} |"

@@ -243,17 +243,17 @@ error[D212]: joint `hinge` is floating, and joints are revolute, prismatic or fi
 """,
     ),
     mistake(
-        "a joint that follows another",
+        "a joint that follows one that is fixed",
         ('<axis xyz="0 0 1"/>', '<mimic joint="other" multiplier="-1"/>'),
         ("</robot>", OTHER),
         says="""\
-error[D213]: joint `hinge` follows `other`, which is not in this version
+error[D213]: no moving joint `other` for joint `hinge` to follow
   --> two.urdf:13:19
    |
 13 |     <mimic joint="other" multiplier="-1"/>
    |                   ^^^^^
-   = help: in the arm's block, `hinge { remove mimic; }` lets it move by itself
-   = help: `met import --mimic fixed` prints the joint held where it is in the file
+   = help: joints that move: none
+   = help: in the arm's block, `hinge { remove follows; }` lets it move by itself
 """,
     ),
     mistake(
