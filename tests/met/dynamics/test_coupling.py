@@ -12,7 +12,7 @@ from met.dynamics.coupling import Ratios, solve_coupled
 from met.dynamics.recursion import solve
 from met.dynamics.tree import Body, Tree
 from met.trace import Formulas, Graph
-from tests.met.dynamics.test_free_base import fleet, vector
+from tests.met.dynamics.test_free_base import flight, floated, vector
 from tests.oracles.dense import DenseArm
 from tests.oracles.random_tree import RandomArm, random_tree
 from tests.oracles.worst import Worst
@@ -100,7 +100,9 @@ def test_coupled_accelerations_of_three_hundred_trees() -> None:
 
 def test_a_group_on_a_free_base_balances_and_keeps_the_momentum() -> None:
     worst = Worst("torques that a free base's coupled joints lack")
-    for arm, tree, base in fleet()[2:14:6]:
+    for seed in (3, 5):
+        arm, base = floated(random_tree(seed, 6)), flight(seed)
+        tree = Tree.build(arm.bodies, free=True)
         rows, G = grouped(arm)
         given = {"gravity": vector(base.R.T @ np.array(arm.gravity)), "base_rate": vector(base.R.T @ base.w)}
         solved = ours(arm, rows, arm.mode, tree, **given)
