@@ -9,7 +9,6 @@ import click
 from batch.cli.best import tell
 from batch.cli.residuals import log_options
 from met.cli import NO, YES, deck_options, format_option
-from met.messages.visible import line, say
 from met.settings import varies
 
 
@@ -42,8 +41,9 @@ from met.settings import varies
     "--motion",
     "motions",
     multiple=True,
-    metavar="RUN",
-    help="With --identifiable: also say what a log of this run, as noisy as LOG, would add; may be repeated.",
+    metavar="NAME",
+    help="With --identifiable: also say what a log of this run, as noisy as LOG, would add, or one of the best case of "
+    "this sweep; may be repeated.",
 )
 @click.option(
     "--picture",
@@ -51,7 +51,7 @@ from met.settings import varies
     help="Draw the first log, or the first predicted one, as measured, and as computed before and after.",
 )
 @click.option("--diff", is_flag=True, help="Show what --write would change in the deck's text.")
-@click.option("--write", is_flag=True, help="Write the fitted values into the deck's text, and show what changed.")
+@click.option("--write", is_flag=True, help="Write the values into the deck's text, and show what changed.")
 @click.option(
     "-o", "output", metavar="FILE", help="With --diff or --write: a new file, for a changed copy of the deck."
 )
@@ -76,14 +76,13 @@ def fit(
 
     Exit status: 0 all numbers are known; 1 the logs cannot tell some of them, or are doubtful; 2 the input is wrong.
     """
-    import json
-
     from batch.fitting.question import fit_question
     from batch.plotting import logs as pictures
     from batch.plotting import output as places
     from batch.terminal import fit as shown
     from batch.terminal.chosen_deck import fitted_deck
     from batch.terminal.progress import Bar
+    from met.diagnostic import Problem, error
     from met.host.sources import names_archive, names_plan
     from met.outputs import path_of
 
@@ -93,33 +92,41 @@ def fit(
         raise click.UsageError("--vary is for sweeps: `--estimate PATH` is what a fit moves")
     if output is not None and not (diff or write):
         raise click.UsageError("-o is the file for --write")
-    if identifiable and (diff or write or picture or options["predict"]):
-        raise click.UsageError("--identifiable fits nothing: leave --diff, --write, --picture and --predict out")
+    if identifiable and (picture or options["predict"]):
+        raise click.UsageError("--identifiable fits nothing: leave --picture and --predict out")
     drawn = None if picture is None else path_of(picture)
     if drawn is not None:
         places.check(drawn)
     if options["motions"] and not identifiable:
         raise click.UsageError("--motion is for --identifiable: a run without a log cannot be fitted")
     question = fit_question(deck, logs, estimates, **options)
+    given = {key: options[key] for key in ("defines", "settings")}
+    bar, changed = Bar(), None
     if identifiable:
-        known, promised = question.identifiable(), question.promised()
-        if form == "json":
-            say(json.dumps(shown.identifiable_data(question, known, promised), indent=1))
-        else:
-            say("\n".join(map(line, shown.identifiable_lines(question, known, promised))))
+        bar.begin("slopes", 0)
+        known, promised = question.identifiable(), question.promised(bar.advance)
+        bar.end()
+        chosen = [each for each in promised if each.values]
+        if diff or write:
+            if len(chosen) != 1:
+                raise click.UsageError("--identifiable writes the best motion of one sweep: `--motion SWEEP`")
+            name = chosen[0].motion.given.name
+            changed = fitted_deck(deck, shown.written_motion(chosen[0]), output, experiment=name, **given)
+            if logged := {each.given.name for each in question.runs} & {name, *changed.others}:
+                message = f"with this motion, `{min(logged)}` is no longer the run of its log"
+                raise Problem(error("E480", message, help=f"give `{name}` servos of its own"))
+        data = shown.identifiable_data(question, known, promised)
+        tell(form, data, shown.identifiable_lines(question, known, promised), changed, asked=False, write=write)
         return YES if set(known.verdict) == {"known"} else NO
-    bar = Bar()
     bar.begin(f"fit of {question.runs[0].given.name}", 0)
     answer = question.answer(bar.advance)
     bar.end()
     certain = shown.is_certain(answer)
     lines = list(shown.fit_lines(question, answer))
-    changed = None
     if certain:
         lines += ["", *shown.sweep_lines(question, answer)]
         if diff or write:
             values = shown.written_values(question, answer)
-            given = {key: options[key] for key in ("defines", "settings")}
             changed = fitted_deck(deck, values, output, experiment=question.runs[0].given.name, **given)
     if drawn is not None:
         run = (*question.predicted, *question.runs)[0]

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -195,6 +196,14 @@ class Fitter:
         self.weights = 1.0 / noise[self.logs.signal_of]
         self._step = self._probed()
         return self._weighted(self._slopes(self.start)[1])
+
+    def promised_slopes(self, motion: LoggedRuns, noise: np.ndarray) -> np.ndarray:
+        """The slopes of runs that are not logged, at the deck's values, weighted by the inverse of a noise, [number,
+        path]. Their differences begin at the size of the last ones. noise: rms of each signal"""
+        fitter = copy(self)
+        fitter.logs, fitter.weights = motion, 1.0 / noise[motion.signal_of]
+        fitter._slopes(self.start)
+        return np.asarray(fitter.weights[:, None] * fitter._slopes(self.start)[1])
 
     # Numbers of runs
 

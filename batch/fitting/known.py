@@ -41,6 +41,12 @@ class Known:
     size: np.ndarray
     together: tuple[dict[int, float], ...]
 
+    @property
+    def worst(self) -> float:
+        """The largest standard error of a parameter that is not held, in its size."""
+        free = np.array([each != "held" for each in self.verdict])
+        return float(np.max(self.deviation / self.size, where=free, initial=0.0))
+
 
 def known(slopes: np.ndarray, size: np.ndarray, held: np.ndarray, wider: float | np.ndarray = 1.0) -> Known:
     """What weighted slopes tell.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from ic.driver.given_values import GivenRun, VariedRun
 from met import run as engine
 from met.diagnostic import Problem, error
 from met.frozen import frozen
+from met.plan import Experiment
 
 MOST_NUMBERS = 100_000
 """Largest number of measured numbers of a log that are fitted; a longer one is thinned."""
@@ -34,6 +35,7 @@ class LoggedRun:
 
     given    the run;  file: of the log;  log: its signals
     paths    the parameters that get values; of these the run depends on those of `varied` alone
+    fixed    values of other parameters of `varied`, SI, by path
     """
 
     given: GivenRun
@@ -41,6 +43,7 @@ class LoggedRun:
     log: MeasuredSignals
     paths: tuple[str, ...]
     varied: VariedRun
+    fixed: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def read(
@@ -68,20 +71,51 @@ class LoggedRun:
 
     @classmethod
     def imagined(
-        cls, given: GivenRun, starts: Mapping[str, tuple[float, str]], start: np.ndarray, measured: Collection[str]
-    ) -> LoggedRun:
-        """A run as if it had been logged: with what it computes at its recorded rows, of channels that are `measured`.
-        Raises Problem E480 where there is none.
+        cls,
+        given: GivenRun,
+        starts: Mapping[str, tuple[float, str]],
+        start: np.ndarray,
+        measured: Collection[str],
+        sweep: Experiment,
+    ) -> tuple[LoggedRun, ...]:
+        """A run, in each case of a sweep, as if it had been logged: with what it computes at its recorded rows, of
+        channels that are `measured`. Cases that `is_allowed` refuses are left out. Raises Problem E480 where none is
+        left.
 
         starts, start  values of the parameters, by path with their units, and SI alone, [path]
+        sweep          its cases, or the run itself
         """
-        varied, _ = given.vary_most(starts)
-        courses = cls(given, "", MeasuredSignals({}, [], []), tuple(starts), varied).courses(start)
-        signals = {name: (each.times, each.values) for name, each in courses.items() if name in measured}
-        if not signals:
-            message = f"`{given.name}` records nothing that a log has, or fails at its start"
-            raise Problem(error("E480", message, given.experiment.place, help="let it record what was logged"))
-        return cls(given, given.name, MeasuredSignals(signals, [], []), tuple(starts), varied)
+        coordinates = sweep.cases.coordinates
+        further = {each.path: (float(each.values[0]), given.unit(each.path) or "1") for each in coordinates}
+        varied, _ = given.vary_most({**starts, **further})
+        first, found = cls(given, sweep.name, MeasuredSignals({}, [], []), tuple(starts), varied), []
+        for number in range(sweep.cases.count):
+            fixed = {each.path: float(each.values[number]) for each in coordinates}
+            motion = first._with_fixed(f"{sweep.name} #{number}" if coordinates else sweep.name, fixed)
+            if coordinates and not motion.is_allowed(start):
+                continue
+            signals = {name: each for name, each in motion.courses(start).items() if name in measured}
+            motion.log.signals.update({name: (each.times, each.values) for name, each in signals.items()})
+            found += [motion] if signals else []
+        if not found:
+            message = f"`{sweep.name}` records nothing that a log has, or fails at its start"
+            if coordinates:
+                message = f"no case of `{sweep.name}` ends within limits and requirements, and records what a log has"
+            raise Problem(error("E480", message, sweep.place, help="let it record what was logged"))
+        return tuple(found)
+
+    def _with_fixed(self, name: str, fixed: Mapping[str, float]) -> LoggedRun:
+        """The same run with other values of `fixed` and an empty log of this name. The program is shared."""
+        run = replace(self, file=name, fixed=fixed, log=MeasuredSignals({}, [], []))
+        run.__dict__["_prepared"] = self._prepared
+        return run
+
+    def is_allowed(self, values: np.ndarray) -> bool:
+        """Whether a case reaches its end, within the limits of all joints and with all requirements met. values: of
+        `paths`, SI, [path]"""
+        found = engine.run(self._with(self.inputs(values[None, :])), record=False)
+        outside = any(each[0] > 0.0 for each in found.excess.values())
+        return bool(found.status[0] == engine.DONE and not outside and all(each[0] for each in found.met.values()))
 
     @property
     def name(self) -> str:
@@ -90,7 +124,7 @@ class LoggedRun:
 
     @cached_property
     def used(self) -> tuple[str, ...]:
-        """The parameters on which the run depends."""
+        """The parameters on which the run depends, fixed ones included."""
         return tuple(each.path for each in self.varied.experiment.cases.coordinates)
 
     @cached_property
@@ -147,6 +181,12 @@ class LoggedRun:
         """The position of each number's channel in `channels`, [number]."""
         return np.repeat(np.arange(len(self.channels)), [len(rows) for rows in self._rows])
 
+    def inputs(self, values: np.ndarray) -> np.ndarray:
+        """The values of `used`, SI, [case, path], from those of `paths`, with those of `fixed` beside them."""
+        paths = [*self.paths, *self.fixed]
+        every = np.hstack([values, np.tile([*self.fixed.values()], (len(values), 1))])
+        return np.asarray(every[:, [paths.index(path) for path in self.used]])
+
     def computed(self, values: np.ndarray) -> np.ndarray:
         """The numbers computed at `instants`, on straight lines between recorded rows, [case, number]; not-a-number in
         cases that fail, or have a value that its parameter cannot have.
@@ -154,7 +194,7 @@ class LoggedRun:
         values  of `paths`, SI, [case, path]
         """
         out = np.full((len(values), len(self.measured)), np.nan)
-        own = values[:, [self.paths.index(path) for path in self.used]]
+        own = self.inputs(values)
         refused = self.varied.broken(dict(zip(self.used, own.T, strict=True)), len(own))
         rows = np.flatnonzero(~refused)
         many = max(1, MOST_BYTES // max(1, self.given.experiment.structure.history_bytes))
@@ -165,8 +205,7 @@ class LoggedRun:
 
     def courses(self, values: np.ndarray) -> dict[str, ComputedChannel]:
         """What one case computes, by channel. values: of `paths`, SI, [path]"""
-        own = values[[self.paths.index(path) for path in self.used]]
-        history = self._histories(own[None, :])[0]
+        history = self._histories(self.inputs(values[None, :]))[0]
         courses = {}
         for column, each in enumerate(self.columns):
             finite = np.isfinite(history[:, column])
@@ -176,8 +215,7 @@ class LoggedRun:
 
     def cause(self, values: np.ndarray) -> str:
         """Why a case fails, in words. values: of `paths`, SI, [path]"""
-        own = values[[self.paths.index(path) for path in self.used]]
-        found = engine.run(self._with(own[None, :]), record=False)
+        found = engine.run(self._with(self.inputs(values[None, :])), record=False)
         return found.cause[0]
 
     @property
@@ -258,6 +296,5 @@ class LoggedRuns:
         """Whether a value is one that its parameter cannot have, [case]. values: SI, [case, path]"""
         found = np.zeros(len(values), dtype=bool)
         for each in self.runs:
-            own = {path: values[:, self.paths.index(path)] for path in each.used}
-            found |= each.varied.broken(own, len(values))
+            found |= each.varied.broken(dict(zip(each.used, each.inputs(values).T, strict=True)), len(values))
         return found

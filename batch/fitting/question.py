@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -17,9 +17,11 @@ from batch.fitting.logged import LoggedRun, LoggedRuns
 from batch.measured.log import mapped_column
 from batch.measured.residuals import Comparison, compare
 from ic.driver.explain import explanations_of
-from ic.driver.given_values import GivenRun, given_run
+from ic.driver.given_values import GivenRun, given_run, swept_run
+from ic.driver.written_value import WrittenValue
 from met.diagnostic import Problem, error
 from met.frozen import frozen
+from met.plan import Experiment
 from met.unit_parser import parse_unit
 from met.units import same
 
@@ -44,10 +46,31 @@ class FitAnswer:
 
 
 @frozen
+class Promise:
+    """What logs and one more would tell.
+
+    motion  that would be logged, its name in place of a file;  known: of the parameters
+    sweep   of which it is the best case, or the run itself;  judged: number of its cases that could be logged
+    """
+
+    motion: LoggedRun
+    known: Known
+    sweep: Experiment
+    judged: int
+
+    @property
+    def values(self) -> list[WrittenValue]:
+        """What makes the case out of its run."""
+        units = {each.path: each.unit for each in self.sweep.cases.coordinates}
+        return [WrittenValue(path, si, units[path]) for path, si in self.motion.fixed.items()]
+
+
+@frozen
 class FitQuestion:
     """Parameters to estimate from logs.
 
-    runs       to fit, and to predict alone: `predicted`;  motions: those that might be logged
+    runs       to fit, and to predict alone: `predicted`
+    motions    sweeps and runs that might be logged, with those of their cases that could be
     paths      of the parameters;  start: their values in the deck, SI;  units: those in which the deck writes them
     si_units   of the same
     priors     of some of them, by path
@@ -55,7 +78,7 @@ class FitQuestion:
 
     runs: tuple[LoggedRun, ...]
     predicted: tuple[LoggedRun, ...]
-    motions: tuple[LoggedRun, ...]
+    motions: tuple[tuple[Experiment, tuple[LoggedRun, ...]], ...]
     paths: tuple[str, ...]
     start: np.ndarray
     units: tuple[str, ...]
@@ -80,18 +103,23 @@ class FitQuestion:
         fitter = Fitter(self.logs, self.start, self.priors)
         return known(fitter.slopes_at_start(noise_of(self.logs)), fitter.size, fitter.held)
 
-    def promised(self) -> dict[str, Known]:
-        """By the name of each motion, what the logs and one of it could tell, as noisy as the logs are."""
+    def promised(self, progress: Callable[[int], None] = lambda _: None) -> tuple[Promise, ...]:
+        """What the logs and one of each motion could tell, as noisy as the logs are; of a sweep, the case that leaves
+        the least uncertainty."""
         noises = noise_of(self.logs)
         channels = [channel for run in self.runs for channel in run.channels]
         noise = {name: max(noises[np.array([each == name for each in channels])]) for name in channels}
-        found = {}
-        for motion in self.motions:
-            logs = LoggedRuns((*self.runs, motion), self.paths)
-            fitter = Fitter(logs, self.start, self.priors)
-            both = np.array([*noises, *(noise[channel] for channel in motion.channels)])
-            found[motion.given.name] = known(fitter.slopes_at_start(both), fitter.size, fitter.held)
-        return found
+        fitter = Fitter(self.logs, self.start, self.priors, progress)
+        slopes, promises = fitter.slopes_at_start(noises), []
+        for sweep, motions in self.motions:
+            judged = []
+            for motion in motions:
+                own = np.array([noise[channel] for channel in motion.channels])
+                more = fitter.promised_slopes(LoggedRuns((motion,), self.paths), own)
+                judged.append((known(np.vstack([slopes, more]), fitter.size, fitter.held), motion))
+            best, motion = min(judged, key=lambda each: each[0].worst)
+            promises.append(Promise(motion, best, sweep, len(motions)))
+        return tuple(promises)
 
     def answer(self, progress: Callable[[int], None]) -> FitAnswer:
         """Fit the parameters, and say what the fit is worth."""
@@ -127,7 +155,7 @@ def fit_question(
 
     logs, predict  files, each with its run before it where there are several: `slow=slow.csv`
     estimates      paths as `--set` takes them; `links.*.mass` is of all links
-    motions        names of runs that might be logged, too
+    motions        names of runs that might be logged, too, or of sweeps over such motions
     priors         `PATH=normal(MEAN, DEVIATION) UNIT`
     columns, zero  of the logs: `CHANNEL=[FACTOR *] COLUMN [UNIT]`, and the time at which the runs begin, s
 
@@ -135,12 +163,14 @@ def fit_question(
     """
     runs: dict[str | None, GivenRun] = {}
     pairs = [_run_and_log(each) for each in (*logs, *predict)]
-    for run in [*(each for each, _ in pairs), *motions]:
+    for run, _ in pairs:
         if run not in runs:
             runs[run] = given_run(deck, run, include_dirs=include_dirs, defines=defines, settings=settings)
+    swept = [swept_run(deck, each, include_dirs=include_dirs, defines=defines, settings=settings) for each in motions]
     first = runs[pairs[0][0]]
-    paths = _paths(estimates, list(runs.values()))
-    starts = {path: _start(path, list(runs.values())) for path in paths}
+    every = [*runs.values(), *(run for run, _ in swept)]
+    paths = _paths(estimates, every)
+    starts = {path: _start(path, every) for path in paths}
     mapped = [mapped_column(each) for each in columns]
     read = [LoggedRun.read(runs[run], log, starts, mapped, zero) for run, log in pairs]
     for path in paths:
@@ -156,13 +186,31 @@ def fit_question(
     return FitQuestion(
         tuple(read[: len(logs)]),
         tuple(read[len(logs) :]),
-        tuple(LoggedRun.imagined(runs[run], starts, start, measured) for run in motions),
+        tuple(_motion(run, sweep, starts, start, measured) for run, sweep in swept),
         tuple(paths),
         start,
-        tuple(_owner(path, list(runs.values())).written_in(path)[0] for path in paths),
+        tuple(_owner(path, every).written_in(path)[0] for path in paths),
         tuple(unit for _, unit in starts.values()),
         dict(given),
     )
+
+
+def _motion(
+    run: GivenRun,
+    groups: Sequence[Experiment],
+    starts: Mapping[str, tuple[float, str]],
+    start: np.ndarray,
+    measured: Collection[str],
+) -> tuple[Experiment, tuple[LoggedRun, ...]]:
+    """A sweep, or a run, and those of its cases that could be logged. groups: its experiments"""
+    (sweep, *more) = groups
+    if more or sweep.cases.choices:
+        path = sweep.cases.choices[0].path if sweep.cases.choices else ""
+        raise _wrong(f"`{sweep.sweep}` varies `{path}`, which decides the program", "let it vary numbers")
+    varied = next((each.path for each in sweep.cases.coordinates if each.path in starts), None)
+    if varied is not None:
+        raise _wrong(f"`{sweep.name}` varies `{varied}`, which is estimated", "let it vary numbers of commands alone")
+    return sweep, LoggedRun.imagined(run, starts, start, measured, sweep)
 
 
 def _run_and_log(text: str) -> tuple[str | None, str]:

@@ -13,13 +13,15 @@ from typing import Any
 import numpy as np
 
 from batch.fitting.known import Known, correlated
-from batch.fitting.question import FitAnswer, FitQuestion
+from batch.fitting.question import FitAnswer, FitQuestion, Promise
 from batch.measured.residuals import Comparison
 from batch.queries.summary import finite
 from batch.terminal.chosen_deck import FittedValue
 from batch.terminal.residuals import doubt_lines, note_lines
 from ic.driver.written_value import WrittenValue
 from ic.printing.columns import columns
+from met.outputs import quoted
+from met.settings import setting_option
 from met.unit_parser import decimals
 
 WORDS: Mapping[str, str] = MappingProxyType({
@@ -65,8 +67,13 @@ def written_values(question: FitQuestion, answer: FitAnswer) -> list[FittedValue
     return found
 
 
-def identifiable_lines(question: FitQuestion, found: Known, promised: Mapping[str, Known]) -> Iterator[str]:
-    """Lines about the numbers that the logs can tell before anything is fitted, and with a log of other runs."""
+def written_motion(promise: Promise) -> list[FittedValue]:
+    """The values that make the best case of a sweep, to be written into the deck."""
+    return [FittedValue(each, f"of {promise.sweep.cases.count:,}: {promise.motion.file}") for each in promise.values]
+
+
+def identifiable_lines(question: FitQuestion, found: Known, promised: Sequence[Promise]) -> Iterator[str]:
+    """Lines about the numbers that the logs can tell before anything is fitted, and with a log of other motions."""
     rows = [["", "deck", "standard error", "by itself", ""]]
     for place, path in enumerate(question.paths):
         unit = question.units[place]
@@ -80,13 +87,31 @@ def identifiable_lines(question: FitQuestion, found: Known, promised: Mapping[st
     yield from _together(question, found)
     if promised:
         yield ""
-        rows = [["standard errors with a log of", *promised]]
+        rows = [["standard errors with a log of", *(each.motion.file for each in promised)]]
         for place, path in enumerate(question.paths):
-            errors = [_short(each.deviation[place], question.units[place]) for each in promised.values()]
+            errors = [_short(each.known.deviation[place], question.units[place]) for each in promised]
             rows.append([f"  {path}", *errors])
         yield from columns(rows, right=tuple(range(1, len(promised) + 1)))
         yield ""
+        for each in promised:
+            yield from _choice_lines(each)
     yield "The errors are those of the logs' noise alone: what the model lacks adds to them."
+
+
+def _choice_lines(promise: Promise) -> Iterator[str]:
+    """What the best case of a sweep is, and how to run it; nothing for a run."""
+    cases, settings = promise.sweep.cases.count, [each.setting for each in promise.values]
+    if not settings:
+        return
+    judged, others = f"{cases:,} cases", ""
+    if promise.judged < cases:
+        judged, others = f"{promise.judged:,} of {judged}", ": the others fail, leave limits or miss requirements"
+    yield f"{promise.motion.file} is the best of {judged}{others}"
+    given = promise.motion.given
+    words = [f"-D {quoted(each)}" for each in given.defines]
+    words += [setting_option(each) for each in (*given.settings, *settings)]
+    yield f"its motion: {' '.join(['met run', quoted(given.deck.file), given.name, *words])}"
+    yield ""
 
 
 def fit_lines(question: FitQuestion, answer: FitAnswer) -> Iterator[str]:
@@ -196,7 +221,7 @@ def as_data(question: FitQuestion, answer: FitAnswer) -> dict[str, Any]:
     return plain
 
 
-def identifiable_data(question: FitQuestion, found: Known, promised: Mapping[str, Known]) -> dict[str, Any]:
+def identifiable_data(question: FitQuestion, found: Known, promised: Sequence[Promise]) -> dict[str, Any]:
     """Plain data; a number that is not finite is null. SI"""
     parameters = [
         {"path": path, "deck": float(start), "deviation": float(whole), "alone": float(alone), "known": verdict}
@@ -208,7 +233,17 @@ def identifiable_data(question: FitQuestion, found: Known, promised: Mapping[str
         "parameters": parameters,
         "rank": found.rank,
         "condition": found.condition,
-        "motions": {name: each.deviation.tolist() for name, each in promised.items()},
+        "motions": {each.motion.file: each.known.deviation.tolist() for each in promised},
+        "chosen": [
+            {
+                "motion": each.motion.file,
+                "cases": each.sweep.cases.count,
+                "judged": each.judged,
+                "set": [value.setting for value in each.values],
+            }
+            for each in promised
+            if each.values
+        ],
         "together": _as_paths(question, found),
     }
     plain: dict[str, Any] = finite(data)

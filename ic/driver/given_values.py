@@ -203,6 +203,27 @@ def given_run(
     return _given(deck, _name_of(definitions, run, deck), tuple(defines), tuple(settings))
 
 
+def swept_run(
+    path: str | PathLike[str],
+    name: str,
+    *,
+    include_dirs: Sequence[str | PathLike[str]] = (),
+    defines: Sequence[str] = (),
+    settings: Sequence[str] = (),
+) -> tuple[GivenRun, tuple[Experiment, ...]]:
+    """A run of a deck and the run itself, or the run of a sweep and the experiments of the sweep. Raises Problem."""
+    deck = read(Path(path), [Path(each) for each in include_dirs], tuple(defines))
+    sweep = Definitions(deck, Complaints(deck.warnings)).of_kind("sweep").get(name)
+    run = name if sweep is None else _run_of(sweep) or name
+    given = given_run(path, run, include_dirs=include_dirs, defines=defines, settings=settings)
+    if sweep is None:
+        return given, (given.experiment,)
+    compiled = compile_deck(given.deck, select=name, defines=defines, settings=settings)
+    if compiled.plan is None:
+        raise Problem(_errors(compiled), compiled.sources)
+    return given, compiled.plan.experiments
+
+
 def _given(deck: Deck, name: str, defines: tuple[str, ...], settings: tuple[str, ...]) -> GivenRun:
     compiled = compile_deck(deck, select=name, defines=defines, settings=settings)
     if compiled.plan is None:

@@ -124,6 +124,74 @@ def test_a_second_log_of_the_same_motion_would_make_errors_smaller_by_the_root_o
     assert with_it == pytest.approx(error / 2.0**0.5, rel=0.03)
 
 
+SWEEP = """
+servo wider like drive { command = rate(sine(amplitude = 0.05 rad/s, frequency = 0.5 Hz)); }
+run wide like work {
+    servos { hinge = wider; }
+    metric reach = max { of = hinge.q; };
+    require reach < 0.17 rad;
+}
+sweep moves of wide {
+    vary wider.command.amplitude = [0.05, 0.15, 0.3, 0.4] rad/s;
+    vary wider.command.frequency = [0.5, 1] Hz;
+}
+sweep steps of wide { vary rates.dynamics = [500, 1000] Hz; }
+sweep masses of wide { vary mass = [10, 20] kg; }
+sweep far of wide { vary wider.command.amplitude = [5, 6] rad/s; }
+sweep same of work { vary drive.command.amplitude = [0.1, 0.2] rad/s; }
+"""
+TOLD = ("--estimate", "mass", "--estimate", "drive.kp", "--identifiable")
+
+
+@pytest.mark.slow
+def test_the_best_motion_of_a_sweep_is_that_of_the_least_error_and_is_run_and_written_alone(
+    folder: Path, capsys: Say
+) -> None:
+    deck, copy = folder / "moves.ic", folder / "chosen.ic"
+    deck.write_text(DECK + SWEEP)
+    arguments = ["fit", str(deck), f"{folder}/log.csv", *TOLD, "--format", "json"]
+    motions = ["--motion", "moves", "--write", "-o", str(copy)]
+    assert cli.main([*arguments, *motions]) == cli.YES
+    found = json.loads(capsys.readouterr().out)
+    (chosen,), (best,) = found["chosen"], found["motions"].values()
+    assert chosen["cases"] == 8 and chosen["judged"] == 7  # 0.4 rad/s at 0.5 Hz reaches 0.19 rad
+    starts, worst = [each["deck"] for each in found["parameters"]], {}
+    for amplitude, frequency in ((0.3, 0.5), (0.4, 1), (0.15, 0.5), (0.05, 1)):
+        settings = (f"wider.command.amplitude={amplitude} rad/s", f"wider.command.frequency={frequency} Hz")
+        by_hand, command = folder / "by_hand.ic", f"amplitude = {amplitude} rad/s, frequency = {frequency} Hz"
+        by_hand.write_text(deck.read_text().replace("amplitude = 0.05 rad/s, frequency = 0.5 Hz", command))
+        assert cli.main(["fit", str(by_hand), *arguments[2:], "--motion", "wide"]) == cli.YES
+        (errors,) = json.loads(capsys.readouterr().out)["motions"].values()
+        worst[settings] = max(error / start for error, start in zip(errors, starts, strict=True))
+    assert tuple(chosen["set"]) == min(worst, key=lambda each: worst[each])
+    largest = max(error / start for error, start in zip(best, starts, strict=True))
+    assert largest == pytest.approx(min(worst.values()), 0.02)
+    amplitude, frequency = (each.rpartition("=")[2] for each in chosen["set"])
+    assert f"sine(amplitude = {amplitude}, frequency = {frequency})" in copy.read_text()
+    settings = [word for each in chosen["set"] for word in ("--set", each)]
+    assert cli.main(["run", str(deck), "wide", *settings, "-q", "--no-picture", "-o", f"{folder}/w.h5"]) == cli.YES
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--motion", "steps"), "`steps` varies `rates.dynamics`, which decides the program"),
+        (("--motion", "masses"), "`masses` varies `mass`, which is estimated"),
+        (("--motion", "far"), "no case of `far` ends within limits and requirements"),
+        (("--motion", "wide", "--write"), "--identifiable writes the best motion of one sweep"),
+        (("--motion", "same", "--write"), "with this motion, `work` is no longer the run of its log"),
+    ],
+)
+def test_sweeps_that_are_no_choice_of_motions_are_refused(
+    folder: Path, capsys: Say, options: tuple[str, ...], message: str
+) -> None:
+    deck = folder / "moves.ic"
+    deck.write_text(DECK + SWEEP)
+    assert cli.main(["fit", str(deck), f"{folder}/log.csv", *TOLD, *options]) == cli.BAD_INPUT
+    assert message in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_what_a_log_cannot_tell_is_said_and_not_written(folder: Path, capsys: Say) -> None:
     arguments = ["fit", f"{folder}/deck.ic", f"{folder}/log.csv", "--set", "duration=0.3 s"]
