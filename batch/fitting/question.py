@@ -242,7 +242,7 @@ def _start(path: str, runs: Sequence[GivenRun]) -> tuple[float, str]:
     found = {run.name: next(explanations_of(run.compiled, path), None) for run in runs}
     values = {name: each.value for name, each in found.items() if each is not None}
     if not values:
-        owner.vary({path: (0.0, "1")})  # which says what is wrong with it
+        _check_varies(path, (0.0, "1"), owner)
     if not values or not all(isinstance(each, float) for each in values.values()):
         helps = f"`met explain {owner.deck.file} {path}` shows it" if values else "`met explain` lists numbers"
         raise _wrong(f"`{path}` is no number, and a fit moves numbers", helps)
@@ -257,9 +257,14 @@ def _check_varies(path: str, start: tuple[float, str], run: GivenRun) -> None:
     try:
         run.vary({path: start})
     except Problem as problem:
+        first = problem.diagnostics[0]
         if any(each.code == "E434" for each in problem.diagnostics):
             raise _wrong(f"`{path}` decides the program, and a fit moves numbers of one", "leave it out") from None
-        raise
+        if f"`{path}`" in first.message:
+            raise Problem(error(first.code, first.message, help=first.help)) from None
+        parts = [each for each in run.experiment.parameters if each.startswith(f"{path}.")]
+        helps = f"it has {', '.join(f'`{each}`' for each in parts[:6])}" if parts else "`met explain` lists numbers"
+        raise _wrong(f"`{path}` is no number, and a fit moves numbers", helps) from None
 
 
 def _prior(text: str, starts: Mapping[str, tuple[float, str]]) -> tuple[str, Prior]:
