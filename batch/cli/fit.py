@@ -7,9 +7,19 @@ from typing import Any
 import click
 
 from batch.cli.best import tell
-from batch.cli.residuals import log_options
+from batch.cli.instant import Instant
+from batch.cli.residuals import column_option
 from met.cli import NO, YES, deck_options, format_option
 from met.settings import varies
+
+
+class LogInstant(Instant):
+    """An instant of a log: its file, "" for any log, and s."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read `LOG=TIME` or `TIME`."""
+        log, _, instant = value.rpartition("=")
+        return log, super().convert(instant, param, ctx)
 
 
 @click.command(short_help="Estimate numbers of a deck from logs of the real arm.")
@@ -21,7 +31,8 @@ from met.settings import varies
     multiple=True,
     required=True,
     metavar="PATH",
-    help="Estimate this number, by a path that `vary` can name: 'links.jib.mass', 'links.*.mass'; may be repeated.",
+    help="Estimate this number, by a path that `vary` can name: 'links.jib.mass', 'links.*.mass', or the time "
+    "by which a log is late: 'delay of log.csv'; may be repeated.",
 )
 @click.option(
     "--prior",
@@ -55,7 +66,16 @@ from met.settings import varies
 @click.option(
     "-o", "output", metavar="FILE", help="With --diff or --write: a new file, for a changed copy of the deck."
 )
-@log_options
+@column_option
+@click.option(
+    "--zero",
+    "zeros",
+    type=LogInstant(),
+    multiple=True,
+    metavar="[LOG=]TIME",
+    help="The time of the logs, or of this one, at which its run begins: '12.5 s'; 'log.csv=4 ms' of one that is 4 ms "
+    "late; may be repeated.  [0 s]",
+)
 @deck_options
 @format_option
 def fit(
@@ -121,7 +141,7 @@ def fit(
     bar.begin(f"fit of {question.runs[0].given.name}", 0)
     answer = question.answer(bar.advance)
     bar.end()
-    certain = shown.is_certain(answer)
+    certain = shown.is_certain(question, answer)
     lines = list(shown.fit_lines(question, answer))
     if certain:
         lines += ["", *shown.sweep_lines(question, answer)]

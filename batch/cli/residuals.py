@@ -14,15 +14,8 @@ from met.messages.visible import line, say
 Face = TypeVar("Face", bound=Callable[..., Any])
 
 
-def log_options(face: Face) -> Face:
-    """The options of commands that read a log: --column and --zero, passed as `columns` and `zero`."""
-    face = click.option(
-        "--zero",
-        type=Instant(),
-        default="0 s",
-        metavar="TIME",
-        help="The log's time at which the run begins: '12.5 s'; of a log that is 4 ms late, '4 ms'.  [0 s]",
-    )(face)
+def column_option(face: Face) -> Face:
+    """The option --column of commands that read a log, passed as `columns`."""
     return click.option(
         "--column",
         "columns",
@@ -41,7 +34,14 @@ def log_options(face: Face) -> Face:
 @click.option(
     "--picture", metavar="FILE", help="Draw each channel as measured and computed, and the rest: .png, .svg or .pdf."
 )
-@log_options
+@column_option
+@click.option(
+    "--zero",
+    type=Instant(),
+    default="0 s",
+    metavar="TIME",
+    help="The log's time at which the run begins: '12.5 s'; of a log that is 4 ms late, '4 ms'.  [0 s]",
+)
 @format_option
 def residuals(
     archive: str,

@@ -25,6 +25,10 @@ MOST_BYTES = 2**29
 """Largest size of the histories that are in memory at once."""
 
 
+DELAY, LATEST = "delay of ", 0.1
+"""What stands before a log's name in the path of its delay, s: by how much its times are late; and the largest delay of
+either sign that is estimated."""
+
 STRETCHES = 24
 """Least number of stretches of logs by which intervals are judged."""
 
@@ -34,8 +38,10 @@ class LoggedRun:
     """A run beside a log of the real arm.
 
     given    the run;  file: of the log;  log: its signals
-    paths    the parameters that get values; of these the run depends on those of `varied` alone
+    paths    the parameters that get values; of these the run depends on those of `varied` alone, and the log's times
+             on its delay
     fixed    values of other parameters of `varied`, SI, by path
+    zero     the time in the file at which the run begins, s
     """
 
     given: GivenRun
@@ -44,6 +50,7 @@ class LoggedRun:
     paths: tuple[str, ...]
     varied: VariedRun
     fixed: Mapping[str, float] = field(default_factory=dict)
+    zero: float = 0.0
 
     @classmethod
     def read(
@@ -62,8 +69,8 @@ class LoggedRun:
         Raises Problem for a log that does not fit beside the run (E478), and for a parameter that cannot vary.
         """
         log = read_log(file, described_columns(given.experiment), mapped, zero)
-        varied, _ = given.vary_most(starts)
-        logged = cls(given, file, log, tuple(starts), varied)
+        varied, _ = given.vary_most(_of_deck(starts))
+        logged = cls(given, file, log, tuple(starts), varied, zero=zero)
         if not len(logged.measured):
             message = f"no number of `{file}` has one of the run beside it"
             raise Problem(error("E478", message, log.head, help="let its times begin where the run begins, at 0 s"))
@@ -87,7 +94,7 @@ class LoggedRun:
         """
         coordinates = sweep.cases.coordinates
         further = {each.path: (float(each.values[0]), given.unit(each.path) or "1") for each in coordinates}
-        varied, _ = given.vary_most({**starts, **further})
+        varied, _ = given.vary_most({**_of_deck(starts), **further})
         first, found = cls(given, sweep.name, MeasuredSignals({}, [], []), tuple(starts), varied), []
         for number in range(sweep.cases.count):
             fixed = {each.path: float(each.values[number]) for each in coordinates}
@@ -144,12 +151,12 @@ class LoggedRun:
     @cached_property
     def _rows(self) -> list[np.ndarray]:
         """By channel, the log's instants that are fitted, as positions."""
-        last = self._times[-1]
-        usable = []
+        first = LATEST if DELAY + self.file in self.paths else 0.0
+        last, usable = self._times[-1] - first, []
         for channel in self.channels:
             instants, measured = self.log.signals[channel]
             with np.errstate(invalid="ignore"):
-                usable.append(np.flatnonzero((instants >= 0.0) & (instants <= last) & (np.abs(measured) <= LARGEST)))
+                usable.append(np.flatnonzero((instants >= first) & (instants <= last) & (np.abs(measured) <= LARGEST)))
         every = -(-sum(map(len, usable)) // MOST_NUMBERS)
         return [rows[:: max(1, every)] for rows in usable]
 
@@ -194,23 +201,33 @@ class LoggedRun:
         values  of `paths`, SI, [case, path]
         """
         out = np.full((len(values), len(self.measured)), np.nan)
-        own = self.inputs(values)
-        refused = self.varied.broken(dict(zip(self.used, own.T, strict=True)), len(own))
-        rows = np.flatnonzero(~refused)
+        own, delays = self.inputs(values), self._delays(values)
+        rows = np.flatnonzero(~self.refused(values))
         many = max(1, MOST_BYTES // max(1, self.given.experiment.structure.history_bytes))
         for first in range(0, len(rows), many):
             some = rows[first : first + many]
-            out[some] = self._at_instants(self._histories(own[some]))
+            for row, history in zip(some, self._histories(own[some]), strict=True):
+                out[row] = self._at_instants(history, float(delays[row]))
         return out
+
+    def refused(self, values: np.ndarray) -> np.ndarray:
+        """Whether a value is one that its parameter cannot have, [case]. values: of `paths`, SI, [case, path]"""
+        broken = self.varied.broken(dict(zip(self.used, self.inputs(values).T, strict=True)), len(values))
+        return np.asarray(broken | (np.abs(self._delays(values)) > LATEST))
+
+    def _delays(self, values: np.ndarray) -> np.ndarray:
+        """By how much the log is late, s, [case]. values: of `paths`, SI, [case, path]"""
+        path = DELAY + self.file
+        return values[:, self.paths.index(path)] if path in self.paths else np.zeros(len(values))
 
     def courses(self, values: np.ndarray) -> dict[str, ComputedChannel]:
         """What one case computes, by channel. values: of `paths`, SI, [path]"""
         history = self._histories(self.inputs(values[None, :]))[0]
-        courses = {}
+        courses, times = {}, self._times + self._delays(values[None, :])[0]
         for column, each in enumerate(self.columns):
             finite = np.isfinite(history[:, column])
             if finite.any():
-                courses[each["channel"]] = ComputedChannel(self._times[finite], history[finite, column])
+                courses[each["channel"]] = ComputedChannel(times[finite], history[finite, column])
         return courses
 
     def cause(self, values: np.ndarray) -> str:
@@ -234,19 +251,32 @@ class LoggedRun:
         signals = [recorded.name for recorded in self.given.experiment.structure.record]
         return np.concatenate([found.signals[each].reshape(len(own), len(found.time), -1) for each in signals], axis=2)
 
-    def _at_instants(self, histories: np.ndarray) -> np.ndarray:
-        low, share, column = self._between
-        return (1.0 - share) * histories[:, low, column] + share * histories[:, low + 1, column]
+    def _at_instants(self, history: np.ndarray, delay: float) -> np.ndarray:
+        """The numbers of a history, [row, column], at the log's instants less a delay, s, [number]."""
+        low, share = self._between if delay == 0.0 else self._between_rows(delay)
+        return np.asarray((1.0 - share) * history[low, self._column] + share * history[low + 1, self._column])
 
     @cached_property
-    def _between(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of each number: the recorded row before its instant, its share of the way to the next, and its column."""
-        times = self._times
-        low = np.clip(np.searchsorted(times, self.instants, side="right") - 1, 0, len(times) - 2)
-        share = (self.instants - times[low]) / (times[low + 1] - times[low])
+    def _between(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._between_rows(0.0)
+
+    def _between_rows(self, delay: float) -> tuple[np.ndarray, np.ndarray]:
+        """Of each number: the recorded row before its instant less the delay, s, and its share of the way to the next
+        row."""
+        times, instants = self._times, self.instants - delay
+        low = np.clip(np.searchsorted(times, instants, side="right") - 1, 0, len(times) - 2)
+        return low, (instants - times[low]) / (times[low + 1] - times[low])
+
+    @cached_property
+    def _column(self) -> np.ndarray:
+        """The column of each number in a history, [number]."""
         names = [each["channel"] for each in self.columns]
-        column = np.array([names.index(channel) for channel in self.channels], dtype=np.int64)[self.channel_of]
-        return low, share, column
+        return np.array([names.index(channel) for channel in self.channels], dtype=np.int64)[self.channel_of]
+
+
+def _of_deck(starts: Mapping[str, tuple[float, str]]) -> dict[str, tuple[float, str]]:
+    """The parameters that are none of a log."""
+    return {path: each for path, each in starts.items() if not path.startswith(DELAY)}
 
 
 @frozen
@@ -296,5 +326,5 @@ class LoggedRuns:
         """Whether a value is one that its parameter cannot have, [case]. values: SI, [case, path]"""
         found = np.zeros(len(values), dtype=bool)
         for each in self.runs:
-            found |= each.varied.broken(dict(zip(each.used, each.inputs(values).T, strict=True)), len(values))
+            found |= each.refused(values)
         return found

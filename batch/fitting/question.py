@@ -13,7 +13,7 @@ import numpy as np
 
 from batch.fitting.estimate import Fit, Fitter, Prior, noise_of
 from batch.fitting.known import Known, known
-from batch.fitting.logged import LoggedRun, LoggedRuns
+from batch.fitting.logged import DELAY, LoggedRun, LoggedRuns
 from batch.measured.log import mapped_column
 from batch.measured.residuals import Comparison, compare
 from ic.driver.explain import explanations_of
@@ -149,15 +149,16 @@ def fit_question(
     include_dirs: Sequence[str] = (),
     settings: Sequence[str] = (),
     columns: Sequence[str] = (),
-    zero: float = 0.0,
+    zeros: Sequence[tuple[str, float]] = (),
 ) -> FitQuestion:
     """Read a deck and logs.
 
     logs, predict  files, each with its run before it where there are several: `slow=slow.csv`
-    estimates      paths as `--set` takes them; `links.*.mass` is of all links
+    estimates      paths as `--set` takes them; `links.*.mass` is of all links; `delay of LOG` is of a log's times
     motions        names of runs that might be logged, too, or of sweeps over such motions
     priors         `PATH=normal(MEAN, DEVIATION) UNIT`
-    columns, zero  of the logs: `CHANNEL=[FACTOR *] COLUMN [UNIT]`, and the time at which the runs begin, s
+    columns        of the logs: `CHANNEL=[FACTOR *] COLUMN [UNIT]`
+    zeros          the time at which the run of a log begins, s, by the log's file; by "" of all others
 
     Raises Problem for mistakes in these.
     """
@@ -169,12 +170,18 @@ def fit_question(
     swept = [swept_run(deck, each, include_dirs=include_dirs, defines=defines, settings=settings) for each in motions]
     first = runs[pairs[0][0]]
     every = [*runs.values(), *(run for run, _ in swept)]
-    paths = _paths(estimates, every)
-    starts = {path: _start(path, every) for path in paths}
+    delays = [DELAY + log for _, log in pairs[: len(logs)]]
+    paths = _paths(estimates, every, delays)
+    begins = dict(zeros)
+    named = [path.removeprefix(DELAY) for path in (*begins, *paths) if path in begins or path.startswith(DELAY)]
+    unknown = next((each for each in named if each and each not in [log for _, log in pairs]), None)
+    if unknown is not None:
+        raise _wrong(f"`{unknown}` is no log of this command", "name it as it stands there")
+    starts = {path: (0.0, "s") if path in delays else _start(path, every) for path in paths}
     mapped = [mapped_column(each) for each in columns]
-    read = [LoggedRun.read(runs[run], log, starts, mapped, zero) for run, log in pairs]
+    read = [LoggedRun.read(runs[run], log, starts, mapped, begins.get(log, begins.get("", 0.0))) for run, log in pairs]
     for path in paths:
-        if not any(path in each.used for each in read[: len(logs)]):
+        if path not in delays and not any(path in each.used for each in read[: len(logs)]):
             _check_varies(path, starts[path], first)
             raise _wrong(f"`{path}` has no effect in a run that has a log", "leave it out")
     given = [_prior(each, starts) for each in priors]
@@ -189,7 +196,7 @@ def fit_question(
         tuple(_motion(run, sweep, starts, start, measured) for run, sweep in swept),
         tuple(paths),
         start,
-        tuple(_owner(path, every).written_in(path)[0] for path in paths),
+        tuple("s" if path in delays else _owner(path, every).written_in(path)[0] for path in paths),
         tuple(unit for _, unit in starts.values()),
         dict(given),
     )
@@ -218,13 +225,14 @@ def _run_and_log(text: str) -> tuple[str | None, str]:
     return (run, log) if equal and run.isidentifier() and not Path(text).exists() else (None, text)
 
 
-def _paths(estimates: Sequence[str], runs: Sequence[GivenRun]) -> list[str]:
-    """Paths without wildcards, each once."""
+def _paths(estimates: Sequence[str], runs: Sequence[GivenRun], delays: Sequence[str]) -> list[str]:
+    """Paths without wildcards, each once. delays: those of logs"""
     found = []
     for each in estimates:
         matching = [each]
         if any(letter in each for letter in "*?["):
-            matching = [path for run in runs for path in run.experiment.parameters if fnmatchcase(path, each)]
+            known = [*delays, *(path for run in runs for path in run.experiment.parameters)]
+            matching = [path for path in known if fnmatchcase(path, each)]
             if not matching:
                 raise _wrong(f"no parameter of `{runs[0].name}` is like `{each}`", "`met explain` lists them")
         found += matching

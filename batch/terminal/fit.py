@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from batch.fitting.known import Known, correlated
+from batch.fitting.logged import DELAY, LoggedRun
 from batch.fitting.question import FitAnswer, FitQuestion, Promise
 from batch.measured.residuals import Comparison
 from batch.queries.summary import finite
@@ -38,6 +39,9 @@ SHOWN, MOST_PARTS = 3, 6
 REMOVED = 0.5
 """Share of a channel's residual below which a fit has removed what made it doubtful."""
 
+MOST_UNLIKE = 2.0
+"""Largest ratio of the delays of channels that are those of one log."""
+
 DRAWN_APART = 0.7
 """Correlation of errors from which on independent draws are too wide, by 1.4 times."""
 
@@ -60,6 +64,8 @@ def written_values(question: FitQuestion, answer: FitAnswer) -> list[FittedValue
     logs = ", ".join(Path(each.file).name for each in question.runs)
     found = []
     for place, path in enumerate(question.paths):
+        if path.startswith(DELAY):
+            continue
         unit, half = question.units[place], float(answer.fit.factor * answer.fit.deviation[place])
         value = dataclasses.replace(rounded(float(answer.fit.values[place]), half / 10.0, unit), path=path)
         interval = f", +- {_short(half, unit)}" if math.isfinite(half) else ""
@@ -152,18 +158,20 @@ def fit_lines(question: FitQuestion, answer: FitAnswer) -> Iterator[str]:
             for path, value, unit in zip(question.paths, fit.rival.tolist(), question.units, strict=True)
         ]
         yield f"  doubt: other values explain the logs as well: {', '.join(texts)}"
-    for run, before, after in zip(question.runs, answer.before, answer.after, strict=True):
+    doubts = _all_doubts(question, answer)
+    for run, before, after, own in zip(question.runs, answer.before, answer.after, doubts, strict=True):
         yield ""
-        yield from _residual_lines(f"Residuals of {run.file}", before, after)
+        yield from _residual_lines(f"Residuals of {run.file}", before, after, own)
     for run, (before, after) in zip(question.predicted, answer.predicted, strict=True):
         yield ""
-        yield from _residual_lines(f"Predicted, and not fitted: {run.file}", before, after)
+        yield from _residual_lines(f"Predicted, and not fitted: {run.file}", before, after, _doubts(before, after))
 
 
 def sweep_lines(question: FitQuestion, answer: FitAnswer, count: int = 200) -> Iterator[str]:
     """A sweep over what is known of the fitted parameters, for the deck, in lines; none where all are at their limits,
     or errors go together so much that independent draws would be of arms that the logs exclude."""
-    free = [place for place in range(len(question.paths)) if not answer.fit.at_limit[place]]
+    limited = answer.fit.at_limit
+    free = [place for place, path in enumerate(question.paths) if not (limited[place] or path.startswith(DELAY))]
     if not free:
         return
     if pairs := correlated(answer.fit.covariance, question.paths, answer.known, DRAWN_APART):
@@ -207,8 +215,8 @@ def as_data(question: FitQuestion, answer: FitAnswer) -> dict[str, Any]:
         for place, path in enumerate(question.paths)
     ]
     data: dict[str, Any] = {
-        "certain": is_certain(answer),
-        "doubts": [line.strip() for pair in zip(answer.before, answer.after, strict=True) for line in _doubts(*pair)],
+        "certain": is_certain(question, answer),
+        "doubts": [line.strip() for each in _all_doubts(question, answer) for line in each],
         "parameters": parameters,
         "covariance": fit.covariance.tolist(),
         "converged": fit.converged,
@@ -285,7 +293,7 @@ def _together(question: FitQuestion, found: Known) -> Iterator[str]:
         yield f"  doubt: {len(found.together) - SHOWN} more such changes leave no mark: estimate fewer numbers"
 
 
-def _residual_lines(title: str, before: Comparison, after: Comparison) -> Iterator[str]:
+def _residual_lines(title: str, before: Comparison, after: Comparison, doubts: Sequence[str]) -> Iterator[str]:
     earlier = {each.channel: each for each in before.residuals}
     rows = [[title, "before", "after", "", "of spread", "", "what is left follows"]]
     for each in after.residuals:
@@ -297,7 +305,7 @@ def _residual_lines(title: str, before: Comparison, after: Comparison) -> Iterat
         first = "" if was is None else f"{was.rms:.3g}"
         rows.append([f"  {each.channel}", first, f"{each.rms:.3g}", unit, share, white, follows])
     yield from columns(rows, right=(1, 2, 4))
-    yield from dict.fromkeys([*_doubts(before, after), *note_lines(after)])
+    yield from dict.fromkeys([*doubts, *note_lines(after)])
 
 
 def _deck_value(question: FitQuestion, place: int) -> str:
@@ -318,10 +326,34 @@ def _doubts(before: Comparison, after: Comparison) -> list[str]:
     return list(found.values())
 
 
-def is_certain(answer: FitAnswer) -> bool:
+def _late_doubt(run: LoggedRun, path: str, delay: float, after: Comparison) -> list[str]:
+    """A doubt about a log that is late by as much in most channels after a fit. path, delay: of its delay, and the
+    fitted one, s"""
+    first = [each.explained[0] for each in after.residuals if each.explained]
+    sizes = [each.size for each in first if each.means == "a delay" and each.size is not None]
+    if 2 * len(sizes) <= len(after.residuals) or min(sizes) * max(sizes) <= 0.0:
+        return []
+    if max(map(abs, sizes)) > MOST_UNLIKE * min(map(abs, sizes)):
+        return []
+    late = float(np.median(sizes))
+    zero = quoted(f"{run.file}={run.zero + delay + late:.4g} s")
+    words = f"{abs(late):.3g} s {'late' if late > 0.0 else 'early'}"
+    return [f"  doubt: the log seems {words}: `--zero {zero}` begins so, and `--estimate {quoted(path)}` fits it"]
+
+
+def _all_doubts(question: FitQuestion, answer: FitAnswer) -> list[list[str]]:
+    """The reasons to doubt each log that is fitted, as lines."""
+    delays, found = dict(zip(question.paths, answer.fit.values.tolist(), strict=True)), []
+    for run, before, after in zip(question.runs, answer.before, answer.after, strict=True):
+        path = DELAY + run.file
+        found.append([*_doubts(before, after), *_late_doubt(run, path, delays.get(path, 0.0), after)])
+    return found
+
+
+def is_certain(question: FitQuestion, answer: FitAnswer) -> bool:
     """Whether all numbers are known, the only ones, and of logs without a doubt."""
     known = set(answer.known.verdict) == {"known"} and answer.fit.converged and answer.fit.rival is None
-    return known and not any(map(_doubts, answer.before, answer.after))
+    return known and not any(_all_doubts(question, answer))
 
 
 def _short(si: float, unit: str) -> str:

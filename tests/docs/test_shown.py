@@ -18,7 +18,7 @@ from tests.docs.pages import Page, differs
         ("best", 5),
         ("coupled", 3),
         ("evidence", 2),
-        ("fit", 8),
+        ("fit", 9),
         ("linear", 15),
         ("residuals", 6),
         ("search", 8),

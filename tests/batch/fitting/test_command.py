@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +82,45 @@ def test_numbers_of_the_arm_are_within_their_intervals(
     assert found["certain"] and not found["doubts"]
     (comparison,) = found["logs"]
     assert all(each["white"] for each in comparison["after"]["residuals"])
+
+
+@pytest.fixture(scope="module")
+def late(folder: Path) -> Path:
+    """The log of `folder` with times that are 15 ms late."""
+    rows = np.loadtxt(folder / "log.csv", delimiter=",", skiprows=1)
+    rows[:, 0] += 0.015
+    write(folder / "late.csv", "time [s],hinge.q [rad],hinge.servo.motor_torque [N*m]", rows)
+    return folder / "late.csv"
+
+
+@pytest.mark.slow
+def test_a_delay_of_a_log_is_doubted_and_the_remedy_that_is_printed_mends_it(
+    folder: Path, late: Path, capsys: Say
+) -> None:
+    arguments = ["fit", f"{folder}/deck.ic", str(late), "--estimate", "mass", "--estimate", "drive.f_c", "--diff"]
+    assert cli.main(arguments) == cli.NO
+    said = capsys.readouterr().out
+    words = re.search(
+        r"doubt: the log seems (\S+) s late: `(--zero \S+ s)'` begins so, and `(--estimate .*)` fits it", said
+    )
+    assert words is not None and float(words[1]) == pytest.approx(0.015, abs=0.002)
+    assert cli.main([*arguments, *shlex.split(f"{words[2]}'")]) == cli.YES
+    assert "doubt" not in capsys.readouterr().out
+    assert cli.main([*arguments, *shlex.split(words[3]), "--format", "json"]) == cli.YES
+    found = json.loads(capsys.readouterr().out)
+    for each, truth in zip(found["parameters"], (26.0, 0.03, 0.015), strict=True):
+        assert each["known"] == "known" and abs(each["fitted"] - truth) <= 1.5 * each["half_interval"]
+    assert not any("delay" in line for line in found["deck"]["diff"])
+
+
+@pytest.mark.slow
+def test_zero_may_be_of_one_of_several_logs(folder: Path, late: Path, capsys: Say) -> None:
+    arguments = ["fit", f"{folder}/deck.ic", f"{folder}/log.csv", str(late), "--estimate", "mass", "--format", "json"]
+    arguments += ["--estimate", "drive.f_c", "--zero", "0 s", "--zero"]
+    assert cli.main([*arguments, f"{late}=15 ms"]) == cli.YES
+    found = json.loads(capsys.readouterr().out)
+    assert all(each["white"] for log in found["logs"] for each in log["after"]["residuals"])
+    assert cli.main([*arguments, f"{folder}/log.csv=15 ms"]) == cli.NO
 
 
 @pytest.mark.slow
@@ -227,6 +268,9 @@ def test_what_a_log_cannot_tell_is_said_and_not_written(folder: Path, capsys: Sa
         (("--estimate", "mass", *("--prior", "mass=normal(20, 1) kg") * 2), "`mass` has two priors"),
         (("--estimate", "links.bar.com"), "`links.bar.com`"),
         (("--estimate", "mass", "--zero", "9 s"), "has one of the run beside it"),
+        (("--estimate", "mass", "--zero", "other.csv=9 s"), "`other.csv` is no log of this command"),
+        (("--estimate", "mass", "--zero", "late"), "`late` is no instant"),
+        (("--estimate", "delay of other.csv"), "`other.csv` is no log of this command"),
         (("--estimate", "mass", "--column", "hinge.q"), "is no column of a log for a channel"),
         (("--estimate", "mass", "--column", "hinge.w=hinge.q"), "does not record `hinge.w`"),
         (("--estimate", "mass", "--column", "time=-time"), "times of `time` would fall"),

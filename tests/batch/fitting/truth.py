@@ -1,6 +1,7 @@
 """Do intervals of fits hold the truth? Made arms, whose numbers are known, are logged with noise and fitted.
 
 python -m tests.batch.fitting.truth FIRST LAST     arms FIRST to LAST - 1: what was missed, and shares by kind
+python -m tests.batch.fitting.truth FIRST LAST late     the same with logs that are late, whose delay is estimated
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import batch
+from batch.fitting.logged import DELAY
 from batch.fitting.question import fit_question
 from batch.modules.description import described_columns
 from ic.driver.explain import explanations_of
@@ -48,11 +50,14 @@ def deck(draw: np.random.Generator, joints: int) -> str:
     return "\n".join(lines)
 
 
-def write_log(path: Path, sim: batch.Simulation, truth: dict[str, float], draw: np.random.Generator) -> bool:
-    """Log a run with noise, and half of all logs in steps; False where the run fails."""
+def write_log(
+    path: Path, sim: batch.Simulation, truth: dict[str, float], draw: np.random.Generator, delay: float = 0.0
+) -> bool:
+    """Log a run with noise, and half of all logs in steps; False where the run fails. delay: by how much it is late,
+    s"""
     data = sim.run(truth, histories=True)
     noise, steps = float(draw.choice([0.002, 0.01, 0.03])), draw.random() < 0.5
-    heads, columns = ["time [s]"], [data.time.values]
+    heads, columns = ["time [s]"], [data.time.values + delay]
     recorded = described_columns(sim.experiment)
     for signal in dict.fromkeys(each["signal"] for each in recorded):
         values = data[signal].values[0].reshape(len(data.time), -1)
@@ -66,7 +71,7 @@ def write_log(path: Path, sim: batch.Simulation, truth: dict[str, float], draw: 
     return int(data.status[0]) == 0
 
 
-def main(first: int, last: int) -> None:
+def main(first: int, last: int, late: bool) -> None:
     held, missed, unsure = Counter[str](), Counter[str](), 0
     for seed in range(first, last):
         draw = np.random.default_rng(seed)
@@ -83,8 +88,12 @@ def main(first: int, last: int) -> None:
                 (value, *_) = (each.value for each in explanations_of(compiled, name))
                 assert isinstance(value, float)
                 truth[name] = value * float(draw.uniform(0.7, 1.4)) if name != "payload" else draw.uniform(0.5, 5.0)
-            if not write_log(log, batch.Simulation(path), truth, draw):
+            delay = draw.uniform(-0.05, 0.05) if late else 0.0
+            if not write_log(log, batch.Simulation(path), truth, draw, delay):
                 continue
+            if late:
+                names.append(f"{DELAY}{log}")
+                truth[names[-1]] = delay
             answer = fit_question(str(path), [str(log)], names).answer(lambda _: None)
         fit = answer.fit
         if not fit.converged or fit.rival is not None or set(answer.known.verdict) != {"known"}:
@@ -93,7 +102,8 @@ def main(first: int, last: int) -> None:
             continue
         for name, value, deviation in zip(names, fit.values, fit.deviation, strict=True):
             off = abs(value - truth[name]) / (fit.factor * deviation)
-            (held if off <= 1.0 else missed)[name.rpartition(".")[2]] += 1
+            kind = "delay" if name.startswith(DELAY) else name.rpartition(".")[2]
+            (held if off <= 1.0 else missed)[kind] += 1
             if off > 1.0:
                 print(f"arm {seed}: {name} is off by {off:.2f} half intervals", flush=True)
     for kind in sorted(held | missed):
@@ -102,4 +112,4 @@ def main(first: int, last: int) -> None:
 
 
 if __name__ == "__main__":
-    main(*(int(each) for each in sys.argv[1:3]))
+    main(*(int(each) for each in sys.argv[1:3]), late=sys.argv[3:] == ["late"])
