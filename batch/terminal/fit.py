@@ -39,6 +39,9 @@ SHOWN, MOST_PARTS = 3, 6
 REMOVED = 0.5
 """Share of a channel's residual below which a fit has removed what made it doubtful."""
 
+MOST_LEFT = 0.3
+"""Largest median of what a fit leaves of signals that is no noise, in their spreads, without a doubt."""
+
 MOST_UNLIKE = 2.0
 """Largest ratio of the delays of channels that are those of one log."""
 
@@ -345,8 +348,12 @@ def _all_doubts(question: FitQuestion, answer: FitAnswer) -> list[list[str]]:
     """The reasons to doubt each log that is fitted, as lines."""
     delays, found = dict(zip(question.paths, answer.fit.values.tolist(), strict=True)), []
     for run, before, after in zip(question.runs, answer.before, answer.after, strict=True):
-        path = DELAY + run.file
-        found.append([*_doubts(before, after), *_late_doubt(run, path, delays.get(path, 0.0), after)])
+        path, doubts = DELAY + run.file, _doubts(before, after)
+        left = [each.rms / each.spread for each in after.residuals if each.white is False and each.spread]
+        if 2 * len(left) > len(after.residuals) and not doubts and np.median(left) > MOST_LEFT:
+            words = f"the fit leaves {np.median(left):.2g} of what was measured in most channels"
+            doubts.append(f"  doubt: {words}: is the log of this run, and of an arm like this?")
+        found.append([*doubts, *_late_doubt(run, path, delays.get(path, 0.0), after)])
     return found
 
 

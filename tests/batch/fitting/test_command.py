@@ -214,6 +214,15 @@ def test_the_best_motion_of_a_sweep_is_that_of_the_least_error_and_is_run_and_wr
 
 
 @pytest.mark.slow
+def test_a_fit_that_leaves_most_of_what_was_measured_is_doubted(folder: Path, capsys: Say) -> None:
+    arguments = ["fit", f"{folder}/deck.ic", f"{folder}/log.csv", "--estimate", "mass", "--estimate", "drive.f_c"]
+    assert cli.main([*arguments, "--set", "drive.command.amplitude=0.02 rad/s", "--diff"]) == cli.NO
+    said = capsys.readouterr().out
+    assert "of what was measured in most channels: is the log of this run, and of an arm like this?" in said
+    assert "so nothing is written into the deck" in said
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "message"),
     [
