@@ -34,6 +34,8 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
     for joint in structure.joints:
         word(f"{joint.name}.parent", joint.parent, joint.place)
         word(f"{joint.name}.child", joint.child, joint.place)
+        if joint.follows:
+            word(f"{joint.name}.follows", ", ".join(joint.follows), joint.place)
     for use in structure.servos:
         word(f"{use.joint}.servo", use.definition, use.place)
         word(f"{use.joint}.servo.model", use.model, use.place)

@@ -139,7 +139,11 @@ class _Along:
             if structure.base is None:
                 yield from self._base()
         for i, (joint, actuator) in enumerate(zip(self.system.joints, self.system.actuators, strict=True)):
-            if not structure.free and not joint.follows:
+            if joint.follows:
+                leaders = " and ".join(f"`{name}`" for name in joint.follows)
+                assumed = f"follows {leaders} without play, elasticity or forces between teeth"
+                yield Assumption(f"joint `{joint.name}`", assumed)
+            elif not structure.free:
                 yield from self._drive(i, joint, actuator)
         yield from self._zeros()
 
