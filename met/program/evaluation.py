@@ -8,9 +8,10 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from met.dynamics.coupling import inertia_at, solve_coupled
+from met.dynamics.coupling import Ratios, inertia_at, solve_coupled
 from met.dynamics.linearised import tell
 from met.dynamics.recursion import Solved, solve
+from met.dynamics.spatial import is_zero
 from met.dynamics.tree import Tree
 from met.environments.environment import Environment
 from met.frozen import frozen
@@ -114,11 +115,10 @@ def derivative(
             in_torque_mode = s != 0.0
         mode.append(in_torque_mode)
         given_qdd.append(drive.qdd if drive is not None else 0.0)
-        if s is None or (leader != i and drive is None and system.joints[i].name not in loads.dry):
+        if s is None or leader != i:
             dry.append(0.0)
         else:
-            level = s * level_of(system, i, drive, loads)
-            dry.append(level if leader == i else sign(ratios[i][leader]) * level)
+            dry.append(s * group_level(system, ratios, i, drives, loads))
 
     smooth = [
         loads.torques[i] + (0.0 if drive is None or i in prescribed_qdd else drive.torque)
@@ -169,10 +169,7 @@ def derivative(
             of_states = (*of_states, *link_sensors.slopes(system, read, felt, own))
     return Derivative(
         slope=Slope((*qd, *of_payloads[0]), qdd, of_states),
-        tau=tuple(
-            a - b + _of_brakes(system, i, drives[i], loads, smooth[i] - a)
-            for i, (a, b) in enumerate(zip(solved.tau, loads.torques, strict=True))
-        ),
+        tau=_servo_torques(system, ratios, drives, loads, smooth, solved),
         need=needs | state_needs,
         solved=solved,
         shown={path: value for each in driven if each is not None for path, value in each.shown.items()},
@@ -291,8 +288,57 @@ def level_of(system: System, joint: int, drive: Drive | None, loads: _Loads) -> 
     """The level of dry friction at a joint: its servo's, and brakes'."""
     name = system.joints[joint].name
     if drive is None:
-        return loads.dry[name]
+        return loads.dry.get(name, 0.0)
     return drive.dry + loads.dry[name] if name in loads.dry else drive.dry
+
+
+def group_level(system: System, ratios: Ratios, leader: int, drives: Sequence[Drive | None], loads: _Loads) -> Real:
+    """The level of dry friction at a joint that follows none, with that of the joints that follow it alone."""
+    total = level_of(system, leader, drives[leader], loads)
+    for i, ratio in _rubbing(system, ratios, leader, drives, loads).items():
+        total = total + absolute(ratio) * level_of(system, i, drives[i], loads)
+    return total
+
+
+def _servo_torques(
+    system: System,
+    ratios: Ratios,
+    drives: Sequence[Drive | None],
+    loads: _Loads,
+    smooth: Sequence[Real],
+    solved: Solved,
+) -> tuple[Real, ...]:
+    """The torque of each joint's servo. The dry friction of a group, which the recursion has at its leader, is divided
+    in proportion to the levels of its joints."""
+    tau = [a - b for a, b in zip(solved.tau, loads.torques, strict=True)]
+    friction = [a - b for a, b in zip(smooth, solved.tau, strict=True)]
+    for leader, row in enumerate(ratios):
+        rubbing = _rubbing(system, ratios, leader, drives, loads) if leader in row else {}
+        if rubbing:
+            total, whole = group_level(system, ratios, leader, drives, loads), friction[leader]
+            for i, ratio in {leader: 1.0, **rubbing}.items():
+                friction[i] = sign(ratio) * whole * _share(level_of(system, i, drives[i], loads), total)
+                tau[i] = smooth[i] - loads.torques[i] - friction[i]
+    return tuple(
+        a + _of_brakes(system, i, drives[i], loads, b) for i, (a, b) in enumerate(zip(tau, friction, strict=True))
+    )
+
+
+def _rubbing(
+    system: System, ratios: Ratios, leader: int, drives: Sequence[Drive | None], loads: _Loads
+) -> dict[int, Real]:
+    """The joints with dry friction that follow a joint alone, by number, with their ratios."""
+    return {
+        i: row[leader]
+        for i, row in enumerate(ratios)
+        if i != leader and leader in row and len(row) == 1 and not is_zero(level_of(system, i, drives[i], loads))
+    }
+
+
+def _share(level: Real, total: Real) -> Real:
+    """level over total, 0 where there is none."""
+    has_friction = total > 0.0
+    return where(has_friction, level / where(has_friction, total, 1.0), 0.0)
 
 
 def _of_brakes(system: System, joint: int, drive: Drive | None, loads: _Loads, friction: Real) -> Real:

@@ -48,9 +48,10 @@ def sticking(system: System) -> tuple[Sticking, ...]:
         i = system.joints.index(joint)
         if own[i] != 0.0:
             leaders = _leaders(system, joint)
-            if len(leaders) > 1:
-                message = f"joint `{joint.name}` has dry friction, and follows more than one joint"
-                help = "put the friction on the joints that lead"
+            driven = [each for each in leaders if (a := system.actuators[each]) is not None and a.gives]
+            if len(leaders) > 1 or driven or leaders[0] in on_bed:
+                message = f"joint `{joint.name}` has dry friction, and no torque of one joint that leads it feels that"
+                help = "leave the friction out, or put it on the joints that lead"
                 raise Problem(error("E219", message, joint.place, help=help))
             followers[leaders[0]] = (*followers.get(leaders[0], ()), i)
     joints = []

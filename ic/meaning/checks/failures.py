@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,7 +20,7 @@ from met.analysis.probe import accelerates
 from met.diagnostic import Label, Place, leave_out
 from met.frozen import frozen
 from met.instants import has_come
-from met.plan import EnvironmentUse, Schedule, ServoUse, Substitution
+from met.plan import EnvironmentUse, Joint, ServoUse, Structure
 from met.plan.uses import quantities
 
 
@@ -38,18 +38,19 @@ def check_failures(
     scope: Scope,
     uses: Iterable[Use],
     ticks: Mapping[str, Ticks],
-    found: Iterable[Substitution],
-    environment: Sequence[EnvironmentUse],
-    schedule: Schedule,
+    structure: Structure,
 ) -> None:
     """Report models about servos that are missing, lack the affected part, or are on a bed."""
     servos = {use.joint: use for use in uses}
-    beds = {each.joint: each.place for each in found}
+    beds = {each.joint: each.place for each in structure.substitutions}
+    leaders = {joint.name: joint.follows[0] for joint in structure.moving if joint.follows}
     sound = []
-    for failure in _about(scope, environment, "servo_of"):
+    for failure in _about(scope, structure.environment, "servo_of"):
         use, model, joint, place = failure.use, failure.model, failure.joint, failure.place
         servo, continuous = servos.get(joint), joint in ticks and ticks[joint].continuous
         wrong = _wrong(scope, use, model, joint, servo, continuous=continuous)
+        if servo is None and wrong is not None and joint in leaders:
+            wrong = wrong[0], f"name joint `{leaders[joint]}`, which leads it, or leave it out", wrong[2]
         also = [Label(servo.place, "its servo")] if servo is not None else []
         if wrong is None and joint in beds and model.decoupling is not None:
             wrong = f"`{use.name}` would let go of joint `{joint}`, whose motor is on a bed", "leave it out", place
@@ -62,14 +63,25 @@ def check_failures(
             sound.append(failure)
             _check_full(scope, failure, servo)
             if not continuous:
+                schedule = structure.schedule
                 _remark_between_ticks(scope, failure, ticks[joint].divisor / schedule.base_hz, schedule.duration)
     _remark_overlaps(scope, sound)
 
 
-def check_friction(scope: Scope, uses: Iterable[Use], environment: Iterable[EnvironmentUse]) -> None:
-    """Report friction on a joint with a prescribed acceleration, where it would have no effect."""
+def check_friction(scope: Scope, uses: Iterable[Use], structure: Structure) -> None:
+    """Report friction on a joint with a prescribed acceleration, where it would have no effect, and on a joint that
+    follows such a one, one on a bed, or several."""
     servos = {use.joint: use for use in uses}
-    for failure in _about(scope, environment, "friction_joint"):
+    brakes = list(_about(scope, structure.environment, "friction_joint"))
+    rubbing = {failure.joint: failure.place for failure in brakes}
+    for joint, use in servos.items():
+        friction = scope.parameters.get(f"{joint}.servo.friction")
+        if friction is not None and friction.value != 0.0:
+            rubbing[joint] = friction.origin.place or use.place
+    for follower in structure.moving:
+        if follower.follows and follower.name in rubbing:
+            _check_follower(scope, follower, rubbing[follower.name], servos, structure)
+    for failure in brakes:
         servo = servos.get(failure.joint)
         if servo is not None and servo.parameters is not None and accelerates(servo.bare, servo.parameters):
             label = f"servo `{servo.definition}` ({servo.servo.name})"
@@ -83,6 +95,31 @@ def check_friction(scope: Scope, uses: Iterable[Use], environment: Iterable[Envi
                     failure.use.place,
                 ),
             )
+
+
+def _check_follower(
+    scope: Scope, follower: Joint, place: Place, servos: Mapping[str, Use], structure: Structure
+) -> None:
+    """Report dry friction of a follower that would not act: where no torque of its leader's feels it."""
+    joints, leaders = {joint.name: joint for joint in structure.moving}, [follower.name]
+    for name in leaders:
+        leaders += [each for each in joints[name].follows if each not in leaders]
+    leaders = [name for name in leaders if not joints[name].follows]
+    on_beds = {each.joint for each in structure.substitutions}
+    reason = "it follows more than one joint" if len(leaders) > 1 else ""
+    for name in leaders:
+        servo = servos.get(name)
+        if name in on_beds:
+            reason = f"the motor of joint `{name}`, which leads it, is on a bed"
+        elif servo is not None and servo.parameters is not None and accelerates(servo.bare, servo.parameters):
+            label = f"servo `{servo.definition}` ({servo.servo.name})"
+            reason = f"{label} tells joint `{name}`, which leads it, its acceleration"
+    if reason:
+        message = f"joint `{follower.name}` has dry friction, and {reason}"
+        helps = leave_out("leave the friction out: nothing would feel it")
+        if len(leaders) > 1:
+            helps = leave_out("put the friction on the joints that lead, and leave it out here")
+        scope.complaints.error("D213", message, place, help=helps)
 
 
 def _about(scope: Scope, environment: Iterable[EnvironmentUse], which: str) -> Iterable[ServoFailure]:

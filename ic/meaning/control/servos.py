@@ -99,7 +99,7 @@ def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[l
     for item in body.items.values():
         with scope.complaints.gather():
             use: Use | None = use_shared(scope, item, arm, _use)
-            if use is not None:
+            if use is not None and not _drives_a_follower(scope, item, arm, use):
                 uses[use.joint] = use
     moving = [joint.name for joint in arm.moving]
     failed = [item.name for item in body.items.values() if item.name not in uses]
@@ -110,6 +110,20 @@ def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[l
         if name is not None and name not in uses
     )
     return [uses[joint.name] for joint in arm.joints if joint.name in uses], lost
+
+
+def _drives_a_follower(scope: Scope, item: Item, arm: ResolvedArm, use: Use) -> bool:
+    """Return True, with an error, if a servo that drives or holds its joint is on one that follows another."""
+    leaders = next((joint.follows for joint in arm.joints if joint.name == item.name), ())
+    if not leaders or use.servo.is_passive:
+        return False
+    scope.complaints.error(
+        "D213",
+        f"joint `{item.name}` follows {leaders_in_words(leaders)}, so no `{use.servo.name}` drives it",
+        item.place,
+        help=[f"write `{leaders[0]} = ...;`: what drives that joint moves both", leave_out("leave this servo out")],
+    )
+    return True
 
 
 def _note_kinds(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> None:
@@ -170,15 +184,6 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
         return None
     servo = find_bare_model(scope, "servo", model, MODEL_NOT_COMMAND)
     if servo is None:
-        return None
-    leaders = next((joint.follows for joint in arm.joints if joint.name == item.name), ())
-    if leaders and not servo.is_passive:
-        scope.complaints.error(
-            "D213",
-            f"joint `{item.name}` follows {leaders_in_words(leaders)}, so no `{servo.name}` drives it",
-            item.place,
-            help=[f"write `{leaders[0]} = ...;`: what drives that joint moves both", leave_out("leave this servo out")],
-        )
         return None
     sensed, block = list(block.of_kind("sensor")), without_sensors(block)
     parameters = use_model(scope, owner, servo.parameters, block, NOT_PARAMETERS)

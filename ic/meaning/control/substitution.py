@@ -164,7 +164,9 @@ def _substitution(
             f"joint `{item.name}` has no servo, so it has no motor that a bed could take the place of",
             item.place,
             help=[
-                f"give it one: `servos {{ {item.name} = SERVO; }}`",
+                f"put the motor of `{leaders[0]}`, which it follows, on a bed"
+                if (leaders := next(joint.follows for joint in arm.moving if joint.name == item.name))
+                else f"give it one: `servos {{ {item.name} = SERVO; }}`",
                 known_words(
                     "joints whose servos have a motor",
                     [use.joint for use in servos.values() if models.has_motor(use.servo)],

@@ -8,6 +8,7 @@ from dataclasses import replace
 from ic.grammar.syntax import List, Name
 from ic.language.bodies import OFFSET, RATIO
 from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import value_place
 from ic.meaning.parameters.owner import Owner, Settled
 from ic.meaning.parameters.scope import Scope
@@ -34,6 +35,7 @@ def use_follows(scope: Scope, owner: Owner, body: MergedBlock, arm: MergedBlock)
                 helps = ["write `follows = JOINT;` too", leave_out(f"or leave `{name}` out")]
                 scope.complaints.error("D213", message, stray.place, help=helps)
         return ()
+    scope.not_sweepable[owner.join("follows")] = not_sweepable.COMPILED_ALONE
     kinds = {
         joint.name: joint.detail[0].text
         for joint in arm.of_kind("joint")

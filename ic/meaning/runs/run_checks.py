@@ -130,9 +130,8 @@ def _check_base(run: RunParts) -> None:
 
 
 def _check_failures(run: RunParts) -> None:
-    structure = run.structure
-    check_failures(run.scope, run.uses, run.ticks, structure.substitutions, structure.environment, structure.schedule)
-    check_friction(run.scope, run.uses, structure.environment)
+    check_failures(run.scope, run.uses, run.ticks, run.structure)
+    check_friction(run.scope, run.uses, run.structure)
 
 
 def _check_requirements(run: RunParts) -> None:

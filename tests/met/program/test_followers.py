@@ -15,6 +15,7 @@ from met.plan import Joint
 from met.plan.codec import Damaged
 from met.plan.structure import check
 from tests.ic.small_decks import changed, experiment
+from tests.ic.small_decks import check as compile_deck
 
 HINGED = """\
 arm pair {
@@ -176,19 +177,61 @@ def test_modes_of_a_group_are_those_of_its_one_coordinate(tmp_path: Path) -> Non
     np.testing.assert_allclose(run.signals["q"][0, -1, 0], 0.1 * math.cos(math.sqrt(7.0 / J) * 0.5), rtol=1e-9)
 
 
-def test_friction_of_a_joint_that_follows_two_is_refused(tmp_path: Path) -> None:
-    ball = "shape = sphere(radius = 0.1 m);"
-    more = f"""ratio = 2; }}
-    link last {{ mass = 4 kg;  {ball} }}
-    link more {{ mass = 1 kg;  {ball} }}
-    joint other prismatic {{ parent = base;  child = more;  axis = x; }}
-    joint end prismatic {{ parent = base;  child = last;  axis = x;  follows = [drive, other]; }}
-}}"""
-    rubbing = ("trail = bearing;", "trail = bearing;  end = bearing { friction = 1 N; }")
-    text = changed(CARTS, ("ratio = 2; }\n}", more), rubbing)
+TWO = changed(
+    CARTS,
+    (
+        "ratio = 2; }\n}",
+        """ratio = 2; }
+    link last { mass = 4 kg;  shape = sphere(radius = 0.1 m); }
+    link more { mass = 1 kg;  shape = sphere(radius = 0.1 m); }
+    joint other prismatic { parent = base;  child = more;  axis = x; }
+    joint end prismatic { parent = base;  child = last;  axis = x;  follows = [drive, other]; }
+}""",
+    ),
+    ("trail = bearing;", "trail = bearing;  end = bearing;"),
+)
+
+
+def test_friction_that_no_torque_of_a_leader_feels_is_refused(tmp_path: Path) -> None:
+    rubbing = ("trail = bearing;", "trail = bearing { friction = 1 N; }")
+    ideal = ("drive = bearing;", "drive = moved;")
+    moved = "servo moved { model = ideal;  bandwidth = 40 1/s;  command = rate(0.1 m/s); }\nrun roll"
+    brake = ("    rates", "    environment { hold = brake { joint = trail;  torque = 1 N; } }\n    rates")
+    ticks = ("dynamics = 1 kHz;", "dynamics = 1 kHz;  servos = 1 kHz;")
+    decks = [
+        changed(TWO, ("end = bearing;", "end = bearing { friction = 1 N; }")),
+        changed(CARTS, rubbing, ideal, ticks, ("run roll", moved)),
+        changed(CARTS, brake, ideal, ticks, ("run roll", moved)),
+    ]
+    for text in decks:
+        assert [each.code for each in compile_deck(tmp_path, text).diagnostics] == ["D213"]
+
+
+def test_an_engine_refuses_such_friction_of_a_plan(tmp_path: Path) -> None:
+    of_deck = experiment(tmp_path, TWO)
+    friction = replace(of_deck.parameters["end.servo.friction"], value=1.0)
     with pytest.raises(Problem) as problem:
-        ran(tmp_path, text)
+        engine.run(replace(of_deck, parameters={**of_deck.parameters, "end.servo.friction": friction}))
     assert [each.code for each in problem.value.diagnostics] == ["E219"]
+
+
+def test_friction_of_a_stuck_group_is_divided_by_the_levels_of_its_joints(tmp_path: Path) -> None:
+    load = "environment { push = wrench { link = first;  force = [2.4, 0, 0] N; } }\n    rates"
+    rubbing = (
+        "drive = bearing;  trail = bearing;",
+        "drive = bearing { friction = 2 N; }  trail = bearing { friction = 1 N; }",
+    )
+    run = ran(
+        tmp_path, changed(CARTS, ("    rates", f"    {load}"), rubbing, ("record = [q, qd, ", "record = [tau, q, qd, "))
+    )
+    np.testing.assert_allclose(run.signals["tau"][0], [[-1.2, -0.6]] * 51, rtol=1e-12)
+
+
+def test_a_leader_without_a_servo_feels_the_friction_of_what_follows_it(tmp_path: Path) -> None:
+    load = "environment { push = wrench { link = first;  force = [2.4, 0, 0] N; } }\n    rates"
+    rubbing = ("drive = bearing;  trail = bearing;", "trail = bearing { friction = 1 N; }")
+    run = ran(tmp_path, changed(CARTS, ("    rates", f"    {load}"), rubbing))
+    np.testing.assert_allclose(run.signals["q"][0, -1, 0], 0.4 / J * 0.125, rtol=1e-9)
 
 
 @pytest.mark.parametrize("follows", [("trail",), ("nothing",), ("drive", "drive")])
