@@ -78,8 +78,8 @@ WRONG = {
     "linear b { outputs = 3; }": "error[D375]: `outputs` is a list of signals",
     "linear b { outputs = [q, q]; }": "error[D040]: `q` is there twice",
     "linear b { opne = hinge.servo.voltage; }": "error[D141]: `linear b` has no `opne`",
-    "linear b { at = equilibrium(q = [1, 2] deg); }": "error[D375]: `q` of an equilibrium is a position of each moving "
-    "joint, 1 in all",
+    "linear b { at = equilibrium(q = [1, 2] deg); }": "error[D375]: `q` of an equilibrium is a position of each joint "
+    "that follows none, 1 in all",
     "linear b { at = equilibrium(q = 3 s); }": "error[D061]: the position of `hinge` is in rad, and this is in s",
     "linear b { at = equilibrium(p = 3 deg); }": "error[D141]: `equilibrium` of `linear b` has no `p`",
     "linear b { at = equilibrium(3 deg); }": "error[D153]: `equilibrium` takes its values by name",
