@@ -142,18 +142,23 @@ def fit(
     answer = question.answer(bar.advance)
     bar.end()
     certain = shown.is_certain(question, answer)
-    lines = list(shown.fit_lines(question, answer))
+    lines, data = list(shown.fit_lines(question, answer)), {}
+    if form == "json":
+        data = shown.as_data(question, answer)
     if certain:
         lines += ["", *shown.sweep_lines(question, answer)]
         if diff or write:
             values = shown.written_values(question, answer)
-            changed = fitted_deck(deck, values, output, experiment=question.runs[0].given.name, **given)
+            try:
+                changed = fitted_deck(deck, values, output, experiment=question.runs[0].given.name, **given)
+            except Problem:
+                tell(form, data, lines, None, asked=False, write=False)  # the numbers are not lost with the deck
+                raise
     if drawn is not None:
         run = (*question.predicted, *question.runs)[0]
         courses = {"deck": run.courses(question.start), "fitted": run.courses(answer.fit.values)}
         units = {each["channel"]: each["unit"] for each in run.columns}
         pictures.draw(run.name, pictures.panels(run.log, units, courses), drawn)
-    data = shown.as_data(question, answer) if form == "json" else {}
     tell(
         form,
         data,

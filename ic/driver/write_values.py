@@ -30,6 +30,8 @@ LONGEST = 120
 """Largest length of a line with such a comment at its end."""
 
 _COMMENTS = ("//", "/*", "*/")
+_UNIT_OF_LIST = re.compile(r"[^][{};]*\]\s*(?P<unit>[^\s;,})]+)")
+"""What follows a number in a list that has its unit behind the brackets."""
 _LITERAL = re.compile(r"[-+]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*(?P<unit>\S.*)?")
 
 
@@ -230,7 +232,11 @@ def _replaced(source: Text, place: Place, value: WrittenValue, remark: str) -> s
     last = first + place.length
     found = _LITERAL.fullmatch(text[first:last])
     own = (found["unit"] or "") if found else ""
-    return _with_remark(text[:first] + _in_unit(value, own) + text[last:], first, remark)
+    outside = None if own else _UNIT_OF_LIST.match(text, last)
+    made = _in_unit(value, outside["unit"] if outside else own)
+    if outside:
+        made = made.removesuffix(f" {outside['unit']}")
+    return _with_remark(text[:first] + made + text[last:], first, remark)
 
 
 def _in_unit(value: WrittenValue, unit: str) -> str:

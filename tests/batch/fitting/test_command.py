@@ -129,7 +129,7 @@ def test_fitted_numbers_are_written_into_the_deck_with_their_intervals(folder: P
     arguments = ["fit", f"{folder}/deck.ic", f"{folder}/log.csv", "--estimate", "mass", "--write", "-o", str(copy)]
     assert cli.main([*arguments, "--estimate", "drive.f_c"]) == cli.YES
     said = capsys.readouterr().out
-    assert "// chosen by a fit to log.csv, +- " in copy.read_text() and f"{copy}: written" in said
+    assert "// chosen by a fit to log.csv, drive.f_c +- " in copy.read_text() and f"{copy}: written" in said
     (experiment,) = ic.compile(copy).experiments
     assert experiment.parameters["links.bar.mass"].value == pytest.approx(26.0, rel=0.01)
     sweep = said[said.index("sweep fitted of work") : said.index("---")]

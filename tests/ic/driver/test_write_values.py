@@ -63,6 +63,13 @@ def refused(tmp_path: Path, *values: tuple[str, float, str], run: str = "hold") 
     return [diagnostic.message, *diagnostic.help]
 
 
+def test_a_number_of_a_list_is_replaced_in_the_unit_behind_the_brackets(tmp_path: Path) -> None:
+    text = ARM.replace("shape = rod(length = 1 m, along = x)", "com = [40, 1, 0] cm;  inertia = [1, 1, 1] kg*m^2")
+    values = (("links.rod.com.x", 0.52, "m"), ("links.rod.com.y", 0.025, "m"), ("links.rod.inertia.zz", 1.5, "kg*m^2"))
+    found = made(tmp_path, *values, text=text)
+    assert "com = [52, 2.5, 0] cm;  inertia = [1, 1, 1.5] kg*m^2;" in found.text
+
+
 def test_a_number_is_replaced_where_it_stands_in_its_own_unit(tmp_path: Path) -> None:
     found = made(tmp_path, ("base_drive.kp", 0.05, "V*s/rad"))
     assert changed(ARM, found.text) == ["    kp      = 50 mV*s/rad;     // as delivered"]
