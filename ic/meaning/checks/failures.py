@@ -76,7 +76,7 @@ def check_friction(scope: Scope, uses: Iterable[Use], structure: Structure) -> N
     rubbing = {failure.joint: failure.place for failure in brakes}
     for joint, use in servos.items():
         friction = scope.parameters.get(f"{joint}.servo.friction")
-        if friction is not None and friction.value != 0.0:
+        if friction is not None and (not isinstance(friction.value, float) or friction.value != 0.0):
             rubbing[joint] = friction.origin.place or use.place
     for follower in structure.moving:
         if follower.follows and follower.name in rubbing:

@@ -30,7 +30,8 @@ def use_follows(scope: Scope, owner: Owner, body: MergedBlock, arm: MergedBlock)
     if item is None:
         for name in ("ratio", "offset"):
             stray = body.get(name)
-            if stray is not None and not scope.definitions.robot_files.hold(stray.place):
+            freed = any(each.key == "follows" for each in body.removed)
+            if stray is not None and not freed and not scope.definitions.robot_files.hold(stray.place):
                 message = f"{owner.label} has `{name}`, and follows no joint"
                 helps = ["write `follows = JOINT;` too", leave_out(f"or leave `{name}` out")]
                 scope.complaints.error("D213", message, stray.place, help=helps)
@@ -53,11 +54,6 @@ def use_follows(scope: Scope, owner: Owner, body: MergedBlock, arm: MergedBlock)
     else:
         ratio = scope.number(owner, wanted, written)
         ratios = None if ratio is None else (ratio,)
-    if ratios is not None and any(isinstance(ratio, float) and ratio == 0.0 for ratio in ratios):
-        message = f"`ratio` of {owner.label} is 0: the joint stands still"
-        place = item.place if written is None else value_place(written)
-        scope.complaints.error("D213", message, place, help="make the joint `fixed` where it stands")
-        return None
     if scope.number(owner, OFFSET, body.get("offset")) is None or ratios is None:
         return None
     return leaders

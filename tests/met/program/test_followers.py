@@ -207,6 +207,19 @@ def test_friction_that_no_torque_of_a_leader_feels_is_refused(tmp_path: Path) ->
         assert [each.code for each in compile_deck(tmp_path, text).diagnostics] == ["D213"]
 
 
+def test_friction_of_followers_and_ratios_may_vary_and_be_zero(tmp_path: Path) -> None:
+    sweep = "sweep some of roll { vary trail.servo.friction = [0, 1] N;  vary trail.ratio = [0, 2]; }"
+    push = "environment { push = wrench { link = first;  force = [1.9, 0, 0] N; } }\n    rates"
+    run = ran(tmp_path, changed(CARTS, ("    rates", f"    {push}")) + sweep, "some")
+    ends = 1.9 * 0.125 / np.array([2.0, J, 2.0, np.inf])
+    np.testing.assert_allclose(run.signals["q"][:, -1, 0], ends, rtol=1e-9, atol=1e-15)
+
+
+def test_a_joint_of_a_like_arm_is_freed_by_the_removal_of_follows_alone(tmp_path: Path) -> None:
+    text = CARTS + "arm loose like train { trail { remove follows; } }\nrun free like roll { arm = loose; }"
+    assert experiment(tmp_path, text, select="free").structure.moving[1].follows == ()
+
+
 def test_an_engine_refuses_such_friction_of_a_plan(tmp_path: Path) -> None:
     of_deck = experiment(tmp_path, TWO)
     friction = replace(of_deck.parameters["end.servo.friction"], value=1.0)
