@@ -19,11 +19,12 @@ from met.messages.visible import say
 @click.option(
     "--mimic",
     type=click.Choice(["follow", "free", "fixed"]),
+    default="follow",
     help="Joints that follow other joints in the file: let them `follow`, as they do without this option, make them "
     "`free` to move, or `fixed` where those put them at the start.",
 )
 @loudness_options
-def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet: bool, verbose: bool) -> None:
+def import_(file: str, output: str | None, force: bool, mimic: str, quiet: bool, verbose: bool) -> None:
     """Make a deck from a URDF file: the arm with its limits, friction as comments, and runs to begin with.
 
     `met import panda.urdf -o panda.ic`, then `met run panda.ic`. A deck can also take the file as it is:

@@ -20,26 +20,26 @@ from ic.text.limits import MOST_URDF_BYTES
 from met.diagnostic import Diagnostic, Problem
 
 
-def import_robot(path: str, mimic: Treatment | None = None) -> str:
+def import_robot(path: str, mimic: Treatment = "follow") -> str:
     """The text of the deck. mimic: treatment of joints that follow others. Raises Problem, with the file's text."""
     return import_with_remarks(path, mimic)[0]
 
 
-def import_with_remarks(path: str, mimic: Treatment | None = None) -> tuple[str, list[str]]:
+def import_with_remarks(path: str, mimic: Treatment = "follow") -> tuple[str, list[str]]:
     """The text of the deck, and lines about what is not in it or doubtful. mimic: treatment of joints that follow
     others. Raises Problem, with the file's text."""
     files = Files()
     try:
         found = FoundFile(path, os.path.normpath(path))
         made = load(found.name, files.text(found, kind=KIND, most=MOST_URDF_BYTES))
-        if mimic in ("free", "fixed"):
+        if mimic != "follow":
             made = arm_entries(without_mimics(made.robot, mimic))
         made = _checked(made)
     except Problem as problem:
         sources = tuple(files.read_so_far.values())
         raise Problem(in_order(problem.diagnostics, sources), {each.name: each.text for each in sources}) from None
     (source,) = files.read_so_far.values()
-    option = f" --mimic {mimic}" if mimic in ("free", "fixed") else ""
+    option = f" --mimic {mimic}" if mimic != "follow" else ""
     name = os.path.basename(path)
     title = f"made by `met import {name}{option}` from a file with the SHA-256 {source.sha256[:16]}..."
     lines = print_deck(made, title)

@@ -31,7 +31,7 @@ LONGEST = 120
 
 _COMMENTS = ("//", "/*", "*/")
 _UNIT_OF_LIST = re.compile(r"[^][{};]*\]\s*(?P<unit>[^\s;,})]+)")
-"""What follows a number in a list that has its unit behind the brackets."""
+"""The rest of a list behind one of its numbers, with the unit that stands after the brackets."""
 _LITERAL = re.compile(r"[-+]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*(?P<unit>\S.*)?")
 
 

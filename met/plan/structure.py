@@ -13,6 +13,7 @@ from met.plan import BASE, COMPONENTS, ServoUse, Structure
 from met.plan import guides as guides
 from met.plan.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.plan.codec import Damaged
+from met.plan.following import follows_itself
 from met.plan.uses import quantities
 from met.trace.nodes import TRUTHS
 
@@ -83,18 +84,14 @@ def _check_arm(structure: Structure, where: str) -> None:
 
 
 def _check_followers(structure: Structure, where: str) -> None:
-    """Check that joints follow moving joints, none of them itself by way of others."""
+    """Check that joints follow moving joints, none of them itself by way of others, and that no servo drives them."""
     joints = {joint.name: joint for joint in structure.moving}
     for index, joint in enumerate(structure.joints):
-        path, passed, ahead = f"{where}[{index}].follows", {joint.name}, list(joint.follows)
-        if (joint.follows and joint.kind == "fixed") or len(set(joint.follows)) < len(joint.follows):
-            raise Damaged(path, "it is fixed, or follows a joint twice")
-        while ahead:
-            leader = joints.get(ahead.pop())
-            if leader is None or leader.name == joint.name:
-                raise Damaged(path, "it should follow moving joints, and not itself")
-            ahead += [name for name in leader.follows if name not in passed]
-            passed.add(leader.name)
+        named = set(joint.follows)
+        right = joint.name in joints and len(named) == len(joint.follows) and named <= set(joints)
+        if joint.follows and (not right or follows_itself(joint.name, joints)):
+            message = "it should follow moving joints, each once, of which none follows it"
+            raise Damaged(f"{where}[{index}].follows", message)
     servos = {use.joint: models.find("servo", use.model, use.place) for use in structure.servos}
     for index, joint in enumerate(structure.joints):
         if joint.follows and joint.name in servos and not servos[joint.name].is_passive:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.integrators.integrator import Motion
-from met.plan import Joint
+from met.plan.following import leaders
 from met.program.system import Actuator, System
 from met.trace import Real
 
@@ -43,17 +43,18 @@ def sticking(system: System) -> tuple[Sticking, ...]:
         None if joint.name in system.braked else 0.0 if actuator is None else actuator.level
         for joint, actuator in zip(system.joints, system.actuators, strict=True)
     ]
+    known = {joint.name: joint for joint in system.joints}
     followers: dict[int, tuple[int, ...]] = {}
     for joint in system.followers:
         i = system.joints.index(joint)
         if own[i] != 0.0:
-            leaders = _leaders(system, joint)
-            driven = [each for each in leaders if (a := system.actuators[each]) is not None and a.gives]
-            if len(leaders) > 1 or driven or leaders[0] in on_bed:
+            first, *more = (system.joints.index(known[name]) for name in leaders(joint.name, known))
+            actuator = system.actuators[first]
+            if more or first in on_bed or (actuator is not None and actuator.gives):
                 message = f"joint `{joint.name}` has dry friction, and no torque of one joint that leads it feels that"
                 help = "leave the friction out, or put it on the joints that lead"
                 raise Problem(error("E219", message, joint.place, help=help))
-            followers[leaders[0]] = (*followers.get(leaders[0], ()), i)
+            followers[first] = (*followers.get(first, ()), i)
     joints = []
     for i, (joint, actuator) in enumerate(zip(system.joints, system.actuators, strict=True)):
         level = None if i in followers else own[i]
@@ -67,11 +68,3 @@ def sticking(system: System) -> tuple[Sticking, ...]:
         if level != 0.0
     ]
     return (*joints, *states)
-
-
-def _leaders(system: System, joint: Joint) -> list[int]:
-    """The numbers of the joints that lead a follower, by way of others too."""
-    if not joint.follows:
-        return [system.joints.index(joint)]
-    known = {each.name: each for each in system.joints}
-    return sorted({number for name in joint.follows for number in _leaders(system, known[name])})

@@ -165,8 +165,10 @@ class System:
         def place(joint: Joint) -> int:
             i = numbers[joint.name]
             if joint.follows:
-                ratios = [(place(self.joints[numbers[each]]), self.value(path, read)) for each, path in
-                          joint.ratio_paths.items()]  # fmt: skip
+                ratios = [
+                    (place(self.joints[numbers[name]]), self.value(path, read))
+                    for name, path in joint.ratio_paths.items()
+                ]
                 q[i] = sum((ratio * q[j] for j, ratio in ratios), self.value(f"{joint.name}.offset", read))
                 qd[i] = sum((ratio * qd[j] for j, ratio in ratios), 0.0)
             return i

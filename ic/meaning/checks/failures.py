@@ -21,6 +21,7 @@ from met.diagnostic import Label, Place, leave_out
 from met.frozen import frozen
 from met.instants import has_come
 from met.plan import EnvironmentUse, Joint, ServoUse, Structure
+from met.plan.following import leaders
 from met.plan.uses import quantities
 
 
@@ -43,14 +44,14 @@ def check_failures(
     """Report models about servos that are missing, lack the affected part, or are on a bed."""
     servos = {use.joint: use for use in uses}
     beds = {each.joint: each.place for each in structure.substitutions}
-    leaders = {joint.name: joint.follows[0] for joint in structure.moving if joint.follows}
+    joints = {joint.name: joint for joint in structure.moving}
     sound = []
     for failure in _about(scope, structure.environment, "servo_of"):
         use, model, joint, place = failure.use, failure.model, failure.joint, failure.place
         servo, continuous = servos.get(joint), joint in ticks and ticks[joint].continuous
         wrong = _wrong(scope, use, model, joint, servo, continuous=continuous)
-        if servo is None and wrong is not None and joint in leaders:
-            wrong = wrong[0], f"name joint `{leaders[joint]}`, which leads it, or leave it out", wrong[2]
+        if servo is None and wrong is not None and joint in joints and joints[joint].follows:
+            wrong = wrong[0], f"name joint `{leaders(joint, joints)[0]}`, which leads it, or leave it out", wrong[2]
         also = [Label(servo.place, "its servo")] if servo is not None else []
         if wrong is None and joint in beds and model.decoupling is not None:
             wrong = f"`{use.name}` would let go of joint `{joint}`, whose motor is on a bed", "leave it out", place
@@ -101,13 +102,10 @@ def _check_follower(
     scope: Scope, follower: Joint, place: Place, servos: Mapping[str, Use], structure: Structure
 ) -> None:
     """Report dry friction of a follower that would not act: where no torque of its leader's feels it."""
-    joints, leaders = {joint.name: joint for joint in structure.moving}, [follower.name]
-    for name in leaders:
-        leaders += [each for each in joints[name].follows if each not in leaders]
-    leaders = [name for name in leaders if not joints[name].follows]
+    leading = leaders(follower.name, {joint.name: joint for joint in structure.moving})
     on_beds = {each.joint for each in structure.substitutions}
-    reason = "it follows more than one joint" if len(leaders) > 1 else ""
-    for name in leaders:
+    reason = "it follows more than one joint" if len(leading) > 1 else ""
+    for name in leading:
         servo = servos.get(name)
         if name in on_beds:
             reason = f"the motor of joint `{name}`, which leads it, is on a bed"
@@ -117,7 +115,7 @@ def _check_follower(
     if reason:
         message = f"joint `{follower.name}` has dry friction, and {reason}"
         helps = leave_out("leave the friction out: nothing would feel it")
-        if len(leaders) > 1:
+        if len(leading) > 1:
             helps = leave_out("put the friction on the joints that lead, and leave it out here")
         scope.complaints.error("D213", message, place, help=helps)
 

@@ -16,6 +16,7 @@ from ic.text.complaints import known_words
 from met.diagnostic import Label, did_you_mean, leave_out
 from met.plan import Joint, Origin
 from met.plan.channel import joint_unit, ratio_unit
+from met.plan.following import followed, follows_itself
 
 
 def leaders_in_words(leaders: Sequence[str]) -> str:
@@ -90,30 +91,23 @@ def check_followers(scope: Scope, joints: Sequence[Joint]) -> None:
     """Report joints that follow each other in a circle."""
     known = {joint.name: joint for joint in joints}
     for joint in joints:
-        passed, ahead = {joint.name}, list(joint.follows)
-        while ahead:
-            name = ahead.pop()
-            if name == joint.name and joint.place is not None:
-                others = [known[each] for each in passed if each != joint.name and known[each].follows]
-                scope.complaints.error(
-                    "D213",
-                    f"joint `{joint.name}` follows itself by way of others",
-                    joint.place,
-                    also=[Label(each.place, "which follows it") for each in others if each.place is not None],
-                    help="one of them should follow none: that one leads",
-                )
-                return
-            if name in known and name not in passed:
-                passed.add(name)
-                ahead += known[name].follows
+        if joint.place is not None and follows_itself(joint.name, known):
+            circle = [known[name] for name in followed(joint.name, known) if name in known and name != joint.name]
+            others = [each for each in circle if each.place is not None and follows_itself(each.name, known)]
+            scope.complaints.error(
+                "D213",
+                f"joint `{joint.name}` follows itself by way of others",
+                joint.place,
+                also=[Label(each.place, "which follows it") for each in others if each.place is not None],
+                help="one of them should follow none: that one leads",
+            )
+            return
 
 
 def all_led_by(joint: Joint, joints: Sequence[Joint]) -> list[Joint]:
     """The joints that follow a joint, by way of others too."""
-    led = [joint]
-    for leader in led:
-        led += [each for each in joints if leader.name in each.follows and each not in led]
-    return led[1:]
+    known = {each.name: each for each in joints}
+    return [each for each in joints if each is not joint and joint.name in followed(each.name, known)]
 
 
 def begin_followers(scope: Scope, joints: Sequence[Joint]) -> None:
