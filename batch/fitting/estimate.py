@@ -79,7 +79,7 @@ CONFIDENCE = 0.95
 
 @frozen
 class Prior:
-    """What is known of a parameter before: normal, SI."""
+    """A normal distribution of a parameter that is known before a fit, SI."""
 
     mean: float
     deviation: float
@@ -247,7 +247,7 @@ class Fitter:
     # Sizes of parameters, and of the differences for slopes
 
     def _sizes(self) -> np.ndarray:
-        """What counts as a large change of each parameter: its value; of one that is 0 its prior's deviation, or what
+        """The size of a large change of each parameter: its value; of one that is 0 its prior's deviation, or what
         changes the weighted residuals by as much as they are."""
         with np.errstate(divide="ignore"):
             size = np.where(self.start != 0.0, np.abs(self.start), np.where(self._pull > 0.0, 1.0 / self._pull, 0.0))

@@ -1,4 +1,5 @@
-"""What logs can tell of a deck's numbers, by the slopes of what is computed: rank, condition, and which go together.
+"""The knowledge that logs can give of a deck's numbers, by the slopes of what is computed: rank, condition, and which
+go together.
 
 A parameter is known as far as its standard error is small beside its size. Where several are unknown although each by
 itself leaves a mark, a change of all of them together leaves none: the right singular vectors of the slopes say which.
@@ -21,7 +22,7 @@ PART = 0.1
 
 @frozen
 class Known:
-    """What logs tell of parameters.
+    """The knowledge that logs give of parameters.
 
     deviation   standard errors to expect, SI, [path]; infinite where nothing is known
     alone       those of each parameter by itself, the others known, SI, [path]
@@ -49,7 +50,7 @@ class Known:
 
 
 def known(slopes: np.ndarray, size: np.ndarray, held: np.ndarray, wider: float | np.ndarray = 1.0) -> Known:
-    """What weighted slopes tell.
+    """The knowledge that weighted slopes give.
 
     slopes  of residuals in units of their noise, [number, path];  size: of the parameters, [path]
     held    whether the deck allows no value beside a parameter's, [path]

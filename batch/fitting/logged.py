@@ -26,8 +26,8 @@ MOST_BYTES = 2**29
 
 
 DELAY, LATEST = "delay of ", 0.1
-"""What stands before a log's name in the path of its delay, s: by how much its times are late; and the largest delay of
-either sign that is estimated."""
+"""The beginning of the path of a log's delay, s, before its name: by how much its times are late; and the largest delay
+of either sign that is estimated."""
 
 STRETCHES = 24
 """Least number of stretches of logs by which intervals are judged."""
@@ -221,7 +221,7 @@ class LoggedRun:
         return values[:, self.paths.index(path)] if path in self.paths else np.zeros(len(values))
 
     def courses(self, values: np.ndarray) -> dict[str, ComputedChannel]:
-        """What one case computes, by channel. values: of `paths`, SI, [path]"""
+        """The signals that one case computes, by channel. values: of `paths`, SI, [path]"""
         history = self._histories(self.inputs(values[None, :]))[0]
         courses, times = {}, self._times + self._delays(values[None, :])[0]
         for column, each in enumerate(self.columns):
@@ -261,7 +261,7 @@ class LoggedRun:
         return self._between_rows(0.0)
 
     def _between_rows(self, delay: float) -> tuple[np.ndarray, np.ndarray]:
-        """Of each number: the recorded row before its instant less the delay, s, and its share of the way to the next
+        """By number, the recorded row before its instant less the delay, s, and its share of the way to the next
         row."""
         times, instants = self._times, self.instants - delay
         low = np.clip(np.searchsorted(times, instants, side="right") - 1, 0, len(times) - 2)
@@ -316,7 +316,7 @@ class LoggedRuns:
         return max(2, -(-max(STRETCHES, 3 * len(self.paths)) // len(self.runs)))
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
-        """What was measured less what is computed, [case, number]; not-a-number in cases that fail or are refused.
+        """The measured less the computed numbers, [case, number]; not-a-number in cases that fail or are refused.
 
         values  SI, [case, path]
         """

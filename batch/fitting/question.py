@@ -31,7 +31,7 @@ _EXAMPLE = "such as `gearbox.kt=normal(0.061, 0.002) N*m/A`"
 
 @frozen
 class FitAnswer:
-    """What a fit found.
+    """The answer of a fit.
 
     fit             the numbers;  known: what the logs tell of them at these
     before, after   of each log its residuals with the deck's and with the fitted numbers
@@ -47,7 +47,7 @@ class FitAnswer:
 
 @frozen
 class Promise:
-    """What logs and one more would tell.
+    """The knowledge that logs and one more would give.
 
     motion  that would be logged, its name in place of a file;  known: of the parameters
     sweep   of which it is the best case, or the run itself;  judged: number of its cases that could be logged
@@ -60,7 +60,7 @@ class Promise:
 
     @property
     def values(self) -> list[WrittenValue]:
-        """What makes the case out of its run."""
+        """The values that make the case out of its run."""
         units = {each.path: each.unit for each in self.sweep.cases.coordinates}
         return [WrittenValue(path, si, units[path]) for path, si in self.motion.fixed.items()]
 
@@ -99,13 +99,13 @@ class FitQuestion:
         return tuple(found)
 
     def identifiable(self) -> Known:
-        """What the logs can tell of the parameters at the deck's values, from the noise of the logs alone."""
+        """The knowledge that the logs can give of the parameters at the deck's values, from their noise alone."""
         fitter = Fitter(self.logs, self.start, self.priors)
         return known(fitter.slopes_at_start(noise_of(self.logs)), fitter.size, fitter.held)
 
     def promised(self, progress: Callable[[int], None] = lambda _: None) -> tuple[Promise, ...]:
-        """What the logs and one of each motion could tell, as noisy as the logs are; of a sweep, the case that leaves
-        the least uncertainty."""
+        """The knowledge that the logs and one of each motion could give, as noisy as the logs are; of a sweep, with
+        the case that leaves the least uncertainty."""
         noises = noise_of(self.logs)
         channels = [channel for run in self.runs for channel in run.channels]
         noise = {name: max(noises[np.array([each == name for each in channels])]) for name in channels}

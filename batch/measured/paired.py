@@ -80,7 +80,7 @@ class Pair:
 
     @property
     def residual(self) -> np.ndarray:
-        """What was measured less what was computed."""
+        """The measured less the computed values."""
         return self.measured - self.course.at(self.instants)
 
     def usual(self) -> Pair:

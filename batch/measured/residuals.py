@@ -209,7 +209,7 @@ def _whiteness(residual: np.ndarray) -> tuple[float, bool | None]:
 
 @frozen
 class _Feature:
-    """What a residual may follow. unit: of its size; at: its numbers at instants (s), [instant, number]"""
+    """A quantity that a residual may follow. unit: of its size; at: its numbers at instants (s), [instant, number]"""
 
     what: str
     means: str

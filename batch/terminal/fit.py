@@ -31,7 +31,7 @@ WORDS: Mapping[str, str] = MappingProxyType({
     "unseen": "unseen",
     "held": "not free: the deck allows no value beside it",
 })  # fmt: skip
-"""What logs tell of a parameter, in words."""
+"""Words for whether logs tell a parameter."""
 
 SHOWN, MOST_PARTS = 3, 6
 """Largest number of changes without a mark, and of correlated pairs, that are printed; and of parts of a change."""
@@ -108,7 +108,7 @@ def identifiable_lines(question: FitQuestion, found: Known, promised: Sequence[P
 
 
 def _choice_lines(promise: Promise) -> Iterator[str]:
-    """What the best case of a sweep is, and how to run it; nothing for a run."""
+    """Lines that name the best case of a sweep, and the command that runs it; none for a run."""
     cases, settings = promise.sweep.cases.count, [each.setting for each in promise.values]
     if not settings:
         return
