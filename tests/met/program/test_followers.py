@@ -158,7 +158,7 @@ def test_the_momentum_of_a_free_flyer_with_a_gripper_stays(tmp_path: Path) -> No
     assert np.ptp(energy) > 0.01
 
 
-def test_cases_with_other_ratios_are_the_bits_of_runs_alone(tmp_path: Path) -> None:
+def test_cases_with_other_ratios_are_as_runs_alone(tmp_path: Path) -> None:
     swept = ran(tmp_path, HINGED + "sweep ratios of swing { vary tip.ratio = [-2, 0.7]; }", "ratios")
     for case, ratio in enumerate(("-2", "0.7")):
         alone = ran(tmp_path, changed(HINGED, ("ratio = -2", f"ratio = {ratio}")))
