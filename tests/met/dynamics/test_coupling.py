@@ -85,8 +85,8 @@ def _agree(seeds: Sequence[int]) -> None:
             left = column @ torques - column @ np.array(solved.tau)
             balance.see(abs(left) / np.abs(torques).max(), f"seed {seed}, joint {i}")
             assert solved.tau[i] == arm.tau[i] or not mode[i]
-    worst.below(1e-11)
-    balance.below(1e-11)
+    worst.below(1e-13)
+    balance.below(1e-13)
 
 
 def test_coupled_accelerations_are_those_of_the_projected_mass_matrix() -> None:
@@ -98,7 +98,7 @@ def test_coupled_accelerations_of_three_hundred_trees() -> None:
     _agree(range(100, 400))
 
 
-def test_a_group_on_a_free_base_balances_and_keeps_the_momentum() -> None:
+def test_a_group_on_a_free_base_balances() -> None:
     worst = Worst("torques that a free base's coupled joints lack")
     for seed in (3, 5):
         arm, base = floated(random_tree(seed, 6)), flight(seed)
@@ -115,7 +115,7 @@ def test_a_group_on_a_free_base_balances_and_keeps_the_momentum() -> None:
             if i in row and arm.mode[i]:
                 left = G[:, i].astype(float) @ (torques - np.array(arm.tau))
                 worst.see(abs(left) / np.abs(torques).max(), f"seed {arm.seed}, joint {i}")
-    worst.below(1e-11)
+    worst.below(1e-13)
 
 
 def test_geared_discs_have_the_inertia_of_both() -> None:
