@@ -21,6 +21,7 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
         torque=-p.damping * joint.qd - p.stiffness * (joint.q - p.rest),
         dry=p.friction,
         rotor=p.rotor,
+        potential=0.5 * p.stiffness * (joint.q - p.rest) * (joint.q - p.rest),
     )
 
 
