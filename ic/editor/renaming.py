@@ -74,7 +74,12 @@ def refusal_of_word(new: str) -> str:
         return f"`{new}` is a unit"
     if new in (*FUNCTIONS, *CONSTANTS):
         return f"`{new}` is a function or a number of the language"
-    return f"`{new}` is a word of the language" if new in WORDS or new in BLOCKS else ""
+    return f"`{new}` is a word of the language" if new in WORDS or _begins_entries(new) else ""
+
+
+def _begins_entries(word: str) -> bool:
+    """True of the word of a block of the language, but for one behind a name, as in `link NAME boom`."""
+    return word in BLOCKS and BLOCKS[word].written.startswith(word)
 
 
 def refusal_of_name(token: Token, meant: Sequence[NameInText]) -> str:

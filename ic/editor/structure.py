@@ -74,6 +74,9 @@ class TextEntry:
             if self.within is not None and self.within.kind == "servos":
                 return "servo"
             return self.kind if self.texts[2:3] == ["="] and self.kind in BLOCKS else ""
+        behind = next((each for each in self.texts[2:3] if each in BLOCKS), "")  # `link NAME boom { ... }`
+        if behind and BLOCKS[behind].written.startswith(f"{self.kind} "):
+            return behind
         return self.kind if self.kind in BLOCKS else ""
 
     @property

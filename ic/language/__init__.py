@@ -7,7 +7,7 @@ sweeps are made of these declarations. A new key needs an `Entry`, and the code 
 from __future__ import annotations
 
 from ic.language.anywhere import ANYWHERE
-from ic.language.bodies import ARM, JOINT, LINK, PAYLOAD
+from ic.language.bodies import ARM, BOOM, JOINT, LINK, PAYLOAD
 from ic.language.declaration import BlockDeclaration, Entry
 from ic.language.runs import (
     ENVIRONMENT,
@@ -29,8 +29,8 @@ from ic.language.top_level import TOP_LEVEL
 BLOCKS = {
     block.name: block
     for block in (
-        ARM, LINK, JOINT, SERVO, RUN, RATES, INITIAL, ENVIRONMENT, PAYLOAD, SUBSTITUTE, SCALE, METRIC, LINEAR,
-        TOLERANCES, SWEEP, SEARCH, TUNE,
+        ARM, LINK, BOOM, JOINT, SERVO, RUN, RATES, INITIAL, ENVIRONMENT, PAYLOAD, SUBSTITUTE, SCALE, METRIC,
+        LINEAR, TOLERANCES, SWEEP, SEARCH, TUNE,
     )
 }  # fmt: skip
 """All blocks, by name, in the order in which a reader meets them."""

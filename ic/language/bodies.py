@@ -43,6 +43,36 @@ LINK = BlockDeclaration(
     ),
 )  # fmt: skip
 
+EI = Parameter(name="EI", unit="N*m^2", above=0.0, doc="bending stiffness of the boom's cross-section")
+GJ = Parameter(name="GJ", unit="N*m^2", above=0.0, doc="torsional stiffness of the boom's cross-section")
+DAMPING_RATIO = Parameter(
+    name="damping_ratio", unit="1", at_least=0.0, doc="damping ratio of the first mode of the bare boom, clamped"
+)
+NODES = Parameter(name="nodes", unit="1", at_least=2.0, at_most=16.0, doc="places where the boom bends")
+
+BOOM = BlockDeclaration(
+    name="boom",
+    written="link NAME boom { ... }",
+    within="arm",
+    head="links",
+    doc="A link that bends and twists: a uniform beam along its shape, a rod, a box or a cylinder.",
+    entries=(
+        LINK["mass"],
+        LINK["shape"],
+        Entry(name="EI", written="EI = 2.8e6 N*m^2;", parameter=EI, varies="number", path="links.LINK.EI",
+              doc="bending stiffness; a list of two, `[3e6, 1e6] N*m^2`, about the two axes across the boom, in the "
+                  "order x, y, z"),
+        Entry(name="GJ", written="GJ = 1.2e6 N*m^2;", parameter=GJ, varies="number", path="links.LINK.GJ",
+              default="it does not twist", doc="torsional stiffness"),
+        Entry(name="damping_ratio", written="damping_ratio = 0.5 %;", parameter=DAMPING_RATIO, varies="number",
+              path="links.LINK.damping_ratio",
+              doc="damping ratio of the first mode of the bare boom, clamped at its root; of a mode with another "
+                  "frequency it is in proportion to the frequency"),
+        Entry(name="nodes", written="nodes = 4;", parameter=NODES, path="links.LINK.nodes", default="4",
+              doc="places where the boom bends, an even number: 4 give its first two modes, 6 or 8 the third"),
+    ),
+)  # fmt: skip
+
 AT = Parameter(
     name="at", unit="m", shape="vector", default=ZEROS, doc="origin of the joint's frame, in the parent's frame"
 )
@@ -223,7 +253,8 @@ ARM = BlockDeclaration(
             name="link",
             form="named",
             written="link NAME { ... }",
-            doc="a rigid body, or a frame without mass (`met doc link`)",
+            doc="a rigid body, or a frame without mass (`met doc link`); as `link NAME boom`, one that bends (`met doc "
+            "boom`)",
         ),
         Entry(
             name="joint",

@@ -13,6 +13,7 @@ from ic.printing.settings import kept_keys
 from met import models
 from met.parameter import Parameter
 from met.plan import BASE, Base, Experiment, Formula, Joint, Plan, Structure
+from met.plan.chains import chains
 from met.plan.columns import different, span
 from met.plan.defaults import OF_FREE_BASE
 from met.plan.uses import sensor_parts
@@ -141,8 +142,8 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
 
 
 def _arm(experiment: Experiment) -> Iterator[str]:
-    structure = experiment.structure
-    values = _Values(experiment)
+    whole, structure = experiment.structure, experiment.structure.straight
+    values, bends = _Values(experiment), chains(whole.links, whole.joints)
     servos = {use.joint: use for use in structure.servos}
     rows: list[tuple[str, ...]] = [("joint", "moves", "at", "rpy", "link", "mass", "servo"), (BASE,)]
     if any(link.name == BASE for link in structure.links):
@@ -170,7 +171,10 @@ def _arm(experiment: Experiment) -> Iterator[str]:
         branch = f"{stem}{'└─' if last else '├─'} {joint.name}"
         turned = values.vector(f"{joint.name}.rpy")
         turn = "varies" if turned is None else vector(turned, "deg") if any(turned) else ""
-        rows.append((branch, _moves(joint, values), place, turn, joint.child, mass, servo))
+        link = joint.child
+        if link in bends:
+            link += f" (boom, {count(sum(each.kind != 'fixed' for each in bends[link]), 'spring')})"
+        rows.append((branch, _moves(joint, values), place, turn, link, mass, servo))
         waiting += [(child, stem + ("   " if last else "│  ")) for child in reversed(children.get(joint.child, []))]
     moving = f"{count(len(structure.moving), 'joint')} that move{'s' if len(structure.moving) == 1 else ''}"
     yield f"Arm {structure.arm}: {count(len(structure.links), 'link')}, {moving}"
@@ -182,7 +186,7 @@ def _bodies(experiment: Experiment) -> Iterator[str]:
     """Centre of mass and inertia of each link, in its own frame."""
     values = _Values(experiment)
     rows = [("link", "mass", "com", "inertia about it: xx, yy, zz, xy, xz, yz")]
-    for link in experiment.structure.links:
+    for link in experiment.structure.straight.links:
         head = f"links.{link.name}"
         com = values.numbers(f"{head}.com", ("x", "y", "z"))
         moments = values.numbers(f"{head}.inertia", ("xx", "yy", "zz", "xy", "xz", "yz"))

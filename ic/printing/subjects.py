@@ -58,13 +58,14 @@ def channels() -> list[dict[str, str]]:
         *(row(JOINT, name, unit, doc, (), axis) for name, unit, doc in channel.MOTION),
         *(row(JOINT, *each) for each in channel.OF_JOINT),
         *(row(LINK, *each) for each in channel.OF_LINK),
+        *(row(BOOM, *each) for each in channel.OF_BOOM),
         *(row(LINK, name, unit, doc, channel.XYZ, channel.WORLD_AXES) for name, unit, doc in channel.JACOBIAN),
         *(row(PAYLOAD, *each) for each in channel.OF_PAYLOAD),
         *(row("", *each) for each in channel.OF_ARM),
     ]
 
 
-JOINT, LINK, PAYLOAD = "JOINT.", "links.LINK.", "payloads.PAYLOAD."
+JOINT, LINK, BOOM, PAYLOAD = "JOINT.", "links.LINK.", "links.BOOM.", "payloads.PAYLOAD."
 MORE_WORDS = {
     word: f"{channel.TURNING[word]}, or {channel.SLIDING[word]} on a prismatic joint"
     for word in ("inertia", "angular", "linear")

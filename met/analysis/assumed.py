@@ -205,7 +205,7 @@ class _Along:
                 each.name: self.parameters.get(f"{actuator.path}.{each.name}") for each in actuator.parts.parameters
             }
             zeros = [name for name, x in known.items() if x and x.origin.kind == "default" and x.value == 0.0]
-            if zeros:
+            if zeros and actuator.use.joint not in self.system.structure.springs:
                 joints.setdefault(", ".join(zeros), []).append(f"`{actuator.use.joint}`")
         for names, of in joints.items():
             shown = of[0] if len(of) == 1 else f"{of[0]} and {len(of) - 1} more"

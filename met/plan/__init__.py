@@ -43,15 +43,18 @@ A vector parameter of a model is three numbers, `.x .y .z`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import field
+from collections.abc import Mapping
+from dataclasses import field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from met.diagnostic import Place
 from met.frozen import frozen, keyed
-from met.parameter import BASE, Parameter
+from met.parameter import BASE as BASE
+from met.parameter import Parameter
+from met.plan.chains import ground, springs, straightened
 from met.plan.columns import CaseValues, FormulaColumn, ShiftedColumn, all_rows, listed
 from met.plan.judged import (
     MetricUse,
@@ -112,12 +115,15 @@ class Link:
     """A rigid body; its numbers are parameters. `shape` is its picture, in words of `ic` (kind, numbers in SI).
 
     lumped  whether its numbers are an identified set (base parameters), which need not be those of a body
+    root    of a boom: the piece at its root. The boom itself is a frame at its tip: its numbers are those of the whole,
+            and its pieces have the matter
     """
 
     name: str
     place: Place | None = keyed("never", default=None)
     shape: tuple[str, tuple[tuple[str, float], ...]] | None = keyed("never", default=None)
     lumped: bool = keyed("never", default=False)
+    root: str = keyed("where set", default="")
 
 
 @frozen
@@ -420,6 +426,17 @@ class Structure:
         """Size of one case's histories: doubles, a column a channel."""
         return 8 * self.schedule.rows * sum(len(recorded.channels) for recorded in self.record)
 
+    @cached_property
+    def springs(self) -> frozenset[str]:
+        """Names of the joints at which booms bend and twist."""
+        return springs(self.links, self.joints)
+
+    @cached_property
+    def straight(self) -> Structure:
+        """The structure with each boom as the rigid link that it is while straight."""
+        links, joints = straightened(self.links, self.joints)
+        return replace(self, links=links, joints=joints)
+
     @property
     def moving(self) -> tuple[Joint, ...]:
         """The moving joints, in the order of `joints`: the order of every `joint` dimension."""
@@ -429,15 +446,6 @@ class Structure:
     def independent(self) -> tuple[Joint, ...]:
         """The moving joints that follow no other, in the order of `joints`."""
         return tuple(joint for joint in self.moving if not joint.follows)
-
-
-def ground(links: Iterable[Link], joints: Iterable[Joint]) -> tuple[str, ...]:
-    """`Structure.ground` of these links and joints."""
-    found = {BASE}
-    fixed = {joint.child: joint.parent for joint in joints if joint.kind == "fixed"}
-    while more := {child for child, parent in fixed.items() if parent in found} - found:
-        found |= more
-    return tuple(link.name for link in links if link.name in found)
 
 
 Design = Literal["", "random", "lhs", "sobol", "saltelli"]

@@ -25,6 +25,7 @@ Derived channels, computed from the state only where a record or a metric asks f
     <joint>.limit_margin            room to the nearest of the joint's limits, a share; limits.margin: the least of all
     <joint>.reaction.moment|force   what the link takes from its parent: about its frame's origin, in its axes
     links.<link>.position, .orientation, .velocity, .rate       of the link's frame, in world axes
+    links.<boom>.deflection, .bend  of the tip of a link that bends, against its root
     links.<link>.jacobian.angular|linear.<joint>                rate and velocity for each unit of the joint's rate
     energy.kinetic|potential, momentum.linear|angular           of all that the joints move, and of payloads
     payloads.<payload>.position, .orientation, .velocity, .rate of the payload's frame, in world axes
@@ -88,6 +89,16 @@ OF_LINK = (
     ("velocity", "m/s", "velocity of the link frame's origin", XYZ, WORLD_AXES),
     ("rate", "rad/s", "angular velocity of the link", XYZ, WORLD_AXES),
 )
+OF_BOOM = (
+    (
+        "deflection",
+        "m",
+        "way from the tip of the straight boom to that of the bent one",
+        XYZ,
+        "axes of the boom's root",
+    ),
+    ("bend", "rad", "angle of the boom's tip against its root", XYZ, "about each axis of the boom"),
+)
 OF_PAYLOAD = (
     ("position", "m", "position of the origin of the payload's frame", XYZ, WORLD_AXES),
     (
@@ -120,7 +131,7 @@ JACOBIAN = (
 )
 OF_ARM = (
     ("energy.kinetic", "J", "kinetic energy, including that of rotors and motors", (), ""),
-    ("energy.potential", "J", "potential energy of gravity and of wound-up gears", (), ""),
+    ("energy.potential", "J", "potential energy of gravity, of wound-up gears and of springs", (), ""),
     ("limits.margin", "1", "smallest `limit_margin` of all joints that have limits", (), ""),
     ("momentum.linear", "kg*m/s", "linear momentum", XYZ, WORLD_AXES),
     ("momentum.angular", "kg*m^2/s", "angular momentum about the world's origin", XYZ, WORLD_AXES),
@@ -286,7 +297,7 @@ def _channels(structure: Structure, names: list[str], *, all_owners: bool) -> di
     for link in structure.links:
         if not all_owners and link.name not in mentioned:
             continue
-        for name, unit, doc, parts, frame in OF_LINK:
+        for name, unit, doc, parts, frame in (*OF_LINK, *(OF_BOOM if link.root else ())):
             derive(f"links.{link.name}.{name}", unit, doc, parts, frame)
         if link.name not in mentioned:
             continue
@@ -364,6 +375,8 @@ def recordable(
         for name in (vector, path) if vector and vector not in own else (path,):
             own[name] = channel
             group = _of_all(name, channel) if channel.joint else ""
+            if group != "q" and channel.joint in structure.springs:
+                continue  # of a boom's spring only what draws it belongs to all joints' values
             if group:
                 joints.setdefault(group, []).append(channel.joint)
     found: dict[str, tuple[Recorded, ...]] = {}

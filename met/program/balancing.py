@@ -1,8 +1,10 @@
-"""Servos that begin balanced: their states keep their joints from accelerating at the start (docs/physics.md)."""
+"""Servos that begin balanced: their states keep their joints from accelerating at the start (docs/physics.md). Booms
+begin bent by what they carry."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from met.frozen import frozen
 from met.integrators.integrator import Motion
@@ -14,6 +16,8 @@ from met.program.values import NamedValues, answer, returned
 from met.servos.servo import Seen, Setpoint
 from met.trace import Real, both, sign, where
 from met.trace.program import Tape
+
+SETTLINGS = 5
 
 
 @frozen
@@ -60,9 +64,45 @@ def demands(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[s
     The torques are those with which none of their joints accelerates. Other joints move as their servos let them; one
     at rest stays where its dry friction holds it while all of them do, and moves where it does not.
     """
-    balanced = [actuator for actuator in system.working if actuator.servo.balance is not None]
-    if not balanced:
-        return
+    balanced = _balanced(system)
+    if balanced:
+        loads = _loads(system, tape, y, begun)
+        for actuator in balanced:
+            yield _demand(system, tape, y, actuator, loads[actuator.index], begun)
+
+
+def settle_booms(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[str, Real]]) -> None:
+    """Write the positions of booms' springs at which none of them moves, for the arm at state y; begun: as for
+    `balance`.
+
+    A spring turns by its load over its stiffness. The load is that of the arm as it bends, and changes little with it:
+    SETTLINGS rounds leave an error of the ratio of the two changes to that power.
+    """
+    for _ in range(SETTLINGS):
+        loads, q = _loads(system, tape, y, begun), list(y.q)
+        for spring in _springs(system):
+            p = system.servo_values(spring, tape.read)
+            q[spring.index] = p.rest - loads[spring.index] / p.stiffness
+        y = replace(y, q=tuple(q))
+    for spring in _springs(system):
+        tape.write(f"{spring.use.joint}.q", y.q[spring.index])
+
+
+def _balanced(system: System) -> list[Actuator]:
+    return [actuator for actuator in system.working if actuator.servo.balance is not None]
+
+
+def _springs(system: System) -> list[Actuator]:
+    """The actuators of booms' springs."""
+    return [actuator for actuator in system.working if actuator.use.joint in system.structure.springs]
+
+
+def _loads(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[str, Real]]) -> Sequence[Real]:
+    """The torques of all joints, N m (N), with which no joint of a balanced servo accelerates; on an arm with booms
+    none of their springs either, nor a joint that goes with its command."""
+    still, springs = _balanced(system), _springs(system)
+    if springs:
+        still += springs + [actuator for actuator in system.working if actuator.servo.follows]
     held = [NamedValues("", {} if a is None else begun[a.use.joint]) for a in system.actuators]
 
     def moved(modes: Mapping[str, Real]) -> Derivative:
@@ -75,10 +115,10 @@ def demands(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[s
             time=0.0,
             begin=0.0,
             part=tape.part,
-            prescribed_qdd={actuator.index: 0.0 for actuator in balanced},
+            prescribed_qdd={actuator.index: 0.0 for actuator in still},
         )
 
-    others = [each for each in sticking(system) if not each.state and each.actuator not in balanced]
+    others = [each for each in sticking(system) if not each.state and each.actuator not in still]
     levels = {each.name: _level(system, tape, y, each, held) for each in others}
     modes = {each.name: where(levels[each.name] > 0.0, sign(each.rate(y)), 1.0) for each in others}
     found = moved(modes)
@@ -94,8 +134,7 @@ def demands(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[s
             for each in others
         }
         found = moved(modes)
-    for actuator in balanced:
-        yield _demand(system, tape, y, actuator, found.loads[actuator.index], begun)
+    return found.loads
 
 
 def _demand(

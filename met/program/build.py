@@ -157,8 +157,11 @@ class Builder:
         payloads.start(self.system, tape)
         self.step.keep_followers(tape)
         guiding.start(self.system, tape)
+        begun = {actuator.use.joint: self._begin_servo(tape, actuator) for actuator in self.system.working}
+        if self.system.structure.balanced and self.system.structure.springs:
+            balancing.settle_booms(self.system, tape, self.step.state(tape), begun)
         link_sensors.start(self.system, tape, lambda y: gravity(self.system, tape.read, y, 0.0))
-        return {actuator.use.joint: self._begin_servo(tape, actuator) for actuator in self.system.working}
+        return begun
 
     def _begin_servo(self, tape: Tape, actuator: Actuator) -> dict[str, Real]:
         """Write a servo's memory and states where a run begins, and return them by name."""

@@ -15,8 +15,9 @@ from met.dynamics.energy import Energy, energy
 from met.dynamics.kinematics import LinkMotion, jacobian
 from met.dynamics.payload import energy_of
 from met.dynamics.recursion import Wrench, reactions
-from met.dynamics.spatial import Vector, add, choose, dot
+from met.dynamics.spatial import Pose, Vector, add, choose, compose, dot, inverse, scale, sub
 from met.integrators.integrator import Motion
+from met.plan.chains import chains
 from met.plan.channel import XYZ, Channel
 from met.program.evaluation import Derivative
 from met.program.joint_limits import excess
@@ -98,7 +99,30 @@ class Observed:
         if kind == "jacobian":
             angular, linear = self._jacobian(link)[self.joints.index(channel.joint)]
             return (angular if rest[0] == "angular" else linear)[XYZ.index(rest[-1])]
+        if kind in ("bend", "deflection"):
+            return (self._bend if kind == "bend" else self._deflection)(link)[XYZ.index(rest[0])]
         return _of_frame(self.motions[link], kind, rest[0])
+
+    def _bend(self, boom: str) -> Vector:
+        """The angles of a boom's tip against its root about each axis of the boom, rad: sums over its springs."""
+        turned: Vector = (0.0, 0.0, 0.0)
+        for joint in chains(self.system.structure.links, self.system.structure.joints)[boom]:
+            if joint.kind == "fixed":
+                continue
+            axis = self.system.vector(f"{joint.name}.axis", self.read)
+            turned = add(turned, scale(self.q[self.joints.index(joint.name)], axis))
+        return turned
+
+    def _deflection(self, boom: str) -> Vector:
+        """The way of a boom's tip from its place on the straight boom, in axes of its root, m."""
+        [root] = [link.root for link in self.system.structure.links if link.name == boom]
+        tip = scale(2.0, self.system.com(boom, self.read))
+        return sub(
+            compose(
+                inverse(self.motions[root].pose), Pose(self.motions[boom].pose.R, self.motions[boom].position(tip))
+            ).p,
+            tip,
+        )
 
     def _of_payload(self, parts: list[str]) -> Real:
         name, kind, *rest = parts

@@ -350,9 +350,9 @@ class System:
                     rpy=self.vector(f"{joint.name}.rpy", read),
                     axis=(0.0, 0.0, 1.0) if joint.kind == "fixed" else self.vector(f"{joint.name}.axis", read),
                     pivot=self.vector(f"{joint.name}.pivot", read) if self._has_pivot(joint) else (0.0, 0.0, 0.0),
-                    mass=self.mass(link.name, read),
+                    mass=0.0 if link.root else self.mass(link.name, read),
                     com=self.com(link.name, read),
-                    inertia=self.inertia(link.name, read),
+                    inertia=(0.0,) * 6 if link.root else self.inertia(link.name, read),
                 )
             )
         if any(link.name == BASE for link in self.structure.links):

@@ -16,6 +16,7 @@ from tests.docs.pages import Page, differs
         ("bed", 6),
         ("bench", 4),
         ("best", 5),
+        ("booms", 2),
         ("coupled", 3),
         ("evidence", 2),
         ("fit", 9),

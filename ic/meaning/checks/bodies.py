@@ -75,6 +75,15 @@ def forgotten(run: RunNumbers) -> Iterator[Scale]:
             yield Scale("joint without a place", path, long, "m", wide, other, 0.0, 2.0, usual, said=said, cure=cure)
 
 
+def booms(run: RunNumbers) -> Iterator[Scale]:
+    """Lengths of booms beside their widths: springs bend, and a short beam also shears."""
+    usual = "shear adds 8 % to what the tip of a tube of 5 widths yields"
+    for boom in [link.name for link in run.structure.links if link.root]:
+        long, wide = run.slender(f"links.{boom}")
+        if wide > 0.0:
+            yield Scale("length of a boom", f"links.{boom}.shape", long, "m", wide, "its width", 5.0, 1e9, usual)
+
+
 def held(run: RunNumbers) -> Iterator[Scale]:
     """Loads at the start of joints that turn: of those without a servo that begin at 0 unwritten, on an arm with
     motors, and by the turns by which they wind up springs."""

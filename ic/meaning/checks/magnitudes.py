@@ -140,7 +140,7 @@ def check_magnitudes(scope: Scope, structure: Structure) -> None:
                 found.setdefault(kind, []).append((path, settled))
     for kind, those in found.items():
         _observe(scope, kind, those)
-    bodies = list(_bodies(scope, structure))
+    bodies = list(_bodies(scope, structure.straight))
     _observe_densities(scope, [body for body in bodies if body.sizes and body.may_be_odd])
     of_their_own = [body for body in bodies if any(each.origin.kind != "derived" for each in body.moments)]
     # the inertia of a shape follows from it; a base may be of any size, and so may a payload

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from ic.meaning.checks.asked import grapples, spreads, targets
-from ic.meaning.checks.bodies import centres, forgotten, held, masses
+from ic.meaning.checks.bodies import booms, centres, forgotten, held, masses
 from ic.meaning.checks.magnitudes import LENGTHS, MASSES, MEANT, SMALLEST_GYRATION
 from ic.meaning.checks.run_numbers import BEARING_NOTHING, RunNumbers
 from ic.meaning.checks.scale import TURN, Scale, inside
@@ -427,6 +427,7 @@ SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
     masses,
     centres,
     forgotten,
+    booms,
     held,
     grapples,
     spreads,
@@ -474,7 +475,7 @@ def check_scales(scope: Scope, structure: Structure, uses: Iterable[Use]) -> Non
         by_path: dict[tuple[str, str], set[float]] = {}
         for row in _chosen(rows):
             numbers = dict(zip(numbers_of, rows[row].tolist(), strict=True))
-            of_case = scales(RunNumbers(structure, uses, settled, numbers, ranges))
+            of_case = scales(RunNumbers(structure.straight, uses, settled, numbers, ranges))
             scope.scales = scope.scales or of_case
             for scale in of_case:
                 by_path.setdefault((scale.what, scale.path), set()).add(scale.multiple)

@@ -37,7 +37,7 @@ from met import models
 from met.diagnostic import Label, Place, Problem, did_you_mean, error, leave_out, meant
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import Command, SensorUse, ServoUse
+from met.plan import Command, Joint, SensorUse, ServoUse
 from met.plan.channel import COMMAND_UNIT
 from met.trace import Scalar, where
 from met.unit_parser import parse_unit
@@ -93,13 +93,13 @@ class Use:
 def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[list[Use], frozenset[str]]:
     """Every servo of the run, in the order of the arm's joints; and the joints whose servo failed or may belong to an
     unknown name (already reported)."""
-    uses = {}
+    uses = {joint.name: _spring(scope, joint) for joint in arm.moving if joint.name in arm.springs}
     body = with_other_joints(body, arm, scope.complaints)
     _note_kinds(scope, body, arm)
     for item in body.items.values():
         with scope.complaints.gather():
             use: Use | None = use_shared(scope, item, arm, _use)
-            if use is not None and not _drives_a_follower(scope, item, arm, use):
+            if use is not None and not _is_taken(scope, item, arm, use):
                 uses[use.joint] = use
     moving = [joint.name for joint in arm.moving]
     failed = [item.name for item in body.items.values() if item.name not in uses]
@@ -112,8 +112,23 @@ def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[l
     return [uses[joint.name] for joint in arm.joints if joint.name in uses], lost
 
 
-def _drives_a_follower(scope: Scope, item: Item, arm: ResolvedArm, use: Use) -> bool:
-    """Return True, with an error, if a servo that drives or holds its joint is on one that follows another."""
+def _spring(scope: Scope, joint: Joint) -> Use:
+    """The servo of a boom's spring, whose stiffness and damping are the boom's."""
+    assert joint.place is not None  # joints from a deck have one
+    servo, owner = models.find("servo", "passive"), Owner(f"joint `{joint.name}`", joint.place, f"{joint.name}.servo")
+    others = [each for each in servo.parameters if f"{owner.path}.{each.name}" not in scope.parameters]
+    parameters = use_model(scope, owner, others, MergedBlock()) or {}
+    parameters |= {each.name: scope.parameters[owner.join(each.name)].value for each in servo.parameters}
+    return Use(joint.name, "boom", servo, None, None, parameters, joint.place)
+
+
+def _is_taken(scope: Scope, item: Item, arm: ResolvedArm, use: Use) -> bool:
+    """Return True, with an error, if a servo is on a spring of a boom, or drives or holds a joint that follows
+    another."""
+    if item.name in arm.springs:
+        message = f"joint `{item.name}` is a spring of a boom, so it has no servo"
+        scope.complaints.error("D213", message, item.place, help=leave_out("leave it out"))
+        return True
     leaders = next((joint.follows for joint in arm.joints if joint.name == item.name), ())
     if not leaders or use.servo.is_passive:
         return False

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 import pickle
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import cached_property
 from types import MappingProxyType
 
 from ic.grammar.syntax import Call, Expression, Name, Unary
 from ic.language import HEADS
-from ic.language.bodies import ARM, AT, AXIS, JOINT, JOINT_KINDS, JOINT_LIMITS, LINK, LUMPED, Q_MIN, RPY
+from ic.language.bodies import ARM, AT, AXIS, BOOM, JOINT, JOINT_KINDS, JOINT_LIMITS, LINK, LUMPED, Q_MIN, RPY
 from ic.meaning.definitions.merge import Item, MergedBlock, no_block, with_meant_names
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.mechanics.bodies import check_moved
+from ic.meaning.mechanics.booms import KEYS, check_names, resolve_boom
 from ic.meaning.mechanics.dh import use_dh
 from ic.meaning.mechanics.following import check_followers, use_follows
 from ic.meaning.mechanics.foreign import how_to_close, refuse_foreign_joint
@@ -29,6 +31,7 @@ from ic.text.complaints import Complaints, known_words, where_it_belongs
 from met.diagnostic import Label, Place, did_you_mean, leave_out, meant, write
 from met.frozen import frozen
 from met.plan import BASE, Joint, Link
+from met.plan.chains import springs
 from met.trace import Scalar, sqrt
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -60,17 +63,27 @@ class ResolvedArm:
     def moving(self) -> tuple[Joint, ...]:
         return tuple(joint for joint in self.joints if joint.kind != "fixed")
 
+    @cached_property
+    def springs(self) -> frozenset[str]:
+        """Names of the joints at which booms bend and twist."""
+        return springs(self.links, self.joints)
+
     @property
     def independent(self) -> tuple[Joint, ...]:
-        """The moving joints that follow no other."""
-        return tuple(joint for joint in self.moving if not joint.follows)
+        """The moving joints that follow no other and are no springs of booms."""
+        return tuple(joint for joint in self.moving if not joint.follows and joint.name not in self.springs)
+
+
+Part = tuple[Link | Joint, ...]
+"""A link or a joint of the deck; of a boom its pieces and joints."""
 
 
 @frozen
 class SharedPart:
-    """A link or a joint without mistakes, resolved without a sweep, and its entries of a scope."""
+    """A link or a joint without mistakes, resolved without a sweep, and its entries of a scope. item: kind and name"""
 
-    thing: Link | Joint
+    item: tuple[str, str]
+    part: Part
     entries: SharedEntries
 
 
@@ -118,12 +131,8 @@ def resolve_arm(scope: Scope, definition: Definition) -> ResolvedArm | None:
         for part in shared.parts:
             part.entries.enter(scope)
         return replace(shared.arm, free_of_errors=not scope.complaints.errors)
-    those = {_name(part.thing): part for part, plain in zip(shared.parts, as_written, strict=True) if plain}
+    those = {part.item: part for part, plain in zip(shared.parts, as_written, strict=True) if plain}
     return _resolved(scope, definition, those)
-
-
-def _name(thing: Link | Joint) -> tuple[str, str]:
-    return "link" if isinstance(thing, Link) else "joint", thing.name
 
 
 def _shared(scope: Scope, definition: Definition) -> SharedArm | None:
@@ -141,23 +150,17 @@ def _shared(scope: Scope, definition: Definition) -> SharedArm | None:
 
 def _alone(scope: Scope, definition: Definition) -> SharedArm | None:
     """The arm resolved alone, each part in a scope of its own."""
-    complaints, scopes = Complaints(), list[Scope]()
+    complaints, alone = Complaints(), list[tuple[tuple[str, str], Part, Scope]]()
     definitions = scope.definitions.reporting_to(complaints)
-
-    def own_scope() -> Scope:
-        scopes.append(Scope(definitions, complaints))
-        return scopes[-1]
-
-    arm = _resolved(Scope(definitions, complaints), definition, own_scope=own_scope)
+    arm = _resolved(Scope(definitions, complaints), definition, alone=alone)
     if not arm or not complaints.is_clear:
         return None
-    things: tuple[Link | Joint, ...] = (*arm.links, *arm.joints)
     parts = []
-    for thing, own in zip(things, scopes, strict=True):
+    for item, part, own in alone:
         entries = SharedEntries.of(own)
         if entries is None:
             return None
-        parts.append(SharedPart(thing, entries))
+        parts.append(SharedPart(item, part, entries))
     return SharedArm(arm, tuple(parts))
 
 
@@ -171,12 +174,12 @@ def _resolved(
     scope: Scope,
     definition: Definition,
     shared: Mapping[tuple[str, str], SharedPart] = MappingProxyType({}),
-    own_scope: Callable[[], Scope] | None = None,
+    alone: list[tuple[tuple[str, str], Part, Scope]] | None = None,
 ) -> ResolvedArm | None:
     """The arm resolved in this scope.
 
-    shared     parts that are taken over instead, by kind and name
-    own_scope  makes the scope in which each part is resolved; None: in this one
+    shared  parts that are taken over instead, by kind and name
+    alone   takes each part with kind and name and the scope of its own in which it is resolved; None: in this scope
     """
     block = scope.definitions.block(definition)
     if block is None:
@@ -192,17 +195,34 @@ def _resolved(
         )
     ends = {item.name: None for item in block.of_kind("link")}
 
-    def part(item: Item) -> Link | Joint | None:
+    def part(item: Item) -> Part:
         known = shared.get((item.kind, item.name))
         if known is not None:
             known.entries.enter(scope)
-            return known.thing
-        there = scope if own_scope is None else own_scope()
-        return resolve_link(there, item, homes) if item.kind == "link" else _joint(there, item, homes, block, ends)
+            return known.part
+        there = scope if alone is None else Scope(scope.definitions, scope.complaints)
+        if item.kind == "link":
+            made = resolve_link(there, item, homes)
+        else:
+            joint = _joint(there, item, homes, block, ends)
+            made = () if joint is None else (joint,)
+        if alone is not None:
+            alone.append(((item.kind, item.name), made, there))
+        return made
 
-    links = [link for item in block.of_kind("link") if isinstance(link := part(item), Link)]
-    made = [part(item) for item in block.of_kind("joint")]
-    joints = [joint for joint in made if isinstance(joint, Joint)]
+    links, of_booms = list[Link](), list[Joint]()
+    for item in block.of_kind("link"):
+        made = part(item)
+        check_names(scope, item, made, block)
+        links += [each for each in made if isinstance(each, Link)]
+        ends |= {each.name: None for each in links if each.shape is not None}
+        of_booms += [each for each in made if isinstance(each, Joint)]
+    roots = {link.name: link.root for link in links if link.root}
+    written = [part(item) for item in block.of_kind("joint")]
+    own = [each for made in written for each in made if isinstance(each, Joint)]
+    joints = [replace(each, child=roots.get(each.child, each.child)) for each in own]
+    complete = len(joints) == len(written) and not scope.complaints.is_known_to_lack(definition.place, "joint")
+    joints += of_booms
     if not any(True for _ in block.of_kind("link")):
         scope.complaints.missing(
             definition.place,
@@ -211,12 +231,11 @@ def _resolved(
             f"arm `{definition.name}` has no links",
             help="write `link NAME { ... }` and a joint to hold it",
         )
-    complete = len(joints) == len(made) and not scope.complaints.is_known_to_lack(definition.place, "joint")
     check_tree(scope, definition.name, links, joints, complete=complete)
     check_followers(scope, joints)
     free_of_errors = not scope.complaints.errors
-    written = {item.name for kind in ARM.named for item in block.of_kind(kind)}
-    failed = frozenset(written - {link.name for link in links} - {joint.name for joint in joints})
+    names = {item.name for kind in ARM.named for item in block.of_kind(kind)}
+    failed = frozenset(names - {link.name for link in links} - {joint.name for joint in joints})
     return ResolvedArm(definition.name, tuple(links), tuple(joints), failed, free_of_errors)
 
 
@@ -247,15 +266,17 @@ def _stray(scope: Scope, item: Item, block: MergedBlock) -> None:
 # Links
 
 
-def resolve_link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | None:
-    """A link of an arm, with its numbers entered as parameters; None where it has no block (already reported)."""
+def resolve_link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Part:
+    """A link of an arm, with its numbers entered as parameters; of a boom its pieces; empty where it has no block
+    (already reported)."""
     owner = Owner(f"link `{item.name}`", item.place, f"links.{item.name}", homes=homes)
-    if item.detail:
+    is_boom = bool(item.detail) and item.detail[0].text == BOOM.name and item.name != BASE
+    if item.detail and not is_boom:
         scope.complaints.error(
             "D085",
             f"`{item.detail[0].text}` after the name of a link",
             item.detail[0].place,
-            help=f"write `link {item.name} {{ ... }}`",
+            help=[f"write `link {item.name} {{ ... }}`", f"or `link {item.name} boom {{ ... }}`, of a link that bends"],
         )
     if item.body is None or item.value is not None:
         scope.complaints.error(
@@ -264,11 +285,12 @@ def resolve_link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Link | Non
             item.place,
             help=f"write `link {item.name} {{ mass = ...; shape = ...; }}`",
         )
-        return None
-    check_keys(scope, item.body, LINK.keys, owner)
+        return ()
+    check_keys(scope, item.body, KEYS if is_boom else LINK.keys, owner)
     written = item.body.get(LUMPED.name)
     lumped = written is not None and scope.word(owner, LUMPED, written) != "off"  # None: no such word, already reported
-    return Link(item.name, item.place, use_matter(scope, owner, "link", item.name, item.body, lumped=lumped), lumped)
+    link = Link(item.name, item.place, use_matter(scope, owner, "link", item.name, item.body, lumped=lumped), lumped)
+    return resolve_boom(scope, owner, item, item.body, link) if is_boom else (link,)
 
 
 # Joints

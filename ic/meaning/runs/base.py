@@ -23,7 +23,8 @@ from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import Help, Label, Place, did_you_mean, leave_out
 from met.parameter import WORLD, Parameter
-from met.plan import BASE, COMPONENTS, Base, Course, Link, Payload, Structure, ground
+from met.plan import BASE, COMPONENTS, Base, Course, Link, Payload, Structure
+from met.plan.chains import ground
 from met.plan.defaults import INERTIA, OF_FREE_BASE, component
 
 USAGE = "write `base = fixed;`, `base = free;` or `base = prescribed { x = sine(amplitude = 1 cm, frequency = 2 Hz); }`"
@@ -204,8 +205,8 @@ def _free(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:
     written = None if known else scope.definitions.base_from_file(arm.name)
     if written is None:
         return _standing(scope, item, arm)
-    link = resolve_link(scope, written, scope.definitions.homes(scope.definitions.of_kind("arm")[arm.name]))
-    return arm if link is None else replace(arm, links=(*arm.links, link))
+    made = resolve_link(scope, written, scope.definitions.homes(scope.definitions.of_kind("arm")[arm.name]))
+    return replace(arm, links=(*arm.links, *(link for link in made if isinstance(link, Link))))
 
 
 def _standing(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:

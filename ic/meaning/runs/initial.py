@@ -30,7 +30,8 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
     """
     servos = {use.joint: use for use in uses}
     known = dict.fromkeys(("q", "qd"), "")
-    known |= {f"{joint.name}.{name}": "" for joint in arm.independent for name in ("q", "qd")}
+    springs = [joint for joint in arm.moving if joint.name in arm.springs]
+    known |= {f"{joint.name}.{name}": "" for joint in (*arm.independent, *springs) for name in ("q", "qd")}
     known |= dict.fromkeys(INITIAL.keys, "")
     of_base = dict.fromkeys(INITIAL_OF_BASE if any(link.name == BASE for link in arm.links) else (), "")
     for item in body.items.values():
@@ -94,6 +95,11 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
             if general is not None and own is None and listed is None and _mixed(scope, owner, wanted, general, arm):
                 break
             scope.number(owner, wanted, written, value=value)
+        for joint in springs:
+            own = body.get(f"{joint.name}.{name}")
+            place = own.place if own is not None else joint.place
+            owner = Owner(f"joint `{joint.name}`", place, f"initial.{joint.name}", joint=joint.kind)  # type: ignore
+            scope.number(owner, wanted, own)
     begin_followers(scope, arm.joints)
 
 
@@ -102,7 +108,7 @@ def check_balanced(scope: Scope, item: Item | None, uses: Sequence[Use], structu
     it"""
     if not structure.balanced or item is None:
         return
-    if not any(use.servo.balance for use in uses):
+    if not any(use.servo.balance for use in uses) and not structure.springs:
         able = [name for name, model in models.available("servo").items() if model.balance]
         scope.complaints.remark(
             "D248",

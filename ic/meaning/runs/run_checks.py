@@ -24,6 +24,7 @@ from ic.meaning.control.substitution import check_brakes, check_runaways, check_
 from ic.meaning.definitions.merge import MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.mechanics.bodies import check_moved
+from ic.meaning.mechanics.booms import check_places
 from ic.meaning.mechanics.payloads import check_payloads
 from ic.meaning.parameters.models import body_of
 from ic.meaning.parameters.scope import Scope
@@ -148,6 +149,7 @@ class RunCheck:
 
 RUN_CHECKS = (
     RunCheck(lambda run: check_moved(run.scope, run.arm.links, run.arm.joints, run.structure.payloads), _arm_is_sound),
+    RunCheck(lambda run: check_places(run.scope, run.structure), _arm_is_sound),
     RunCheck(_check_beginnings),
     RunCheck(_check_beds),
     RunCheck(_check_failures),

@@ -16,6 +16,6 @@ def test_the_tables_of_the_page_are_up_to_date() -> None:
 
 def test_each_large_block_has_its_table() -> None:
     marked = re.findall(r"<!-- table of (\w+) -->\n\|", PAGE.read_text(encoding="utf-8"))
-    blocks = ["joint", "link", "payload", "run", "scale", "search", "servo", "substitute", "sweep", "tune"]
+    blocks = ["boom", "joint", "link", "payload", "run", "scale", "search", "servo", "substitute", "sweep", "tune"]
     assert sorted(marked) == blocks
     assert set(marked) <= set(BLOCKS)

@@ -1,0 +1,52 @@
+"""Parts of an arm that belong together: links that are fixed to the base, and the pieces and springs of a boom."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from met.parameter import BASE
+
+if TYPE_CHECKING:
+    from met.plan import Joint, Link
+
+
+def ground(links: Iterable[Link], joints: Iterable[Joint]) -> tuple[str, ...]:
+    """The links that do not move against the base: the base, where it is a link, and all links fixed to it."""
+    found = {BASE}
+    fixed = {joint.child: joint.parent for joint in joints if joint.kind == "fixed"}
+    while more := {child for child, parent in fixed.items() if parent in found} - found:
+        found |= more
+    return tuple(link.name for link in links if link.name in found)
+
+
+def chains(links: Iterable[Link], joints: Iterable[Joint]) -> dict[str, tuple[Joint, ...]]:
+    """The joints between the pieces of each boom, from its tip to its root, by the boom's name."""
+    carriers = {joint.child: joint for joint in joints}
+    found = {}
+    for boom in links:
+        piece, chain = boom.name, []
+        while boom.root and piece != boom.root and piece in carriers:
+            chain.append(carriers.pop(piece))
+            piece = chain[-1].parent
+        if boom.root:
+            found[boom.name] = tuple(chain)
+    return found
+
+
+def springs(links: Iterable[Link], joints: Iterable[Joint]) -> frozenset[str]:
+    """Names of the joints at which booms bend and twist."""
+    return frozenset(each.name for chain in chains(links, joints).values() for each in chain if each.kind != "fixed")
+
+
+def straightened(links: Iterable[Link], joints: Iterable[Joint]) -> tuple[tuple[Link, ...], tuple[Joint, ...]]:
+    """The links and joints with each boom as the rigid link that it is while straight."""
+    links, joints = tuple(links), tuple(joints)
+    inner = [joint for chain in chains(links, joints).values() for joint in chain]
+    roots = {link.root: link.name for link in links if link.root}
+    pieces, own = {joint.parent for joint in inner}, {joint.name for joint in inner}
+    return (
+        tuple(link for link in links if link.name not in pieces),
+        tuple(replace(each, child=roots.get(each.child, each.child)) for each in joints if each.name not in own),
+    )

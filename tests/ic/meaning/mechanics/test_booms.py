@@ -1,0 +1,90 @@
+"""What a boom may not be, is told with a remedy; what it is made of, is the rigid link that it is while straight."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.ic.small_decks import changed, check, experiment, messages
+
+BOOM = """\
+arm crane {
+    link jib boom {
+        mass = 84 kg;  shape = box(size = [7, 0.2, 0.1] m, along = x);
+        EI = [3e6, 1e6] N*m^2;  GJ = 1e6 N*m^2;  damping_ratio = 1 %;
+    }
+    link hook { mass = 5 kg;  shape = sphere(radius = 0.1 m); }
+    joint luff revolute { parent = base;  child = jib;  axis = y; }
+    joint end fixed { parent = jib;  child = hook;  at = [7, 0, 0] m; }
+}
+servo bearing { model = passive; }
+run hang {
+    arm = crane;
+    servos { luff = bearing; }
+    rates { dynamics = 10 kHz;  record = 100 Hz; }
+    integrator = rk4;
+    duration = 1 s;
+    record = [q];
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("GJ = 1e6", "com = [3, 0, 0] m;  GJ = 1e6"), "a boom is uniform, and this is its `com`"),
+        (("GJ = 1e6", "nodes = 3;  GJ = 1e6"), "a boom bends at an even number of nodes"),
+        (("box(size = [7, 0.2, 0.1] m, along = x)", "sphere(radius = 1 m)"), "no shape that says how long it is"),
+        (("box(size = [7, 0.2, 0.1] m, along = x)", "rod(length = 7 m, along = x)"), "no inertia to twist with"),
+        (("at = [7, 0, 0] m", "at = [3, 0, 0] m"), "joint `end` is on boom `jib`, and not at its tip"),
+        (("at = [7, 0, 0] m", ""), "0 m is on piece `jib_0`"),
+        (("damping_ratio = 1 %;", ""), "damping_ratio"),
+        (("mass = 84 kg;", "mass = 0 kg;"), "boom `jib` has no mass"),
+        (("EI = [3e6, 1e6] N*m^2;", "EI = 0 N*m^2;"), "`EI` of link `jib` must be above 0"),
+        (("EI = [3e6, 1e6] N*m^2;", "EI = [1e6, -1] N*m^2;"), "must be above 0"),
+        (("[7, 0.2, 0.1] m", "[0, 0.2, 0.1] m"), "must be above 0"),
+        (("luff = bearing;", "luff = bearing;  jib_1y = bearing;"), "`jib_1y` is a spring of a boom"),
+        (("joint luff", "joint jib_1z"), "boom `jib` has a part `jib_1z` of its own"),
+        (("link jib boom {", "link jib beam {"), "or `link jib boom { ... }`, of a link that bends"),
+        (
+            ("    rates", "    payload box { mass = 9 kg;  shape = sphere(radius = 0.1 m);  on = jib; }\n    rates"),
+            "D084",
+        ),
+    ],
+)
+def test_a_boom_that_cannot_be_is_told(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    found = check(tmp_path, changed(BOOM, change))
+    assert found.plan is None and message in messages(found)
+
+
+def test_the_pieces_together_are_the_straight_link(tmp_path: Path) -> None:
+    """Mass, first moment and inertia about the centre; and the frames of all pieces are the link's."""
+    made = experiment(tmp_path, BOOM)
+
+    def number(path: str) -> float:
+        value = made.parameters[path].value
+        assert isinstance(value, float)
+        return value
+
+    pieces = [f"links.jib_{piece}" for piece in range(5)]
+    masses = np.array([number(f"{piece}.mass") for piece in pieces])
+    coms = np.array([number(f"{piece}.com.x") for piece in pieces])
+    assert masses.sum() == pytest.approx(84.0, rel=1e-15) and masses @ coms == pytest.approx(84.0 * 3.5, rel=1e-15)
+    for axis, moved in (("xx", 0.0), ("yy", 1.0), ("zz", 1.0)):
+        own = sum(number(f"{piece}.inertia.{axis}") for piece in pieces)
+        whole = number(f"links.jib.inertia.{axis}")
+        assert own + moved * (masses @ (coms - 3.5) ** 2) == pytest.approx(whole, rel=1e-14)
+    assert {number(f"{joint.name}.at.x") for joint in made.structure.joints} == {0.0, 7.0}
+    assert [link.name for link in made.structure.straight.links] == ["jib", "hook"]
+    assert number("jib_1y.servo.stiffness") == pytest.approx(3e6 * 4.0 / 7.0, rel=1e-15)
+    assert number("jib_1z.servo.stiffness") == pytest.approx(1e6 * 4.0 / 7.0, rel=1e-15)
+
+
+def test_decks_of_sane_booms_are_not_warned_of(tmp_path: Path) -> None:
+    assert not check(tmp_path, BOOM).diagnostics
+
+
+def test_a_stubby_boom_is_told(tmp_path: Path) -> None:
+    assert "a tube of 5 widths" in messages(check(tmp_path, changed(BOOM, ("[7, 0.2, 0.1] m", "[7, 2, 2] m"))))
