@@ -418,7 +418,8 @@ def _signals(experiment: Experiment, sizes: dict[str, int], kind: Kind, told: Ma
         dims += [component_dims[recorded.components]] if recorded.components else []
         unit, attributes = _signal_unit(recorded)
         frame = known[recorded.channels[0]].frame
-        attributes |= {name: value for name, value in {"frame": frame, **told}.items() if value}
+        inner = [joint for joint in recorded.joints if joint in experiment.structure.springs]
+        attributes |= {name: value for name, value in {"frame": frame, "springs": inner, **told}.items() if value}
         out.append(Variable(recorded.name, kind, tuple(dims), "signal", recorded.doc, unit, attributes))
     return out
 

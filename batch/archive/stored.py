@@ -32,6 +32,11 @@ class Stored:
         return str(self.attributes.get("path", self.name))
 
     @property
+    def springs(self) -> tuple[str, ...]:
+        """The joints of a signal at which booms bend, which are drawn only where they are asked for."""
+        return tuple(str(joint) for joint in np.atleast_1d(self.attributes.get("springs", ())))
+
+    @property
     def of_joints(self) -> bool:
         """True if a signal's third dimension holds joints."""
         return any(dim == "joint" or dim.startswith("joint_of_") for dim in self.dims[2:3])

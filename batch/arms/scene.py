@@ -13,7 +13,7 @@ from typing import Any
 
 from batch.arms.placing import OF_FREE_BASE, POSITION, parameters, world_poses
 from batch.arms.shapes import ArmNumbers, drawn, numbers, shape_of, shapes
-from met.dynamics.spatial import HERE, IDENTITY, Pose, Vector, compose, rotation_quaternion, settled
+from met.dynamics.spatial import HERE, IDENTITY, Pose, Vector, compose, rotation_quaternion, scale, settled
 from met.frozen import frozen
 from met.plan import BASE, Experiment, Joint, Link, Payload
 from met.program.courses import TIME
@@ -223,6 +223,8 @@ def _end(arm: ArmNumbers, name: str) -> Vector:
         along = int(dict(link.shape[1]).get("along", 0.0))
         far = {"sphere": 0.0, "box": sizes.get(f"size_{'xyz'[along]}", 0.0)}.get(kind, sizes.get("length", 0.0))
         return (far * float(along == 0), far * float(along == 1), far * float(along == 2))
+    if link is not None and link.root:
+        return scale(2.0, numbers(arm, f"links.{name}.com"))
     return numbers(arm, f"{carried[-1].name}.at" if carried else f"links.{name}.com")
 
 

@@ -81,7 +81,9 @@ def shapes(arm: ArmNumbers, bodies: Sequence[Link | Payload]) -> dict[str, list[
     for body in bodies:
         role: Literal["link", "payload"] = "payload" if isinstance(body, Payload) else "link"
         found = [_solid(arm, body, role)] if drawn(body) else _bare(arm, body, carried.get(body.name, ()), role)
-        if body.name in carrier:
+        if isinstance(body, Link) and body.root:
+            found = []  # it is drawn by its pieces
+        if body.name in carrier and carrier[body.name].name not in structure.springs:
             found += _joint(arm, carrier[body.name])
         out[body.name] = [*found, *_rails(arm, carried.get(body.name, ()))]
     return {name: [each for each in found if _there(each)] for name, found in out.items()}

@@ -193,6 +193,7 @@ def data_of(
             visible(name): [visible(each.path) for each in uses] for name, uses in extremes(experiment).items()
         },
         "signalAbout": {visible(each.name): visible(each.doc) for each in experiment.structure.record},
+        "springs": [f"{joint}.q" for joint in sorted(experiment.structure.springs)],
         "columnUnits": [_unit(unit) for _, unit in columns],
         "columnScales": [scale for scale, _ in columns],
         "arm": arm,

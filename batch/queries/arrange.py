@@ -57,7 +57,7 @@ def joints_of(group: ArchiveGroup) -> list[str]:
     """All joints with signals here, in the arm's order where one signal has them all."""
     signals = group.role("signal")
     together = sorted((v for v in signals if group.joints(v)), key=lambda v: v.dims[2] != "joint")
-    names = [joint for variable in together for joint in group.joints(variable)]
+    names = [joint for variable in together for joint in group.joints(variable) if joint not in variable.springs]
     alone = [joint_of(v.name) for v in signals if not group.joints(v)]
     return [joint for joint in dict.fromkeys([*names, *alone]) if joint]
 

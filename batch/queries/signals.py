@@ -116,8 +116,11 @@ def _panels(group: ArchiveGroup, choice: SignalSelection) -> list[Panel]:
     several = len({column // width for column in choice.columns}) > 1
     alone = choice.name != variable.name and len(choice.columns) == 1
     gathered: dict[tuple[str, str], list[tuple[str, str, int]]] = {}
+    springs = variable.springs if choice.name == variable.name else ()
     for column in sorted(choice.columns, key=lambda column: column % width if several else column):
         joint = joints[column // width] if joints else joint_of(variable.name)
+        if joint in springs:
+            continue
         component = components[column % width] if components else ""
         name = f"{variable.name}.{component}" if several and component else choice.name
         label = component if component and not several else joint if joints else ""

@@ -20,9 +20,9 @@ MET.traces = (() => {
     const hidden = new Set();  // channels
     let [plots, lines, under, judged, pointed] = [[], [], [], () => null, false];
 
-    // A plot a signal, of unlike units one a unit: the columns of each.
+    // A plot a signal, of unlike units one a unit: the columns of each, but for the springs of booms.
     const plotted = (n) => `${columns[n].signal}\n${data.columnUnits[n]}`;
-    const signals = [...new Set(columns.map((_, n) => plotted(n)))].map((which) => columns.flatMap((_, n) => (plotted(n) === which ? [n] : [])));
+    const signals = [...new Set(columns.map((_, n) => plotted(n)))].map((which) => columns.flatMap((_, n) => (plotted(n) === which && !data.springs.includes(columns[n].channel) ? [n] : [])));
     const drawn = (group) => [time, ...(beside ? group.map((n) => under[n]) : []), ...group.map((n) => lines[n])];
 
     // The limits of requirements on a group's columns, in their unit.
