@@ -79,8 +79,8 @@ def test_the_arms_that_come_with_met_are_those_and_have_these_joints_and_this_ma
     assert sorted(deck for deck, _, _ in rows) == standard_decks()
     for deck, joints, mass in rows:
         made = ic.compile(deck).experiments[0]
-        assert len(made.structure.moving) == int(joints)
+        assert len(made.structure.straight.moving) == int(joints)
         held = {"base", *(j.child for j in made.structure.joints if j.parent == "base" and j.kind == "fixed")}
-        moved = [link.name for link in made.structure.links if link.name not in {*held, "load"}]
+        moved = [link.name for link in made.structure.straight.links if link.name not in {*held, "load"}]
         weighed = sum(made.parameters[f"links.{name}.mass"].value for name in moved)
         assert weighed == pytest.approx(float(mass), abs=0.05)

@@ -27,6 +27,7 @@ PUBLISHED = (
     ("shuttle_arm", "shuttle_arm_payloads"),
     ("manutec_r3", "manutec_r3_driven"),
     ("ets_vii", "ets_vii_afloat"),
+    ("shuttle_booms", "shuttle_stop"),
 )
 """Decks that come with MET, and a run or sweep of each."""
 
