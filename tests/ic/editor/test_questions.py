@@ -70,7 +70,11 @@ def words(editor: Editor, deck: Path, text: str) -> list[str]:
 
 
 def test_an_entry_of_a_block_begins_with_what_the_language_declares_for_it(editor: Editor, deck: Path) -> None:
-    for written, kind in (("run more like nominal { | }", "run"), ("arm other { link a { | } }", "link")):
+    for written, kind in (
+        ("run more like nominal { | }", "run"),
+        ("arm other { link a { | } }", "link"),
+        ("arm other { link a boom { | } }", "boom"),
+    ):
         found = words(editor, deck, ARM + written)
         assert found[: len(BLOCKS[kind].entries)] == [entry.name for entry in BLOCKS[kind].entries]
     found = words(editor, deck, ARM + "run more like nominal { rates { dy|")
