@@ -120,6 +120,11 @@ def _cause_of_balance(experiment: Experiment, number: int, joints: Sequence[Unhe
     """
     joint = experiment.structure.moving[number].name
     found = {each.joint.name: each for each in joints}
+    if joint in experiment.structure.springs:
+        return (
+            f"t = 0 s: joint {joint}: it cannot begin balanced: no bend was found at which the boom stands still. It "
+            "is so soft that its load bends it far, or buckles it: make it stiffer, or leave `servos = balanced` out."
+        )
     if joint not in found:
         return f"t = 0 s: joint {joint}: it cannot begin balanced: its servo holds just less than the joint takes."
     each = found[joint]

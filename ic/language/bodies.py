@@ -57,8 +57,11 @@ BOOM = BlockDeclaration(
     head="links",
     doc="A link that bends and twists: a uniform beam along its shape, a rod, a box or a cylinder.",
     entries=(
-        LINK["mass"],
-        LINK["shape"],
+        Entry(name="mass", written="mass = 84 kg;", parameter=MASS, varies="number", path="links.LINK.mass",
+              doc="mass of the boom, above 0, along all of it"),
+        Entry(name="shape", written="shape = cylinder(radius = 0.1 m, length = 7 m, along = x);",
+              path="links.LINK.shape",
+              doc="a cylinder, a box or a rod: how long the boom is, along which axis, and its centre and inertia"),
         Entry(name="EI", written="EI = 2.8e6 N*m^2;", parameter=EI, varies="number", path="links.LINK.EI",
               doc="bending stiffness; a list of two, `[3e6, 1e6] N*m^2`, about the two axes across the boom, in the "
                   "order x, y, z"),

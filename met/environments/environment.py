@@ -23,8 +23,8 @@ class World(Protocol):
 
     time                 of the stage, s
     begin, step          time at which the dynamics step began that the stage is part of, and its length, s
-    joints, links        names, in the plan's order; joints are those that move, and payloads follow the links: where a
-                         link is asked for, a payload may be, whether a link carries it or not
+    joints, links        names, in the plan's order; joints are those that move, but for springs of booms, and payloads
+                         follow the links: where a link is asked for, a payload may be, whether a link carries it or not
     slides(joint)        whether it is prismatic
     q(joint), qd(joint)  rad, rad/s (m, m/s)
     position(link, point)  world position of a point given in the link's frame (m)

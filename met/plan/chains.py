@@ -43,10 +43,14 @@ def springs(links: Iterable[Link], joints: Iterable[Joint]) -> frozenset[str]:
 def straightened(links: Iterable[Link], joints: Iterable[Joint]) -> tuple[tuple[Link, ...], tuple[Joint, ...]]:
     """The links and joints with each boom as the rigid link that it is while straight."""
     links, joints = tuple(links), tuple(joints)
-    inner = [joint for chain in chains(links, joints).values() for joint in chain]
-    roots = {link.root: link.name for link in links if link.root}
-    pieces, own = {joint.parent for joint in inner}, {joint.name for joint in inner}
+    found = chains(links, joints)
+    booms = {joint.parent: boom for boom, chain in found.items() for joint in chain}  # by each of their pieces
+    own = {joint.name for chain in found.values() for joint in chain}
     return (
-        tuple(link for link in links if link.name not in pieces),
-        tuple(replace(each, child=roots.get(each.child, each.child)) for each in joints if each.name not in own),
+        tuple(link for link in links if link.name not in booms),
+        tuple(
+            replace(each, parent=booms.get(each.parent, each.parent), child=booms.get(each.child, each.child))
+            for each in joints
+            if each.name not in own
+        ),
     )

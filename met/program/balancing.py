@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from met.frozen import frozen
 from met.integrators.integrator import Motion
@@ -14,10 +15,16 @@ from met.program.sticking import Sticking, sticking
 from met.program.system import Actuator, System
 from met.program.values import NamedValues, answer, returned
 from met.servos.servo import Seen, Setpoint
-from met.trace import Real, both, sign, where
+from met.trace import Real, absolute, both, maximum, sign, where
 from met.trace.program import Tape
 
-SETTLINGS = 5
+SETTLINGS = 10
+"""Steps by which booms are put where their loads hold them."""
+
+SETTLED = 1e-7
+"""Angle, rad, and share of a spring's own, that it may be away from where its load holds it."""
+
+LEAST_REST = 1e-3
 
 
 @frozen
@@ -75,17 +82,51 @@ def settle_booms(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapp
     """Write the positions of booms' springs at which none of them moves, for the arm at state y; begun: as for
     `balance`.
 
-    A spring turns by its load over its stiffness. The load is that of the arm as it bends, and changes little with it:
-    SETTLINGS rounds leave an error of the ratio of the two changes to that power.
+    A spring turns by its load over its stiffness, and the load changes as the boom bends. The equations are solved by
+    Broyden's method from the unbent boom (C. T. Kelley, Iterative Methods for Linear and Nonlinear Equations, SIAM,
+    1995, section 7.3, which keeps the steps alone). `first_unsettled` says where SETTLINGS steps are too few.
     """
+    springs, steps = _springs(system), list[list[Real]]()
     for _ in range(SETTLINGS):
-        loads, q = _loads(system, tape, y, begun), list(y.q)
-        for spring in _springs(system):
-            p = system.servo_values(spring, tape.read)
-            q[spring.index] = p.rest - loads[spring.index] / p.stiffness
+        step = [-each for each in _turns_missing(system, tape, y, begun)]
+        for before, after in pairwise(steps):
+            share = _share(before, step)
+            step = [a + share * b for a, b in zip(step, after, strict=True)]
+        if steps:
+            rest = 1.0 - _share(steps[-1], step)
+            step = [each / where(absolute(rest) > LEAST_REST, rest, 1.0) for each in step]
+        steps.append(step)
+        q = list(y.q)
+        for spring, turn in zip(springs, step, strict=True):
+            q[spring.index] = q[spring.index] + turn
         y = replace(y, q=tuple(q))
-    for spring in _springs(system):
+    for spring in springs:
         tape.write(f"{spring.use.joint}.q", y.q[spring.index])
+
+
+def first_unsettled(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[str, Real]]) -> Real:
+    """The first spring of a boom, by its joint's number from 1, that is not at rest at state y; 0 where all are."""
+    first: Real = 0.0
+    for spring, missing in reversed([*zip(_springs(system), _turns_missing(system, tape, y, begun), strict=True)]):
+        still = absolute(missing) <= maximum(SETTLED * absolute(y.q[spring.index]), SETTLED)
+        first = where(still, first, spring.index + 1.0)
+    return first
+
+
+def _turns_missing(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[str, Real]]) -> list[Real]:
+    """By how much each spring of a boom is turned too far for its load, rad."""
+    loads, missing = _loads(system, tape, y, begun), list[Real]()
+    for spring in _springs(system):
+        p = system.servo_values(spring, tape.read)
+        missing.append(y.q[spring.index] - p.rest + loads[spring.index] / p.stiffness)
+    return missing
+
+
+def _share(before: Sequence[Real], step: Sequence[Real]) -> Real:
+    """The share of an earlier step in this one: their product over the square of the earlier one, 0 where that is 0."""
+    square = sum((each * each for each in before), 0.0)
+    product = sum((a * b for a, b in zip(before, step, strict=True)), 0.0)
+    return where(square > 0.0, product / where(square > 0.0, square, 1.0), 0.0)
 
 
 def _balanced(system: System) -> list[Actuator]:

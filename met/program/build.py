@@ -133,7 +133,10 @@ class Builder:
             y = self.step.state(tape)
             demands = balancing.balance(self.system, tape, y, begun)
             if UNHELD in self.watched:
-                tape.write(UNHELD, holding.first_unheld(self.system, tape, y, demands))
+                first = holding.first_unheld(self.system, tape, y, demands)
+                if self.system.structure.springs:
+                    first = where(first == 0.0, balancing.first_unsettled(self.system, tape, y, begun), first)
+                tape.write(UNHELD, first)
         plausible.start(tape, self.step.coordinates)
         for actuator in self.system.working:
             self._begin_sensors(tape, actuator)

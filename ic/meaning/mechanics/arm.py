@@ -270,13 +270,17 @@ def resolve_link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Part:
     """A link of an arm, with its numbers entered as parameters; of a boom its pieces; empty where it has no block
     (already reported)."""
     owner = Owner(f"link `{item.name}`", item.place, f"links.{item.name}", homes=homes)
-    is_boom = bool(item.detail) and item.detail[0].text == BOOM.name and item.name != BASE
+    written_boom = [word.text for word in item.detail] == [BOOM.name]
+    is_boom = written_boom and item.name != BASE
     if item.detail and not is_boom:
         scope.complaints.error(
             "D085",
             f"`{item.detail[0].text}` after the name of a link",
             item.detail[0].place,
-            help=[f"write `link {item.name} {{ ... }}`", f"or `link {item.name} boom {{ ... }}`, of a link that bends"],
+            help=[
+                f"write `link {item.name} {{ ... }}`",
+                *([f"or `link {item.name} boom {{ ... }}`, of a link that bends"] if item.name != BASE else []),
+            ],
         )
     if item.body is None or item.value is not None:
         scope.complaints.error(
@@ -286,7 +290,7 @@ def resolve_link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Part:
             help=f"write `link {item.name} {{ mass = ...; shape = ...; }}`",
         )
         return ()
-    check_keys(scope, item.body, KEYS if is_boom else LINK.keys, owner)
+    check_keys(scope, item.body, KEYS if written_boom else LINK.keys, owner)
     written = item.body.get(LUMPED.name)
     lumped = written is not None and scope.word(owner, LUMPED, written) != "off"  # None: no such word, already reported
     link = Link(item.name, item.place, use_matter(scope, owner, "link", item.name, item.body, lumped=lumped), lumped)

@@ -79,7 +79,7 @@ def resolve_boom(scope: Scope, owner: Owner, item: Item, body: MergedBlock, link
         scope.complaints.error("D084", message, body.items[GJ.name].place, help=cures)
         return ()
     mass, length = scope.settled(f"{owner.path}.mass"), _length(scope, owner, link, along)
-    failed = wrong or any(scope.checks.failed(owner.join(name)) for name in ("shape", *BOOM.keys))
+    failed = wrong or any(scope.checks.failed(owner.join(name)) for name in BOOM.keys)
     if failed or stiff is None or torsion is None or ratio is None or nodes is None or mass is None or length is None:
         return ()
     scope.checks.require(
@@ -236,25 +236,30 @@ def check_names(scope: Scope, item: Item, parts: Sequence[Link | Joint], arm: Me
             scope.complaints.error("D084", message, other.place, help="give one of the two another name")
 
 
+PLACES = {"link": ("at", "point"), "to": ("to_at", "to_point"), "nozzle_link": ("nozzle",)}
+"""The parameters of models that name a link, with those that are places on it."""
+
+
 def check_places(scope: Scope, structure: Structure) -> None:
     """Check that what stands on a boom is at its tip, for the boom's frame moves with its last piece."""
-    things = [(f"joint `{each.name}`", each.name, each.parent, each.place) for each in structure.straight.joints]
-    things += [
-        (f"payload `{each.name}`", f"payloads.{each.name}", each.link, each.place) for each in structure.payloads
-    ]
+    things = [(f"joint `{each.name}`", f"{each.name}.at", each.parent, each.place) for each in structure.joints]
+    for payload in structure.payloads:
+        things.append((f"payload `{payload.name}`", f"payloads.{payload.name}.at", payload.link, payload.place))
     for head, group in (("environment", structure.environment), ("sensors", structure.sensors)):
-        for each in group:
-            named = scope.parameters.get(f"{head}.{each.name}.link")
-            if named is not None and isinstance(named.value, str):
-                things.append((f"`{each.name}`", f"{head}.{each.name}", named.value, each.place))
+        for use in group:
+            path = f"{head}.{use.name}"
+            for key, places in PLACES.items():
+                named = scope.parameters.get(f"{path}.{key}")
+                if named is not None and isinstance(named.value, str) and not _is_moment_alone(scope, path):
+                    things += [(f"`{use.name}`", f"{path}.{place}", named.value, use.place) for place in places]
     shapes = {link.name: dict(link.shape[1]) for link in structure.links if link.shape is not None}
     for boom, chain in chains(structure.links, structure.joints).items():
         along = XYZ[int(shapes[chain[-1].parent]["along"])]
         springs = [f"{joint.name}.pivot.{along}" for joint in reversed(chain) if joint.kind != "fixed"]
         nodes = [scope.parameters[path].value for path in springs]
         for words, path, link, place in things:
-            at = scope.parameters.get(f"{path}.at.{along}")
-            if link == boom and at is not None and place is not None:
+            at = scope.parameters.get(f"{path}.{along}")
+            if link == boom and at is not None and place is not None and path != f"{chain[0].name}.at":
                 scope.checks.require(
                     (at.value, *nodes),  # type: ignore[arg-type]  # numbers
                     partial(_before_the_tip, boom),
@@ -263,6 +268,16 @@ def check_places(scope: Scope, structure: Structure) -> None:
                     place=at.origin.place or place,
                     help=f"what is on `{boom}` moves with its tip: name the piece that is there, or the link before it",
                 )
+
+
+def _is_moment_alone(scope: Scope, path: str) -> bool:
+    """True of a wrench without a force in any case, which acts on a boom wherever it is."""
+    forces = [each.value for key, each in scope.parameters.items() if key.startswith(f"{path}.force")]
+    return bool(forces) and all(not any(each) if isinstance(each, tuple) else _is_zero(each) for each in forces)
+
+
+def _is_zero(value: Real | str) -> bool:
+    return isinstance(value, float) and value == 0.0
 
 
 def _before_the_tip(boom: str, values: np.ndarray) -> tuple[np.ndarray, list[str]]:

@@ -89,7 +89,7 @@ def _environment_use(
     # a payload called `world` is already reported, and is no reason to report uses that mean the ground
     bodies = [*(link.name for link in arm.links), *(each.name for each in payloads if each.name != WORLD)]
     failed = (*arm.failed, *(each.name for each in payloads if each.name == WORLD))
-    known = {"joint": [joint.name for joint in arm.moving], "link": bodies}
+    known = {"joint": [joint.name for joint in arm.moving if joint.name not in arm.springs], "link": bodies}
     named = check_names(scope, owner, environment.parameters, body, arm=arm.name, known=known, failed=failed)
     about = next((named[p.name] for p in environment.parameters if p.names == "joint" and p.name in named), None)
     if about is not None:  # the meaning of the unit words `joint` and `effort`

@@ -267,7 +267,7 @@ class ChannelTable:
         wild = [name for name in _names(expression) if name.path[0].text == EVERY_JOINT]
         if not wild:
             return ()
-        moving = [joint.name for joint in self.structure.moving]
+        moving = [joint.name for joint in self.structure.moving if joint.name not in self.structure.springs]
         rests = [".".join(word.text for word in name.path[1:]) for name in wild]
         for name, rest in zip(wild, rests, strict=True):
             if not any(f"{joint}.{rest}" in self.known for joint in moving):

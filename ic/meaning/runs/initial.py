@@ -104,10 +104,19 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
 
 
 def check_balanced(scope: Scope, item: Item | None, uses: Sequence[Use], structure: Structure) -> None:
-    """Warn where servos should begin balanced and none of them can, or there is no load. item: the entry that asks for
-    it"""
+    """Warn where servos should begin balanced and none of them can, or there is no load; and of positions that a deck
+    gives the springs of booms, which begin where their loads hold them. item: the entry that asks for it"""
     if not structure.balanced or item is None:
         return
+    for spring in structure.springs:
+        begins = scope.parameters.get(f"initial.{spring}.q")
+        if begins is not None and begins.origin.place is not None:
+            scope.complaints.remark(
+                "D248",
+                f"`{spring}.q` changes nothing: with `servos = balanced` a boom begins where its load holds it",
+                begins.origin.place,
+                help=leave_out("leave it out, or `servos = balanced`"),
+            )
     if not any(use.servo.balance for use in uses) and not structure.springs:
         able = [name for name, model in models.available("servo").items() if model.balance]
         scope.complaints.remark(

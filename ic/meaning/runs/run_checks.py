@@ -33,6 +33,7 @@ from ic.meaning.runs.initial import check_balanced
 from met import models
 from met.frozen import frozen
 from met.plan import Structure
+from met.plan.chains import straightened
 from met.plan.judged import MetricUse, Requirement
 
 
@@ -148,7 +149,12 @@ class RunCheck:
 
 
 RUN_CHECKS = (
-    RunCheck(lambda run: check_moved(run.scope, run.arm.links, run.arm.joints, run.structure.payloads), _arm_is_sound),
+    RunCheck(
+        lambda run: check_moved(
+            run.scope, *straightened(run.arm.links, run.arm.joints), payloads=run.structure.payloads
+        ),
+        _arm_is_sound,
+    ),
     RunCheck(lambda run: check_places(run.scope, run.structure), _arm_is_sound),
     RunCheck(_check_beginnings),
     RunCheck(_check_beds),

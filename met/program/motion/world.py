@@ -32,18 +32,19 @@ class ArmWorld:
     ) -> None:
         self.time, self.begin = time, begin
         self.step = system.structure.schedule.step
-        self.joints = tuple(joint.name for joint in system.joints)
+        self._names = tuple(joint.name for joint in system.joints)
+        self.joints = tuple(name for name in self._names if name not in system.structure.springs)
         self.links = (*(each.name for each in system.structure.links), *(p.name for p in system.structure.payloads))
         self._sliding = {joint.name: joint.kind == "prismatic" for joint in system.joints}
         self._system, self._read = system, read
-        n = len(self.joints)
+        n = len(self._names)
         self._tree, self._y, self._base = tree, y, base
         self._q, self._qd = y.q[:n], y.qd[:n]
         self._flying = {payload.name: payload for payload in system.flying}
         self._motions: dict[str, LinkMotion] | None = None
 
     def slides(self, joint: str) -> bool:
-        return self._sliding[self.joints[self._number(joint)]]
+        return self._sliding[self._names[self._number(joint)]]
 
     def q(self, joint: str) -> Real:
         return self._q[self._number(joint)]
@@ -96,7 +97,7 @@ class ArmWorld:
         return link
 
     def _number(self, joint: str) -> int:
-        if joint not in self.joints:
+        if joint not in self._names:
             message = f"an environment model asks for joint `{joint}`, which the arm does not have"
             raise Problem(error("E218", message, help=f"moving joints: {', '.join(self.joints)}"))
-        return self.joints.index(joint)
+        return self._names.index(joint)

@@ -107,6 +107,7 @@ def test_modes_of_a_boom_with_a_body_at_its_tip(tmp_path: Path) -> None:
     assert natural(tmp_path, LOADED)[:2] == pytest.approx(roots(determinant, 2), rel=2e-4)
 
 
+@pytest.mark.slow
 def test_modes_of_a_hinged_boom_and_of_one_that_flies(tmp_path: Path) -> None:
     (hinged,) = roots(lambda b: math.sin(b) - math.cos(b) * math.tanh(b), 1)
     assert natural(tmp_path, HINGED, EIGHT)[1] == pytest.approx(hinged, rel=5e-4)
@@ -135,6 +136,34 @@ PULLED = (
     ("duration = 1 s", "duration = 1 ms"),
     ("record = 100 Hz", "record = 1 kHz"),
 )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("angle", "load"), [(0, 2.0), (80, 2.0), (-60, 2.0), (-80, 1.0), (20, 4.0)])
+def test_a_soft_boom_is_found_at_rest(tmp_path: Path, angle: float, load: float) -> None:
+    """Under up to four times EI/L^2."""
+    text = changed(
+        BOOM,
+        ("    rates", "    environment { gravity = [0, 0, -1] m/s^2; }\n    rates"),
+        ("    rates", f"    initial {{ root.q = {angle} deg;  servos = balanced; }}\n    rates"),
+        ("axis = z;", "axis = -y;"),
+        ("mass = 0 kg;", f"mass = {load} kg;  inertia = [0.1, 0.1, 0.1] kg*m^2;"),
+        ("mass = 1 kg;", "mass = 1 g;"),
+        ("record = [q,", "record = [energy.kinetic, q,"),
+        ("duration = 1 s", "duration = 0.1 s"),
+    )
+    run = engine.run(experiment(tmp_path, text))
+    assert not run.cause[0] and run.signals["energy.kinetic"].max() < 1e-10
+
+
+def test_a_boom_that_is_not_found_at_rest_fails(tmp_path: Path) -> None:
+    heavy = changed(
+        BOOM,
+        ("    rates", "    environment { gravity = [0, 0, -1] m/s^2; }\n    rates"),
+        ("    rates", "    initial { servos = balanced; }\n    rates"),
+        ("mass = 0 kg;", "mass = 300 kg;  inertia = [0.1, 0.1, 0.1] kg*m^2;"),
+    )
+    assert "it cannot begin balanced: no bend was found" in engine.run(experiment(tmp_path, heavy)).cause[0]
 
 
 @pytest.mark.slow

@@ -46,6 +46,16 @@ run hang {
         (("EI = [3e6, 1e6] N*m^2;", "EI = [1e6, -1] N*m^2;"), "must be above 0"),
         (("[7, 0.2, 0.1] m", "[0, 0.2, 0.1] m"), "must be above 0"),
         (("luff = bearing;", "luff = bearing;  jib_1y = bearing;"), "`jib_1y` is a spring of a boom"),
+        (
+            ("    rates", "    environment { w = wrench { link = jib;  force = [0, 0, 9] N; } }\n    rates"),
+            "`w` is on boom",
+        ),
+        (
+            ("    rates", "    environment { b = brake { joint = jib_1y;  torque = 1 N*m; } }\n    rates"),
+            "no joint `jib_1y`",
+        ),
+        (("link jib boom {", "link jib boom long {"), "after the name of a link"),
+        (("[7, 0.2, 0.1] m, along = x)", "[7, 0.2, 0.1] m, along = w)"), "along"),
         (("joint luff", "joint jib_1z"), "boom `jib` has a part `jib_1z` of its own"),
         (("link jib boom {", "link jib beam {"), "or `link jib boom { ... }`, of a link that bends"),
         (
@@ -82,8 +92,22 @@ def test_the_pieces_together_are_the_straight_link(tmp_path: Path) -> None:
     assert number("jib_1z.servo.stiffness") == pytest.approx(1e6 * 4.0 / 7.0, rel=1e-15)
 
 
-def test_decks_of_sane_booms_are_not_warned_of(tmp_path: Path) -> None:
-    assert not check(tmp_path, BOOM).diagnostics
+PIECE = (
+    "joint luff",
+    "link eye { mass = 1 kg;  shape = sphere(radius = 0.1 m); }\n"
+    "    joint clamp fixed { parent = jib_2;  child = eye;  at = [3, 0, 0] m; }\n    joint luff",
+)
+MOMENT = ("    rates", "    environment { w = wrench { link = jib;  moment = [0, 9, 0] N*m; } }\n    rates")
+
+
+@pytest.mark.parametrize("changes", [(), (PIECE,), (MOMENT,)])
+def test_decks_of_sane_booms_are_not_warned_of(tmp_path: Path, changes: tuple[tuple[str, str], ...]) -> None:
+    assert not check(tmp_path, changed(BOOM, *changes)).diagnostics
+
+
+def test_where_a_spring_begins_is_lost_in_a_balanced_start(tmp_path: Path) -> None:
+    begins = ("    rates", "    initial { jib_1y.q = 1 deg;  servos = balanced; }\n    rates")
+    assert "warning[D248]: `jib_1y.q` changes nothing" in messages(check(tmp_path, changed(BOOM, begins)))
 
 
 def test_a_stubby_boom_is_told(tmp_path: Path) -> None:
