@@ -6,6 +6,9 @@ from __future__ import annotations
 from batch.differences.words import Distribution, Ending, SignalRow, WorstCase
 from met.frozen import frozen
 
+PARAMETERS = "Parameters and models"
+"""The kind of differing origins that are parameters, or models, with other values."""
+
 
 @frozen
 class OtherOrigin:

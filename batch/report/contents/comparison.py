@@ -12,7 +12,7 @@ from batch.differences.result import Diff, ExperimentDiff
 from batch.queries.failures import ranges
 from batch.queries.pool import ENDED, Pool
 from batch.report.contents.against import GOOD, ComparedArchive, EarlierCases
-from batch.report.contents.changes import ArchiveChanges, DeckTextChange, OtherOrigin, RunChanges
+from batch.report.contents.changes import PARAMETERS, ArchiveChanges, DeckTextChange, OtherOrigin, RunChanges
 from batch.report.contents.moves import metric_moves
 from batch.report.contents.parts import OutcomeCount, RequirementFlow, Verdict
 from met.messages.visible import visible
@@ -24,7 +24,7 @@ KINDS = {
     "versions": "Versions",
     "code": "Code",
     "structure": "Structure",
-    "changed": "Parameters and models",
+    "changed": PARAMETERS,
     "follows": "What follows",
     "new": "New parameters",
     "kept": "Histories",

@@ -30,6 +30,7 @@ from batch.report.contents.verdicts import metric_rows, verdict
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem
 from met.host.files import open_regular
+from met.outputs import quoted
 from met.plan import Experiment
 
 MOST_LINES, MOST_LETTERS = 2000, 200_000
@@ -98,6 +99,9 @@ def gather(
         sources=_sources(archive),
         provenance=_provenance(archive, groups) + (() if against is None else _compared_with(against)),
         changes=None if against is None else comparison.archive_changes(against.found),
+        again=tuple(
+            f"met run {quoted(each)} --all" for each in (name, *(() if against is None else [str(against.found.a)]))
+        ),
     )
 
 

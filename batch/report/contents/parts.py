@@ -53,6 +53,7 @@ class RequirementCounts:
     verdict  of one over a share of cases: its worst of all design points, such as "not shown"; "" of one that every
              case is to meet; of one in the cases of a search's answer, how it came out in words
     ok       of the latter alone: it is met
+    bound    of one over a share of cases at one design point: on the share of all cases, in words; "" without one
     """
 
     text: str
@@ -64,6 +65,7 @@ class RequirementCounts:
     case: int | None = None
     verdict: str = ""
     ok: bool = True
+    bound: str = ""
 
 
 @frozen
@@ -546,12 +548,14 @@ class ReportSection:
 
 @frozen
 class Report:
-    """All of a page. verdicts: one a section, in their order; of other kinds, such as a comparison, after them."""
+    """All of a page. verdicts: one a section, in their order; of other kinds, such as a comparison, after them.
+    again: the commands that run this archive again, and the one it is compared with."""
 
     title: str
     archive: str
     deck: str
     replay: str
+    again: tuple[str, ...]
     verdicts: tuple[Verdict, ...]
     sections: tuple[ReportSection, ...]
     sources: tuple[SourceListing, ...]

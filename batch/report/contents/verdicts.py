@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from batch.queries.answer_outcome import answer_outcome
 from batch.queries.at_limits import limit_summaries, reached_texts
-from batch.queries.evidence import evidence
+from batch.queries.evidence import EvidenceRow, evidence, percent_above, percent_below
 from batch.queries.failures import failures, ranges
 from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
 from batch.queries.search_answers import SearchAnswer
@@ -54,9 +54,9 @@ def verdict(pool: Pool, experiments: Mapping[str, Experiment], *, named: bool) -
     parts = tuple(OutcomeCount(word, int(n)) for word, n in zip(ENDED, ended, strict=True) if n)
     good = int(ended[ENDED.index("met")] + ended[ENDED.index("done")])
     errors = [each for group in pool.groups for each in verdicts(group, figures(group))]
-    shares: dict[str, list[str]] = {}
+    shares: dict[str, list[EvidenceRow]] = {}
     for row in (row for group in pool.groups for row in evidence(group)):
-        shares.setdefault(row.requirement.text, []).append(row.verdict)
+        shares.setdefault(row.requirement.text, []).append(row)
     return Verdict(
         kind="requirements",
         about=pool.name if named else "",
@@ -64,13 +64,23 @@ def verdict(pool: Pool, experiments: Mapping[str, Experiment], *, named: bool) -
         headline=_headline(pool, good),
         parts=parts,
         demands=tuple(
-            replace(_demand(pool, place, text), verdict=max(shares.get(text, [""]), key=WORSE.index))
+            _over_share(_demand(pool, place, text), shares.get(text, []))
             for place, text in enumerate(pool.requirements)
         ),
         failing=_failing(pool),
         notes=(*_notes(pool), *map(_of_step_error, errors)),
         warnings=_report_warnings(pool, experiments),
     )
+
+
+def _over_share(counts: RequirementCounts, rows: Sequence[EvidenceRow]) -> RequirementCounts:
+    """A requirement with the worst verdict of its design points, and the bound where there is one of them."""
+    verdict, bound = max((row.verdict for row in rows), key=WORSE.index, default=""), ""
+    for row in rows if len(rows) == 1 else ():
+        if row.lower is not None and row.upper is not None:
+            refuted = row.verdict == "refuted"
+            bound = f"at most {percent_above(row.upper)}" if refuted else f"at least {percent_below(row.lower)}"
+    return replace(counts, verdict=verdict, bound=f"{bound} of all" if bound else "")
 
 
 def _of_answer(pool: Pool, answer: SearchAnswer, experiments: Mapping[str, Experiment], *, named: bool) -> Verdict:

@@ -6,6 +6,7 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 
 from batch.queries.pool import page_number
 from batch.queries.summary import SPREAD_COLUMNS
+from batch.report.contents.changes import PARAMETERS, ArchiveChanges
 from batch.report.contents.parts import (
     Fact,
     FailureRow,
@@ -63,11 +64,13 @@ def spot_link(spot: Spot | None, anchors: Anchors) -> Html | None:
 
 # The verdict
 
+MOST_CHANGED = 4
+"""Largest number of changed parameters beside the verdict of a comparison."""
 
-def verdict(found: Verdict, anchors: Anchors, *, tried: bool = False) -> Html:
-    """The answer, large, beside its grounds and doubts. tried: it is of all candidates, and neither yes nor no"""
-    if found.kind == "comparison":
-        return _comparison(found)
+
+def verdict(found: Verdict, anchors: Anchors, *, tried: bool = False, again: str = "") -> Html:
+    """The answer, large, beside its grounds and doubts. tried: it is of all candidates, and neither yes nor no; again:
+    the command that runs all again, if it is to be here"""
     yes, no = (found.word, found.word) if found.kind == "answer" else _words(found)
     answer = el(
         "div",
@@ -75,6 +78,7 @@ def verdict(found: Verdict, anchors: Anchors, *, tried: bool = False) -> Html:
         None if tried else el("p", mark(found.ok), yes if found.ok else no, cls="word"),
         el("p", share(found.good, found.cases), cls="share") if found.cases > 1 else None,
         el("p", found.headline, ".", cls="headline"),
+        _again("Run it again:", [again]) if again else None,
         cls="answer",
     )
     evidence = [_parts(found) if found.cases > 1 else None, _demands(found)]
@@ -84,6 +88,16 @@ def verdict(found: Verdict, anchors: Anchors, *, tried: bool = False) -> Html:
     evidence += [el("p", note, cls="note") for note in found.notes]
     kind = "" if tried else " yes" if found.ok else " no"
     return el("div", answer, el("div", evidence, cls="evidence"), cls=f"verdict{kind}")
+
+
+def command(words: str) -> Html:
+    """A command line, and a button that copies it."""
+    button = el("button", "copy", type="button", cls="copy", data_copy=words, aria_label=f"Copy {words}")
+    return join([button, " ", el("code", words)])
+
+
+def _again(words: str, commands: Sequence[str]) -> Html:
+    return join([el("p", words, cls="said"), *(el("p", command(each), cls="command") for each in commands)])
 
 
 def _words(found: Verdict) -> tuple[str, str]:
@@ -143,9 +157,12 @@ SHARES = {
 }
 
 
-def _comparison(found: Verdict) -> Html:
-    """The share of cases that meet all requirements, before and now; the number of differing cases; gains and losses of
-    each requirement."""
+def comparison(found: Verdict, changes: ArchiveChanges, again: Sequence[str]) -> Html:
+    """The share of cases that meet all requirements, before and now, with the first parameters that changed; the number
+    of differing cases; gains and losses of each requirement. again: the commands that run both archives again"""
+    changed = [line for each in changes.origins if each.about == PARAMETERS for line in each.lines]
+    more = len(changed) - MOST_CHANGED
+    listed = [*changed[:MOST_CHANGED], *([f"and {more:,} more, below"] if more > 0 else [])]
     figure: list[Child] = []
     if found.figure is not None:
         was, now, of = found.figure
@@ -158,12 +175,15 @@ def _comparison(found: Verdict) -> Html:
         el("p", likeness(found.word), found.word.capitalize(), cls="word"),
         figure,
         el("p", found.headline, ".", cls="headline") if found.headline else None,
+        el("p", "Parameters that changed:", cls="said") if listed else None,
+        [el("p", line, cls="under") for line in listed],
+        _again("Run both again:", again),
         cls="answer",
     )
     parts = [(*SHARES.get(part.word, ("other", part.word)), part.count) for part in found.parts]
     moves = [*found.flows, *([found.ends] if found.ends is not None else [])]
     apart = [_moves(moves, better=better) for better in (True, False)] if moves else []
-    evidence = [_bar_of(parts) if found.cases > 1 else None, _flows(found.flows), apart]
+    evidence = [_bar_of(parts) if found.cases > 1 else None, apart, _flows(found.flows)]
     return el("div", answer, el("div", evidence, cls="evidence"), cls="verdict against")
 
 
@@ -272,7 +292,7 @@ def _demand(each: RequirementCounts, single: bool, shares: bool, missed: bool, u
         name,
         el("td", f"{each.met:,} of {each.of:,}", cls="right"),
         el("td", share(each.met, each.of), cls="right strong"),
-        _share_verdict(each.verdict) if shares else None,
+        _share_verdict(each) if shares else None,
         el("td", f"{each.missed:,}" if each.missed else "–", cls="right bad" if each.missed else "right")
         if missed
         else None,
@@ -281,12 +301,13 @@ def _demand(each: RequirementCounts, single: bool, shares: bool, missed: bool, u
     ]
 
 
-def _share_verdict(word: str) -> Html:
-    """The verdict on a requirement over a share of cases; empty for one on every case."""
-    if not word:
+def _share_verdict(each: RequirementCounts) -> Html:
+    """The verdict on a requirement over a share of cases, with its bound; empty for one on every case."""
+    if not each.verdict:
         return el("td", "–")
-    ok = word in ("met", "demonstrated")
-    return el("td", mark(ok), word, cls="good" if ok else "bad")
+    ok = each.verdict in ("met", "demonstrated")
+    bound = el("span", each.bound, cls="under") if each.bound else None
+    return el("td", mark(ok), each.verdict, bound, cls="good" if ok else "bad")
 
 
 def case_link(case: int) -> Html:

@@ -20,9 +20,9 @@ from batch.differences.words import (
 from batch.queries.pool import page_number
 from batch.report.contents.changes import ArchiveChanges, DeckTextChange, OtherOrigin, RunChanges
 from batch.report.contents.parts import TextTable
-from batch.report.html.blocks import case_link, headings, likeness, rows_under
+from batch.report.html.blocks import case_link, command, headings, likeness, rows_under
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
-from batch.report.html.tables import command, table
+from batch.report.html.tables import table
 
 SHOWN_LINES, SHOWN_WORST, SHOWN_DIFF = 12, 5, 60
 """Numbers of visible lines of one kind of change, of cases that changed most, and of lines of a deck's file; the others

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 from batch.queries.pool import page_number
 from batch.report.contents.parts import DesignAnswer, DesignMap
+from batch.report.html.blocks import command
 from batch.report.html.markup import Child, Html, el, join
-from batch.report.html.tables import command, table
+from batch.report.html.tables import table
 
 SIDE = 320
 """Length of a map's longer side in its drawing's units."""
@@ -19,12 +20,12 @@ SHADES = 4
 
 def designs(found: DesignAnswer) -> Html:
     """The answer of `met best`, or of a search."""
-    words: list[Child] = [el("p", found.headline, cls="pick")]
-    words += [el("p", line, cls="said") for line in found.why.split("\n")]
+    first, *others = [el("p", line, cls="said") for line in found.why.split("\n")]
+    words: list[Child] = [el("p", found.headline, cls="pick"), first]
     if found.command:
         words += [el("p", found.said, cls="said"), el("p", command(found.command), cls="command")]
+    words += [*others, *(el("p", note, cls="note") for note in found.notes)]
     words += [table(found.stretches, "How far each may go")] if found.stretches is not None else []
-    words += [el("p", note, cls="note") for note in found.notes]
     head = el("div", el("div", words), _map(found.map) if found.map is not None else None, cls="answered")
     about = el("p", found.about, cls="said")
     return join([head, about, _progress(found), table(found.table, found.title)])

@@ -38,9 +38,9 @@ def page(report: Report) -> str:
     ]
     body = lines(
         [
-            el("a", "To the report", href="#verdict" if report.chosen_design is None else "#s0-designs", cls="skip"),
+            el("a", "To the report", href="#main", cls="skip"),
             _header(report),
-            el("main", lines([*_main(report, anchors)])),
+            el("main", lines([*_main(report, anchors)]), id="main"),
             _footer(report),
             el("div", id="tip", role="status", hidden=True),
             *data,
@@ -59,7 +59,7 @@ def _replay(report: Report, section: ReportSection) -> str:
 
 def _header(report: Report) -> Html:
     lede = report.sections[0].lede if len(report.sections) == 1 else f"{len(report.sections)} runs and sweeps."
-    links = [("verdict", _verdict_name(report)), *([("changed", "What changed")] if report.changes is not None else [])]
+    links = [*([("changed", "What changed")] if report.changes is not None else []), ("verdict", _verdict_name(report))]
     links += [link for n, section in enumerate(report.sections) for link in _links(n, section, report)]
     links += [("parameters", "Parameters"), ("provenance", "Provenance")]
     if report.chosen_design is not None:
@@ -95,6 +95,7 @@ def _links(number: int, section: ReportSection, report: Report) -> list[tuple[st
         ("stability", "Stability", section.stability is not None),
         ("run", "What was run", True),
     ]
+    found.sort(key=lambda link: section.single and link[0] != "signals")
     return [(f"s{number}-{key}", name) for key, name, there in found if there]
 
 
@@ -116,11 +117,18 @@ def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
     several = len(report.sections) > 1
     first, name = report.chosen_design, _verdict_name(report)
     tried = name != "Verdict"
-    answers = [blocks.verdict(each, anchors, tried=tried) for each in report.verdicts]
-    verdict = el("section", el("h2", name, cls="" if tried else "quiet"), answers, id="verdict")
-    out: list[Child] = [verdict if first is None else [_designs(0, first, "h2"), verdict]]
+    out: list[Child] = [] if first is None else [_designs(0, first, "h2")]
     if report.changes is not None:
-        out.append(el("section", el("h2", "What changed"), changes.origins(report.changes), id="changed"))
+        compared = [
+            blocks.comparison(each, report.changes, report.again)
+            for each in report.verdicts
+            if each.kind == "comparison"
+        ]
+        out.append(el("section", el("h2", "What changed"), compared, changes.origins(report.changes), id="changed"))
+    own = [each for each in report.verdicts if each.kind != "comparison"]
+    again = "" if report.changes is not None or (first is not None and first.command) else report.again[0]
+    answers = [blocks.verdict(each, anchors, tried=tried, again="" if n else again) for n, each in enumerate(own)]
+    out.append(el("section", el("h2", name, cls="" if tried else "quiet"), answers, id="verdict"))
     for number, section in enumerate(report.sections):
         shown = section if first is None else replace(section, designs=None)
         parts = lines(_section(number, shown, anchors, "h3" if several else "h2"))
@@ -159,6 +167,15 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
         )
     if section.designs is not None:
         out.append(_designs(number, section.designs, head))
+    if section.signals is not None:
+        run_again = section.simulation.said if section.simulation is not None else ()
+        said = [el("p", each, cls="said") for each in (*section.signals.said, *run_again)]
+        arm = el("div", cls="arm", data_plot="arm") if section.simulation is not None else None
+        plots = el("div", cls="signals plot", data_plot="signals")
+        drawn = [part("signals", _signals_name(section), arm, plots, said)]
+    else:
+        drawn = [part("signals", "Signals", said=section.no_signals)]
+    out += drawn if section.single else []
     if section.evidence is not None:
         out.append(part("evidence", "Evidence", tables.evidence(section.evidence)))
     if section.best is not None:
@@ -180,14 +197,7 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
         )
     elif table is not None:
         out.append(part("overview", "Metrics", table))
-    if section.signals is not None:
-        run_again = section.simulation.said if section.simulation is not None else ()
-        said = [el("p", each, cls="said") for each in (*section.signals.said, *run_again)]
-        arm = el("div", cls="arm", data_plot="arm") if section.simulation is not None else None
-        plots = el("div", cls="signals plot", data_plot="signals")
-        out.append(part("signals", _signals_name(section), arm, plots, said))
-    else:
-        out.append(part("signals", "Signals", said=section.no_signals))
+    out += [] if section.single else drawn
     if section.influences:
         shown = [tables.influence(each) for each in section.influences]
         out.append(part("influence", "Which parameters matter", shown, said=ABOUT_INFLUENCE))

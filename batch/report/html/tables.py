@@ -15,7 +15,7 @@ from batch.report.contents.parts import (
     Stability,
     TextTable,
 )
-from batch.report.html.blocks import Anchors, case_link, headings, mark, rows_under, scrolling, spot_link
+from batch.report.html.blocks import Anchors, case_link, command, headings, mark, rows_under, scrolling, spot_link
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
 
 SHOWN_CASES = 8
@@ -147,12 +147,6 @@ def _tornado(row: InfluenceRow, mean: float, low: float, high: float) -> Html:
     middle = el("line", x1=f"{at(mean):.2f}", x2=f"{at(mean):.2f}", y1=0, y2=18, cls="floor")
     words = f"{row.path}: from {row.ends}"
     return el("svg", bars, middle, cls="tornado", viewBox="-1 0 162 18", role="img", aria_label=words)
-
-
-def command(words: str) -> Html:
-    """A command line, and a button that copies it."""
-    button = el("button", "copy", type="button", cls="copy", data_copy=words, aria_label=f"Copy {words}")
-    return join([button, " ", el("code", words)])
 
 
 def beds(found: Stability) -> Html:

@@ -226,7 +226,9 @@ class TestThePage:
         assert found.changes is not None
         [made] = [each for each in found.changes.origins if each.about == "Parameters and models"]
         assert len(made.lines) > 20
-        assert f"and {len(made.lines) - 12} more" in words(page(found))
+        text = words(page(found))
+        assert f"and {len(made.lines) - 12} more" in text and f"and {len(made.lines) - 4} more, below" in text
+        assert [text.count(words(f"<p>{line}</p>")) for line in made.lines[3:5]] == [2, 1]
 
     @pytest.mark.slow
     def test_says_where_there_is_no_text_of_a_deck_as_markup(self, planted: tuple[Path, Path]) -> None:
@@ -244,6 +246,16 @@ class TestThePage:
     def test_is_that_of_the_archive_alone_without_another(self, planted: tuple[Path, Path]) -> None:
         source = report(planted[1], "1.html").read_text(encoding="utf-8")
         assert "What changed" not in source and '"against":null' in source
+
+    @pytest.mark.slow
+    def test_begins_with_what_changed_and_how_to_run_both_again(self, planted: tuple[Path, Path]) -> None:
+        found = gathered(*planted)
+        source = page(found)
+        changed, verdict = (source.index(f'<section id="{part}"') for part in ("changed", "verdict"))
+        assert changed < source.index('class="verdict against"') < verdict
+        assert found.again == ("met run b.h5 --all", "met run a.h5 --all")
+        assert [source[changed:verdict].count(f"<code>{each}</code>") for each in found.again] == [1, 1]
+        assert "Run it again:" not in source
 
     @pytest.mark.slow
     def test_of_one_run_of_several_is_of_it_alone(self, here: Path, engine: None) -> None:

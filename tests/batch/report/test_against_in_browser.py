@@ -58,6 +58,14 @@ def test_it_opens_in_silence_and_its_plots_are_drawn(page: Page) -> None:
     quiet(page)
 
 
+def test_a_case_of_the_comparison_leads_to_where_it_is_shown(page: Page) -> None:
+    first = "document.querySelector('.verdict.against button[data-case]')"
+    page.run(f"{first}.click()")
+    page.settle()
+    assert str(page.run("MET.models[0].chosen")) == page.run(f"{first}.dataset.case")
+    assert page.run(f"{first}.getAttribute('aria-pressed')") == "true"
+
+
 def test_it_is_as_small_as_its_data(sent: Path) -> None:
     source = sent.read_text(encoding="utf-8")
     data = sum(map(len, re.findall(r'<script type="application/json" id="d\d+">(.*?)</script>', source, re.DOTALL)))

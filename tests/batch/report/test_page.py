@@ -174,7 +174,7 @@ def test_answers_come_first(here: Path, engine: None) -> None:
     assert places == sorted(places)
     links = re.findall(r'<a href="#([\w-]+)">', source[source.index("<nav") : source.index("</nav>")])
     assert links == [*parts, "parameters", "provenance"]
-    assert '<a href="#s0-designs" class="skip">' in source
+    assert '<a href="#main" class="skip">' in source
     assert "All that was tried" in source and "Requirements not met" not in source, "candidates are no failure"
 
 

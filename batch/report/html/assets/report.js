@@ -31,8 +31,10 @@
     });
   });
 
-  // In the verdict a case is of the section that the verdict is about: they come in the same order.
-  document.querySelectorAll("#verdict .verdict").forEach((box, n) => {
+  // In the verdict a case is of the section that the verdict is about: they come in the same order. A comparison is of all sections.
+  const verdicts = [...document.querySelectorAll("#verdict .verdict")];
+  document.querySelectorAll(".verdict").forEach((box) => {
+    const n = models.length === 1 ? 0 : verdicts.indexOf(box);
     box.addEventListener("click", (event) => {
       const pressed = event.target.closest("button[data-case]");
       if (!pressed || !models[n]) return;
