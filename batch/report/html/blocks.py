@@ -6,7 +6,6 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 
 from batch.queries.pool import page_number
 from batch.queries.summary import SPREAD_COLUMNS
-from batch.report.contents.changes import PARAMETERS, ArchiveChanges
 from batch.report.contents.parts import (
     Fact,
     FailureRow,
@@ -63,9 +62,6 @@ def spot_link(spot: Spot | None, anchors: Anchors) -> Html | None:
 
 
 # The verdict
-
-MOST_CHANGED = 4
-"""Largest number of changed parameters beside the verdict of a comparison."""
 
 
 def verdict(found: Verdict, anchors: Anchors, *, tried: bool = False, again: str = "") -> Html:
@@ -157,12 +153,12 @@ SHARES = {
 }
 
 
-def comparison(found: Verdict, changes: ArchiveChanges, again: Sequence[str]) -> Html:
-    """The share of cases that meet all requirements, before and now, with the first parameters that changed; the number
-    of differing cases; gains and losses of each requirement. again: the commands that run both archives again"""
-    changed = [line for each in changes.origins if each.about == PARAMETERS for line in each.lines]
-    more = len(changed) - MOST_CHANGED
-    listed = [*changed[:MOST_CHANGED], *([f"and {more:,} more, below"] if more > 0 else [])]
+def comparison(found: Verdict, changed: Sequence[Child], again: Sequence[str]) -> Html:
+    """The share of cases that meet all requirements, before and now, with what changed; the number of differing cases;
+    gains and losses of each requirement.
+
+    changed  the lines about the parameters that differ;  again: the commands that run both archives again
+    """
     figure: list[Child] = []
     if found.figure is not None:
         was, now, of = found.figure
@@ -175,9 +171,8 @@ def comparison(found: Verdict, changes: ArchiveChanges, again: Sequence[str]) ->
         el("p", likeness(found.word), found.word.capitalize(), cls="word"),
         figure,
         el("p", found.headline, ".", cls="headline") if found.headline else None,
-        el("p", "Parameters that changed:", cls="said") if listed else None,
-        [el("p", line, cls="under") for line in listed],
         _again("Run both again:", again),
+        changed,
         cls="answer",
     )
     parts = [(*SHARES.get(part.word, ("other", part.word)), part.count) for part in found.parts]

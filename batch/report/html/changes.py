@@ -18,7 +18,7 @@ from batch.differences.words import (
     signal_columns,
 )
 from batch.queries.pool import page_number
-from batch.report.contents.changes import ArchiveChanges, DeckTextChange, OtherOrigin, RunChanges
+from batch.report.contents.changes import PARAMETERS, ArchiveChanges, DeckTextChange, OtherOrigin, RunChanges
 from batch.report.contents.parts import TextTable
 from batch.report.html.blocks import case_link, command, headings, likeness, rows_under
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
@@ -33,11 +33,20 @@ MOST_ENDED = 20
 
 
 def origins(found: ArchiveChanges) -> Html:
-    """The section on the provenance of the two archives, and on runs that only one of them has."""
-    rows = [el("div", el("dt", each.about), el("dd", _lines(each))) for each in found.origins]
-    same = el("p", SAME[0].upper() + SAME[1:], ".", cls="said") if not rows and not found.decks else None
+    """The section on the provenance of the two archives, without their parameters, and on runs that only one of them
+    has."""
+    rows = [
+        el("div", el("dt", each.about), el("dd", _lines(each))) for each in found.origins if each.about != PARAMETERS
+    ]
+    same = el("p", SAME[0].upper() + SAME[1:], ".", cls="said") if not found.origins and not found.decks else None
     decks = [el("h3", "The decks' text"), [_deck(each) for each in found.decks]] if found.decks else None
     return join([el("dl", rows, cls="facts made") if rows else None, same, _noted(found.alone), decks])
+
+
+def parameters(found: ArchiveChanges) -> list[Child]:
+    """The parameters and models that differ, to stand beside the verdict of the comparison."""
+    several = [each for each in found.origins if each.about == PARAMETERS]
+    return [el("div", el("p", f"{each.about}:", cls="said"), _lines(each), cls="changed") for each in several]
 
 
 MARKS = {"+": "new", "-": "gone", "@": "at"}

@@ -120,7 +120,7 @@ def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
     out: list[Child] = [] if first is None else [_designs(0, first, "h2")]
     if report.changes is not None:
         compared = [
-            blocks.comparison(each, report.changes, report.again)
+            blocks.comparison(each, changes.parameters(report.changes), report.again)
             for each in report.verdicts
             if each.kind == "comparison"
         ]

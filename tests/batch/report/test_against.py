@@ -227,8 +227,8 @@ class TestThePage:
         [made] = [each for each in found.changes.origins if each.about == "Parameters and models"]
         assert len(made.lines) > 20
         text = words(page(found))
-        assert f"and {len(made.lines) - 12} more" in text and f"and {len(made.lines) - 4} more, below" in text
-        assert [text.count(words(f"<p>{line}</p>")) for line in made.lines[3:5]] == [2, 1]
+        assert f"and {len(made.lines) - 12} more" in text
+        assert text.index("Against") < text.index("Parameters and models:") < text.index("Improvements")
 
     @pytest.mark.slow
     def test_says_where_there_is_no_text_of_a_deck_as_markup(self, planted: tuple[Path, Path]) -> None:
