@@ -62,6 +62,33 @@ def centres(run: RunNumbers) -> Iterator[Scale]:
             yield Scale("centre beside a link", path, far, "m", most, other, 0.0, 0.25, usual, verb=verb)
 
 
+def shared_lines(run: RunNumbers) -> Iterator[Scale]:
+    """Driven joints that turn about the line about which the driven joint before them turns: by the reach beside the
+    distance of the two lines, which is at most the reach away. A spring in a joint is a joint of its own, undriven."""
+    driven = {use.joint for use in run.uses if use.command is not None and run.kinds.get(use.joint) == "revolute"}
+    before, places = dict[str, str](), run.poses({})[2]
+    for joint in run.outward:
+        last = before.get(joint.parent, "")
+        before[joint.child] = last if joint.kind == "fixed" else joint.name
+        if {joint.name, last} <= driven:
+            (axis, point), (other, through) = places[joint.name], places[last]
+            far = np.linalg.norm(np.cross(point - through, other)) + run.reach * np.linalg.norm(np.cross(axis, other))
+            if far < 1e-6 * run.reach:
+                yield Scale(
+                    "line of a joint",
+                    f"{joint.name}.axis",
+                    run.reach,
+                    "m",
+                    max(float(far), 1e-9 * run.reach),
+                    "the distance of the two lines",
+                    0.0,
+                    1e6,
+                    "two motors in a row usually turn about two lines",
+                    said=f"turns `{joint.name}` about the line of `{last}`",
+                    cure="write another axis, or another place, of one of the two",
+                )
+
+
 def forgotten(run: RunNumbers) -> Iterator[Scale]:
     """Joints that turn, or are fixed, without an `at` on a link whose shape leads away from its own joint."""
     usual, by_dh = "without `at` both joints of a link are in one place", {x.partition(".dh.")[0] for x in run.settled}

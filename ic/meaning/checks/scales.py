@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from ic.meaning.checks.asked import grapples, spreads, targets
-from ic.meaning.checks.bodies import booms, centres, forgotten, held, masses
+from ic.meaning.checks.bodies import booms, centres, forgotten, held, masses, shared_lines
 from ic.meaning.checks.magnitudes import LENGTHS, MASSES, MEANT, SMALLEST_GYRATION
 from ic.meaning.checks.run_numbers import BEARING_NOTHING, RunNumbers
 from ic.meaning.checks.scale import TURN, Scale, inside
@@ -428,6 +428,7 @@ SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
     centres,
     forgotten,
     booms,
+    shared_lines,
     held,
     grapples,
     spreads,

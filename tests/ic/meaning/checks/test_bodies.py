@@ -94,11 +94,15 @@ def test_what_is_said_to_be_usual_is_not_told(tmp_path: Path) -> None:
 
 
 def test_a_joint_without_a_place_on_a_long_link_is_told(tmp_path: Path) -> None:
-    without = ("axis = -y;  at = [80, 0, 0] mm;", "axis = -y;")
+    without, line = (
+        ("axis = -y;  at = [80, 0, 0] mm;", "axis = -y;"),
+        "`knee.axis` turns `knee` about the line of `lift`",
+    )
     assert said(tmp_path, BARE, without) == [
-        "`knee.at` is not written, and `femur`, which carries the joint, is 0.08 m long"
+        "`knee.at` is not written, and `femur`, which carries the joint, is 0.08 m long",
+        line,
     ]
-    assert said(tmp_path, BARE, (without[0], "axis = -y;  at = [0, 0, 0] mm;")) == []  # it is meant so
+    assert said(tmp_path, BARE, (without[0], "axis = -y;  at = [0, 0, 0] mm;")) == [line]  # the place is meant so
     short = ("axis = -y;  at = [40, 0, 0] mm;", "axis = -y;")
     assert said(tmp_path, short) == []  # no longer than wide
 

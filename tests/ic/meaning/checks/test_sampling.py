@@ -197,7 +197,7 @@ def test_two_joints_with_one_servo_are_told_once(tmp_path: Path) -> None:
     arm = changed(
         ARM,
         ("    joint hinge", "    link tip { mass = 1 kg; shape = rod(length = 1 m, along = x); }\n    joint hinge"),
-        ("axis = z; }\n", "axis = z; }\n    joint wrist revolute { parent = bar; child = tip; axis = z; }\n"),
+        ("axis = z; }\n", "axis = z; }\n    joint wrist revolute { parent = bar; child = tip; axis = y; }\n"),
     )
     servo = under("rate(step(to = 1 rad/s, at = 3 s))")
     assert codes(tmp_path, arm, servo, changed(RUN, ("hinge = drive", "hinge = drive; wrist = drive"))) == ["D334"]

@@ -57,6 +57,25 @@ PUSH = "push = wrench { link = fore; point = [0.4, 0, 0] m; force = [0, 0, 1] N;
 """A load on the arm, without which the motors alone hold it."""
 
 
+SPRING = "servo spring { model = passive;  stiffness = 0.01 N*m/rad; }"
+
+
+def test_two_driven_joints_about_one_line_are_told_and_a_spring_in_a_joint_is_not() -> None:
+    roll = "joint elbow revolute { parent = upper; child = fore; axis = x; at = [0.6, 0, 0] m; }"
+    hand = "link hand { mass = 0.1 kg; shape = sphere(radius = 50 mm); }"
+    elbow, servos = next(line for line in TWO_LINKS.splitlines() if "joint elbow" in line), "elbow = drive; }"
+
+    def found(axis: str, servo: str, place: str = "0.2", between: str = roll) -> list[str]:
+        wrist = f"joint wrist revolute {{ parent = fore; child = hand; axis = {axis}; at = [{place}, 0, 0] m; }}"
+        driven = (servos, f"elbow = drive;  wrist = {servo}; }}")
+        changes = ((elbow.strip(), f"{between} {hand} {wrist}"), driven, ("run lift {", f"{SPRING}\nrun lift {{"))
+        return [message for message, _ in remarks(*changes) if "the line of" in message]
+
+    said = "`wrist.axis` turns `wrist` about the line of `elbow`; two motors in a row usually turn about two lines"
+    assert found("x", "drive") == [said] == found("-x", "drive")
+    assert found("z", "drive") == found("x", "spring") == found("y", "drive", between=elbow.strip()) == []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said", "help"),
@@ -123,7 +142,7 @@ def test_of_a_motor_that_cannot_hold_its_arm_the_load_and_what_it_holds_are_told
     assert said.endswith("times what it holds at the joint, 11 N*m; a motor that cannot hold its arm lets it fall")
     enough = help.removesuffix(" would hold it")
     assert remarks((weak[0], f"tau_max = {enough}"), (PUSH, "")) == []
-    stop = "stop = joint_stop { joint = NAME; lower = -1 rad; upper = 1 rad; stiffness = 100 N*m/rad; }"
+    stop = "stop = joint_stop { joint = NAME; lower = -1 rad; upper = 1 rad; stiffness = 0.01 N*m/rad; }"
     assert len(remarks(weak, (PUSH, stop.replace("NAME", "elbow")))) == 1
     assert remarks(weak, (PUSH, stop.replace("NAME", "shoulder"))) == []
 
