@@ -177,7 +177,9 @@ class RobustTuning:
     def _step_from(self, candidate: Candidate) -> None:
         """Begin steps along slopes, where there are any."""
         if self.steps is not None:
-            self.steps.begin(self._points[candidate], np.frombuffer(candidate), self._active_plants)
+            self.steps.begin(
+                self._points[candidate], np.frombuffer(candidate), self._active_plants, self._worst(candidate)
+            )
 
     @property
     def _active_plants(self) -> list[tuple[float, ...]]:
@@ -191,7 +193,8 @@ class RobustTuning:
         """Pass on the known worths of a generation; or judge the best of a turn, which was tried against all plants."""
         if not self._confirming:
             if self.steps is not None and self.steps.going:
-                self.steps.tell(np.frombuffer(self._batch[0]), self._active_plants)
+                asked = self._batch[0]
+                self.steps.tell(np.frombuffer(asked), self._active_plants, self._worst(asked))
             else:
                 self._tuner.tell(np.array([self._worst(each) for each in self._batch]))
             return

@@ -10,6 +10,7 @@ import numpy as np
 from met.optimisers.descent import LocalModel, SlopeDescent
 from met.plan.searches import Search
 from met.searches.slopes import CaseSlopes, SlopeSource, local_model, worth_of
+from met.searches.values import MET
 
 
 class SlopeSteps:
@@ -29,9 +30,13 @@ class SlopeSteps:
         """True while a descent goes on."""
         return self._descent is not None
 
-    def begin(self, point: np.ndarray, candidate: np.ndarray, plants: Sequence[tuple[float, ...]]) -> None:
-        """Begin at a point of the unit cube, with the values there, SI, if there are slopes."""
+    def begin(
+        self, point: np.ndarray, candidate: np.ndarray, plants: Sequence[tuple[float, ...]], known: float
+    ) -> None:
+        """Begin at a point of the unit cube, with the values there, SI, if there are slopes. known: its worth"""
         worth, model = self._local(candidate, plants)
+        if self._steered_away(known, worth):
+            model, self.why_not = None, "the least margin has no slopes"
         self.settled = False
         self._descent = None if model is None else SlopeDescent(point, worth, model)
 
@@ -48,10 +53,16 @@ class SlopeSteps:
         """End the descent."""
         self._descent = None
 
-    def tell(self, candidate: np.ndarray, plants: Sequence[tuple[float, ...]]) -> None:
-        """The candidate that was asked for last has been run with these plants."""
+    def tell(self, candidate: np.ndarray, plants: Sequence[tuple[float, ...]], known: float) -> None:
+        """The candidate that was asked for last has been run with these plants. known: its worth"""
         assert self._descent is not None
-        self._descent.tell(*self._local(candidate, plants))
+        away = self._steered_away(known, self._descent.worth)
+        self._descent.tell(*((math.inf, None) if away else self._local(candidate, plants)))
+
+    def _steered_away(self, known: float, worth: float) -> bool:
+        """True of a candidate that misses the least margin, which steers, beside a worth by the metrics alone that
+        misses nothing: slopes of the metrics would lead farther beyond the margin."""
+        return self._search.steers and known >= MET > worth
 
     def _local(self, candidate: np.ndarray, plants: Sequence[tuple[float, ...]]) -> tuple[float, LocalModel | None]:
         """The worth of a candidate, by its metrics between samples, and a local model of the function to minimise."""

@@ -186,6 +186,34 @@ def test_a_limit_is_kept_and_a_margin_is_paid_for() -> None:
     assert least == pytest.approx(edge.min(), rel=1e-4)
 
 
+@dataclass
+class Steered(Bowl):
+    """A bowl whose worth also asks for a load below 2.2, which has no slopes, as a least margin has none."""
+
+    beyond: int = 0
+
+    def slopes(self, cases: np.ndarray) -> CaseSlopes | str:
+        self.beyond += bool((self.values(cases)["load"] > 2.2).any())
+        return super().slopes(cases)
+
+    def worth(self, cases: np.ndarray, search: Search) -> np.ndarray:
+        values, limits = self.values(cases), (*self.requirements, Limit("load", "<", 2.2))
+        return served(values["settle"], search.largest, np.ones(len(cases), bool), limits, values, search.margin)
+
+
+def test_steps_along_slopes_stay_within_a_margin_that_steers() -> None:
+    """Slopes beyond it are asked for where a descent begins alone, and the answer lies on its edge."""
+    search = replace(tuning((0.5,), margin=0.0), steers=True)
+    source = Steered()
+    method, cases, worth = run(search, source)
+    assert method.steps is not None and method.steps.cases > 20 and 0 < source.asked < 0.6 * method.steps.cases
+    assert source.beyond <= 1
+    best = cases[worth.argmin()]
+    edge = np.linspace(1.0, 2.2, 100_001)  # kp, with ki = 2.2 - kp
+    least = float((1.0 + np.log(edge / 2.0) ** 2 + (1.7 - edge) ** 2).min())
+    assert source.values(best[None])["settle"][0] < least * (1.0 + 1e-3)
+
+
 def test_where_there_are_no_slopes_it_goes_on_without_and_says_why() -> None:
     method, cases, _ = run(tuning(), Refused())
     assert steps_of(method) == {
