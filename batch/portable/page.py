@@ -23,7 +23,9 @@ from batch.portable import beside
 from batch.portable.numbers import OtherNumbers, deck_of, limits
 from batch.queries.deck_units import DeckUnits
 from batch.queries.groups import groups_named
+from batch.queries.pool import pools
 from batch.queries.signals import Panel, deck_unit, pretty_unit
+from batch.report.contents.designs import design_answer
 from batch.report.html import inlined
 from batch.report.html.head import page_head
 from batch.report.html.markup import Html, el, lines
@@ -79,6 +81,9 @@ def view(
         experiment = next(each for each in file.plan().experiments if each.name == group.name)
         data = data_of(experiment, file, group)
         data["report"] = visible(f"met report {quoted(Path(archive).name)}")
+        answer = design_answer(file, pools(groups)[0])
+        if answer is not None and answer.case in data["positions"]:
+            data["opens"] = data["positions"].index(answer.case)
         if against is not None:
             data["beside"] = _beside(against, file, group, experiment, tell)
         if numbers is not None:

@@ -26,7 +26,7 @@ MET.simulate = (data, back, { seen = null, surface = null } = {}) => {
   let turn = 0;  // of computing them
   const addressed = Boolean(data.report) && cases.length > 1;  // the page's address says which case is shown
   let [noted, moved] = [0, false];
-  let values = (data.stood || (addressed && asked()) || cases[0]).slice();
+  let values = (data.stood || (addressed && asked()) || cases[data.opens ?? 0]).slice();
   let lines = [];
   let pale = [];  // of what stands beside, under them
   let theirs = null;  // metrics of what stands beside, by name, SI

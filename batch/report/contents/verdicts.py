@@ -9,7 +9,7 @@ import numpy as np
 
 from batch.queries.answer_outcome import answer_outcome
 from batch.queries.at_limits import limit_summaries, reached_texts
-from batch.queries.evidence import EvidenceRow, evidence, percent_above, percent_below
+from batch.queries.evidence import EvidenceRow, evidence, percent_below
 from batch.queries.failures import failures, ranges
 from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
 from batch.queries.search_answers import SearchAnswer
@@ -75,12 +75,9 @@ def verdict(pool: Pool, experiments: Mapping[str, Experiment], *, named: bool) -
 
 def _over_share(counts: RequirementCounts, rows: Sequence[EvidenceRow]) -> RequirementCounts:
     """A requirement with the worst verdict of its design points, and the bound where there is one of them."""
-    verdict, bound = max((row.verdict for row in rows), key=WORSE.index, default=""), ""
-    for row in rows if len(rows) == 1 else ():
-        if row.lower is not None and row.upper is not None:
-            refuted = row.verdict == "refuted"
-            bound = f"at most {percent_above(row.upper)}" if refuted else f"at least {percent_below(row.lower)}"
-    return replace(counts, verdict=verdict, bound=f"{bound} of all" if bound else "")
+    verdict = max((row.verdict for row in rows), key=WORSE.index, default="")
+    lower = rows[0].lower if len(rows) == 1 and verdict != "refuted" else None
+    return replace(counts, verdict=verdict, bound="" if lower is None else f"at least {percent_below(lower)} of all")
 
 
 def _of_answer(pool: Pool, answer: SearchAnswer, experiments: Mapping[str, Experiment], *, named: bool) -> Verdict:

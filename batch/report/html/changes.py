@@ -45,8 +45,11 @@ def origins(found: ArchiveChanges) -> Html:
 
 def parameters(found: ArchiveChanges) -> list[Child]:
     """The parameters and models that differ, to stand beside the verdict of the comparison."""
-    several = [each for each in found.origins if each.about == PARAMETERS]
-    return [el("div", el("p", f"{each.about}:", cls="said"), _lines(each), cls="changed") for each in several]
+    return [
+        el("div", el("p", f"{each.about}:", cls="said"), _lines(each), cls="changed")
+        for each in found.origins
+        if each.about == PARAMETERS
+    ]
 
 
 MARKS = {"+": "new", "-": "gone", "@": "at"}

@@ -136,7 +136,7 @@ def test_every_recorded_number_in_the_browser_has_the_archives_bits(
 
 @pytest.mark.browser
 def test_a_slider_runs_the_case_again_and_turns_the_verdict(chromium: Chromium, sent: Path) -> None:
-    page = chromium.open(sent / "tuned.view.html")
+    page = chromium.open(f"{(sent / 'tuned.view.html').resolve().as_uri()}#case=0")
     page.settle()
     before = page.picture(sent / "before.png").read_bytes()
     assert page.run("document.querySelector('.answers .met, .answers .missed').className") == "missed"
@@ -192,6 +192,20 @@ def test_the_list_of_cases_says_values_misses_the_best_and_the_worst(chromium: C
 
 
 @pytest.mark.browser
+def test_it_opens_on_the_worst_case_of_the_design_to_use(chromium: Chromium, sent: Path) -> None:
+    with xarray.open_dataset(sent / "tuned.h5") as data:
+        volts, gains = data["volts"].values, data["gearbox.kp"].values
+    page = chromium.open(sent / "tuned.view.html")
+    page.settle()
+    opens = page.run("MET_PAGE.opens")
+    own = volts[gains == gains[opens]]
+    assert len(own) == 2 and own.max() == volts[opens] < 3.55 < volts.max()
+    assert page.run("MET.page.values()") == page.run("MET_PAGE.description.cases.inputs[MET_PAGE.opens]")
+    quiet(page)
+    page.close()
+
+
+@pytest.mark.browser
 def test_the_address_keeps_the_case_and_the_sliders(chromium: Chromium, sent: Path) -> None:
     page = chromium.open(sent / "tuned.view.html")
     page.settle()
@@ -207,9 +221,9 @@ def test_the_address_keeps_the_case_and_the_sliders(chromium: Chromium, sent: Pa
     for hash_, expected in (
         ("#case=3", "cases.inputs[3]"),
         (between, json.dumps(values)),
-        ("#case=99", "cases.inputs[0]"),
-        ("#at=1e300,1", "cases.inputs[0]"),
-        ("#at=<b>", "cases.inputs[0]"),
+        ("#case=99", "cases.inputs[MET_PAGE.opens]"),
+        ("#at=1e300,1", "cases.inputs[MET_PAGE.opens]"),
+        ("#at=<b>", "cases.inputs[MET_PAGE.opens]"),
     ):
         page = chromium.open(start + hash_)
         page.settle()
@@ -226,7 +240,7 @@ def test_an_archive_that_holds_other_numbers_is_told_apart(chromium: Chromium, s
     assert changed != text
     loose = re.sub(r"script-src '[^']*'", "script-src 'unsafe-inline'", changed)
     (tmp_path / "changed.html").write_text(loose, encoding="utf-8")
-    page = chromium.open(tmp_path / "changed.html")
+    page = chromium.open(f"{(tmp_path / 'changed.html').resolve().as_uri()}#case=0")
     assert page.run(SAID).startswith("Other numbers than the archive has for case #0 (volts): ")
     page.close()
     (tmp_path / "unsigned.html").write_text(changed, encoding="utf-8")
