@@ -54,6 +54,8 @@ class Parameter:
     ticks        of a frequency: how often something is done, which turns no angle: 1/s is as plain there as Hz
     as_many_as   of a list: the list that it has a number for each of; it may be empty where that is its default
     if_negative  of a number above 0: what a negative one stands for, where its magnitude may be written in its place
+    timing       of an environment's number that says when the model acts: a plan holds it only where it is set. Without
+                 it the model acts always and in full, as checks of steps have it
     """
 
     name: str
@@ -81,6 +83,7 @@ class Parameter:
     ticks: bool = False
     as_many_as: str = ""
     if_negative: str = ""
+    timing: bool = False
     only: Only | None = None
 
 
@@ -134,6 +137,7 @@ class Signal:
     """A number that a model shows at every instant, computed from the rest; recorded under its name.
 
     limit  the parameter that its size never exceeds, by name; "": none
+    axes   of an environment's vector of three numbers: the axes that they are along, in words; "": it is one number
     """
 
     name: str
@@ -141,6 +145,7 @@ class Signal:
     doc: str
     only: Only | None = None
     limit: str = ""
+    axes: str = ""
 
 
 @frozen(kw_only=True)

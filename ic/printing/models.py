@@ -110,7 +110,7 @@ SERVO_CHANNELS = {
 
 
 def recorded_channels(kind: models.Kind, model: Any) -> Iterator[Table]:
-    """Tables of the channels of a servo, guide, sensor of a link, bed or law."""
+    """Tables of the channels of a servo, guide, sensor of a link, environment model, bed or law."""
     if kind == "servo":
         for field, caption in SERVO_CHANNELS.items():
             yield _channel_table(caption, [(p.name, p.unit, p.doc) for p in getattr(model, field)])
@@ -120,6 +120,11 @@ def recorded_channels(kind: models.Kind, model: Any) -> Iterator[Table]:
     if kind == "sensor" and model.measures is not None:
         caption = "States of the sensor, recorded as sensors.NAME.NAME; its reading is recorded as sensors.NAME"
         yield _channel_table(caption, [(p.name, watched_unit(p.unit, model.unit), p.doc) for p in model.states])
+    if kind == "environment":
+        caption = "Signals computed at every instant; recorded as environment.NAME.NAME"
+        yield _channel_table(
+            caption, [(p.name, p.unit, f"{p.doc}; {p.axes}" if p.axes else p.doc) for p in model.signals]
+        )
     if kind in ("bed", "law"):
         caption = f"Values of the {kind}, updated at each tick of the servo; recorded as JOINT.{kind}.NAME"
         yield _channel_table(caption, model.shown)

@@ -39,6 +39,7 @@ OF_ANY = (
         "JOINT.bed.NAME, JOINT.law.NAME",
         "values of the motor bed of a joint and of the law of its load motor: `met doc beds`, `met doc laws`",
     ),
+    ("environment.NAME.NAME", "a signal of a model of the environment; `met doc` and the name of the model lists them"),
     (
         "sensors.NAME, sensors.NAME.NAME",
         "reading of a sensor on a link, and a state of its filter; `sensors` is short for the readings of all sensors",

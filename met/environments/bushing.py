@@ -14,19 +14,32 @@ M follows from the energy phi' turning phi/2 at any angle below half a turn, so 
 no energy; for small angles M is -turning phi. At half a turn the rotation vector changes its sign, and M jumps: motions
 that may reach this angle need another model. The model is not made for rubber whose stiffness depends on load or
 frequency.
+
+The bushing acts at times t with from <= t < until. With a `ramp`, its force and moment grow from nothing at `from` to
+their full size, in proportion to the time, as those of a latch do that closes:
+
+    s = clip((t - from)/ramp, 0, 1),     s F and s M in the place of F and M
+
+A stiffness that grows while the bushing is stretched puts energy into the arm. What closes the latch does this work,
+x' stiffness x/2 for each unit of s, and likewise of phi. At `until` all of it ends at once.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from met.environments.environment import Environment, Force, Loads, World
-from met.parameter import WORLD, ZEROS, Parameter
-from met.trace import Real, cos, sin, sqrt, where
+from met.environments.window import WINDOW, never, passed, share
+from met.parameter import WORLD, ZEROS, Parameter, Signal
+from met.trace import Real, clip, cos, sin, sqrt, where
 from met.vectors import (
     Matrix,
     Vector,
     add,
+    constant,
     cross,
     dot,
     product,
@@ -41,6 +54,20 @@ from met.vectors import (
 
 
 def loads(p: Any, world: World) -> Loads:
+    other, apart, along, about = _felt(p, world)
+    force, moment = turn_vector(other, along), turn_vector(other, about)
+    back = scale(-1.0, add(moment, cross(apart, force)))
+    return Loads(forces=(Force(p.link, force, moment, p.at), Force(p.to, scale(-1.0, force), back, p.to_at)))
+
+
+def show(p: Any, world: World) -> Mapping[str, Vector]:
+    _, _, along, about = _felt(p, world)
+    return {"force": along, "moment": about}
+
+
+def _felt(p: Any, world: World) -> tuple[Matrix, Vector, Vector, Vector]:
+    """Axes of the frame on `to`, in the world; the vector from its origin to that of the frame on `link`, m, world
+    axes; force and moment on `link`, N and N m, along the axes of the frame on `to`."""
     own = product(world.orientation(p.link), rotation_rpy(*p.rpy))
     other = product(world.orientation(p.to), rotation_rpy(*p.to_rpy))
     apart = sub(world.position(p.link, p.at), world.position(p.to, p.to_at))
@@ -48,10 +75,20 @@ def loads(p: Any, world: World) -> Loads:
     turning = sub(world.rate(p.link), world.rate(p.to))
 
     x, v, w = (turn_vector_back(other, vector) for vector in (apart, moving, turning))
-    force = turn_vector(other, _minus(_each(p.stiffness, x), _each(p.damping, v)))
-    moment = turn_vector(other, sub(restoring(p.turning, product(transposed(other), own)), _each(p.turning_damping, w)))
-    back = scale(-1.0, add(moment, cross(apart, force)))
-    return Loads(forces=(Force(p.link, force, moment, p.at), Force(p.to, scale(-1.0, force), back, p.to_at)))
+    force = _minus(_each(p.stiffness, x), _each(p.damping, v))
+    moment = sub(restoring(p.turning, product(transposed(other), own)), _each(p.turning_damping, w))
+    strength = _strength(p, world)
+    return other, apart, scale(strength, force), scale(strength, moment)
+
+
+def _strength(p: Any, world: World) -> Real:
+    """s at a stage, from 0 to 1, with the share of the step that lies in the window."""
+    begins, until, ramp = getattr(p, "from"), p.until, p.ramp
+    if constant(begins) and constant(until) and constant(ramp) and begins <= 0.0 and math.isinf(until) and ramp == 0.0:
+        return 1.0
+    closes = ramp > 0.0
+    closed = clip((world.time - begins) / where(closes, ramp, 1.0), 0.0, 1.0)
+    return where(closes, closed * passed(world, until), share(world, begins, until))
 
 
 def restoring(stiffness: Vector, R: Matrix) -> Vector:
@@ -69,7 +106,7 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
         return ("stiffness", "turning", "damping", "turning_damping"), "it has neither stiffness nor damping"
     if p.link == p.to:
         return ("to",), f"both its frames are fixed to link `{p.link}`"
-    return None
+    return never(getattr(p, "from"), p.until, duration)
 
 
 def _bending(square: Real) -> Real:
@@ -94,6 +131,8 @@ def _minus(a: Vector, b: Vector) -> Vector:
 def _three(name: str, unit: str, doc: str) -> Parameter:
     return Parameter(name=name, unit=unit, shape="vector", default=ZEROS, at_least=0.0, doc=doc)
 
+
+AXES = "axes of the bushing's frame on `to`"
 
 ENVIRONMENT = Environment(
     name="bushing",
@@ -141,9 +180,23 @@ ENVIRONMENT = Environment(
         _three("damping", "N*s/m", "force per velocity along each axis"),
         _three("turning", "N*m/rad", "moment per small angle about each axis"),
         _three("turning_damping", "N*m*s/rad", "moment per angular velocity about each axis"),
+        *(replace(each, timing=True) for each in WINDOW),
+        Parameter(
+            name="ramp",
+            unit="s",
+            default=0.0,
+            at_least=0.0,
+            timing=True,
+            doc="time from `from` in which force and moment grow to their full size; 0: they act in full at once",
+        ),
     ),
     loads=loads,
     idle=idle,
     pushed_links=lambda p: ("link", "to"),
+    signals=(
+        Signal(name="force", unit="N", doc="force of the bushing on `link`", axes=AXES),
+        Signal(name="moment", unit="N*m", doc="moment of the bushing on `link`", axes=AXES),
+    ),
+    show=show,
     holds=lambda p: ("link", "to") if any((*p.stiffness, *p.turning)) else (),
 )

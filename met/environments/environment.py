@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from met.content import Content
 from met.frozen import frozen
 from met.messages.renamed import old_fields
-from met.parameter import Limit, Parameter
+from met.parameter import Limit, Parameter, Signal
 from met.trace import Real
 from met.vectors import Matrix, Vector
 
@@ -154,6 +154,8 @@ class Environment:
            deck is warned where the dynamics' step is long for that (met/analysis/contact.py). (): there is none
     limits  those that it has: how much of a run is spent at each is kept of every case. (): there are none
     jet  (p, world) -> the gas of which its loads come, which pictures show. None: they come of none
+    signals  what it shows, each a channel `environment.NAME.SIGNAL`
+    show  (p, world) -> the signals by name, a number or a vector each. None: it has none
     friction_joint  the parameter that names the one joint on which it puts dry friction. "": none does
 
     What it may do to the servo of one joint, such as to let it fail:
@@ -191,6 +193,8 @@ class Environment:
     springs: tuple[str, ...] = ()
     limits: tuple[Limit, ...] = ()
     jet: Callable[[Any, World], Jet] | None = None
+    signals: tuple[Signal, ...] = ()
+    show: Callable[[Any, World], Mapping[str, Any]] | None = None
     friction_joint: str = ""
     servo_of: str = ""
     decoupling: Callable[[Any, Any], Real] | None = None

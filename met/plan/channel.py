@@ -31,6 +31,7 @@ Derived channels, computed from the state only where a record or a metric asks f
     payloads.<payload>.position, .orientation, .velocity, .rate of the payload's frame, in world axes
     payloads.<payload>.distance     from the point `at` of its link to its frame
     payloads.<payload>.carried      1 while its link carries it, 0 while it flies
+    environment.<model>.<name>      what an environment model shows, by its declaration
 
 Computed of other channels, at each instant of the dynamics or tick at which one of these is sampled:
 
@@ -309,6 +310,10 @@ def _channels(structure: Structure, names: list[str], *, all_owners: bool) -> di
     for payload in structure.payloads:
         for name, unit, doc, several, frame in OF_PAYLOAD:
             derive(f"payloads.{payload.name}.{name}", unit, doc, several, frame)
+    for load in structure.environment:
+        for signal in models.find("environment", load.model, load.place).signals:
+            own = f"environment.{load.name}.{signal.name}"
+            derive(own, signal.unit, signal.doc, XYZ if signal.axes else (), signal.axes)
     limited = any(joint.limits for joint in structure.moving)
     for name, unit, doc, components, frame in OF_ARM:
         if limited or name != "limits.margin":
@@ -346,7 +351,8 @@ def channel_paths(name: str, joints: tuple[str, ...], components: tuple[str, ...
 
 def joint_of(name: str) -> str:
     """The joint in the name of a variable; none where the variable belongs to no joint."""
-    if name.startswith(("links.", "payloads.", "guides.", "sensors.", "signals.", *(own for own, *_ in OF_ARM))):
+    of_things = ("links.", "payloads.", "guides.", "sensors.", "signals.", "environment.")
+    if name.startswith((*of_things, *(own for own, *_ in OF_ARM))):
         return ""
     return name.partition(".")[0]
 

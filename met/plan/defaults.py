@@ -27,7 +27,7 @@ def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity |
     defaults: dict[str, Quantity] = {}
     scaled = {use.joint for use in experiment.structure.substitutions if use.scaled}
     for path, unit, default, parameter in declared(experiment):
-        if path in experiment.parameters:
+        if path in experiment.parameters or (parameter is not None and parameter.timing):
             continue
         found = None if default is None else Quantity(default, unit, Origin("default", note="not in the plan file"))
         joint = path.partition(".")[0]

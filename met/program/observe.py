@@ -6,8 +6,9 @@ the program, which compute the derivative anew: so no bit of another channel dep
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, reduce
+from typing import Any
 
 from met.dynamics.coupling import at_leaders
 from met.dynamics.effective_inertia import effective_inertia
@@ -23,7 +24,9 @@ from met.program.evaluation import Derivative
 from met.program.joint_limits import excess
 from met.program.motion import payloads
 from met.program.motion.base import BaseMotion, motions
+from met.program.motion.world import ArmWorld, environment_values
 from met.program.system import ReadCell, System
+from met.program.values import answer, returned
 from met.trace import Real, minimum, sqrt
 from met.vectors import Quaternion, quaternion
 
@@ -49,13 +52,13 @@ def derived(system: System) -> tuple[list[Channel], list[Channel]]:
 class Observed:
     """The arm at one instant. Quantities that no channel needs are not computed.
 
-    y      the state, and base, where it stands;  found  gives its derivative
+    y      the state, and base, where it stands, at this time, s;  found  gives its derivative
     """
 
     def __init__(
-        self, system: System, read: ReadCell, y: Motion, base: BaseMotion, found: Callable[[], Derivative]
+        self, system: System, read: ReadCell, y: Motion, base: BaseMotion, time: Real, found: Callable[[], Derivative]
     ) -> None:
-        self.system, self.read, self.y = system, read, y
+        self.system, self.read, self.y, self.time = system, read, y, time
         self.joints = tuple(joint.name for joint in system.joints)
         n = len(self.joints)
         self.tree, self.q, self.qd, self.base = system.tree(read), y.q[:n], y.qd[:n], base
@@ -69,6 +72,8 @@ class Observed:
             return self._of_link(channel, parts[1:])
         if parts[0] == "payloads":
             return self._of_payload(parts[1:])
+        if parts[0] == "environment":
+            return self._of_environment(*parts[1:])
         return self._of_joint(channel.joint, parts[1:]) if channel.joint else self._of_arm(parts)
 
     def orientation(self, name: str) -> Quaternion:
@@ -133,6 +138,17 @@ class Observed:
             way = payloads.gap(self.system, payload, self.read, motion, self.motions[payload.link])
             return sqrt(dot(way, way))
         return _of_frame(motion, kind, rest[0])
+
+    def _of_environment(self, name: str, signal: str, axis: str = "") -> Real:
+        model = dict(self.system.environment)[name]
+        assert model.show is not None
+        owner, p = environment_values(self.system, name, model, self.read)
+        tree = payloads.tree_with_payloads(self.system, self.read)
+        world = ArmWorld(self.system, self.read, tree, self.y, self.base, self.time, self.time)
+        found: Mapping[str, Any] = returned(
+            owner, "signals", answer(owner, model.show, p, world), (each.name for each in model.signals)
+        )
+        return found[signal][XYZ.index(axis)] if axis else found[signal]
 
     def _of_arm(self, parts: list[str]) -> Real:
         match parts:

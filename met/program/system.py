@@ -277,8 +277,17 @@ class System:
 
     def value(self, path: str, read: ReadCell) -> Any:
         """A parameter: a float, list or word as the plan has it, or read from the case's memory."""
-        value = self.experiment.parameters[path].value
+        value = self._timing[path] if path in self._timing else self.experiment.parameters[path].value
         return read(PARAMETER + path) if isinstance(value, Formula) else value
+
+    @cached_property
+    def _timing(self) -> dict[str, Any]:
+        """Defaults of the numbers of environment models that no plan holds unless they are set, by path."""
+        declared = (
+            (f"environment.{name}.{each.name}", each) for name, model in self.environment for each in model.parameters
+        )
+        held = self.experiment.parameters
+        return {path: each.default for path, each in declared if each.timing and path not in held}
 
     def mass(self, link: str, read: ReadCell) -> Real:
         """Mass of a link or payload, kg."""

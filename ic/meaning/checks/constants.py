@@ -14,7 +14,7 @@ from met.trace import Scalar
 
 def constant_value(scope: Scope, path: str) -> Any:
     """A parameter's value: a number or a word; None where it varies, or is unknown."""
-    settled = scope.parameters.get(path)
+    settled = scope.settled(path)
     return None if settled is None or isinstance(settled.value, Scalar) else settled.value
 
 

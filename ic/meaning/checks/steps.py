@@ -47,17 +47,18 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
         complaints.settle()
         return experiment
 
-    from met.analysis.step_size import MOST_STATES, TooLarge, chosen_cases, remedy, step_size
+    from met.analysis.step_size import MOST_STATES, TooLarge, at_full_strength, chosen_cases, remedy, step_size
 
+    full = at_full_strength(experiment)
     rows = chosen_cases(experiment, [row for figure in declared.values() for row in figure[1]])
     looked: list[StepSize] = []
 
     def look() -> StepSize:
-        looked.append(step_size(experiment, rows, memo, most=MOST_STATES))
+        looked.append(step_size(full, rows, memo, most=MOST_STATES))
         return looked[0]
 
     try:
-        found = memo.answer("steps", experiment, lambda: look().without_matrices(), rows)
+        found = memo.answer("steps", full, lambda: look().without_matrices(), rows)
     except Problem:  # reported where the program is built
         complaints.settle()
         return experiment
@@ -78,18 +79,18 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
             continue
 
         def better_step(fault: StepFault = each) -> Remedy:
-            return remedy(experiment, (looked[0] if looked else look()).map, fault)
+            return remedy(full, (looked[0] if looked else look()).map, fault)
 
-        better = memo.answer(f"remedy for what {each.kind}", experiment, better_step, rows)
+        better = memo.answer(f"remedy for what {each.kind}", full, better_step, rows)
         complaints.pass_on(fault_warning(experiment, each, better, scope.rate_place, _where(experiment, each, found)))
     if "D104" not in kept and not any(each.kind == "grows" and not _is_of_loops(each, found) for each in found.faults):
 
         def find_usual() -> list[str]:
-            return usual_number(scope, experiment, lambda changed: not step_size(changed, rows).loops)
+            return usual_number(scope, full, lambda changed: not step_size(changed, rows).loops)
 
         told = [loop for loop in found.loops if not experiment.allows("D320" if loop.ticks else "D322")]
         far = any(loop.parameters or loop.gain is None or not NEAR < loop.gain < 1.0 / NEAR for loop in told)
-        blamed = memo.answer("usual number", experiment, find_usual, rows) if far else []
+        blamed = memo.answer("usual number", full, find_usual, rows) if far else []
         for loop in found.loops:
             start = at_the_start(experiment, loop.case)
             warning = loop_warning(experiment, loop, scope.rate_place, f"as it stands {start}")

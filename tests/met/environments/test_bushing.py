@@ -8,12 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from met import run as engine
 from met.environments.bushing import ENVIRONMENT, loads, restoring
 from met.integrators import INTEGRATORS
 from met.integrators.integrator import Integrator
+from met.plan import Experiment
+from met.run import Prepared
 from met.trace import Formulas, Graph
 from met.vectors import rotation_about, rotation_rpy, rotation_vector
-from tests.ic.small_decks import check
+from tests.ic.small_decks import changed, check, experiment
 from tests.met.environments.energies import Placed, order_of_loss
 from tests.met.environments.test_spring import RAIL, pair
 from tests.met.environments.worlds import given
@@ -127,3 +130,47 @@ def test_one_that_holds_nothing_is_told(tmp_path: Path) -> None:
     text = RAIL.replace("pull = spring", "mount = bushing").replace("to_point = [-1, 0, 0] m; ", "")
     text = text.replace("stiffness = 50 N/m; length = 1 m; damping = 4 N*s/m;", "")
     assert [d.code for d in check(tmp_path, text).diagnostics] == ["D168"]
+
+
+LATCH = RAIL.replace("pull = spring", "latch = bushing").replace("to_point = [-1, 0, 0] m; ", "").replace(
+    "stiffness = 50 N/m; length = 1 m; damping = 4 N*s/m;", "stiffness = [50, 0, 0] N/m; TIMING"
+)  # fmt: skip
+TIMING = ("environment.latch.from", "environment.latch.until", "environment.latch.ramp")
+
+
+def latched(folder: Path, timing: str, *parts: str, select: list[str] | None = None) -> Experiment:
+    return experiment(folder, LATCH.replace("TIMING", timing), *parts, select=select)
+
+
+def test_a_plan_has_a_window_and_a_ramp_only_where_a_deck_sets_them(tmp_path: Path) -> None:
+    plain, written = latched(tmp_path, ""), latched(tmp_path, "from = 0 s; ramp = 0 s;")
+    assert not {*TIMING} & {*plain.parameters} and {*written.parameters} - {*plain.parameters} == {TIMING[0], TIMING[2]}
+    assert Prepared(plain).code_key == Prepared(written).code_key, "and what always acts costs nothing"
+
+
+def test_a_ramp_that_a_deck_leaves_out_may_still_vary(tmp_path: Path) -> None:
+    sweep = "sweep closing of it { vary environment.latch.ramp = [0, 0.5] s; }"
+    found = engine.run(latched(tmp_path, "", sweep, select=["closing"]))
+    plain, slow = (engine.run(latched(tmp_path, each)) for each in ("", "ramp = 0.5 s;"))
+    for case, alone in enumerate((plain, slow)):
+        np.testing.assert_allclose(found.signals["q"][case], alone.signals["q"][0], rtol=1e-12, atol=1e-15)
+    assert np.ptp(plain.signals["q"]) > 1e-3 < np.abs(plain.signals["q"] - slow.signals["q"]).max()
+
+
+def test_it_acts_within_its_window_and_its_force_is_a_channel(tmp_path: Path) -> None:
+    text = changed(
+        LATCH,
+        ("record = [q, qd]", "record = [q, environment.latch.force]"),
+        ("slide.q = 0.5 m", "slide.q = -0.5 m; slide.qd = 1 m/s"),
+    )
+    found = engine.run(experiment(tmp_path, text.replace("TIMING", "from = 0.3 s; until = 0.7 s; ramp = 0.2 s;")))
+    force, q, t = found.signals["environment.latch.force"][0], found.signals["q"][0, :, 0], found.time
+    share = np.where(t < 0.7 - 1e-9, np.clip((t - 0.3) / 0.2, 0.0, 1.0), 0.0)
+    np.testing.assert_allclose(force[:, 0], -50.0 * share * q, rtol=1e-9, atol=1e-12)
+    assert np.ptp(force[:, 0]) > 0.1 and not force[:, 1:].any()
+
+
+def test_steps_are_checked_at_its_full_strength(tmp_path: Path) -> None:
+    stiff = LATCH.replace("stiffness = [50, 0, 0] N/m", "stiffness = [5e9, 0, 0] N/m")
+    for timing in ("", "from = 0.5 s; ramp = 0.1 s;"):
+        assert [each.code for each in check(tmp_path, stiff.replace("TIMING", timing)).diagnostics] == ["D317"], timing
