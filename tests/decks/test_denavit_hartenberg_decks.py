@@ -77,6 +77,7 @@ def test_the_standard_decks_can_be_included_together(tmp_path: Path) -> None:
     assert compiled.plan is not None, compiled.diagnostics
     arms = {each.structure.arm for each in compiled.plan.experiments}
     assert arms == {
+        "catcher",
         "ets_vii",
         "free_flyer",
         "manutec_r3",

@@ -18,6 +18,7 @@ from tests.docs.pages import Page, differs
         ("best", 5),
         ("booms", 2),
         ("coupled", 3),
+        ("environments", 1),
         ("evidence", 2),
         ("fit", 9),
         ("linear", 15),
