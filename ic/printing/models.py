@@ -123,7 +123,7 @@ def recorded_channels(kind: models.Kind, model: Any) -> Iterator[Table]:
     if kind == "environment":
         caption = "Signals computed at every instant; recorded as environment.NAME.NAME"
         yield _channel_table(
-            caption, [(p.name, p.unit, f"{p.doc}; {p.axes}" if p.axes else p.doc) for p in model.signals]
+            caption, [(p.name, p.unit, "; ".join(filter(None, (p.doc, p.axes)))) for p in model.signals]
         )
     if kind in ("bed", "law"):
         caption = f"Values of the {kind}, updated at each tick of the servo; recorded as JOINT.{kind}.NAME"

@@ -15,7 +15,7 @@ from met.parameter import Parameter
 from met.plan import BASE, Base, Experiment, Formula, Joint, Plan, Structure
 from met.plan.chains import chains
 from met.plan.columns import different, span
-from met.plan.defaults import OF_FREE_BASE
+from met.plan.defaults import OF_FREE_BASE, of_environment
 from met.plan.uses import sensor_parts
 from met.substitution import bed_scale
 from met.unit_parser import decimals, written
@@ -376,8 +376,8 @@ def _environment(experiment: Experiment) -> Iterator[str]:
         "" if structure.environment else "; no gravity, no other loads"
     )
     rows: list[tuple[str, str, str]] = []
-    for use in structure.environment:
-        shown = _given(experiment, f"environment.{use.name}", models.find("environment", use.model).parameters)
+    for use, (prefix, declared) in zip(structure.environment, of_environment(experiment), strict=True):
+        shown = _given(experiment, prefix, declared)
         rows.append((use.name, use.model, ", ".join(shown)))
     if all(name == model for name, model, _ in rows):
         yield from columns([(name, shown) for name, _, shown in rows])

@@ -22,7 +22,6 @@ from met.frozen import frozen
 from met.integrators.integrator import Integrator
 from met.plan import BASE, Experiment
 from met.plan.columns import ends
-from met.plan.defaults import of_environment
 
 if TYPE_CHECKING:
     from met.analysis.blame import Unstable
@@ -106,18 +105,6 @@ def chosen_cases(experiment: Experiment, also: Iterable[int] = ()) -> tuple[int,
         even = np.linspace(0, experiment.cases.count - 1, min(experiment.cases.count, most)).astype(int).tolist()
         found += [case for case in even if case not in found][: most - len(found)]
     return tuple(found)
-
-
-def at_full_strength(experiment: Experiment) -> Experiment:
-    """The experiment with environment models acting from the start and in full, without windows and ramps."""
-    timing = {
-        f"{prefix}.{each.name}"
-        for prefix, parameters in of_environment(experiment.structure)
-        for each in parameters
-        if each.timing
-    }
-    kept = {path: quantity for path, quantity in experiment.parameters.items() if path not in timing}
-    return replace(experiment, parameters=kept)
 
 
 def step_size(

@@ -15,7 +15,7 @@ from met.frozen import frozen
 from met.messages.renamed import old_fields
 from met.parameter import Limit, Parameter, Signal
 from met.trace import Real
-from met.vectors import Matrix, Vector
+from met.vectors import Matrix, Vector, cross, scale
 
 
 class World(Protocol):
@@ -88,6 +88,30 @@ class Loads:
 
 
 @frozen
+class Touch:
+    """Where two bodies touch, or would, in the world's axes.
+
+    normal  unit vector along which they press the first apart from the other
+    depth   of one in the other, m; below 0, the gap between them
+    rate    at which the depth grows, m/s
+    moving  velocity of the first against the other, at the point where they touch, m/s
+    arm, other  that point from those at which the two are placed, `at` and `to_at`, m
+    """
+
+    normal: Vector
+    depth: Real
+    rate: Real
+    moving: Vector
+    arm: Vector
+    other: Vector
+
+    def forces(self, p: Any, force: Vector) -> tuple[Force, Force]:
+        """A force on the first, and its opposite on the other, where they touch."""
+        back = scale(-1.0, force)
+        return Force(p.link, force, cross(self.arm, force), p.at), Force(p.to, back, cross(self.other, back), p.to_at)
+
+
+@frozen
 class Plate:
     """A rectangle that is fixed to a link: its middle, m, and its sides as vectors, m, in the link's frame."""
 
@@ -150,9 +174,13 @@ class Environment:
            is warned, for then it holds nothing. (): it holds none, with these numbers. None: it never does
     may_be_load  it is also a load, such as a balancing spring: nothing is said of what it holds where a metric sees
            torques
-    springs  the parameters that name a joint, and are the stiffness with which it is pushed back where it touches: a
-           deck is warned where the dynamics' step is long for that (met/analysis/contact.py). (): there is none
+    springs  the parameter that names a joint, or with `touch` a link, and those of which one is the stiffness with
+           which it is pushed back where it touches: a deck is warned where the dynamics' step is long for that
+           (met/analysis/contact.py). (): there are none
     limits  those that it has: how much of a run is spent at each is kept of every case. (): there are none
+    touch  (p, world) -> where two bodies touch. None: it is no contact of bodies
+    lasts  (p, mass, rate) -> how long a contact lasts, s: of bodies of this reduced mass, kg, that meet at this rate,
+           m/s
     jet  (p, world) -> the gas of which its loads come, which pictures show. None: they come of none
     signals  what it shows, each a channel `environment.NAME.SIGNAL`
     show  (p, world) -> the signals by name, a number or a vector each. None: it has none
@@ -192,6 +220,8 @@ class Environment:
     may_be_load: bool = False
     springs: tuple[str, ...] = ()
     limits: tuple[Limit, ...] = ()
+    touch: Callable[[Any, World], Touch] | None = None
+    lasts: Callable[[Any, float, float], float] | None = None
     jet: Callable[[Any, World], Jet] | None = None
     signals: tuple[Signal, ...] = ()
     show: Callable[[Any, World], Mapping[str, Any]] | None = None

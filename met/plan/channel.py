@@ -351,8 +351,9 @@ def channel_paths(name: str, joints: tuple[str, ...], components: tuple[str, ...
 
 def joint_of(name: str) -> str:
     """The joint in the name of a variable; none where the variable belongs to no joint."""
-    of_things = ("links.", "payloads.", "guides.", "sensors.", "signals.", "environment.")
-    if name.startswith((*of_things, *(own for own, *_ in OF_ARM))):
+    if name.startswith(
+        ("links.", "payloads.", "guides.", "sensors.", "signals.", "environment.", *(own for own, *_ in OF_ARM))
+    ):
         return ""
     return name.partition(".")[0]
 

@@ -246,7 +246,7 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
     structure, parameters = experiment.structure, experiment.parameters
     known: set[str] = set()
     models_of = heads_of_models(structure)
-    relations.check_uses(experiment, related(structure), where)  # first, since units depend on a model's joint
+    relations.check_uses(experiment, related(experiment), where)  # first, since units depend on a model's joint
     for path, unit, _, parameter in declared(experiment):
         if path in known:
             raise Damaged(where, f"two things are called `{path}`")
@@ -430,7 +430,7 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
     if structure.free:
         masses = [f"links.{name}.mass" for name in structure.ground]
         tests.append((f"links.{BASE}.mass", masses, _is_some, "the base moves freely and has no mass"))
-    tests += [*rest.tests(experiment), *relations.tests(experiment, related(structure))]
+    tests += [*rest.tests(experiment), *relations.tests(experiment, related(experiment))]
     varied = []
     for path, paths, holds, message in tests:
         if any(path not in experiment.parameters for path in paths):

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from met import models
 from met.diagnostic import Place, nearest
-from met.parameter import Parameter, under
+from met.parameter import Parameter, is_present, under
 from met.plan import COMPONENTS, Course, Experiment, Joint, Origin, Quantity, Structure
 from met.plan.channel import JOINT_LIMITS, channels, joint_unit, ratio_unit, watched_unit
 from met.plan.uses import quantities, sensor_parts, servo_parts
@@ -66,16 +66,30 @@ Declared = tuple[str, str, float | tuple[float, ...] | str | None, Parameter | N
 """Path, SI unit and default of a parameter, and its model's declaration; None for the arm's own."""
 
 
-def of_environment(structure: Structure) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
-    """The prefix of the paths of each environment model's parameters, with their declarations."""
-    for use in structure.environment:
-        yield f"environment.{use.name}", models.find("environment", use.model, use.place).parameters
+def of_environment(experiment: Experiment) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
+    """The prefix of the paths of each environment model's parameters, with the declarations of those that are there."""
+    held = experiment.parameters
+    for use in experiment.structure.environment:
+        prefix, declared = f"environment.{use.name}", models.find("environment", use.model, use.place).parameters
+        words = {each.name: str(held[path].value) for each in declared if (path := f"{prefix}.{each.name}") in held}
+        yield prefix, tuple(each for each in declared if is_present(each, words))
 
 
-def related(structure: Structure) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
+def timing_defaults(experiment: Experiment) -> dict[str, Quantity]:
+    """The numbers with which all environment models act always and in full (`Parameter.timing`), by path."""
+    return {
+        f"{prefix}.{each.name}": Quantity(each.default, each.unit, Origin("default"))
+        for prefix, declared in of_environment(experiment)
+        for each in declared
+        if each.timing and each.default is not None
+    }
+
+
+def related(experiment: Experiment) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
     """`of_environment`, with the same for guides and links' sensors: parameters that may name parts of the arm, or
     belong together."""
-    yield from of_environment(structure)
+    structure = experiment.structure
+    yield from of_environment(experiment)
     for sensor in structure.sensors:
         yield f"sensors.{sensor.name}", sensor_parts(sensor, "parameters")
     for use in structure.guides:
@@ -133,7 +147,7 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
                     yield from _numbers(f"{on_bed.joint}.{head}", parameter, joint_unit(parameter.unit, joint))
         for parameter in bed_scale.PARAMETERS if on_bed.scaled else ():
             yield from _numbers(f"{on_bed.joint}.bed.scale", parameter, parameter.unit)
-    for prefix, parameters in of_environment(structure):
+    for prefix, parameters in of_environment(experiment):
         named = next((f"{prefix}.{parameter.name}" for parameter in parameters if parameter.names == "joint"), None)
         about = experiment.parameters.get(named) if named is not None else None
         on = kinds.get(str(about.value)) if about is not None else None

@@ -305,9 +305,8 @@ class StepPhases:
     def observed(self, tape: Tape) -> Observed:
         """The arm at an instant, with the derivative from `derive`."""
         y = self.state(tape)
-        time = tape.read("instant")
-        stands = base.base_of(self.system, tape.read, y, time)
-        return Observed(self.system, tape.read, y, stands, time, lambda: self._derivative(tape, y, 0.0))
+        stands = base.base_of(self.system, tape.read, y, tape.read("instant"))
+        return Observed(self.system, tape.read, y, stands, tape.read("instant"), lambda: self._derivative(tape, y, 0.0))
 
     def _derivative(
         self, tape: Tape, y: Motion, fraction: Real, prescribed_qdd: dict[int, Real] | None = None

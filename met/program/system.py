@@ -23,8 +23,20 @@ from met.integrators.integrator import Integrator, Motion
 from met.metrics.furthest import furthest
 from met.metrics.metric import Metric
 from met.parameter import Memory, Parameter, State
-from met.plan import BASE, Experiment, Formula, Joint, LinkSensor, Payload, SensorUse, ServoUse, Structure
+from met.plan import (
+    BASE,
+    Experiment,
+    Formula,
+    Joint,
+    LinkSensor,
+    Payload,
+    Quantity,
+    SensorUse,
+    ServoUse,
+    Structure,
+)
 from met.plan.channel import Channel, channels
+from met.plan.defaults import of_environment, timing_defaults
 from met.plan.uses import sensor_parts, servo_parts
 from met.program.courses import recorded
 from met.program.values import NamedValues, answer, parameters, returned
@@ -277,17 +289,17 @@ class System:
 
     def value(self, path: str, read: ReadCell) -> Any:
         """A parameter: a float, list or word as the plan has it, or read from the case's memory."""
-        value = self._timing[path] if path in self._timing else self.experiment.parameters[path].value
+        value = self._parameters[path].value
         return read(PARAMETER + path) if isinstance(value, Formula) else value
 
     @cached_property
-    def _timing(self) -> dict[str, Any]:
-        """Defaults of the numbers of environment models that no plan holds unless they are set, by path."""
-        declared = (
-            (f"environment.{name}.{each.name}", each) for name, model in self.environment for each in model.parameters
-        )
-        held = self.experiment.parameters
-        return {path: each.default for path, each in declared if each.timing and path not in held}
+    def declared(self) -> dict[str, tuple[Parameter, ...]]:
+        """The declarations of each environment model's parameters, by the prefix of their paths."""
+        return dict(of_environment(self.experiment))
+
+    @cached_property
+    def _parameters(self) -> Mapping[str, Quantity]:
+        return {**timing_defaults(self.experiment), **self.experiment.parameters}
 
     def mass(self, link: str, read: ReadCell) -> Real:
         """Mass of a link or payload, kg."""

@@ -72,6 +72,10 @@ OTHERS: Mapping[str, Variant] = {
         environment=f"used = bushing {{ link = {_LINK};  to = world;  stiffness = [9, 9, 9] N/m;  "
         "turning = [1, 1, 1] N*m/rad; }"
     ),
+    "contact": Variant(
+        environment=f"used = contact {{ link = {_LINK};  radius = 9 m;  normal = [0, 0, 1];  stiffness = 1 N/m;  "
+        "friction = 0.3; }"
+    ),
     "plume, 1 cell": Variant(
         environment=f"used = plume {{ link = {_LINK};  width = 1 m;  height = 1 m;  cells = 1;  "
         "thrust = 10 N;  exponent = 6;  nozzle = [3, 0, 1] m;  axis = [-1, 0, 0]; }"

@@ -147,6 +147,11 @@ SMALLEST: dict[tuple[str, str], Small] = {
     ("environment", "bushing"): Small({
         "link": "tip", "to": "bar", "to_at": (1.0, 0.0, 0.0), "stiffness": (90.0, 50.0, 10.0),
         "damping": (1.0, 2.0, 3.0), "turning": (5.0, 6.0, 7.0), "turning_damping": (0.1, 0.2, 0.3),
+        "from": 0.05, "until": 0.15, "ramp": 0.05,
+    }),
+    ("environment", "contact"): Small({
+        "link": "tip", "radius": 2.0, "normal": (0.1, -0.2, 1.0), "to_radius": 0.5, "stiffness": 50.0, "modulus": 20.0,
+        "dissipation": 0.2, "friction": 0.3, "slip": 0.02,
     }),
     ("environment", "dead_sensor"): Small({"of": "qd", "from": 0.05, "until": 0.1}, beside=DRIVEN),
     ("environment", "free_swinging"): Small({"from": 0.05, "until": 0.1}, beside=DRIVEN),

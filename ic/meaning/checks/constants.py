@@ -20,11 +20,12 @@ def constant_value(scope: Scope, path: str) -> Any:
 
 def constant_values(scope: Scope, head: str, declared: Iterable[Parameter]) -> SimpleNamespace | None:
     """The values of a model's parameters, as attributes of their names; None where one varies, or is unknown.
+    Those that are there only under some words are left out.
 
     head  path of the model's use, such as `environment.stop`
     """
     values: dict[str, Any] = {}
-    for each in declared:
+    for each in (each for each in declared if each.only is None):
         path = f"{head}.{each.name}"
         if each.shape == "vector":
             parts = tuple(constant_value(scope, f"{path}.{axis}") for axis in XYZ)

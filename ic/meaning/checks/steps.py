@@ -21,6 +21,7 @@ from met.diagnostic import Problem
 from met.messages.message import shown_place
 from met.plan import Experiment
 from met.plan.columns import ends
+from met.plan.defaults import timing_defaults
 
 if TYPE_CHECKING:
     from met.analysis.memo import AnalysisMemo
@@ -47,9 +48,10 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
         complaints.settle()
         return experiment
 
-    from met.analysis.step_size import MOST_STATES, TooLarge, at_full_strength, chosen_cases, remedy, step_size
+    from met.analysis.step_size import MOST_STATES, TooLarge, chosen_cases, remedy, step_size
 
-    full = at_full_strength(experiment)
+    # environment models act from the start and in full: what they do later, the steps must follow too
+    full = replace(experiment, parameters={**experiment.parameters, **timing_defaults(experiment)})
     rows = chosen_cases(experiment, [row for figure in declared.values() for row in figure[1]])
     looked: list[StepSize] = []
 

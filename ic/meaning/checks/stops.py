@@ -1,4 +1,4 @@
-"""Warnings about steps that are too long for stops that joints may run into."""
+"""Warnings about steps that are too long for stops that joints may run into, and for contacts of bodies."""
 
 from __future__ import annotations
 
@@ -29,29 +29,31 @@ def check_stops(complaints: Complaints, experiment: Experiment) -> None:
     integrator = models.find("integrator", structure.integrator)
     enough = ENOUGH.get(integrator.order, FEW)
     with complaints.gather():
-        named = {name: models.find("environment", use.model).springs[1] for name, use in uses.items()}
-        stiffness = {name: experiment.parameters[f"environment.{name}.{part}"] for name, part in named.items()}
+        paths = [
+            (name, f"environment.{name}.{part}")
+            for name, use in uses.items()
+            for part in models.find("environment", use.model).springs[1:]
+        ]
+        stiffness = {name: experiment.parameters[path] for name, path in paths if path in experiment.parameters}
         stiffest = {name: _stiffest(experiment, quantity) for name, quantity in stiffness.items()}
         found = {case: contacts(experiment, case) for case in set(stiffest.values())}
         for each in (each for name, case in stiffest.items() for each in found[case] if each.stop == name):
             if not each.steps < enough:
                 continue
-            unit = _unit(experiment, each.joint)
             place = stiffness[each.stop].origin.place or uses[each.stop].place
             times = enough / each.steps if each.steps > 0.0 else math.inf
             rate = times * structure.schedule.base_hz / structure.schedule.dynamics
-            fits = "no rate is so high: make the stop softer"
+            fits = "no rate is so high: make it softer"
             if math.isfinite(rate):
                 least = slowest_that_fits(structure.schedule, _AT_MOST)(rate)
-                fits = f"quicken the dynamics to {least}, or make the stop softer"
+                fits = f"quicken the dynamics to {least}, or make it softer"
             complaints.remark(
                 "D295",
-                f"`{each.stop}` is stiff for the dynamics' step: joint `{each.joint}` touches it for "
-                f"{each.steps:.2g} steps",
+                f"`{each.stop}` is stiff for the dynamics' step: {each.body} touches it for {each.steps:.2g} steps",
                 Label(place, f"h = {structure.schedule.step:g} s") if place else place,
                 help=[
                     f"with {integrator.name} a contact of fewer than {enough:g} steps gives energy that nobody put in",
-                    f"{fits}: the joint feels {each.inertia:.3g} {unit} at the start",
+                    f"{fits}: it feels {each.inertia:.3g} {each.unit} at the start",
                 ],
             )
 
@@ -65,8 +67,3 @@ def _stiffest(experiment: Experiment, stiffness: Quantity) -> int:
     if not isinstance(stiffness.value, Formula):
         return 0
     return ends(experiment.column(stiffness.value))[1]
-
-
-def _unit(experiment: Experiment, joint: str) -> str:
-    kind = next(each.kind for each in experiment.structure.moving if each.name == joint)
-    return "kg" if kind == "prismatic" else "kg m^2"

@@ -21,7 +21,7 @@ def environment_values(system: System, name: str, model: Environment, read: Read
     """The name in messages of an environment model in use, and its parameters."""
     owner = f"environment model `{model.name}` (as `{name}`)"
     head = f"environment.{name}"
-    return owner, parameters(owner, head, model.parameters, lambda path: system.value(path, read))
+    return owner, parameters(owner, head, system.declared[head], lambda path: system.value(path, read))
 
 
 class ArmWorld:

@@ -22,7 +22,7 @@ def deck(stiffness: float, *changes: tuple[str, str]) -> str:
 
 def test_a_contact_lasts_half_a_swing_of_arm_and_rotor(tmp_path: Path) -> None:
     (found,) = contacts(experiment(tmp_path, ARM, SERVO, deck(500.0)))
-    assert (found.stop, found.joint) == ("end", "hinge") and found.inertia == pytest.approx(RIGID, rel=1e-14)
+    assert (found.stop, found.body) == ("end", "joint `hinge`") and found.inertia == pytest.approx(RIGID, rel=1e-14)
     assert found.steps == pytest.approx(np.pi * np.sqrt(RIGID / 500.0) / 1e-3, rel=1e-14)
 
 
@@ -40,7 +40,7 @@ warning[D295]: `end` is stiff for the dynamics' step: joint `hinge` touches it f
 """), text
     assert text.endswith("""\
    = help: with modified_euler a contact of fewer than 10 steps gives energy that nobody put in
-   = help: quicken the dynamics to 2000 Hz, or make the stop softer: the joint feels 1.67 kg m^2 at the start
+   = help: quicken the dynamics to 2000 Hz, or make it softer: it feels 1.67 kg m^2 at the start
 
 1 warning
 """), text
@@ -65,7 +65,7 @@ def test_with_numbers_at_their_ends_it_is_no_fault(tmp_path: Path) -> None:
     assert contacts(experiment(tmp_path, nothing, deck(500.0, ("servos { hinge = drive; }", "servos { }")))) == ()
     rotor = changed(SERVO, ("ratio = 100", "ratio = 1"), ("j_m = 1e-4", "j_m = 1e-308"), ("kt = 0.05", "kt = 1e-308"))
     text = messages(check(tmp_path, nothing, rotor, deck(1e308)))
-    assert "touches it for 0 steps" in text and "no rate is so high: make the stop softer" in text
+    assert "touches it for 0 steps" in text and "no rate is so high: make it softer" in text
 
 
 @pytest.mark.parametrize(("steps", "least", "most"), [(2.0, 1.0, 6.0), (10.0, 0.005, 0.04)])
