@@ -13,7 +13,9 @@ from met import backends
 from met.backends.backend import Kernel
 from met.run import inputs, prepare
 from met.trace.recording import Recording
+from tests.ic.small_decks import experiment
 from tests.met.backends.marked import NAMES
+from tests.met.program.test_followers import GROUPS
 
 DECK = Path(ic.__file__).parent / "decks" / "two_link.ic"
 
@@ -39,6 +41,17 @@ def test_all_have_the_bits_of_the_default(name: str, run: str) -> None:
     assert rows is not None and other_rows is not None and rows.any()
     assert np.array_equal(bits(rows), bits(other_rows))
     assert np.array_equal(bits(outputs), bits(other_outputs))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_joints_that_follow_others_have_the_bits_of_the_default(name: str, tmp_path: Path) -> None:
+    made = experiment(tmp_path, GROUPS, select=["ratios"])
+    recording, given = prepare(made).recording, inputs(made, np.arange(3))
+    rows, outputs = backends.load(recording).run(given, 60)
+    other_rows, other_outputs = backends.load(recording, name=name).run(given, 60)
+    assert rows is not None and other_rows is not None and rows.std() > 0.0
+    assert np.array_equal(bits(rows), bits(other_rows)) and np.array_equal(bits(outputs), bits(other_outputs))
 
 
 @pytest.mark.slow

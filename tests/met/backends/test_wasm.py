@@ -20,6 +20,7 @@ from met.trace.recording import Recording
 from tests.ic.small_decks import experiment
 from tests.met.backends import whole_runs
 from tests.met.backends.whole_runs import WholeRun, differing, whole_run
+from tests.met.program.test_followers import GROUPS
 from tests.met.small_models import EVERY, smallest
 
 MACHINE = pytest.mark.parametrize("machine", [pytest.param(False, id="own fma"), pytest.param(None, id="found out")])
@@ -119,6 +120,13 @@ def test_arms_of_2_7_and_30_joints_that_reverse_have_the_native_bits(
     arm: Arm, model: str, machine: bool | None
 ) -> None:
     count, wrong = counted(whole_runs.reversing(arm, model), machine)
+    assert wrong == 0 and count > 1_000
+
+
+@pytest.mark.node
+@MACHINE
+def test_joints_that_follow_others_have_the_native_bits(machine: bool | None, tmp_path: Path) -> None:
+    count, wrong = counted(whole_run("groups", experiment(tmp_path, GROUPS, select=["ratios"]), cases=3), machine)
     assert wrong == 0 and count > 1_000
 
 

@@ -55,6 +55,42 @@ run roll {
 }
 """
 J = 2.0 + 2.0**2 * 3.0
+GROUPS = """\
+arm crane {
+    link upper { mass = 8 kg;  shape = rod(length = 0.9 m, along = x); }
+    link crank { mass = 3 kg;  shape = rod(length = 0.4 m, along = x); }
+    link fore  { mass = 4 kg;  shape = rod(length = 0.8 m, along = x); }
+    link rack  { mass = 1 kg;  shape = sphere(radius = 0.1 m); }
+    link hand  { mass = 1 kg;  shape = box(size = [0.1, 0.2, 0.1] m, along = x); }
+    joint shoulder revolute { parent = base;  child = upper;  axis = -y; }
+    joint lever    revolute { parent = base;  child = crank;  axis = -y; }
+    joint elbow    revolute { parent = upper;  child = fore;  at = [0.9, 0, 0] m;  axis = -y;
+                              follows = [shoulder, lever];  ratio = [-1, 1]; }
+    joint slide    prismatic { parent = fore;  child = rack;  axis = [1, 0.5, 0.2];
+                               follows = lever;  ratio = 0.1 m/rad;  offset = 0.3 m; }
+    joint wrist    revolute { parent = rack;  child = hand;  axis = z; }
+}
+servo bearing { model = passive;  damping = 0.5 N*m*s/rad;  stiffness = 300 N*m/rad; }
+servo sliding { model = passive;  damping = 3 N*s/m;  friction = 4 N; }
+run lift {
+    arm = crane;
+    servos {
+        shoulder = bearing { friction = 2 N*m;  rotor = 0.3 kg*m^2; }
+        lever = bearing;
+        slide = sliding;
+        wrist = bearing { stiffness = 5 N*m/rad;  friction = 0.1 N*m; }
+    }
+    environment { gravity = [0, 1, -9.81] m/s^2; }
+    initial { shoulder.q = 0.3 rad;  lever.q = -0.2 rad;  wrist.q = 0.4 rad;  shoulder.qd = 0.8 rad/s; }
+    rates { dynamics = 1 kHz;  record = 100 Hz; }
+    duration = 1 s;
+    record = [q, qd, qdd, tau];
+    metric last = final { of = wrist.q; }
+    metric most = peak { of = elbow.qd; }
+}
+sweep ratios of lift { vary slide.ratio = [-0.1, 0.05, 0.2] m/rad; }
+"""
+"""A group of two leaders, in which a joint follows both and a prismatic one a revolute one, with friction and loads."""
 
 
 def ran(folder: Path, text: str, select: str | None = None) -> engine.Run:

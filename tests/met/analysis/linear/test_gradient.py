@@ -20,6 +20,7 @@ from met.messages.render import render
 from met.plan import Experiment
 from met.program.build import METRIC
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, experiment
+from tests.met.program.test_followers import GROUPS
 from tests.met.small_models import EVERY, smallest
 
 SWAY = """\
@@ -94,6 +95,19 @@ def test_they_are_those_of_settling_peak_and_rms_through_20_sticks() -> None:
         expected = by_richardson(program, number, 1e-4)
         for metric, name in enumerate(found.metrics):
             assert found.slope[0, metric, number] == pytest.approx(expected[name], rel=1e-6), (name, number)
+
+
+def test_they_are_those_of_ratios_and_masses_of_joints_that_follow_others() -> None:
+    numbers = {"slide.ratio": (0.1, "m/rad"), "slide.offset": (0.3, "m"), "links.rack.mass": (1.0, "kg")}
+    # without the wrist's friction: with it, differences jump where the wrist comes to rest in another step
+    text = changed(GROUPS.partition("sweep")[0], ("  friction = 0.1 N*m;", ""))
+    program = GradientProgram(varied(text, numbers))
+    found = program.of([0])
+    assert not found.why_not
+    for number in range(len(found.paths)):
+        expected = by_richardson(program, number, 2e-4)
+        for metric, name in enumerate(found.metrics):
+            assert found.slope[0, metric, number] == pytest.approx(expected[name], rel=1e-8), (name, number)
 
 
 COAST = """\

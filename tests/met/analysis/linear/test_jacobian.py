@@ -25,6 +25,7 @@ from tests.met.analysis.linear.oracles import (
     shipped,
     shipped_experiment,
 )
+from tests.met.program.test_followers import GROUPS
 from tests.met.small_models import EVERY, smallest
 
 
@@ -32,6 +33,46 @@ def mapped(made: Experiment, time: float = 0.0, inputs: bool = False) -> PeriodM
     program = PeriodProgram(made, input_signals(made.structure) if inputs else ())
     tick = round(time * program.schedule.base_hz) // program.ticks * program.ticks
     return period_map(program, at_instant(program, 0, tick))
+
+
+LATCHED = """
+arm rail {
+    link cart { mass = 4 kg;  inertia = [1, 1, 1] kg*m^2; }
+    joint slide prismatic { parent = base;  child = cart;  axis = x; }
+}
+run it {
+    arm = rail;
+    initial { slide.q = 0.1 m;  slide.qd = -1 m/s; }
+    environment { MODEL }
+    rates { dynamics = 1 kHz; }
+    duration = 1 s;
+    record = [q];
+}
+"""
+LATCH = "latch = bushing { link = cart;  stiffness = [9, 3, 3] N/m;  from = 0.1 s;  ramp = 2 s; }"
+PAD = (
+    "pad = contact { link = cart;  radius = 1 m;  normal = [1, 0.2, 0];  law = hertz;  modulus = 1 kPa;  "
+    "dissipation = 0.1 s/m;  friction = 0.3; }"
+)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        GROUPS,
+        LATCHED.replace("MODEL", LATCH),
+        LATCHED.replace("MODEL", PAD),
+    ],
+    ids=["groups", "a latch", "a contact"],
+)  # fmt: skip
+def test_it_is_that_of_joints_that_follow_others_of_latches_and_of_contacts(text: str, tmp_path: Path) -> None:
+    """By complex steps, about states that are scattered around the run's."""
+    made = experiment(tmp_path, text, select=["lift"] if text is GROUPS else None)
+    program, rng = PeriodProgram(made), np.random.default_rng(3)
+    for time in (0.05, 0.4):
+        start = scattered(program, rng, time=time, size=0.1)
+        found = period_map(program, start.copy())
+        assert near(found.A, by_complex_step(program, start, found)) < 1e-13
 
 
 @pytest.mark.release
