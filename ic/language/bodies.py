@@ -98,7 +98,12 @@ JOINT_LIMITS = (Q_MIN, Q_MAX, QD_MAX, TAU_MAX)
 """Limits that a joint should stay within: every run monitors them, and none of them affects the motion."""
 
 RATIO = Parameter(
-    name="ratio", unit="1", default=1.0, doc="position of the joint for each unit of the joint that it follows"
+    name="ratio",
+    unit="1",
+    default=1.0,
+    at_least=-1e100,
+    at_most=1e100,  # of its square times an inertia, a number is left
+    doc="position of the joint for each unit of the joint that it follows",
 )
 OFFSET = Parameter(
     name="offset", unit="joint", default=0.0, doc="position of the joint where all that it follows are at 0"

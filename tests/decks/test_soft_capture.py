@@ -105,6 +105,7 @@ def unbalanced(found: engine.Run) -> float:
     return float(np.abs(kinetic + stored - kinetic[0] - work + lost).max()) / ENERGY
 
 
+@pytest.mark.slow
 def test_energy_is_what_the_closing_latch_puts_in_less_what_its_damper_takes(tmp_path: Path) -> None:
     """To order 2, of the run and of the sums here."""
     off = []

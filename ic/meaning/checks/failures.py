@@ -50,8 +50,9 @@ def check_failures(
         use, model, joint, place = failure.use, failure.model, failure.joint, failure.place
         servo, continuous = servos.get(joint), joint in ticks and ticks[joint].continuous
         wrong = _wrong(scope, use, model, joint, servo, continuous=continuous)
-        if servo is None and wrong is not None and joint in joints and joints[joint].follows:
-            wrong = wrong[0], f"name joint `{leaders(joint, joints)[0]}`, which leads it, or leave it out", wrong[2]
+        lead = leaders(joint, joints)[0] if joint in joints and joints[joint].follows else ""
+        if wrong and lead and (servo is None or (not servo.has_law and lead in servos and servos[lead].has_law)):
+            wrong = wrong[0], f"name joint `{lead}`, which leads it, or leave it out", wrong[2]
         also = [Label(servo.place, "its servo")] if servo is not None else []
         if wrong is None and joint in beds and model.decoupling is not None:
             wrong = f"`{use.name}` would let go of joint `{joint}`, whose motor is on a bed", "leave it out", place

@@ -228,6 +228,14 @@ TWO = changed(
 )
 
 
+@pytest.mark.parametrize("ratio", ["1e300", "-1e200"])
+def test_a_ratio_whose_square_is_no_number_is_refused(ratio: str, tmp_path: Path) -> None:
+    (told,) = compile_deck(tmp_path, changed(HINGED, ("ratio = -2", f"ratio = {ratio}"))).diagnostics
+    assert told.code == "D077" and told.message == "`ratio` of joint `tip` must be at least -1e+100 and at most 1e+100"
+    sweep = "sweep ratios of swing { vary tip.ratio = [-2, RATIO]; }".replace("RATIO", ratio)
+    assert "D077" in [each.code for each in compile_deck(tmp_path, HINGED + sweep, select=["ratios"]).diagnostics]
+
+
 def test_friction_that_no_torque_of_a_leader_feels_is_refused(tmp_path: Path) -> None:
     rubbing = ("trail = bearing;", "trail = bearing { friction = 1 N; }")
     ideal = ("drive = bearing;", "drive = moved;")

@@ -192,3 +192,20 @@ def test_a_joint_that_begins_outside_of_its_range_is_told(tmp_path: Path) -> Non
     assert (found.code, led.code) == ("D294", "D297")  # its rate leads it further
     assert found.message == "joint `hinge` begins at 2 rad, beyond its range: above 1 rad"
     assert codes(tmp_path, arm, SERVO, changed(begins, ("2 rad", "0.9 rad"))) == []
+
+
+@pytest.mark.parametrize("failure", ["runaway { joint = finger; }", "dead_sensor { joint = finger;  of = qd; }"])
+def test_of_a_follower_without_a_law_the_joint_that_leads_it_is_named(failure: str, tmp_path: Path) -> None:
+    arm = changed(
+        ARM,
+        ("    joint hinge", "    link tip { mass = 1 kg; inertia = [1, 1, 1] kg*m^2; }\n    joint hinge"),
+        ("axis = z; }\n", "axis = z; }\n    joint finger revolute { parent = bar; child = tip; axis = z; follows = hinge; }\n"),
+    )  # fmt: skip
+    run = changed(run_with(f"fault = {failure};"), ("hinge = drive;", "hinge = drive; finger = bearing;"))
+    bearing = "servo bearing { model = passive; damping = 1 N*m*s/rad; }\n"
+    told = shown(tmp_path, arm, SERVO, bearing, run)
+    assert "servo `bearing` (passive) of joint `finger` has no law that `fault` could do anything to" in told
+    assert told.endswith("   = help: name joint `hinge`, which leads it, or leave it out\n")
+    assert codes(tmp_path, arm, SERVO, bearing, run.replace("joint = finger", "joint = hinge")) == []
+    passive = run.replace("hinge = drive", "hinge = bearing")
+    assert shown(tmp_path, arm, bearing, passive).endswith("   = help: leave it out\n"), "which would help neither"

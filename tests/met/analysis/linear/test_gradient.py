@@ -97,6 +97,7 @@ def test_they_are_those_of_settling_peak_and_rms_through_20_sticks() -> None:
             assert found.slope[0, metric, number] == pytest.approx(expected[name], rel=1e-6), (name, number)
 
 
+@pytest.mark.slow
 def test_they_are_those_of_ratios_and_masses_of_joints_that_follow_others() -> None:
     numbers = {"slide.ratio": (0.1, "m/rad"), "slide.offset": (0.3, "m"), "links.rack.mass": (1.0, "kg")}
     # without the wrist's friction: with it, differences jump where the wrist comes to rest in another step

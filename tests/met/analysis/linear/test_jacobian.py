@@ -56,6 +56,7 @@ PAD = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     [
