@@ -235,8 +235,7 @@ def test_a_misspelt_deck_is_told_with_the_one_that_was_meant(
         == """\
 error[D173]: no deck `two_lnk.ic`
  = help: did you mean `two_link.ic`?
- = help: standard decks: ets_vii.ic, free_flyer.ic, manutec_r3.ic, manutec_r3_one_axis.ic, panda.ic, puma_560.ic, shuttle_arm.ic, shuttle_booms.ic, stanford_arm.ic, station_arm.ic, two_link.ic
- = help: standard decks: ets_vii.ic, free_flyer.ic, manutec_r3.ic, manutec_r3_one_axis.ic, panda.ic, puma_560.ic, shuttle_arm.ic, soft_capture.ic, stanford_arm.ic, station_arm.ic, two_link.ic
+ = help: standard decks: ets_vii.ic, free_flyer.ic, manutec_r3.ic, manutec_r3_one_axis.ic, panda.ic, puma_560.ic, shuttle_arm.ic, shuttle_booms.ic, soft_capture.ic, stanford_arm.ic, station_arm.ic, two_link.ic
 
 1 error
 """
