@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from batch.archive.read import ArchiveFile
-from ic.driver.write_values import with_values
+from ic.driver.write_values import DeckWithValues, with_values
 from ic.driver.written_value import WrittenValue
 from ic.formatting.files import write
 from ic.text.files import Files, decode, file_at
@@ -62,10 +62,16 @@ class ChosenDeck:
 
 @frozen
 class FittedValue:
-    """A value to be written into a deck, and what a comment says of it."""
+    """A value to be written into a deck, with the two parts of its comment. Values on one line share `origin`."""
 
     value: WrittenValue
-    remark: str
+    origin: str
+    interval: str = ""
+
+    @property
+    def remark(self) -> str:
+        """The comment of a value that has a line of its own."""
+        return f"{self.origin}, {self.interval}" if self.interval else self.origin
 
 
 def chosen_deck(
@@ -131,18 +137,27 @@ def fitted_deck(
         raise _other(f"`{target}` is there already", "name a file that is not: it would be lost")
     before = Files().text(file_at(deck))
     newline = "\n" if output is not None else _newline_as_archived(deck, before)
-    after, others = before, dict[str, None]()
-    for fitted in values:
-        made = with_values(
+    after, others, remarks = before, dict[str, None](), list[str]()
+
+    def written(value: WrittenValue, remark: str) -> DeckWithValues:
+        return with_values(
             after,
-            [fitted.value],
+            [value],
             name=Path(deck).name,
             folder=Path(deck).parent,
             experiment=experiment,
             defines=defines,
-            remark=fitted.remark,
+            remark=remark,
         )
+
+    for fitted in values:
+        remark = fitted.remark
+        made = written(fitted.value, remark)
+        for lost in [each for each in remarks if each not in made.text]:  # that of a value on the same line
+            remark = f"{lost}, {fitted.interval}"
+            made = written(fitted.value, remark)
         after = made.text
+        remarks = [each for each in (*remarks, remark) if each in after]
         others |= dict.fromkeys(made.others)
     return ChosenDeck(target, output is None, before, after, experiment, tuple(others), newline)
 

@@ -71,8 +71,8 @@ def written_values(question: FitQuestion, answer: FitAnswer) -> list[FittedValue
             continue
         unit, half = question.units[place], float(answer.fit.factor * answer.fit.deviation[place])
         value = dataclasses.replace(rounded(float(answer.fit.values[place]), half / 10.0, unit), path=path)
-        interval = f", {path} +- {_short(half, unit)}" if math.isfinite(half) else ""
-        found.append(FittedValue(value, f"by a fit to {logs}{interval}"))
+        interval = f"{path} +- {_short(half, unit)}" if math.isfinite(half) else ""
+        found.append(FittedValue(value, f"by a fit to {logs}", interval))
     return found
 
 

@@ -273,11 +273,11 @@ def _with_remark(text: str, at: int, remark: str) -> str:
     if not remark or line.rstrip().endswith("\\") or (not mark and any(each in line for each in _COMMENTS)):
         return text
     line = line.rstrip()
-    whole = f"{line}    {REMARK}{remark}"
-    if len(whole) <= LONGEST:
-        return text[:first] + whole + text[end:]
     above = text.rfind("\n", 0, max(first - 1, 0)) + 1
     start = above if text[above:first].lstrip().startswith(REMARK) else first
+    whole = f"{line}    {REMARK}{remark}"
+    if len(whole) <= LONGEST:
+        return text[:start] + whole + text[end:]
     indent = line[: len(line) - len(line.lstrip())]
     return f"{text[:start]}{indent}{REMARK}{remark}\n{line}{text[end:]}"
 

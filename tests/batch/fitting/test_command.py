@@ -127,14 +127,17 @@ def test_zero_may_be_of_one_of_several_logs(folder: Path, late: Path, capsys: Sa
 def test_fitted_numbers_are_written_into_the_deck_with_their_intervals(folder: Path, capsys: Say) -> None:
     copy = folder / "fitted.ic"
     arguments = ["fit", f"{folder}/deck.ic", f"{folder}/log.csv", "--estimate", "mass", "--write", "-o", str(copy)]
-    assert cli.main([*arguments, "--estimate", "drive.f_c"]) == cli.YES
+    assert cli.main([*arguments, "--estimate", "drive.f_c", "--estimate", "drive.kp"]) == cli.YES
     said = capsys.readouterr().out
-    assert "// chosen by a fit to log.csv, drive.f_c +- " in copy.read_text() and f"{copy}: written" in said
+    assert f"{copy}: written" in said
+    assert re.search(r"// chosen by a fit to log.csv, mass \+- \S+ kg\n", copy.read_text())
+    both = r"// chosen by a fit to log.csv, drive.f_c \+- \S+ N\*m, drive.kp \+- \S+ V\*s/rad\n"
+    assert re.search(both, copy.read_text())
     (experiment,) = ic.compile(copy).experiments
     assert experiment.parameters["links.bar.mass"].value == pytest.approx(26.0, rel=0.01)
     sweep = said[said.index("sweep fitted of work") : said.index("---")]
     copy.write_text(copy.read_text() + sweep)
-    assert len(ic.compile(copy, select=["fitted"]).experiments[0].cases.coordinates) == 2
+    assert len(ic.compile(copy, select=["fitted"]).experiments[0].cases.coordinates) == 3
 
 
 @pytest.mark.slow

@@ -148,6 +148,14 @@ def test_a_long_line_has_its_remark_above_and_keeps_one(tmp_path: Path) -> None:
     ]
 
 
+def test_a_remark_above_goes_where_the_next_one_fits_at_the_end_of_the_line(tmp_path: Path) -> None:
+    above = ARM.replace(
+        "servo drive like base_drive", "// chosen of 400: many, an_archive.h5\nservo drive like base_drive"
+    )
+    found = made(tmp_path, ("drive.ki", 0.3, "V/rad"), text=above)
+    assert changed(ARM, found.text) == ["servo drive like base_drive { ki = 0.3 V/rad; }    // chosen of 9: many, a.h5"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("si", [0.1, 1 / 3, 0.30000000000000004, 1e-5, 0.05 * (1 + 2**-52), 123456.789])
 def test_the_deck_written_means_what_set_does_to_the_bit(si: float, tmp_path: Path) -> None:
