@@ -19,8 +19,10 @@ from batch.measured.residuals import Comparison, compare
 from ic.driver.explain import explanations_of
 from ic.driver.given_values import GivenRun, given_run, swept_run
 from ic.driver.written_value import WrittenValue
+from ic.text.complaints import known_words
 from met.diagnostic import Problem, error
 from met.frozen import frozen
+from met.outputs import quoted
 from met.plan import Experiment
 from met.unit_parser import parse_unit
 from met.units import same
@@ -226,17 +228,56 @@ def _run_and_log(text: str) -> tuple[str | None, str]:
 
 
 def _paths(estimates: Sequence[str], runs: Sequence[GivenRun], delays: Sequence[str]) -> list[str]:
-    """Paths without wildcards, each once. delays: those of logs"""
+    """Paths without wildcards, each once: parameters of a form, or else names of definitions and values of that form.
+    delays: those of logs. Raises Problem E480 where a form has none, or some that a fit cannot move"""
     found = []
     for each in estimates:
         matching = [each]
         if any(letter in each for letter in "*?["):
-            known = [*delays, *(path for run in runs for path in run.experiment.parameters)]
-            matching = [path for path in known if fnmatchcase(path, each)]
+            own = [*delays, *(path for run in runs for path in run.experiment.parameters)]
+            names = [name for run in runs for name in _names(run)]
+            like = [path for path in own if fnmatchcase(path, each)] or [
+                name for name in names if fnmatchcase(name, each)
+            ]
+            matching = list(dict.fromkeys(like))
             if not matching:
-                raise _wrong(f"no parameter of `{runs[0].name}` is like `{each}`", "`met explain` lists them")
+                raise _wrong(f"no parameter of `{runs[0].name}` is like `{each}`", _listing(each, runs[0]))
+            movable = [path for path in matching if path in {*delays, *_movable(matching, runs)}]
+            if movable != matching:
+                still = next(path for path in matching if path not in movable)
+                message = f"a fit cannot move all that is like `{each}`: not `{still}`"
+                raise _wrong(message, known_words("estimate of these", movable, len(movable)))
         found += matching
     return list(dict.fromkeys(found))
+
+
+def _names(run: GivenRun) -> list[str]:
+    """The paths that set parameters of a run, by its definitions, too, and its values."""
+    return [name for scope in run.compiled.scopes for name in (*scope.known, *scope.definitions.lets)]
+
+
+def _movable(paths: Sequence[str], runs: Sequence[GivenRun]) -> set[str]:
+    """Those of these paths whose numbers can vary together in a run."""
+    found = set()
+    for run in runs:
+        values = {path: next(explanations_of(run.compiled, path), None) for path in paths}
+        varied, _ = run.vary_most(
+            {
+                path: (each.value, each.unit)
+                for path, each in values.items()
+                if each is not None and isinstance(each.value, float)
+            }
+        )
+        found |= {each.path for each in varied.experiment.cases.coordinates}
+    return found
+
+
+def _listing(path: str, run: GivenRun) -> str:
+    """The command that lists numbers of a run: those that begin as a path does, or else as the first one does."""
+    heads = [name.partition(".")[0] for name in _names(run)]
+    head = path.partition(".")[0]
+    head = head if head in heads else heads[0]
+    return f"`met explain {quoted(run.deck.file)} {head} --run {run.name}` lists those of `{head}`"
 
 
 def _owner(path: str, runs: Sequence[GivenRun]) -> GivenRun:
@@ -252,7 +293,8 @@ def _start(path: str, runs: Sequence[GivenRun]) -> tuple[float, str]:
     if not values:
         _check_varies(path, (0.0, "1"), owner)
     if not values or not all(isinstance(each, float) for each in values.values()):
-        helps = f"`met explain {owner.deck.file} {path}` shows it" if values else "`met explain` lists numbers"
+        shows = f"`met explain {quoted(owner.deck.file)} {path} --run {owner.name}` shows it"
+        helps = shows if values else _listing(path, owner)
         raise _wrong(f"`{path}` is no number, and a fit moves numbers", helps)
     if len(set(values.values())) > 1:
         several = " and ".join(f"{value:g} in `{name}`" for name, value in values.items())
@@ -271,7 +313,7 @@ def _check_varies(path: str, start: tuple[float, str], run: GivenRun) -> None:
         if f"`{path}`" in first.message:
             raise Problem(error(first.code, first.message, help=first.help)) from None
         parts = [each for each in run.experiment.parameters if each.startswith(f"{path}.")]
-        helps = f"it has {', '.join(f'`{each}`' for each in parts[:6])}" if parts else "`met explain` lists numbers"
+        helps = f"it has {', '.join(f'`{each}`' for each in parts[:6])}" if parts else _listing(path, run)
         raise _wrong(f"`{path}` is no number, and a fit moves numbers", helps) from None
 
 
