@@ -21,8 +21,8 @@ def column_option(face: Face) -> Face:
         "columns",
         multiple=True,
         metavar="CHANNEL=COLUMN [UNIT]",
-        help="The log's column of a channel, or of `time`, under another name, with a sign or a factor: "
-        "'elbow.q=-angle_2 [deg]', 'elbow.tau=95.8 * current_2 [N*m]'; may be repeated.",
+        help="The log's column of a channel, or of `time`, under another name, with a sign or a factor, "
+        "and a constant: 'elbow.q=-angle_2 + 12 [deg]', 'elbow.tau=95.8 * current_2 [N*m]'; may be repeated.",
     )(face)
 
 

@@ -159,7 +159,7 @@ def fit_question(
     estimates      paths as `--set` takes them; `links.*.mass` is of all links; `delay of LOG` is of a log's times
     motions        names of runs that might be logged, too, or of sweeps over such motions
     priors         `PATH=normal(MEAN, DEVIATION) UNIT`
-    columns        of the logs: `CHANNEL=[FACTOR *] COLUMN [UNIT]`
+    columns        of the logs: `CHANNEL=[FACTOR *] COLUMN [+ OFFSET] [UNIT]`
     zeros          the time at which the run of a log begins, s, by the log's file; by "" of all others
 
     Raises Problem for mistakes in these.

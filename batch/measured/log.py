@@ -30,36 +30,41 @@ SHOWN = 12
 
 @frozen
 class MappedColumn:
-    """A channel of a run, or `time`, that a CSV file has under another name: `factor` times its column.
+    """A channel of a run, or `time`, that a CSV file has under another name: `factor` times its column, and `offset`.
 
-    unit  of that product; None where the file's head says it
+    unit  of that sum; None where the file's head says it
     """
 
     channel: str
     column: str
     factor: float
+    offset: float
     unit: str | None
 
 
 _MAPPED = re.compile(
     r"(?P<channel>[^=]+)=\s*(?:(?P<minus>-)|(?P<factor>[-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*\*)?"
-    r"(?P<column>[^\[\]]+)(?:\[(?P<unit>[^\[\]]+)\])?\s*"
+    r"(?P<column>[^\[\]]+?)(?P<offset>\s[-+]\s*[\d.]+(?:[eE][-+]?\d+)?\s*)?(?:\[(?P<unit>[^\[\]]+)\])?\s*"
 )
 
 
 def mapped_column(text: str) -> MappedColumn:
-    """The meaning of `CHANNEL=[FACTOR *] COLUMN [UNIT]`, with `-` for a factor of -1. Raises Problem E478."""
+    """The meaning of `CHANNEL=[FACTOR *] COLUMN [+ OFFSET] [UNIT]`, with `-` for a factor of -1.
+
+    Raises Problem E478.
+    """
     match = _MAPPED.fullmatch(text)
     try:
         if match is not None:
             factor = -1.0 if match["minus"] else float(match["factor"] or 1.0)
+            offset = float("".join((match["offset"] or "0").split()))
             unit = None if match["unit"] is None else match["unit"].strip()
             parse_unit(unit or "1")
-            if math.isfinite(factor) and factor:
-                return MappedColumn(match["channel"].strip(), match["column"].strip(), factor, unit)
+            if math.isfinite(factor + offset) and factor:
+                return MappedColumn(match["channel"].strip(), match["column"].strip(), factor, offset, unit)
     except ValueError:
         pass
-    helps = "such as `elbow.q=-angle_2 [deg]` or `elbow.tau=95.8 * current_2 [N*m]`, the unit that of the product"
+    helps = "such as `elbow.q=-angle_2 + 12 [deg]` or `elbow.tau=95.8 * current_2 [N*m]`, the unit that of the channel"
     raise Problem(error("E478", f"`{visible(text)}` is no column of a log for a channel", help=helps))
 
 
@@ -101,7 +106,7 @@ def _csv_signals(
     path: str | Path, columns: Sequence[Mapping[str, str]], mapped: Sequence[MappedColumn]
 ) -> MeasuredSignals:
     table = _with_names(read_csv(str(path)), mapped, [TIME, *(each["channel"] for each in columns)])
-    factors = {each.channel: each.factor for each in mapped}
+    changes = {each.channel: each for each in mapped}
     head = table.columns[0].place
     time_column = table.column(TIME)
     if time_column is None:
@@ -124,13 +129,9 @@ def _csv_signals(
             raise Problem(error("E478", f"`{path}` has several cases, and a log is of one", other.place, help=helps))
     time = table.numbers(time_column, "s", parse_unit("s").dimension, Label(time_column.place, "times of the log"))
     table.rising(time_column, time)
-    instants = factors.get(TIME, 1.0) * np.array(time)
-    found = {each["channel"]: _column(table, each) for each in columns}
-    signals = {
-        name: (instants, factors.get(name, 1.0) * np.array(numbers))
-        for name, numbers in found.items()
-        if numbers is not None
-    }
+    instants = _changed(time_column, time, changes)
+    found = {each["channel"]: _column(table, each, changes) for each in columns}
+    signals = {name: (instants, numbers) for name, numbers in found.items() if numbers is not None}
     known, sources = {TIME, *found}, {each.column for each in mapped}
     used = [f"{each.name} [{each.unit or '1'}]" for each in table.columns if each.name in known]
     unused = [visible(each.name) for each in table.columns if each.name not in {*known, *sources}]
@@ -162,14 +163,22 @@ def _with_names(table: CsvTable, mapped: Sequence[MappedColumn], channels: Seque
     return replace(table, columns=(*added, *table.columns))
 
 
-def _column(table: CsvTable, recorded: Mapping[str, str]) -> tuple[float, ...] | None:
-    """A channel's numbers in SI; none where the log lacks it."""
+def _changed(column: CsvColumn, numbers: Sequence[float], changes: Mapping[str, MappedColumn]) -> np.ndarray:
+    """A column's numbers with the factor and the offset of its channel, SI, [row]. numbers: as they stand, SI"""
+    change = changes.get(column.name)
+    if change is None:
+        return np.array(numbers)
+    return np.asarray(change.factor * np.array(numbers) + parse_unit(column.unit or "1").to_si(change.offset))
+
+
+def _column(table: CsvTable, recorded: Mapping[str, str], changes: Mapping[str, MappedColumn]) -> np.ndarray | None:
+    """A channel's numbers in SI, [row]; none where the log lacks it."""
     column = table.column(recorded["channel"])
     if column is None:
         return None
     unit = recorded["unit"]
     label = Label(column.place, f"the run records it in {unit}" if unit != "1" else "the run records it without a unit")
-    return table.numbers(column, unit, parse_unit(unit).dimension, label)
+    return _changed(column, table.numbers(column, unit, parse_unit(unit).dimension, label), changes)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -51,7 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rows = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
     rows[:, 1:] += 0.01 * rows[:, 1:].std(axis=0) * np.random.default_rng(1).standard_normal(rows[:, 1:].shape)
     write(place / "log.csv", "time [s],hinge.q [rad],hinge.servo.motor_torque [N*m]", rows)
-    raw = np.stack([1000.0 * (rows[:, 0] + 7.0), -np.degrees(rows[:, 1]), rows[:, 2] / 0.061], axis=1)
+    raw = np.stack([1000.0 * (rows[:, 0] + 7.0), 12.0 - np.degrees(rows[:, 1]), rows[:, 2] / 0.061], axis=1)
     write(place / "raw.csv", "t,angle,current [A]", raw)
     return place
 
@@ -61,7 +61,7 @@ def write(path: Path, head: str, rows: np.ndarray) -> None:
 
 
 RAW = (
-    "--zero", "7 s", "--column", "time=t [ms]", "--column", "hinge.q=-angle [deg]",
+    "--zero", "7 s", "--column", "time=t [ms]", "--column", "hinge.q=-angle + 12 [deg]",
     "--column", "hinge.servo.motor_torque=0.061 * current [N*m]",
 )  # fmt: skip
 
@@ -291,6 +291,7 @@ def test_what_a_log_cannot_tell_is_said_and_not_written(folder: Path, capsys: Sa
         (("--estimate", "mass", "--column", "time=-time"), "times of `time` would fall"),
         (("--estimate", "mass", *("--column", "hinge.q=-hinge.q") * 2), "`hinge.q` has two columns"),
         (("--estimate", "mass", "--column", "hinge.q=angle"), "has no column `angle`"),
+        (("--estimate", "mass", "--column", "hinge.q=hinge.q + 1e999"), "is no column of a log for a channel"),
         (("--estimate", "mass", "--vary", "mass=[1, 2] kg"), "--vary is for sweeps"),
         (("--estimate", "mass", "--motion", "work"), "--motion is for --identifiable"),
         (("--estimate", "mass", "--identifiable", "--motion", "wok"), "no run `wok` in this deck"),
