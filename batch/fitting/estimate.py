@@ -3,8 +3,9 @@
 A run is simulated with its controllers, friction and delays, and what it computes is compared with what was measured.
 The numbers are moved by Levenberg's and Marquardt's steps until the weighted squares are least. Slopes are differences
 of runs to both sides, over half of what the logs can tell: so decisions at ticks, such as breaking away, count by what
-they change on average. A signal's weight is the inverse of its residual's rms, and smaller where the residual is alike
-for long; it is found again until it stays.
+they change on average. Where parameters leave less of a mark together, that is tried along their own direction. A
+signal's weight is the inverse of its residual's rms, and smaller where the residual is alike for long; it is found
+again until it stays.
 
 Intervals come from the scores of stretches of the logs (White, Econometrica 48, 1980; Liang and Zeger, Biometrika 73,
 1986), so that they also hold where residuals are correlated in time or over signals, and are at least those of white
@@ -65,9 +66,16 @@ CHANGE = 0.5
 PROBED = tuple(10.0**power for power in range(-12, 7))
 """Sizes, SI, that are tried of a parameter that is 0."""
 
+MOST_CHANGE = 0.1
+"""Largest difference for a slope, in sizes of its parameter."""
+
 SIDES, EVENT = (1.0, -1.0, 0.125, -0.125), 1.5
 """Differences for a slope, in its step; and by how much the largest of them may exceed the smallest without an event
 on its way."""
+
+WEAK, TURNED = 0.5, 3
+"""Singular value, of slopes that each have the length 1, below which differences are taken along its own direction; and
+how often."""
 
 ELSEWHERE, AS_GOOD = 25.0, 2.0
 """Change of the squares, as slopes predict it, from which on values are elsewhere; and by how much half of the squares
@@ -278,23 +286,43 @@ class Fitter:
         return step
 
     def _slopes(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The residuals and their slopes, [number], [number, path]: the mean of differences near and far on both sides,
-        without those that are refused or have an event on their way. The next differences are by `CHANGE` of the
-        deviations that follow."""
-        steps = np.outer(SIDES, self._step)
-        found = self._residuals(np.vstack([values, *(values + np.diag(each) for each in steps)]))
-        middle, moved = found[0], found[1:].reshape(len(SIDES), len(values), -1)
-        slopes = np.zeros((len(middle), len(values)))
-        for place in range(len(values)):
-            sides = (moved[:, place] - middle) / steps[:, place, None]
+        """The residuals and their slopes, [number], [number, path]. Differences are by `CHANGE` of the deviations that
+        the last slopes gave: first those of each parameter by itself, then those of changes of several that leave less
+        of a mark together. Small differences would hide that, since events leave marks of their own."""
+        middle, changes = self._changes(values, np.diag(self._step))
+        slopes = np.where(np.isfinite(changes), changes, 0.0) / self._step
+        for _ in range(TURNED):
+            scale = np.linalg.norm(self._weighted(slopes), axis=0)
+            scale[scale == 0.0] = 1.0
+            _, singular, right = np.linalg.svd(self._weighted(slopes) / scale, full_matrices=False)
+            weak = singular < WEAK
+            if not weak.any():
+                break
+            with np.errstate(divide="ignore"):
+                far = np.minimum(CHANGE / singular, MOST_CHANGE / np.abs(right / scale / self.size).max(axis=1))[weak]
+            moves = far[:, None] * right[weak] / scale
+            _, changes = self._changes(values, moves)
+            lacks = np.where(np.isfinite(changes), changes - slopes @ moves.T, 0.0) / far
+            slopes = slopes + lacks @ (right[weak] * scale)
+        with np.errstate(divide="ignore"):
+            wanted = CHANGE / np.linalg.norm(self._weighted(slopes), axis=0)
+        self._step = np.clip(wanted, 1e-7 * self.size, MOST_CHANGE * self.size)
+        return middle, slopes
+
+    def _changes(self, values: np.ndarray, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The residuals, [number], and by how much each move changes them, [number, move]: the mean of differences near
+        and far on both sides, without those that are refused or have an event on their way; not-a-number where all are.
+        moves: of values, [move, path]"""
+        found = self._residuals(np.vstack([values, *(values + side * moves for side in SIDES)]))
+        middle, moved = found[0], found[1:].reshape(len(SIDES), len(moves), -1)
+        changes = np.full((len(middle), len(moves)), np.nan)
+        for place in range(len(moves)):
+            sides = (moved[:, place] - middle) / np.array(SIDES)[:, None]
             sizes = np.linalg.norm(self.weights * sides, axis=1)
             sides, sizes = sides[np.isfinite(sizes)], sizes[np.isfinite(sizes)]
             if len(sizes):
-                slopes[:, place] = sides[sizes <= EVENT * sizes.min()].mean(axis=0)
-        with np.errstate(divide="ignore"):
-            wanted = CHANGE / np.linalg.norm(self._weighted(slopes), axis=0)
-        self._step = np.clip(wanted, 1e-7 * self.size, 0.1 * self.size)
-        return middle, slopes
+                changes[:, place] = sides[sizes <= EVENT * sizes.min()].mean(axis=0)
+        return middle, changes
 
     def _weighted(self, slopes: np.ndarray) -> np.ndarray:
         return np.vstack([self.weights[:, None] * slopes, np.diag(self._pull)])

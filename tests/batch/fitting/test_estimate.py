@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from batch.fitting.estimate import Fit, Fitter, Prior
+from batch.fitting.known import known
 from batch.fitting.logged import LoggedRuns
 from met.frozen import frozen
 
@@ -119,6 +120,17 @@ def test_few_numbers_far_from_all_others_are_left_out() -> None:
     noise[[50, 51, 400]] += 5.0
     fit = fitted(noise)
     assert fit.outliers >= 3 and np.all(np.abs(fit.values - TRUTH) <= 1.5 * fit.factor * fit.deviation)
+
+
+def test_events_do_not_tell_numbers_apart_of_which_only_the_sum_is_seen() -> None:
+    def stepped(values: np.ndarray) -> np.ndarray:
+        return np.asarray(np.round((values[0] + 3.0 * values[1]) * np.cos(TIME), 3))
+
+    logs = Formula((), ("mass", "com"), stepped, stepped(np.array([8.0, 0.5])) + white(6))
+    fitter = Fitter(logs, np.array([8.0, 0.5]), {})
+    found = known(fitter.slopes_at_start(np.array([0.02])), fitter.size, np.zeros(2, bool))
+    assert found.verdict == ("tied", "tied") and found.rank == 1
+    assert found.alone == pytest.approx(0.02 / np.sqrt(np.sum(np.cos(TIME) ** 2)) / np.array([1.0, 3.0]), rel=0.2)
 
 
 def test_another_answer_that_explains_the_log_as_well_is_told() -> None:
