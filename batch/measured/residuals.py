@@ -143,7 +143,7 @@ def compare(
         residuals.append(_residual(name, pair, courses, units, joint))
     usual = {name: pair.usual() for name, pair in pairs.items()}
     white = {each.channel for each in residuals if each.white}
-    times = [log.signals[name][0] for name in pairs]
+    times = [log.signals[name][0] for name in courses if name in log.signals]
     longest = max(times, key=len, default=np.empty(0))
     step, gaps = gaps_of(longest)
     return Comparison(

@@ -61,6 +61,14 @@ def test_noise_is_white_and_follows_nothing() -> None:
     assert (found.doubts, found.gaps, found.missing) == ((), (), ())
 
 
+def test_a_channel_without_a_number_that_can_be_squared_is_left_out_and_counted() -> None:
+    def change(measured: Numbers) -> None:
+        measured["luff.q"][:] = 1e200
+
+    found = compared(change)
+    assert found.left_out == len(TIME) and "luff.q" not in [each.channel for each in found.residuals]
+
+
 def test_sizes_are_those_of_measured_less_computed() -> None:
     def change(measured: Numbers) -> None:
         measured["luff.q"] += 0.1
