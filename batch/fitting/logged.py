@@ -149,27 +149,26 @@ class LoggedRun:
         return engine.prepare(self.varied.experiment)
 
     @cached_property
-    def _rows(self) -> list[np.ndarray]:
-        """By channel, the log's instants that are fitted, as positions."""
+    def _usable(self) -> list[np.ndarray]:
+        """By channel, the log's instants that have a number and one of the run beside it, as positions."""
         first = LATEST if DELAY + self.file in self.paths else 0.0
         last, usable = self._times[-1] - first, []
         for channel in self.channels:
             instants, measured = self.log.signals[channel]
             with np.errstate(invalid="ignore"):
                 usable.append(np.flatnonzero((instants >= first) & (instants <= last) & (np.abs(measured) <= LARGEST)))
-        every = -(-sum(map(len, usable)) // MOST_NUMBERS)
-        return [rows[:: max(1, every)] for rows in usable]
+        return usable
 
-    @cached_property
+    @property
     def thinned(self) -> bool:
         """Whether the log has more numbers than are fitted."""
-        return (
-            sum(len(rows) for rows in self._rows)
-            < sum(
-                int(np.sum(np.isfinite(measured))) for measured in (self.log.signals[each][1] for each in self.channels)
-            )
-            // 2
-        )
+        return sum(map(len, self._usable)) > MOST_NUMBERS
+
+    @cached_property
+    def _rows(self) -> list[np.ndarray]:
+        """By channel, the log's instants that are fitted, as positions."""
+        every = -(-sum(map(len, self._usable)) // MOST_NUMBERS)
+        return [rows[:: max(1, every)] for rows in self._usable]
 
     @cached_property
     def instants(self) -> np.ndarray:
