@@ -16,6 +16,7 @@ from ic.driver.given_values import GivenRun, VariedRun
 from met import run as engine
 from met.diagnostic import Problem, error
 from met.frozen import frozen
+from met.outputs import quoted
 from met.plan import Experiment
 
 MOST_NUMBERS = 100_000
@@ -73,7 +74,9 @@ class LoggedRun:
         logged = cls(given, file, log, tuple(starts), varied, zero=zero)
         if not len(logged.measured):
             message = f"no number of `{file}` has one of the run beside it"
-            raise Problem(error("E478", message, log.head, help="let its times begin where the run begins, at 0 s"))
+            begins = min((float(times[0]) for times, _ in log.signals.values() if len(times)), default=0.0) + zero
+            helps = f"if the run begins with the log: `--zero {quoted(f'{file}={begins:.12g} s')}`"
+            raise Problem(error("E478", message, log.head, help=helps))
         return logged
 
     @classmethod

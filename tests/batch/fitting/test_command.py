@@ -124,6 +124,18 @@ def test_zero_may_be_of_one_of_several_logs(folder: Path, late: Path, capsys: Sa
 
 
 @pytest.mark.slow
+def test_of_a_log_with_another_clock_the_beginning_that_is_printed_mends_it(folder: Path, capsys: Say) -> None:
+    rows = np.loadtxt(folder / "log.csv", delimiter=",", skiprows=1)
+    rows[:, 0] += 1.7e9
+    write(folder / "epoch.csv", "time [s],hinge.q [rad],hinge.servo.motor_torque [N*m]", rows)
+    arguments = ["fit", f"{folder}/deck.ic", f"{folder}/epoch.csv", "--estimate", "mass"]
+    assert cli.main(arguments) == cli.BAD_INPUT
+    words = re.search(r"if the run begins with the log: `(--zero .*)`", capsys.readouterr().err)
+    assert words is not None
+    assert cli.main([*arguments, "--identifiable", *shlex.split(words[1])]) == cli.YES
+
+
+@pytest.mark.slow
 def test_fitted_numbers_are_written_into_the_deck_with_their_intervals(folder: Path, capsys: Say) -> None:
     copy = folder / "fitted.ic"
     arguments = ["fit", f"{folder}/deck.ic", f"{folder}/log.csv", "--estimate", "mass", "--write", "-o", str(copy)]
