@@ -66,8 +66,8 @@ CHANGE = 0.5
 PROBED = tuple(10.0**power for power in range(-12, 7))
 """Sizes, SI, that are tried of a parameter that is 0."""
 
-MOST_CHANGE = 0.1
-"""Largest difference for a slope, in sizes of its parameter."""
+MOST_CHANGE, MOST_TURNED = 0.1, 0.25
+"""Largest difference for a slope, in sizes of its parameter, and of several parameters together."""
 
 SIDES, EVENT = (1.0, -1.0, 0.125, -0.125), 1.5
 """Differences for a slope, in its step; and by how much the largest of them may exceed the smallest without an event
@@ -75,7 +75,7 @@ on its way."""
 
 WEAK, TURNED = 0.5, 3
 """Singular value, of slopes that each have the length 1, below which differences are taken along its own direction; and
-how often."""
+how often at most."""
 
 ELSEWHERE, AS_GOOD = 25.0, 2.0
 """Change of the squares, as slopes predict it, from which on values are elsewhere; and by how much half of the squares
@@ -299,11 +299,13 @@ class Fitter:
             if not weak.any():
                 break
             with np.errstate(divide="ignore"):
-                far = np.minimum(CHANGE / singular, MOST_CHANGE / np.abs(right / scale / self.size).max(axis=1))[weak]
+                far = np.minimum(CHANGE / singular, MOST_TURNED / np.abs(right / scale / self.size).max(axis=1))[weak]
             moves = far[:, None] * right[weak] / scale
             _, changes = self._changes(values, moves)
             lacks = np.where(np.isfinite(changes), changes - slopes @ moves.T, 0.0) / far
             slopes = slopes + lacks @ (right[weak] * scale)
+            if np.all(np.linalg.norm(self.weights[:, None] * lacks, axis=0) * far < 0.5 * CHANGE):
+                break
         with np.errstate(divide="ignore"):
             wanted = CHANGE / np.linalg.norm(self._weighted(slopes), axis=0)
         self._step = np.clip(wanted, 1e-7 * self.size, MOST_CHANGE * self.size)

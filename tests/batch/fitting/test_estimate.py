@@ -124,7 +124,7 @@ def test_few_numbers_far_from_all_others_are_left_out() -> None:
 
 def test_events_do_not_tell_numbers_apart_of_which_only_the_sum_is_seen() -> None:
     def stepped(values: np.ndarray) -> np.ndarray:
-        return np.asarray(np.round((values[0] + 3.0 * values[1]) * np.cos(TIME), 3))
+        return np.asarray(np.round((values[0] + 3.0 * values[1]) * np.cos(TIME), 4))
 
     logs = Formula((), ("mass", "com"), stepped, stepped(np.array([8.0, 0.5])) + white(6))
     fitter = Fitter(logs, np.array([8.0, 0.5]), {})
