@@ -16,8 +16,9 @@ from met.frozen import frozen
 UNKNOWN = 0.25
 """Standard error of a parameter, as a share of its size, from which on it is unknown."""
 
-PART = 0.1
-"""Share of the largest part of a change, each in sizes of its parameter, from which on a part counts."""
+PARTS = (0.1, 0.01)
+"""Share of the largest part of a change, each in sizes of its parameter, from which on a part counts; and where that
+leaves one part alone."""
 
 
 @frozen
@@ -72,7 +73,10 @@ def known(slopes: np.ndarray, size: np.ndarray, held: np.ndarray, wider: float |
     together = []
     for direction, error in zip(right[::-1], along[::-1], strict=True):
         largest = float(np.abs(direction).max())
-        members = np.flatnonzero(np.abs(direction) >= PART * largest)
+        for part in PARTS:
+            members = np.flatnonzero(np.abs(direction) >= part * largest)
+            if len(members) > 1:
+                break
         if error >= UNKNOWN and len(members) > 1 and any(verdict[each] == "tied" for each in members):
             sign = np.sign(direction[members[0]])
             together.append({int(each): float(sign * direction[each] / largest * size[each]) for each in members})

@@ -32,6 +32,14 @@ def test_parameters_with_one_mark_are_tied_and_their_change_together_is_named() 
     assert found.alone == pytest.approx([0.01, 0.04])
 
 
+def test_a_change_of_which_one_part_is_much_the_largest_is_named_whole() -> None:
+    direction = np.array([0.09, -0.09, 1.0])
+    _, _, right = np.linalg.svd(direction[None, :])
+    found = known(np.array([[0.0], [1e3], [1e3]]) * right, np.ones(3), np.zeros(3, bool))
+    (together,) = found.together
+    assert found.verdict == ("tied",) * 3 and together == pytest.approx({0: 0.09, 1: -0.09, 2: 1.0})
+
+
 def test_a_parameter_without_a_mark_is_unseen_and_does_not_tie_others() -> None:
     found = known(np.hstack([columns(1) * 100.0, np.zeros((50, 1))]), np.array([1.0, 1.0]), NONE_HELD)
     assert found.verdict == ("known", "unseen") and not found.together
