@@ -296,8 +296,6 @@ class Fitter:
             scale[scale == 0.0] = 1.0
             _, singular, right = np.linalg.svd(self._weighted(slopes) / scale, full_matrices=False)
             weak = singular < WEAK
-            if not weak.any():
-                break
             with np.errstate(divide="ignore"):
                 far = np.minimum(CHANGE / singular, MOST_TURNED / np.abs(right / scale / self.size).max(axis=1))[weak]
             moves = far[:, None] * right[weak] / scale
@@ -316,7 +314,7 @@ class Fitter:
         and far on both sides, without those that are refused or have an event on their way; not-a-number where all are.
         moves: of values, [move, path]"""
         found = self._residuals(np.vstack([values, *(values + side * moves for side in SIDES)]))
-        middle, moved = found[0], found[1:].reshape(len(SIDES), len(moves), -1)
+        middle, moved = found[0], found[1:].reshape(len(SIDES), len(moves), found.shape[1])
         changes = np.full((len(middle), len(moves)), np.nan)
         for place in range(len(moves)):
             sides = (moved[:, place] - middle) / np.array(SIDES)[:, None]

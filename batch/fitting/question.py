@@ -258,25 +258,19 @@ def _names(run: GivenRun) -> list[str]:
 
 def _movable(paths: Sequence[str], runs: Sequence[GivenRun]) -> set[str]:
     """Those of these paths whose numbers can vary together in a run."""
-    found = set()
+    found = set[str]()
     for run in runs:
-        values = {path: next(explanations_of(run.compiled, path), None) for path in paths}
-        varied, _ = run.vary_most(
-            {
-                path: (each.value, each.unit)
-                for path, each in values.items()
-                if each is not None and isinstance(each.value, float)
-            }
-        )
-        found |= {each.path for each in varied.experiment.cases.coordinates}
+        known = ((path, next(explanations_of(run.compiled, path), None)) for path in paths)
+        values = {path: (each.value, each.unit) for path, each in known if each and isinstance(each.value, float)}
+        _, left_out = run.vary_most(values)
+        found |= values.keys() - set(left_out)
     return found
 
 
 def _listing(path: str, run: GivenRun) -> str:
     """The command that lists numbers of a run: those that begin as a path does, or else as the first one does."""
     heads = [name.partition(".")[0] for name in _names(run)]
-    head = path.partition(".")[0]
-    head = head if head in heads else heads[0]
+    head = next((each for each in heads if each == path.partition(".")[0]), heads[0])
     return f"`met explain {quoted(run.deck.file)} {head} --run {run.name}` lists those of `{head}`"
 
 
