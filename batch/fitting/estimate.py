@@ -66,8 +66,8 @@ CHANGE = 0.5
 PROBED = tuple(10.0**power for power in range(-12, 7))
 """Sizes, SI, that are tried of a parameter that is 0."""
 
-MOST_CHANGE, MOST_TURNED = 0.1, 0.25
-"""Largest difference for a slope, in sizes of its parameter, and of several parameters together."""
+MOST_CHANGE = 0.1
+"""Largest difference for a slope, in sizes of its parameter."""
 
 SIDES, EVENT = (1.0, -1.0, 0.125, -0.125), 1.5
 """Differences for a slope, in its step; and by how much the largest of them may exceed the smallest without an event
@@ -297,7 +297,7 @@ class Fitter:
             _, singular, right = np.linalg.svd(self._weighted(slopes) / scale, full_matrices=False)
             weak = singular < WEAK
             with np.errstate(divide="ignore"):
-                far = np.minimum(CHANGE / singular, MOST_TURNED / np.abs(right / scale / self.size).max(axis=1))[weak]
+                far = np.minimum(CHANGE / singular, MOST_CHANGE / np.abs(right / scale / self.size).max(axis=1))[weak]
             moves = far[:, None] * right[weak] / scale
             _, changes = self._changes(values, moves)
             lacks = np.where(np.isfinite(changes), changes - slopes @ moves.T, 0.0) / far
