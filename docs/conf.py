@@ -20,8 +20,8 @@ from met.version import VERSION  # noqa: E402  (only once the checkout is on the
 # In the order in which a user needs them; the headings stand in the sidebar.
 PAGES = {
     "Begin": ["README", "tutorial"],
-    "Decks": ["deck", "loops", "coupled", "booms", "editions", "robots", "servos", "environments", "models", "substitution",
-              "reference", "diagnostics", "editors"],
+    "Decks": ["deck", "loops", "coupled", "booms", "editions", "robots", "servos", "environments", "models",
+              "substitution", "reference", "diagnostics", "editors"],
     "Campaigns and results": ["cluster", "best", "search", "verification", "evidence", "sensitivity", "linear", "plots",
                               "report", "diff", "residuals", "fit", "export", "webassembly", "notebooks"],
     "A motor on a bed": ["bed", "bench", "drives", "pico", "pico_safety", "protocol", "../hw/firmware/README"],

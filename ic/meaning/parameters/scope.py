@@ -517,8 +517,7 @@ class Scope:
         endless = not isinstance(value, Scalar) and math.isinf(value)
         if origin.kind != "default" or not endless:  # a model's own default may be: never
             self.value_checks.range(owner, wanted, value, place, path, needs)
-        record = record and not (wanted.timing and origin.kind == "default")
-        kept = self.parameters if record else self.auxiliary
+        kept = self.parameters if record and not (wanted.timing and origin.kind == "default") else self.auxiliary
         if record or owner.called is None:
             kept[path] = Settled(value, owner.unit(wanted)[0], origin, wanted.doc, expression)
         return value
