@@ -9,7 +9,7 @@ _HEAD = """\
 #define NAMED(I) length_##I
 #define METRES(I) (0.001 * I) * 1 m
 #define LINK(I, LENGTH) link link_##I { mass = 1 kg; shape = rod(length = LENGTH, along = x); }
-#define JOINT(I, FROM) joint joint_##I revolute { parent = FROM; child = link_##I; axis = z; }
+#define JOINT(I, FROM, AXIS) joint joint_##I revolute { parent = FROM; child = link_##I; axis = AXIS; }
 servo drive like rigid_gearbox { command = rate(0.1 rad/s); }
 """
 _RUN = """\
@@ -28,6 +28,6 @@ def text(lines: int) -> str:
     arm = []
     for i in range(links):
         parent = "base" if i % LINKS_IN_ROW == 0 else f"link_{i - 1}"
-        arm.append(f"LINK({i}, length_{i + 1}) JOINT({i}, {parent})")
+        arm.append(f"LINK({i}, length_{i + 1}) JOINT({i}, {parent}, {'zy'[i % 2]})")
     servos = [f"joint_{i} = drive;" for i in range(links)]
     return "\n".join([_HEAD, *lets, "arm many {", *arm, "}", _RUN, "servos {", *servos, "}", "}", ""])
