@@ -123,13 +123,14 @@ MET.signals = (() => {
       const reading = node("div", { class: "reading" });
       const unit = panel.unit ? ` (${panel.unit})` : "";
       const change = how === "change";
+      const strong = (each) => (each.line.command ? colours.ink : colourOf(each.own ? each.line.joint : "", each.at, colours));
+      const keyed = found.filter((each) => each.nth === 0 && !each.was && !each.own && !each.line.command);  // components
       const box = node("div", { class: "panel" }, node("div", { class: "head" }, node("b", null, change ? "change of " : null, node("code", null, panel.name), unit),
-        node("span", { class: "about" }, panel.about), reading), frame);
+        node("span", { class: "about" }, panel.about), node("span", { class: "about versions" }, ...keyed.map((each) => node("span", null, swatch(strong(each), []), each.line.label))), reading), frame);
       panels.append(box);
       roomFor(box, reading, found, MET.width(frame));
       frame.setAttribute("aria-label", `${change ? "change of " : ""}${panel.name}${unit} against time, cases ${shown.map((c) => `#${c}`).join(", ")}. Arrow keys move the reading, plus and minus zoom, Escape shows all.`);
       const flat = found.every((each) => each.points.every((v) => v === null || v === 0));
-      const strong = (each) => (each.line.command ? colours.ink : colourOf(each.own ? each.line.joint : "", each.at, colours));
       const colour = (each) => (each.was ? pale(strong(each)) : strong(each));
       const u = new uPlot({
         width: MET.width(frame), height: (flat ? 90 : 178) + (last ? 18 : 0), padding: [8, 14, 0, 0], legend: { show: false },
