@@ -71,8 +71,8 @@ def same_bed(one: str, other: str) -> bool:
 
 
 def bench_at(name: str) -> dict[str, str]:
-    """What tells the bench at a port from another, in words by name; empty where the port says nothing of it. Raises
-    Problem."""
+    """The marks that tell the bench at a port from another, in words by name; empty where the port says nothing of it.
+    Raises Problem."""
     return dict(kind_of(name).bench(name.partition(":")[2]))
 
 

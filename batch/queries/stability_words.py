@@ -77,7 +77,7 @@ def _loops(margins: LeastMargins) -> str:
 
 
 def _allowance(disk: float) -> str:
-    """What a disk margin allows: a factor on the gain, and an angle of phase."""
+    """The changes that a disk margin allows: a factor on the gain, and an angle of phase."""
     factor = allowed_gain(disk)
     gain = f"{factor:.4g} times the gain" if math.isfinite(factor) else "any gain"
     return f"{gain} or {math.degrees(2.0 * math.atan(0.5 * disk)):.3g} deg"

@@ -108,7 +108,7 @@ def check_balanced(scope: Scope, item: Item | None, uses: Sequence[Use], structu
     gives the springs of booms, which begin where their loads hold them. item: the entry that asks for it"""
     if not structure.balanced or item is None:
         return
-    for spring in structure.springs:
+    for spring in sorted(structure.springs):
         begins = scope.parameters.get(f"initial.{spring}.q")
         if begins is not None and begins.origin.place is not None:
             scope.complaints.remark(

@@ -170,9 +170,7 @@ RUN_CHECKS = (
     RunCheck(lambda run: check_reach(run.scope, run.block, run.structure), _all_is_sound),
     RunCheck(lambda run: check_magnitudes(run.scope, run.structure), _all_is_sound),
     RunCheck(lambda run: check_scales(run.scope, run.structure, run.uses), _all_is_sound),
-    RunCheck(
-        lambda run: check_requirements(run.scope, run.requirements, run.structure, run.linear_metrics), _all_is_sound
-    ),
+    RunCheck(_check_requirements, _all_is_sound),
 )
 
 
