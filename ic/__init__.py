@@ -43,7 +43,7 @@ def check(
         include_dirs=tuple(include_dirs),
         defines=tuple(defines),
         select=select,
-        settings=(*map(to_set, _settings(set)), *(f"{VARY} {each}" for each in _settings(vary))),
+        settings=(*map(to_set, _settings(set)), *(f"{VARY} {setting}" for setting in _settings(vary))),
         text=text,
     )
 

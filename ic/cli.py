@@ -150,7 +150,7 @@ def _whoever_includes(part: object) -> object:
     if isinstance(part, tuple):
         return tuple(map(_whoever_includes, part))
     if is_dataclass(part):
-        names = (each.name for each in fields(part) if each.name not in ("included", "used"))
+        names = (field.name for field in fields(part) if field.name not in ("included", "used"))
         return tuple(_whoever_includes(getattr(part, name)) for name in names)
     return part
 
@@ -315,8 +315,8 @@ def doc(words: tuple[str, ...], form: str) -> None:
         raise click.UsageError("at most a kind and a model")
     pages = requested_pages(words)
     if form == "text":
-        _print_text(separated(in_terminal(each, terminal_width()) for each in pages))
-    elif any(each.records for each in pages):
+        _print_text(separated(in_terminal(page, terminal_width()) for page in pages))
+    elif any(page.records for page in pages):
         _print_json(in_json(pages))
     else:
         raise click.UsageError(f"what `{words[0]}` means is text: it has no --format")

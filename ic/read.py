@@ -54,10 +54,10 @@ def read(
     if seen.complete:
         with suppress(GiveUp):
             parsed, roofs = used.parse(seen, file or FoundFile(DECK_IN_MEMORY, DECK_IN_MEMORY))
-    sources = (*files.read_so_far.values(), *(each for each in seen.sources if each.name == COMMAND_LINE))
+    sources = (*files.read_so_far.values(), *(source for source in seen.sources if source.name == COMMAND_LINE))
     found = in_order(findings.all, sources)
     complete = seen.complete and used.complete
-    sound = used.sound and despite_errors and not any(each.code in UNKNOWN_TEXT for each in findings.errors)
+    sound = used.sound and despite_errors and not any(error.code in UNKNOWN_TEXT for error in findings.errors)
     if not complete or (findings.errors and not sound):
         raise Problem(found, {source.name: source.text for source in sources})
     return Deck(
@@ -65,7 +65,7 @@ def read(
         parsed.entries,
         sources,
         found,
-        tuple(os.fspath(each) for each in include_dirs),
+        tuple(os.fspath(include_dir) for include_dir in include_dirs),
         os.fspath(path),
         tuple(defines),
         tuple(used.unreadable),
@@ -78,8 +78,8 @@ def read(
 
 def read_again(deck: Deck, defines: Sequence[str], *, library: Path = LIBRARY) -> Deck:
     """A deck read again with further macros, `NAME=VALUE`, which replace those of their names on the command line."""
-    names = {each.partition("=")[0] for each in defines}
-    kept = [each for each in deck.defines if each.partition("=")[0] not in names]
+    names = {define.partition("=")[0] for define in defines}
+    kept = [define for define in deck.defines if define.partition("=")[0] not in names]
     return read(deck.path, deck.include_dirs, (*kept, *defines), library=library, text=deck.text, unsaved=deck.unsaved)
 
 

@@ -52,7 +52,7 @@ class UsedDecks:
         parsed = parse_on(seen.tokens, self._findings, looped=self._looped)
         self.sound &= parsed.sound
         self.unreadable += parsed.unreadable
-        own = {word.text: word for each in parsed.entries for word in _defined(each)}
+        own = {word.text: word for entry in parsed.entries for word in _defined(entry)}
         roofs: dict[str, Roof] = {}
         brought: list[Entry] = []
         for use in parsed.uses:
@@ -108,7 +108,7 @@ class UsedDecks:
         try:
             self._files.text(file)
         except Problem as problem:
-            self._findings.add(*(reached_by(each, use.at, included, used) for each in problem.diagnostics))
+            self._findings.add(*(reached_by(diagnostic, use.at, included, used) for diagnostic in problem.diagnostics))
             return None
         seen = preprocess_on(self._files, self._findings, lambda: file, included=included, used=used, count=self._count)
         if not seen.complete:

@@ -38,7 +38,7 @@ def _cause_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
         )
     if int(number) == len(moving) and experiment.structure.free:
         return _cause_of_base(experiment, failure, tick)
-    others = len(moving) + experiment.structure.free + sum(each.flies for each in experiment.structure.payloads)
+    others = len(moving) + experiment.structure.free + sum(payload.flies for payload in experiment.structure.payloads)
     if int(number) >= others:
         return _cause_of_sensor(experiment, int(number) - others, tick)
     if int(number) >= len(moving):

@@ -184,7 +184,7 @@ def check_options(
     for option, given in (("-D", defines), ("-I", include_dirs)):
         if given and names_plan(source):
             raise click.UsageError(f"{option} is for decks: `{source}` is a plan, whose macros are expanded already")
-    varied = [each for each in settings if varies(each)]
+    varied = [setting for setting in settings if varies(setting)]
     set_or_vary = "--vary" if settings and len(varied) == len(settings) else "--set"
     if varied and everything:
         raise click.UsageError("--vary is of one run, and --all of all: name the run")
@@ -282,7 +282,7 @@ def _form_asked(arguments: Sequence[str]) -> str:
     """The form in which a usage error is printed too: that of --format."""
     known = PROGRAM_FORMS if arguments[:1] == ["check"] else ("json",)
     asked = [form for option, form in pairwise(arguments) if option == "--format"]
-    asked += [each.removeprefix("--format=") for each in arguments if each.startswith("--format=")]
+    asked += [argument.removeprefix("--format=") for argument in arguments if argument.startswith("--format=")]
     return asked[-1] if asked and asked[-1] in known else "text"
 
 

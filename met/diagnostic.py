@@ -63,7 +63,7 @@ class Problem(Exception):
         So the traceback in a notebook ends in the deck's line with its caret.
         """
         if not self.sources:
-            helps = (f"\n  {text}" for each in self.diagnostics for text in each.help)
+            helps = (f"\n  {text}" for diagnostic in self.diagnostics for text in diagnostic.help)
             return super().__str__() + "".join(helps)
         from met.messages.render import render
 

@@ -147,8 +147,8 @@ def distinct_names(parameters: Sequence[Parameter]) -> list[str]:
     for n, one in enumerate(parameters):
         others = [each for each in parameters[:n] if each.name == one.name]
         apart = one.only is not None and all(
-            each.only is not None and each.only[0] == one.only[0] and not {*each.only[1]} & {*one.only[1]}
-            for each in others
+            other.only is not None and other.only[0] == one.only[0] and not {*other.only[1]} & {*one.only[1]}
+            for other in others
         )
         names += [] if others and apart else [one.name]
     return names

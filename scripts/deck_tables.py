@@ -22,7 +22,7 @@ MARK = "<!-- table of {} -->"
 def table(block: BlockDeclaration) -> list[str]:
     """The block's entries as a table in Markdown."""
     by_key = block.within and not block.named and not block.statements
-    rows = [(each.name if by_key else each.written, each.doc, each.default) for each in block.entries]
+    rows = [(entry.name if by_key else entry.written, entry.doc, entry.default) for entry in block.entries]
     head = (f"{'key' if by_key else 'entry'} of {with_article(block.name)}", "is", "default")
     free = [f"| others | {block.free} | |"] if block.free else []
     return [*table_in_markdown(Table(head=head, rows=rows)), *free]

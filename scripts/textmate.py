@@ -45,7 +45,7 @@ STATEMENTS = (
 PARTS = tuple(dict.fromkeys(word for block in BLOCKS.values() for word in block.named))
 """Words that begin an entry and are followed by a name."""
 
-_DECLARED = [each.parameter for block in BLOCKS.values() for each in block.entries if each.parameter is not None]
+_DECLARED = [entry.parameter for block in BLOCKS.values() for entry in block.entries if entry.parameter is not None]
 WORDS = (BASE, "faults", *BASE_KINDS[1:], *(word for wanted in _DECLARED for word in wanted.words))
 NAME = r"[A-Za-z_][A-Za-z0-9_]*"
 BRACES = r"\{[A-Za-z0-9_(+-][A-Za-z0-9_ +*/%()-]*\}"

@@ -80,15 +80,19 @@ class DatasetMaker:
         fixed = values_of_dimensions(experiment) | {"case": np.arange(count), "recorded_case": np.arange(count)}
         fixed["time"] = times_of(experiment)
         coordinates, laid = {}, {}
-        for each in variables:
-            attributes = _as_opened(each.written_attributes | each.code_key(prepared.result_keys))
-            if each.role == "dimension":
-                values = np.asarray(fixed[each.name])
-                coordinates[each.name] = (each.dims, values.astype(str) if each.kind == "str" else values, attributes)
+        for variable in variables:
+            attributes = _as_opened(variable.written_attributes | variable.code_key(prepared.result_keys))
+            if variable.role == "dimension":
+                values = np.asarray(fixed[variable.name])
+                coordinates[variable.name] = (
+                    variable.dims,
+                    values.astype(str) if variable.kind == "str" else values,
+                    attributes,
+                )
             else:
-                kind = "U1" if each.kind == "str" else KINDS[each.kind]
-                nothing = np.broadcast_to(np.zeros((), kind), [layout.sizes[dim] for dim in each.dims])
-                laid[each.name] = each.dims, nothing, attributes
+                kind = "U1" if variable.kind == "str" else KINDS[variable.kind]
+                nothing = np.broadcast_to(np.zeros((), kind), [layout.sizes[dim] for dim in variable.dims])
+                laid[variable.name] = variable.dims, nothing, attributes
         named = str(layout.attributes["coordinates"]).split()
         attributes = {
             "schema": archive_layout.SCHEMA,
@@ -135,7 +139,7 @@ class GroupInMemory(ArchiveGroup):
 
     @cached_property
     def variables(self) -> dict[str, Stored]:
-        return {each.name: _stored(each) for each in self._layout.variables}
+        return {variable.name: _stored(variable) for variable in self._layout.variables}
 
     def shape(self, name: str) -> tuple[int, ...]:
         return tuple(self.values(name).shape)

@@ -133,7 +133,7 @@ def why_unsound(group: StoredGroup) -> str:
     except (ValueError, RecursionError, Damaged) as reason:
         return f"an attribute of its search is no list of what it should be: {reason}"
     coordinates = list(group.role("coordinate"))
-    chosen = [each for each in coordinates if "low" in each.attributes]
+    chosen = [coordinate for coordinate in coordinates if "low" in coordinate.attributes]
     if not chosen or not all(map(_is_range, chosen)) or coordinates[: len(chosen)] != chosen:
         return "its search chooses nothing that it could"
     if GENERATION not in group.variables or group.type(GENERATION) != "<i8":

@@ -18,7 +18,7 @@ FIELDS = {"text": str, "metric": str, "comparison": str, "limit": float, "share"
 
 def written(limits: Iterable[StepErrorLimit], names: Mapping[str, str]) -> str:
     """The value of the attribute. names: of the metrics' variables, by the metrics' own"""
-    plain = [{name: getattr(each, name) for name in FIELDS} | {"metric": names[each.metric]} for each in limits]
+    plain = [{name: getattr(limit, name) for name in FIELDS} | {"metric": names[limit.metric]} for limit in limits]
     return json.dumps(plain, sort_keys=True, separators=(",", ":"))
 
 

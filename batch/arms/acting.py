@@ -120,7 +120,7 @@ class RecordedWorld(ArmWorld):
 def acting_on(experiment: Experiment, scene: ArmScene, recorded: Collection[str]) -> ActingOnArm:
     """The loads on the arm of a scene. recorded: existing channels; loads that need others are listed in `not_drawn`"""
     system, graph = System(experiment), Graph()
-    varied = {each.path: graph.input(each.path) for each in experiment.cases.coordinates}
+    varied = {coordinate.path: graph.input(coordinate.path) for coordinate in experiment.cases.coordinates}
     values = {path: _settled(value) for path, value in parameters(experiment, varied).items()}
     memory: dict[str, Any] = {PARAMETER + path: value for path, value in values.items()}
     system.keep_tree(memory.__getitem__, memory.__setitem__)
@@ -179,9 +179,9 @@ def acting_json(acting: ActingOnArm) -> dict[str, Any]:
         "nodes": [list(node) for node in acting.formulas.nodes],
         "outputs": list(acting.formulas.outputs),
         "channels": list(acting.channels),
-        "arrows": [[each.kind, each.name, each.unit] for each in acting.arrows],
+        "arrows": [[arrow.kind, arrow.name, arrow.unit] for arrow in acting.arrows],
         "jets": list(acting.jets),
-        "payloads": [[each.name, each.link, each.body] for each in acting.payloads],
+        "payloads": [[payload.name, payload.link, payload.body] for payload in acting.payloads],
         "notDrawn": [[each.what, each.name, list(each.signals)] for each in acting.not_drawn],
     }
 

@@ -81,9 +81,11 @@ def arm_scene(experiment: Experiment, recorded: Sequence[str]) -> ArmScene:
     position and orientation are among them"""
     structure = experiment.structure
     graph = Graph()
-    varied = {each.path: graph.input(each.path) for each in experiment.cases.coordinates}
+    varied = {coordinate.path: graph.input(coordinate.path) for coordinate in experiment.cases.coordinates}
     values = {path: _settled(value) for path, value in parameters(experiment, varied).items()}
-    first = parameters(experiment, {each.path: each.values[0] for each in experiment.cases.coordinates})
+    first = parameters(
+        experiment, {coordinate.path: coordinate.values[0] for coordinate in experiment.cases.coordinates}
+    )
     joints = structure.moving
     channels = [f"{joint.name}.{POSITION}" for joint in joints]
     q = [graph.input(channel) for channel in channels]
@@ -154,7 +156,7 @@ def scene_json(scene: ArmScene) -> dict[str, Any]:
     """The scene as a page's script takes it."""
     return {
         "bodies": [[body.name, body.carrier] for body in scene.bodies],
-        "shapes": [[each.body, each.kind, each.role, each.joint] for each in scene.shapes],
+        "shapes": [[shape.body, shape.kind, shape.role, shape.joint] for shape in scene.shapes],
         "nodes": [list(node) for node in scene.formulas.nodes],
         "outputs": list(scene.formulas.outputs),
         "channels": list(scene.channels),

@@ -68,7 +68,7 @@ def joint_of(experiment: Experiment, name: str | None, texts: Mapping[str, str] 
     servos = [use.joint for use in experiment.structure.servos]
     use = servo_of(experiment, name)
     if use is None:
-        there = any(each.name == name for each in experiment.structure.joints)
+        there = any(joint.name == name for joint in experiment.structure.joints)
         message = f"joint `{name}` of `{experiment.name}` has no servo" if there else f"no joint `{name}`"
         helps = (*(() if there else did_you_mean(name, servos)), f"joints that have a servo: {', '.join(servos)}")
         raise Problem(error("E440", message, help=helps))
@@ -114,7 +114,7 @@ def bed_size(
         figures=figures,
         exchanges=exchanges,
         filter=filter_range(bedded, joint, ends, (lightest.value, heaviest.value), margin),
-        verdicts=tuple(judge_part(each, margin) for each in candidates),
+        verdicts=tuple(judge_part(candidate, margin) for candidate in candidates),
         benches={name: (judge_part(a, margin), judge_part(b, margin)) for name, (a, b) in benches.items()},
         notes=tuple(_notes(experiment, joint, figures, candidates)),
     )
@@ -123,7 +123,7 @@ def bed_size(
 def _candidates(named: Mapping[str, MotorPart], listed: PartsList) -> list[Candidate]:
     """The candidate parts: the named ones, else all, each as drive and as load."""
     if not named:
-        return [Candidate(role, MotorFigures(each)) for role in ("drive", "load") for each in listed.motors.values()]
+        return [Candidate(role, MotorFigures(motor)) for role in ("drive", "load") for motor in listed.motors.values()]
     beside = named["drive"].figure("inertia") if "drive" in named else None
     return [Candidate(role, MotorFigures(each), beside) for role, each in named.items()]
 
@@ -149,10 +149,10 @@ def _notes(experiment: Experiment, joint: str, figures: BedFigures, candidates: 
             times = schedule.dynamics // use.divisor
             yield f"the servo ticks {times} times a step of the dynamics, and one of them alone is seen"
     yield "a part's rotor is on the shaft with it; a coupling and a brake are not"
-    if any(each.role == "drive" for each in candidates):
+    if any(candidate.role == "drive" for candidate in candidates):
         whose = "bed" if scaled else "servo"
         yield f"a drive of other constants moves the joint otherwise: write its own into the {whose}, and ask again"
-    if any(each.part.figure("resistance") for each in candidates):
+    if any(candidate.part.figure("resistance") for candidate in candidates):
         yield "voltages of parts are of resistance and back-EMF, without inductance and what heat does to both"
     if figures.at_most:
         yield (

@@ -68,7 +68,7 @@ def _chosen_bed(word: str, plan: Plan | None, names: tuple[str, ...]) -> ChosenB
     if plan is None:
         return ChosenBed(port)
     experiment = on_beds(plan, names or None)[0]
-    joints = [each.joint for each in experiment.structure.substitutions]
+    joints = [substitution.joint for substitution in experiment.structure.substitutions]
     if joint in joints:
         return ChosenBed(port, experiment, joint)
     if joint:

@@ -23,8 +23,8 @@ def clear_and_tell(word: str, *, baud: int, form: str, quiet: bool = False, verb
         say(json.dumps({"name": about.name, "cleared": names}))
     elif not quiet:
         say(f"bed `{about.name}` at {word}: {cleared_line(faults)}")
-        for each in refusals.remedies(faults):
-            say(f"  = help: {each}")
+        for remedy in refusals.remedies(faults):
+            say(f"  = help: {remedy}")
 
 
 def clear(word: str, baud: int) -> tuple[About, Fault]:

@@ -124,15 +124,15 @@ class OnBeds:
             found.append(self._case(section, int(row)))
         self._done = 0
         results = [each for each, _ in found]
-        history = np.stack([each.rows for each in results]) if section.recorded else None
+        history = np.stack([result.rows for result in results]) if section.recorded else None
         if history is not None and section.single:
             history = history.astype(np.float32)
         fates = {place: (FAILED, why) for place, (_, why) in enumerate(found) if why}
         computed = shard.Shard(
             section.key(task.first, task.last),
-            engine.with_linear(section.prepared, np.stack([each.outputs for each in results])),
+            engine.with_linear(section.prepared, np.stack([result.outputs for result in results])),
             history,
-            sum(each.seconds for each in results),
+            sum(result.seconds for result in results),
             fates,
         )
         try:

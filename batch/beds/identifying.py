@@ -73,7 +73,7 @@ class DataSheet:
 def sheet_of(experiment: Experiment, joint: str, kt_load: float | None) -> DataSheet:
     """The data sheet of a joint's motor in the first case: the servo's motor, over the scales of the bed where it has
     some, and the bed's other parameters."""
-    inputs = {each.path: float(each.values[0]) for each in experiment.cases.coordinates}
+    inputs = {coordinate.path: float(coordinate.values[0]) for coordinate in experiment.cases.coordinates}
     outputs = experiment.formulas.replay(inputs)
 
     def servo(name: str) -> float:
@@ -226,7 +226,7 @@ def table_lines(found: FitResult, estimates: Mapping[str, Estimate], sheet: Data
     left = float((found.residual**2).mean() ** 0.5)
     out = columns(rows, right=(3, 4, 5))
     out.append("`off by`: found less the data sheet's, in halves of the interval")
-    out += [f"given, not found: {each}" for each in reasons(found)]
+    out += [f"given, not found: {reason}" for reason in reasons(found)]
     out.append(
         f"left unexplained: {left:.3g} of {found.rate:.3g} rad/s, rms; misalignment {found.ripple[0]:.2g} N m once a "
         f"turn and {found.ripple[1]:.2g} N m twice, rms; at its largest torque {found.limited:.0%} of the time"
@@ -283,7 +283,7 @@ def included(
     from ic.formatting.formatter import formatted
 
     head = re.sub(r"\W", "_", joint)
-    [use] = (each for each in experiment.structure.substitutions if each.joint == joint)
+    [use] = (substitution for substitution in experiment.structure.substitutions if substitution.joint == joint)
     [servo] = (each for each in experiment.structure.servos if each.joint == joint)
     bed = [*(f"{name} = {head}_{name}" for name in UNITS), *_believed(experiment, use)]
     scale = _scale_of(experiment, joint)

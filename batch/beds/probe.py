@@ -150,7 +150,10 @@ def data(result: ProbeResult) -> dict[str, Any]:
         ],
         "interlock": [{"message": what, "help": [remedy]} for what, remedy in refusals.interlocked(sample.interlock)],
         "remarks": dict(result.remarks),
-        "warnings": [{"code": each.code, "message": each.message, "help": list(each.help)} for each in result.warnings],
+        "warnings": [
+            {"code": warning.code, "message": warning.message, "help": list(warning.help)}
+            for warning in result.warnings
+        ],
         "line": {
             "bytes": exchanged(about.capabilities),
             "bytes_take": result.needed or None,

@@ -32,7 +32,9 @@ from met.plan import Experiment, Plan
 
 def ports_of(given: Sequence[str], experiments: Sequence[Experiment]) -> dict[str, str]:
     """The port of each joint on a bed, from words `PORT` or `JOINT=PORT`. Raises Problem E418."""
-    joints = list(dict.fromkeys(each.joint for one in experiments for each in one.structure.substitutions))
+    joints = list(
+        dict.fromkeys(substitution.joint for one in experiments for substitution in one.structure.substitutions)
+    )
     found: dict[str, str] = {}
     for word in given:
         joint, port = split(word)
@@ -70,9 +72,9 @@ def campaign_of(
     """The campaign, its ports by joint, and True where the beds have no time of their own. Raises Problem."""
     experiments = on_beds(plan, names)
     by_joint = ports_of(ports, experiments)
-    for each in experiments:
-        for use in each.structure.substitutions:
-            check_model(by_joint[use.joint], each, use.joint)
+    for experiment in experiments:
+        for use in experiment.structure.substitutions:
+            check_model(by_joint[use.joint], experiment, use.joint)
     steps = {in_lock_step(port, lock_step) for port in by_joint.values()}
     if len(steps) > 1:
         one = "give all beds ports of one kind"

@@ -74,8 +74,8 @@ def _of_archive(source: str, names: Sequence[str]) -> tuple[Plan, dict[str, np.n
     """The plan in an archive, with the runs that it holds, and the rows of each that it has cases of."""
     with ArchiveFile(source) as file:
         plan, groups = file.plan(), groups_named(file, names)
-        cases = {each.name: each.cases.table for each in plan.experiments}
-        return plan, {each.name: np.searchsorted(cases[each.name], each.values("case")) for each in groups}
+        cases = {experiment.name: experiment.cases.table for experiment in plan.experiments}
+        return plan, {group.name: np.searchsorted(cases[group.name], group.values("case")) for group in groups}
 
 
 def _on_beds(plan: Plan, names: Sequence[str]) -> Sequence[Experiment]:
@@ -124,7 +124,7 @@ def as_data(size: BedSize) -> dict[str, Any]:
             "margin": own.factor,
             "filters": [{"f_cut": f_cut, "stable": stable} for f_cut, stable in size.filter.tried],
         },
-        "parts": [_verdict_as_data(each) for each in size.verdicts],
+        "parts": [_verdict_as_data(verdict) for verdict in size.verdicts],
         "benches": {name: [_verdict_as_data(each) for each in two] for name, two in size.benches.items()},
         "notes": list(size.notes),
     }
@@ -141,15 +141,15 @@ def _verdict_as_data(verdict: PartVerdict) -> dict[str, Any]:
         "missing": list(verdict.missing),
         "checks": [
             {
-                "what": each.what,
-                "unit": each.unit,
-                "asked": each.asked,
-                "has": each.has,
-                "share": each.share,
-                "case": each.at.case,
-                **({} if each.at.time is None else {"time": each.at.time}),
+                "what": check.what,
+                "unit": check.unit,
+                "asked": check.asked,
+                "has": check.has,
+                "share": check.share,
+                "case": check.at.case,
+                **({} if check.at.time is None else {"time": check.at.time}),
             }
-            for each in verdict.checks
+            for check in verdict.checks
         ],
     }
 

@@ -110,10 +110,16 @@ def _named(size: BedSize, several: bool) -> Iterator[str]:
     for verdict in size.verdicts:
         yield f"  {verdict.role} {verdict.part.name}: {_verdict(verdict)}"
         rows = [
-            [each.what, _with(each.asked, each.unit), "of", _with(each.has, each.unit), f"{100.0 * each.share:.0f} %",
-             _in(each.at, several).removeprefix(", ")]
-            for each in sorted(verdict.checks, key=lambda each: -each.share)
-        ]  # fmt: skip
+            [
+                check.what,
+                _with(check.asked, check.unit),
+                "of",
+                _with(check.has, check.unit),
+                f"{100.0 * check.share:.0f} %",
+                _in(check.at, several).removeprefix(", "),
+            ]
+            for check in sorted(verdict.checks, key=lambda check: -check.share)
+        ]
         yield from columns(rows, right=(1, 3, 4), indent="    ")
         yield f"    source: {verdict.part.source}"
         yield from wrap(verdict.part.note, WIDTH, initial_indent="    ", subsequent_indent="    ")
@@ -123,7 +129,7 @@ def _listed(size: BedSize) -> Iterator[str]:
     """All parts by role, fitting ones first and the tightest of them before; then benches, both motors on a shaft."""
     rows = [["part", "", "fits", "what binds"]]
     for role in ROLES:
-        of_role = [each for each in size.verdicts if each.role == role]
+        of_role = [verdict for verdict in size.verdicts if verdict.role == role]
         for number, each in enumerate(sorted(of_role, key=lambda each: (not each.fits, _order(each)))):
             rows.append([role if number == 0 else "", each.part.name, _fits(each), _binding(each)])
     for name, two in size.benches.items():

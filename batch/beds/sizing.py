@@ -253,8 +253,8 @@ def gather(blocks: Iterable[ShaftWork], candidates: Sequence[Candidate] = ()) ->
         for name, values in (("arm", work.arm), ("ratio", work.arm / work.rotor[:, None])):
             rest.of_instants(f"{name}+", values, work)
             rest.of_instants(f"{name}-", -values, work)
-        for each in candidates:
-            each.see(work)
+        for candidate in candidates:
+            candidate.see(work)
         ends["rotor"] += [float(work.rotor.min()), float(work.rotor.max())]
         ends["shaft"] += [float(work.shaft.min()), float(work.shaft.max())]
         cases, instants = cases + len(work.case), len(work.time)
@@ -341,7 +341,7 @@ def judge_part(candidate: Candidate, margin: float) -> PartVerdict:
         has = part.figure(own)
         if has is not None and name in asked:
             checks.append(PartCheck(what, UNITS[name], margin * asked[name].value, has, asked[name]))
-    made = {each.what for each in checks}
+    made = {check.what for check in checks}
     missing = [name for name in ("torque, continuous", "rate") if name not in made]
     if not made & {"torque, peak", "current, peak", "voltage"}:
         missing.insert(1, "torque, peak")

@@ -109,7 +109,7 @@ def _parameters(before: Experiment, now: Experiment, new: set[str]) -> Iterator[
             yield from computed.change(path)
     for word, mine, other in (("new", now, before), ("gone", before, now)):
         for name, members in _vectors(sorted(mine.parameters.keys() - other.parameters.keys())).items():
-            first, *_ = quantities = [mine.parameters[each] for each in members]
+            first, *_ = quantities = [mine.parameters[member] for member in members]
             follows = first.origin.kind == "derived" or any(name.startswith(entity) for entity in new)
             places = (None, first.origin.place) if mine is now else (first.origin.place, None)
             yield Change(f"{name} is {word}: {_shown_all(quantities)}{_at(first)}", follows, *places)
@@ -163,8 +163,8 @@ class _Computed:
 def _some_cases(before: Cases, now: Cases) -> dict[str, np.ndarray]:
     """Values of all varied parameters in cases of `now`; those that it does not vary have their former values."""
     rows = np.unique(np.linspace(0, max(0, now.count - 1), MOST_CASES, dtype=np.int64)) if now.count else np.arange(0)
-    found = {each.path: np.resize(each.values[: len(rows)], len(rows)) for each in before.coordinates}
-    return found | {each.path: each.values[rows] for each in now.coordinates}
+    found = {coordinate.path: np.resize(coordinate.values[: len(rows)], len(rows)) for coordinate in before.coordinates}
+    return found | {coordinate.path: coordinate.values[rows] for coordinate in now.coordinates}
 
 
 def _at(quantity: Quantity) -> str:
@@ -179,7 +179,7 @@ def _vectors(paths: Iterable[str]) -> dict[str, list[str]]:
     for path in known:
         vector, _, axis = path.rpartition(".")
         members = [f"{vector}.{each}" for each in AXES]
-        whole = axis in AXES and all(each in known for each in members)
+        whole = axis in AXES and all(member in known for member in members)
         found[vector if whole else path] = members if whole else [path]
     return found
 
@@ -207,7 +207,7 @@ def _shown_all(quantities: Sequence[Quantity]) -> str:
     if len(quantities) == 1:
         return _shown(quantities[0])
     unit = quantities[0].unit
-    numbers = ", ".join(_shown(dataclasses.replace(each, unit="1")) for each in quantities)
+    numbers = ", ".join(_shown(dataclasses.replace(quantity, unit="1")) for quantity in quantities)
     return f"[{numbers}]" + (f" {unit}" if unit != "1" else "")
 
 
@@ -241,7 +241,11 @@ def _stops(before: Experiment, now: Experiment) -> Iterator[str]:
         yield "cases are run until it is shown what is required" if early[1] else "all cases are run"
     elif early[1]:
         old, new = (
-            {each.text: _shown_by(each) for each in run.requirements if each.confidence is not None}
+            {
+                requirement.text: _shown_by(requirement)
+                for requirement in run.requirements
+                if requirement.confidence is not None
+            }
             for run in (before, now)
         )
         for text in dict.fromkeys([*old, *new]):
@@ -257,7 +261,7 @@ def _searches(before: Search, now: Search) -> Iterator[str]:
     """Changes of a search's parameters, their bounds, and its number of cases."""
     if before.goal != now.goal:
         yield f"goal: {before.goal} -> {now.goal}"
-    old, new = ({each.path: each for each in search.parameters} for search in (before, now))
+    old, new = ({parameter.path: parameter for parameter in search.parameters} for search in (before, now))
     for path in dict.fromkeys([*old, *new]):
         if path not in new:
             yield f"{path} is not chosen any more"
@@ -276,7 +280,7 @@ def _searches(before: Search, now: Search) -> Iterator[str]:
 
 def _tuned_limits(before: Experiment, now: Experiment) -> Iterator[str]:
     """Changes of the requirements of a tuning, which decide the worth of its cases, and so its later cases."""
-    old, new = ([each.text for each in run.requirements] for run in (before, now))
+    old, new = ([requirement.text for requirement in run.requirements] for run in (before, now))
     if old != new and now.search is not None and now.search.kind == "tune":
         gone, come = ([text for text in one if text not in other] for one, other in ((old, new), (new, old)))
         yield f"requirements: {', '.join(gone) or 'none'} -> {', '.join(come) or 'none'}"
@@ -385,7 +389,7 @@ def _base(before: Base | None, now: Base | None) -> Iterator[tuple[str, str]]:
 
 
 def _courses(what: str, path: str, before: Sequence[Course], now: Sequence[Course]) -> Iterator[tuple[str, str]]:
-    old, new = ({each.component: each.model for each in courses} for courses in (before, now))
+    old, new = ({course.component: course.model for course in courses} for courses in (before, now))
     for component in dict.fromkeys([*old, *new]):
         models = [each.get(component, "none") for each in (old, new)]
         if models[0] != models[1]:
@@ -441,7 +445,7 @@ def _with_dynamics(one: int | None, two: int | None, before: Structure, now: Str
 
 
 def _sensors(before: Sequence[Any], now: Sequence[Any]) -> Iterator[str]:
-    old, new = ({each.of: each.model for each in sensors} for sensors in (before, now))
+    old, new = ({sensor.of: sensor.model for sensor in sensors} for sensors in (before, now))
     for of in dict.fromkeys([*old, *new]):
         models = [each.get(of, "none") for each in (old, new)]
         if models[0] != models[1]:

@@ -406,7 +406,7 @@ def _checked(data: Any) -> dict[str, Any]:
         and isinstance(data["float32"], bool)
         and data.get("verify", "auto") in VERIFY_WORDS
         and isinstance(data.get("rows", "all"), str)
-        and all(is_count(each["number"]) for each in sections)
+        and all(is_count(section["number"]) for section in sections)
         and all(one["number"] < other["number"] for one, other in pairwise(sections))
     )
     for each in sections if good else ():

@@ -30,7 +30,7 @@ def not_followed(
     if not found:
         return []
     begun = step_size(experiment, chosen_cases(experiment))
-    if begun.loops or any(each.kind == "grows" for each in begun.faults):
+    if begun.loops or any(fault.kind == "grows" for fault in begun.faults):
         return []
     worst, *others = found
     place, what = _place(experiment, worst), "path of guide" if worst.kind == "path" else "joint"
@@ -40,7 +40,7 @@ def not_followed(
     message = f"{what} `{worst.of}` {does}{case}: it is {_off(experiment, worst)}{at_limit}"
     helps = [_remedy(experiment, worst)]
     if others:
-        helps.append(f"the same of {', '.join(f'`{each.of}`' for each in others)}")
+        helps.append(f"the same of {', '.join(f'`{other.of}`' for other in others)}")
     helps.append(f"root mean square from {worst.since:.4g} s to {worst.until:.4g} s, and it does not fall")
     return [Diagnostic("D348", message, None if place is None else Label(place), (), tuple(helps), "warning")]
 
@@ -48,7 +48,7 @@ def not_followed(
 def _off(experiment: Experiment, found: Unfollowed) -> str:
     """The error in words: `1.047 rad off, of 1.047 rad that it is told to move`."""
     straight = found.kind == "path" or any(
-        each.name == found.of and each.kind == "prismatic" for each in experiment.structure.joints
+        joint.name == found.of and joint.kind == "prismatic" for joint in experiment.structure.joints
     )
     unit = ("m" if straight else "rad") + ("/s" if found.kind == "rate" else "")
     off = f"{number_text(found.off)} {unit} off"

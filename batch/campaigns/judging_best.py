@@ -20,7 +20,7 @@ def judged_best(file: ArchiveFile, designs: Designs, order: np.ndarray, least_ma
     if not least_margin or not len(order):
         return {}
     try:
-        experiments = {each.name: each for each in file.plan().experiments}
+        experiments = {experiment.name: experiment for experiment in file.plan().experiments}
     except Problem as problem:  # for instance, a model of the plan is not installed here
         first = int(order[0])
         case = int(designs.pool.cases[designs.first[first]])

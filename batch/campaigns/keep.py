@@ -124,7 +124,7 @@ def _with(found: Keep, word: str | int, experiments: Sequence[Experiment]) -> Ke
         return replace(found, worst=(*found.worst, (int(rest[0]), metric)))
     if word.startswith("#") or (word and all(c in "0123456789abcdef" for c in word)):
         return replace(found, cases=(*found.cases, word))
-    near = [each for each in difflib.get_close_matches(name, SINGLE, n=1) if each != name]
+    near = [match for match in difflib.get_close_matches(name, SINGLE, n=1) if match != name]
     helps = [*(f"did you mean `{each}`?" for each in near), f"what may be kept: {WORDS}"]
     if "," in word:
         helps.insert(
@@ -137,7 +137,7 @@ def _with(found: Keep, word: str | int, experiments: Sequence[Experiment]) -> Ke
 
 
 def _check_metric(metric: str, experiments: Sequence[Experiment]) -> None:
-    known = list(dict.fromkeys(use.name for each in experiments for use in each.metrics))
+    known = list(dict.fromkeys(use.name for experiment in experiments for use in experiment.metrics))
     if not known:
         remedy = "a run has them by `metric NAME = MODEL { of = ...; }`"
         raise Problem(error("E351", "there is no metric by which cases could be the worst", help=remedy))

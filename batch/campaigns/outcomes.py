@@ -67,18 +67,18 @@ class CaseOutcomes:
     def add_run(self, run: Run) -> None:
         """Take the next cases from their results."""
         self.add(run.status, run.metrics)
-        for each in self._experiment.requirements:
-            value = ~np.isnan(run.metrics[each.metric])
+        for requirement in self._experiment.requirements:
+            value = ~np.isnan(run.metrics[requirement.metric])
             known = (run.status == DONE) & value
             counts = np.array(
                 [
-                    np.count_nonzero(known & run.met[each.text]),
-                    np.count_nonzero(known & ~run.met[each.text]),
+                    np.count_nonzero(known & run.met[requirement.text]),
+                    np.count_nonzero(known & ~run.met[requirement.text]),
                     np.count_nonzero(~known),
                     np.count_nonzero((run.status == DONE) & ~value),
                 ]
             )
-            self._met[each.text] = self._met.get(each.text, 0) + counts
+            self._met[requirement.text] = self._met.get(requirement.text, 0) + counts
 
     def counted(self, recorded: int) -> CountedCases:
         """The number of cases of each kind. recorded: number of cases with histories"""

@@ -105,8 +105,8 @@ def perform(
         each if part.open_ended else now
         for part, each, now in zip(campaign.parts, values, instants.with_memories(values), strict=True)
     ]
-    for each in values:
-        linear_metrics.check(each.prepared)
+    for value in values:
+        linear_metrics.check(value.prepared)
     values[0].prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
     folder = Folder(beside(campaign.output))
     try:
@@ -196,15 +196,15 @@ class _CampaignWork:
         executor.open(self.folder, self.sections, driver.tell)
         try:
             for attempt in range(ATTEMPTS):
-                searches = {each.number: CampaignSearch(each) for each in self.values if self._searches(each)}
+                searches = {value.number: CampaignSearch(value) for value in self.values if self._searches(value)}
                 for number in searches:
                     driver.counts[number] = Count(self._done(self.values[number]))
-                missing = [(each, driver.find(each)) for each in self.values if each.number not in searches]
+                missing = [(value, driver.find(value)) for value in self.values if value.number not in searches]
                 self._tell_found(first=not attempt)
                 left = sum(last - first for _, stretches in missing for first, last in stretches)
                 if together and left:
                     raise Stopped(f"{left:,} of {self.campaign.cases:,} cases are missing")
-                early = [each for each in self.values if self.campaign.parts[each.experiment].stops_early]
+                early = [value for value in self.values if self.campaign.parts[value.experiment].stops_early]
                 stops = {each.number: StoppingPoints(each) for each in early}
                 for number, points in stops.items():
                     points.read(self.folder)
@@ -267,12 +267,12 @@ class _CampaignWork:
         if not stops and not searches:
             return
         self.kept = [
-            without_dropped(self.folder, each, stops[each.number], 2 * len(self.values) + each.number)
-            if each.number in stops
-            else searches[each.number].section
-            if each.number in searches
-            else each
-            for each in self.values
+            without_dropped(self.folder, value, stops[value.number], 2 * len(self.values) + value.number)
+            if value.number in stops
+            else searches[value.number].section
+            if value.number in searches
+            else value
+            for value in self.values
         ]
         self.kept = [
             now if each.number in stops or each.number in searches else each
@@ -374,8 +374,8 @@ class _CampaignWork:
                     writer.put_summary(number, self.summaries[number].summary)
                 self.counted[section.name] = outcomes.counted(len(parts[number].kept))
                 self._verify(writer, number, whole, outcomes)
-                for each in instants.step_warnings(whole, outcomes, self._threads):
-                    self.warned.setdefault((each.code, each.at), each)
+                for step_warning in instants.step_warnings(whole, outcomes, self._threads):
+                    self.warned.setdefault((step_warning.code, step_warning.at), step_warning)
                 self.reporter.end()
             writer.finish()
             sidecar = {

@@ -84,7 +84,7 @@ def _ended(process: subprocess.Popen[bytes], limit: float | None) -> str:
         return f"has not ended after {limit:g} s"
     if status >= 0:
         return f"ended with status {status}"
-    name = {each.value: each.name for each in signal.Signals}.get(-status, f"signal {-status}")
+    name = {number.value: number.name for number in signal.Signals}.get(-status, f"signal {-status}")
     return f"was killed by {name}"
 
 

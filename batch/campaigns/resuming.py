@@ -53,7 +53,9 @@ def _search_of(section: CampaignSection) -> list[Any]:
     search = experiment.search
     if search is None:
         return []
-    limits = [[each.metric, each.comparison, each.limit] for each in experiment.requirements]
+    limits = [
+        [requirement.metric, requirement.comparison, requirement.limit] for requirement in experiment.requirements
+    ]
     return [encode(Search, replace(search, place=None)), *([limits] if search.kind == "tune" else [])]
 
 
@@ -72,7 +74,9 @@ def settled(campaign: Campaign, values: Sequence[CampaignSection]) -> Campaign:
     """The campaign, with `verify` as "auto" where that has the same effect."""
     if campaign.verify == "auto" or campaign.open_ended:  # the number of cases is not known yet
         return campaign
-    return replace(campaign, verify=when.settled(campaign.verify, ((each.prepared, len(each.rows)) for each in values)))
+    return replace(
+        campaign, verify=when.settled(campaign.verify, ((value.prepared, len(value.rows)) for value in values))
+    )
 
 
 def _begun_key(folder: Folder, campaign: Campaign) -> str:

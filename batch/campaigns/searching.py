@@ -38,7 +38,7 @@ def check_first_generation(experiment: Experiment) -> None:
     """Refuse a plan of a search whose cases are not the search's first generation. Raises Problem E302."""
     assert experiment.search is not None
     asked = search_method(experiment.search).ask()
-    table = np.stack([np.asarray(each.values) for each in experiment.cases.coordinates], axis=1)
+    table = np.stack([np.asarray(coordinate.values) for coordinate in experiment.cases.coordinates], axis=1)
     if asked.shape != table.shape or not (asked == table).all():
         message = f"the cases of `{experiment.name}` in this plan are not those that it begins with"
         helps = "they were changed, or are of another version of MET: make the plan again from its deck"

@@ -24,7 +24,7 @@ class TuningSlopes:
     def __init__(self, experiment: Experiment) -> None:
         assert experiment.search is not None
         self._experiment, self._search = experiment, experiment.search
-        names = (self._search.metric, *(each.metric for each in experiment.requirements))
+        names = (self._search.metric, *(requirement.metric for requirement in experiment.requirements))
         self._metrics = tuple(dict.fromkeys(names))
 
     @property

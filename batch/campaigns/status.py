@@ -143,25 +143,27 @@ def report(folder: Folder, now: float) -> dict[str, Any]:
             }
         )
     workers = []
-    for each in status_records(folder):
+    for status_record in status_records(folder):
         rate = None
-        done = each["section_done"] - each["at_first"]
-        seconds = each["updated"] - each["section_began"]
+        done = status_record["section_done"] - status_record["at_first"]
+        seconds = status_record["updated"] - status_record["section_began"]
         if done > 0 and seconds > 0:
             rate = done / seconds
         workers.append(
             {
-                "job": each["name"],
-                "state": each["state"] if alive(each, now) or each["state"] not in AT_WORK else "died",
-                "host": each["host"],
-                "pid": each["pid"],
-                "workers": each["workers"],
-                "cases": each["cases"],
-                "done": each["section_done"],
-                "failed": each["failed"],
-                "more": each["more"] if isinstance(each.get("more"), str) else "",
+                "job": status_record["name"],
+                "state": status_record["state"]
+                if alive(status_record, now) or status_record["state"] not in AT_WORK
+                else "died",
+                "host": status_record["host"],
+                "pid": status_record["pid"],
+                "workers": status_record["workers"],
+                "cases": status_record["cases"],
+                "done": status_record["section_done"],
+                "failed": status_record["failed"],
+                "more": status_record["more"] if isinstance(status_record.get("more"), str) else "",
                 "cases_per_s": rate,
-                "seconds_ago": max(0.0, now - each["updated"]),
+                "seconds_ago": max(0.0, now - status_record["updated"]),
             }
         )
     return {
@@ -233,11 +235,12 @@ AT_WORK = ("starting", "running", "merging")
 
 def died_lines(folder: Folder) -> Iterator[str]:
     """Lines about an earlier run that ended without a message."""
-    for each in status_records(folder):
-        if not each["name"] and each["state"] in AT_WORK and not alive(each, time.time()):
-            alone = "thread" in each["workers"] and not each["workers"].startswith("Dask")
+    for status_record in status_records(folder):
+        if not status_record["name"] and status_record["state"] in AT_WORK and not alive(status_record, time.time()):
+            alone = "thread" in status_record["workers"] and not status_record["workers"].startswith("Dask")
             remedy = "; if a case did it, `--processes 2` finds out which" if alone else ""
-            yield f"the run before this one was killed (process {each['pid']} on {each['host']}){remedy}"
+            process = f"process {status_record['pid']} on {status_record['host']}"
+            yield f"the run before this one was killed ({process}){remedy}"
 
 
 def alive(told: dict[str, Any], now: float) -> bool:

@@ -52,13 +52,19 @@ def point_sizes(experiment: Experiment, rows: CaseValues) -> list[int]:
 
 def _chosen(experiment: Experiment) -> tuple[Coordinate, ...]:
     """The coordinates that distinguish design points: none where nothing is drawn, or nothing is chosen."""
-    return tuple(each for each in experiment.cases.coordinates if not each.design) if _drawn(experiment) else ()
+    return (
+        tuple(coordinate for coordinate in experiment.cases.coordinates if not coordinate.design)
+        if _drawn(experiment)
+        else ()
+    )
 
 
 def _drawn(experiment: Experiment) -> bool:
     """True where values are drawn at random: parameters of a sample, or noise of repeats."""
     repeats = experiment.cases.repeats
-    return any(each.design for each in experiment.cases.coordinates) or (repeats is not None and span(repeats)[1] > 0)
+    return any(coordinate.design for coordinate in experiment.cases.coordinates) or (
+        repeats is not None and span(repeats)[1] > 0
+    )
 
 
 def summarise(

@@ -32,12 +32,14 @@ class StoppingPoints:
 
     def __init__(self, section: CampaignSection) -> None:
         experiment = section.prepared.experiment
-        chosen = [each.values[section.rows] for each in experiment.cases.coordinates if not each.design]
+        chosen = [
+            coordinate.values[section.rows] for coordinate in experiment.cases.coordinates if not coordinate.design
+        ]
         points = design_points(chosen, len(section.rows))
         ordered = np.argsort(points, kind="stable")
         self._section = section
         self._places = np.split(ordered, np.cumsum(np.bincount(points))[:-1])
-        self._wanted = [each for each in experiment.requirements if each.confidence is not None]
+        self._wanted = [requirement for requirement in experiment.requirements if requirement.confidence is not None]
         most = max(map(len, self._places))
         self._limits = [limits(each.share or 0.0, each.confidence or 0.0, most) for each in self._wanted]
         self._read: dict[Task, np.ndarray] = {}

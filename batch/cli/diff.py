@@ -49,7 +49,10 @@ def diff(a: str, b: str, tolerances: tuple[str, ...], require: str, distribution
     from met.outputs import quoted
 
     found = diff(a, b, read(tolerances), distributions=distributions)
-    options = [*(f"--tol {quoted(each)}" for each in tolerances), *(["--distributions"] if distributions else [])]
+    options = [
+        *(f"--tol {quoted(tolerance)}" for tolerance in tolerances),
+        *(["--distributions"] if distributions else []),
+    ]
     cut = Shortening(every, f"`{' '.join(['met diff', quoted(a), quoted(b), *options, '--all'])}`")
     say(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(map(line, diff_lines(found, cut))))
     enough = VERDICTS.index(found.verdict) <= VERDICTS.index(require)

@@ -81,7 +81,7 @@ def export(
     from batch.export import export, summary
     from ic.printing.columns import size
 
-    names = [name.strip() for each in signals for name in each.split(",") if name.strip()]
+    names = [name.strip() for signal in signals for name in signal.split(",") if name.strip()]
     if evidence and histories is not None:
         raise click.UsageError("--evidence is a table of its own: leave out --histories or --metrics")
     table: Rows | None = None if histories is None else "histories" if histories else "metrics"

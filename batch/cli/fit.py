@@ -157,7 +157,7 @@ def fit(
     if drawn is not None:
         run = (*question.predicted, *question.runs)[0]
         courses = {"deck": run.courses(question.start), "fitted": run.courses(answer.fit.values)}
-        units = {each["channel"]: each["unit"] for each in run.columns}
+        units = {column["channel"]: column["unit"] for column in run.columns}
         pictures.draw(run.name, pictures.panels(run.log, units, courses), drawn)
     tell(
         form,

@@ -83,7 +83,7 @@ def residuals(
         position = group.recorded_position(case if case is not None else "#0")
         experiment = next(each for each in file.plan().experiments if each.name == group.name)
         recorded = described_columns(experiment)
-        measured = read_log(log, recorded, [mapped_column(each) for each in columns], zero)
+        measured = read_log(log, recorded, [mapped_column(column) for column in columns], zero)
         joints = [joint.name for joint in experiment.structure.joints]
         courses = computed(group, position, recorded)
         found = compare(courses, recorded, joints, measured)

@@ -23,7 +23,7 @@ def as_data(found: Diff) -> dict[str, Any]:
         "changed": dataclasses.asdict(found.changed),
         "only_a": list(found.only_a),
         "only_b": list(found.only_b),
-        "experiments": [_experiment(each) for each in found.experiments],
+        "experiments": [_experiment(experiment) for experiment in found.experiments],
     }
     plain: dict[str, Any] = finite(data)
     return plain
@@ -46,22 +46,22 @@ def _experiment(found: ExperimentDiff) -> dict[str, Any]:
         "ended": [dataclasses.asdict(each) for each in found.ended],
         "requirements": [
             {
-                "text": each.now,
-                "text_a": each.before,
-                "met_a": each.met_before,
-                "met_b": each.met_now,
-                "gained": each.gained,
-                "lost": each.lost,
-                "other": each.other,
-                "chance": each.chance,
+                "text": requirement.now,
+                "text_a": requirement.before,
+                "met_a": requirement.met_before,
+                "met_b": requirement.met_now,
+                "gained": requirement.gained,
+                "lost": requirement.lost,
+                "other": requirement.other,
+                "chance": requirement.chance,
             }
-            for each in found.requirements
+            for requirement in found.requirements
         ],
         "evidence": [{"a": as_row(each.before), "b": as_row(each.now)} for each in found.evidence],
         "required_in_one": found.required_in_one,
-        "signals": [_signal(each) for each in found.signals],
+        "signals": [_signal(signal) for signal in found.signals],
         "worst": [dataclasses.asdict(each) for each in found.worst],
-        "distributions": [{**dataclasses.asdict(each), "unlike": each.unlike} for each in found.samples],
+        "distributions": [{**dataclasses.asdict(sample), "unlike": sample.unlike} for sample in found.samples],
         "notes": found.notes,
     }
 

@@ -217,4 +217,4 @@ def _of_file(name: str, text: str) -> Iterator[tuple[int, str, str]]:
 
 def _text(tokens: Sequence[Any]) -> str:
     """The text of a line without comments and with single spaces."""
-    return " ".join("".join(each.text for each in tokens).split())
+    return " ".join("".join(token.text for token in tokens).split())

@@ -21,7 +21,10 @@ def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases
     """Count the matched cases that meet each requirement in a and in b; a requirement whose limit has changed counts as
     the same. Requirements of one archive only are noted."""
     met_a, met_b = _met(a, matched.a), _met(b, matched.b)
-    known_a, known_b = ({each.text: each for each in requirements.group_requirements(group)} for group in (a, b))
+    known_a, known_b = (
+        {group_requirement.text: group_requirement for group_requirement in requirements.group_requirements(group)}
+        for group in (a, b)
+    )
     now = {text: text for text in met_a if text in met_b}
     for mine in known_a.values():
         alike = [
@@ -66,7 +69,7 @@ def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases
 
 def _compare_step_errors(a: ArchiveGroup, b: ArchiveGroup, out: ExperimentDiff) -> None:
     """Note requirements on errors due to the step whose verdict has changed, or that only one archive has."""
-    before, now = ({each.text: each for each in verdicts(group, figures(group))} for group in (a, b))
+    before, now = ({verdict.text: verdict for verdict in verdicts(group, figures(group))} for group in (a, b))
     for text in [*before, *(text for text in now if text not in before)]:
         one, other = before.get(text), now.get(text)
         if one is not None and other is not None:

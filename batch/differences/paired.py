@@ -25,9 +25,9 @@ def judge_pairs(found: ExperimentDiff) -> None:
     if found.cases.count < 2:
         return
     alike = [i for i, each in enumerate(found.requirements) if not each.other]
-    metrics = [each for each in found.signals if each.metric and not each.why]
+    metrics = [signal for signal in found.signals if signal.metric and not signal.why]
     pairs = [(found.requirements[i].gained, found.requirements[i].lost) for i in alike]
-    pairs += [(each.higher, each.lower) for each in metrics]
+    pairs += [(metric.higher, metric.lower) for metric in metrics]
     chances = holm([sign_test(*pair) for pair in pairs])
     for i, chance in zip(alike, chances, strict=False):
         found.requirements[i] = replace(found.requirements[i], chance=chance)

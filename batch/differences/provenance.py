@@ -162,7 +162,7 @@ def _names(plan: Plan) -> set[str]:
 
 def _tolerances(before: Experiment, now: Experiment) -> Iterator[str]:
     """Changes of tolerances, which change no number but its verdict."""
-    old, new = ({each.of: each for each in one.tolerances} for one in (before, now))
+    old, new = ({tolerance.of: tolerance for tolerance in one.tolerances} for one in (before, now))
     for name in dict.fromkeys([*old, *new]):
         texts = [one[name].text if name in one else "none" for one in (old, new)]
         if name not in old or name not in new or old[name].value != new[name].value:

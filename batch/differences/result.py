@@ -196,7 +196,7 @@ class ExperimentDiff:
     @property
     def other_requirements(self) -> bool:
         """True if the two have different requirements."""
-        return bool(self.required_in_one) or any(each.other for each in self.requirements)
+        return bool(self.required_in_one) or any(requirement.other for requirement in self.requirements)
 
     @property
     def verdict(self) -> str:

@@ -157,7 +157,7 @@ def _samples(experiment: ExperimentDiff) -> list[str]:
     if not experiment.samples:
         return []
     rows = [[head for head, _ in words.DISTRIBUTION_HEADS]]
-    rows += [list(words.distribution(each).cells) for each in experiment.samples]
+    rows += [list(words.distribution(sample).cells) for sample in experiment.samples]
     rows = [[f"  {first}", *others] for first, *others in rows]
     note = words.star_note(experiment)
     return ["", *columns(rows, right=range(1, 7)), *([f"  {note}"] if note else [])]
@@ -167,9 +167,9 @@ def _worst(found: Diff, experiment: ExperimentDiff, cut: Shortening) -> list[str
     if not experiment.worst:
         return []
     out = []
-    for each in words.worst_cases(found, experiment):
-        now = f"{each.now} {each.unit}".rstrip()
-        first = f"    #{each.case} {each.id}  {each.what}: {each.before}, now {now}"
-        out.append(f"{first}\n      {'; '.join(each.commands)}")
+    for worst_case in words.worst_cases(found, experiment):
+        now = f"{worst_case.now} {worst_case.unit}".rstrip()
+        first = f"    #{worst_case.case} {worst_case.id}  {worst_case.what}: {worst_case.before}, now {now}"
+        out.append(f"{first}\n      {'; '.join(worst_case.commands)}")
     few = cut.cut(out, SHOWN_WORST, "    ")
     return ["", f"  {words.WORST}:", *(line for each in few for line in each.split("\n"))]

@@ -88,7 +88,7 @@ def of_deck(experiment: Experiment, group: ArchiveGroup) -> Tolerances:
     """The tolerances of an archive's deck. group: of the archive, in which a metric may have another name"""
     metrics = {variable.path: variable.name for variable in group.role("metric")}
     signals = {recorded.name for recorded in experiment.structure.record}
-    found = {each.of: each for each in experiment.tolerances}
+    found = {tolerance.of: tolerance for tolerance in experiment.tolerances}
     absolute = {}
     for name, each in found.items():
         if name not in OF_ALL:

@@ -89,9 +89,10 @@ def requirement_lines(experiment: ExperimentDiff) -> list[str]:
     """Lines about requirements that have changed, or are met by another number of cases."""
     count = experiment.cases.count
     return [
-        f"require {requirement_text(each)}  {met_by_text(each.met_before, each.met_now, count)}{pairs_text(each)}"
-        for each in experiment.requirements
-        if each.has_changed
+        f"require {requirement_text(requirement)}  "
+        f"{met_by_text(requirement.met_before, requirement.met_now, count)}{pairs_text(requirement)}"
+        for requirement in experiment.requirements
+        if requirement.has_changed
     ]
 
 
@@ -122,9 +123,10 @@ def paired_metrics(experiment: ExperimentDiff) -> list[str]:
     """For each metric that differs in several cases, the numbers of cases in which it rose and fell, and whether that
     is more than chance, where cases were drawn."""
     return [
-        f"{each.name} rose in {each.higher:,} of {each.compared:,}, fell in {each.lower:,}{_chance(each.chance)}"
-        for each in experiment.signals
-        if each.metric and not each.why and each.compared > 1 and each.higher + each.lower
+        f"{signal.name} rose in {signal.higher:,} of {signal.compared:,}, "
+        f"fell in {signal.lower:,}{_chance(signal.chance)}"
+        for signal in experiment.signals
+        if signal.metric and not signal.why and signal.compared > 1 and signal.higher + signal.lower
     ]
 
 
@@ -167,7 +169,7 @@ def endings(experiment: ExperimentDiff) -> list[Ending]:
     return [
         Ending(
             f"{len(cases):,} case{'s' if len(cases) > 1 else ''} {_one(kind, len(cases))}",
-            ranges(sorted(each.case for each in cases)),
+            ranges(sorted(case.case for case in cases)),
             tuple(cases),
         )
         for kind, cases in ((kind, kinds[kind]) for kind in order)
@@ -367,7 +369,7 @@ def distribution(each: MetricSamples) -> Distribution:
 
 def star_note(experiment: ExperimentDiff) -> str:
     """A note on what a star means, where there is one."""
-    if not any(each.unlike for each in experiment.samples):
+    if not any(sample.unlike for sample in experiment.samples):
         return ""
     return f"* less than {LEVEL:g}, corrected for {len(experiment.samples)} metrics (Kolmogorov-Smirnov, Holm)"
 
@@ -445,13 +447,15 @@ def verdict(found: Diff) -> str:
 def _other_requirements(experiment: ExperimentDiff) -> list[str]:
     """The changed requirements: `settle < 10 s -> settle < 1 s (30 of 36 cases no longer meet it)`."""
     out, of = [], f" of {experiment.cases.count:,}"
-    for each in experiment.requirements:
-        if each.other:
-            before, now = each.limits
-            change = f"{each.now}, limit {before} -> {now}" if now else f"{each.before} -> {each.now}"
+    for requirement in experiment.requirements:
+        if requirement.other:
+            before, now = requirement.limits
+            change = (
+                f"{requirement.now}, limit {before} -> {now}" if now else f"{requirement.before} -> {requirement.now}"
+            )
             moved = [
                 f"{count:,}{of} cases {text}"
-                for count, text in ((each.lost, "no longer meet it"), (each.gained, "meet it now"))
+                for count, text in ((requirement.lost, "no longer meet it"), (requirement.gained, "meet it now"))
                 if count
             ]
             out.append(f"{change} ({', '.join(moved) or 'met by the same cases'})")
@@ -488,9 +492,9 @@ def _beyond_any_tolerance(found: Diff) -> list[str]:
     """Name the differences that are not of values: runs and cases that one archive has alone, and how cases end."""
     out = unmatched_runs(found)
     several = len(found.experiments) > 1
-    for each in found.experiments:
-        of = f" of `{each.name_b}`" if several else ""
-        out += [f"{text}{of}" for text in unmatched_cases(found, each)]
-        out += [f"{kind.text}{of}: {kind.cases}" for kind in endings(each)]
-        out += [f"{each.last_digits}{of}"] if each.last_digits else []
+    for experiment in found.experiments:
+        of = f" of `{experiment.name_b}`" if several else ""
+        out += [f"{text}{of}" for text in unmatched_cases(found, experiment)]
+        out += [f"{kind.text}{of}: {kind.cases}" for kind in endings(experiment)]
+        out += [f"{experiment.last_digits}{of}"] if experiment.last_digits else []
     return out

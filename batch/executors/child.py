@@ -125,7 +125,7 @@ class Child:
         another try would not help."""
         status = self._process.wait()
         if status < 0:
-            name = {each.value: each.name for each in signal.Signals}.get(-status, f"signal {-status}")
+            name = {number.value: number.name for number in signal.Signals}.get(-status, f"signal {-status}")
             return Outcome(task, "lost", why=f"was killed by {name}")
         if status == NO_MEMORY:
             return Outcome(task, "lost", why="had too little memory")

@@ -92,7 +92,7 @@ def submit(
             say(f"goes on: {campaign.cases - cases:,} of {campaign.cases:,} cases are done")
         count = min(jobs or JOBS, max(1, -(-cases // GRANULE)))
         tasks = folder.path / "jobs.json"
-        dealt = [[[t.section, t.first, t.last] for t in each] for each in shares(missing, count)]
+        dealt = [[[t.section, t.first, t.last] for t in share] for share in shares(missing, count)]
         write_json(tasks, {"shares": dealt, "timeout": timeout})
     except FolderBusy:
         raise Problem(busy(campaign.output)) from None

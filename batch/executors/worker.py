@@ -77,7 +77,7 @@ def main(arguments: list[str]) -> None:
         except MemoryError:
             os._exit(NO_MEMORY)
         except Problem as problem:
-            parent.tell(broken="; ".join(each.message for each in problem.diagnostics))
+            parent.tell(broken="; ".join(diagnostic.message for diagnostic in problem.diagnostics))
         except OSError as reason:
             parent.tell(broken=cannot_keep(folder.path, reason))
 

@@ -66,7 +66,7 @@ class CaseTable:
     def blocks(self) -> Iterator[list[list[object]]]:
         """All rows, a block at a time: the values of each field, None where a cell is empty."""
         for first in range(0, self.count, BLOCK):
-            group_of, positions = (each[first : first + BLOCK] for each in self.places)
+            group_of, positions = (place[first : first + BLOCK] for place in self.places)
             yield [self._column(field, group_of, positions) for field in self.fields]
 
     def _column(self, field: TableColumn, group_of: np.ndarray, positions: np.ndarray) -> list[object]:

@@ -63,7 +63,9 @@ def write_rows(file: ArchiveFile, table: CaseTable | EvidenceColumns, output: Pa
     """Write a table of cases, or of evidence, and return the number of its rows. Raises Problem E305, E373."""
     arrow, parquet = pyarrow_here()
     kinds = {"float": arrow.float64(), "int": arrow.int64(), "str": arrow.string()}
-    fields = [arrow.field(each.name, kinds[each.kind], metadata=_told(each.unit, each.about)) for each in table.fields]
+    fields = [
+        arrow.field(field.name, kinds[field.kind], metadata=_told(field.unit, field.about)) for field in table.fields
+    ]
     schema = arrow.schema(fields).with_metadata(_about(file, table.runs))
     with whole(output) as sink:
         with parquet.ParquetWriter(str(temporary_of(output)), schema, compression=COMPRESSION) as writer:

@@ -66,7 +66,9 @@ def arm_of(plan: Plan, case: ExportedCase, prefix: str) -> PosedArm:
             raise LookupError(group.name)
         varied = {v.path: group.at(v.name, [case.position])[0] for v in group.role("coordinate")}
         values = parameters(experiment, varied)
-        first = parameters(experiment, {each.path: each.values[0] for each in experiment.cases.coordinates})
+        first = parameters(
+            experiment, {coordinate.path: coordinate.values[0] for coordinate in experiment.cases.coordinates}
+        )
         joints = experiment.structure.moving
     q = positions(case, [joint.name for joint in joints], free=experiment.structure.free)
     with reading(group.path):

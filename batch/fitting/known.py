@@ -77,9 +77,11 @@ def known(slopes: np.ndarray, size: np.ndarray, held: np.ndarray, wider: float |
             members = np.flatnonzero(np.abs(direction) >= part * largest)
             if len(members) > 1:
                 break
-        if error >= UNKNOWN and len(members) > 1 and any(verdict[each] == "tied" for each in members):
+        if error >= UNKNOWN and len(members) > 1 and any(verdict[member] == "tied" for member in members):
             sign = np.sign(direction[members[0]])
-            together.append({int(each): float(sign * direction[each] / largest * size[each]) for each in members})
+            together.append(
+                {int(member): float(sign * direction[member] / largest * size[member]) for member in members}
+            )
     rank = int(np.sum(along < UNKNOWN))
     return Known(deviation * size, alone * size, tuple(verdict), condition, rank, size, tuple(together))
 

@@ -96,11 +96,14 @@ class LoggedRun:
         sweep          its cases, or the run itself
         """
         coordinates = sweep.cases.coordinates
-        further = {each.path: (float(each.values[0]), given.unit(each.path) or "1") for each in coordinates}
+        further = {
+            coordinate.path: (float(coordinate.values[0]), given.unit(coordinate.path) or "1")
+            for coordinate in coordinates
+        }
         varied, _ = given.vary_most({**_of_deck(starts), **further})
         first, found = cls(given, sweep.name, MeasuredSignals({}, [], []), tuple(starts), varied), []
         for number in range(sweep.cases.count):
-            fixed = {each.path: float(each.values[number]) for each in coordinates}
+            fixed = {coordinate.path: float(coordinate.values[number]) for coordinate in coordinates}
             motion = first._with_fixed(f"{sweep.name} #{number}" if coordinates else sweep.name, fixed)
             if coordinates and not motion.is_allowed(start):
                 continue
@@ -135,7 +138,7 @@ class LoggedRun:
     @cached_property
     def used(self) -> tuple[str, ...]:
         """The parameters on which the run depends, fixed ones included."""
-        return tuple(each.path for each in self.varied.experiment.cases.coordinates)
+        return tuple(coordinate.path for coordinate in self.varied.experiment.cases.coordinates)
 
     @cached_property
     def columns(self) -> list[dict[str, str]]:
@@ -145,7 +148,7 @@ class LoggedRun:
     @cached_property
     def channels(self) -> tuple[str, ...]:
         """The channels that run and log have."""
-        return tuple(each["channel"] for each in self.columns if each["channel"] in self.log.signals)
+        return tuple(column["channel"] for column in self.columns if column["channel"] in self.log.signals)
 
     @cached_property
     def _prepared(self) -> engine.Prepared:
@@ -251,7 +254,9 @@ class LoggedRun:
         """[case, row, column]; own: values of `used`, [case, path]"""
         found = engine.run(self._with(own), record=True)
         signals = [recorded.name for recorded in self.given.experiment.structure.record]
-        return np.concatenate([found.signals[each].reshape(len(own), len(found.time), -1) for each in signals], axis=2)
+        return np.concatenate(
+            [found.signals[signal].reshape(len(own), len(found.time), -1) for signal in signals], axis=2
+        )
 
     def _at_instants(self, history: np.ndarray, delay: float) -> np.ndarray:
         """The numbers of a history, [row, column], at the log's instants less a delay, s, [number]."""
@@ -272,7 +277,7 @@ class LoggedRun:
     @cached_property
     def _column(self) -> np.ndarray:
         """The column of each number in a history, [number]."""
-        names = [each["channel"] for each in self.columns]
+        names = [column["channel"] for column in self.columns]
         return np.array([names.index(channel) for channel in self.channels], dtype=np.int64)[self.channel_of]
 
 
@@ -291,15 +296,15 @@ class LoggedRuns:
     @cached_property
     def measured(self) -> np.ndarray:
         """All measured numbers, SI, [number]."""
-        return np.concatenate([each.measured for each in self.runs])
+        return np.concatenate([run.measured for run in self.runs])
 
     @cached_property
     def signal_of(self) -> np.ndarray:
         """The number of each number's signal: a channel of one log, counted over all logs, [number]."""
         first, found = 0, []
-        for each in self.runs:
-            found.append(first + each.channel_of)
-            first += len(each.channels)
+        for run in self.runs:
+            found.append(first + run.channel_of)
+            first += len(run.channels)
         return np.concatenate(found)
 
     @cached_property
@@ -322,11 +327,11 @@ class LoggedRuns:
 
         values  SI, [case, path]
         """
-        return self.measured - np.concatenate([each.computed(values) for each in self.runs], axis=1)
+        return self.measured - np.concatenate([run.computed(values) for run in self.runs], axis=1)
 
     def refused(self, values: np.ndarray) -> np.ndarray:
         """Whether a value is one that its parameter cannot have, [case]. values: SI, [case, path]"""
         found = np.zeros(len(values), dtype=bool)
-        for each in self.runs:
-            found |= each.refused(values)
+        for run in self.runs:
+            found |= run.refused(values)
         return found

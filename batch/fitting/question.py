@@ -63,7 +63,7 @@ class Promise:
     @property
     def values(self) -> list[WrittenValue]:
         """The values that make the case out of its run."""
-        units = {each.path: each.unit for each in self.sweep.cases.coordinates}
+        units = {coordinate.path: coordinate.unit for coordinate in self.sweep.cases.coordinates}
         return [WrittenValue(path, si, units[path]) for path, si in self.motion.fixed.items()]
 
 
@@ -95,9 +95,9 @@ class FitQuestion:
     def comparisons(self, values: np.ndarray, runs: Sequence[LoggedRun]) -> tuple[Comparison, ...]:
         """The residuals of each log with these values, SI, [path]."""
         found = []
-        for each in runs:
-            joints = [joint.name for joint in each.given.experiment.structure.joints]
-            found.append(compare(each.courses(values), each.columns, joints, each.log))
+        for run in runs:
+            joints = [joint.name for joint in run.given.experiment.structure.joints]
+            found.append(compare(run.courses(values), run.columns, joints, run.log))
         return tuple(found)
 
     def identifiable(self) -> Known:
@@ -110,7 +110,7 @@ class FitQuestion:
         the case that leaves the least uncertainty."""
         noises = noise_of(self.logs)
         channels = [channel for run in self.runs for channel in run.channels]
-        noise = {name: max(noises[np.array([each == name for each in channels])]) for name in channels}
+        noise = {name: max(noises[np.array([channel == name for channel in channels])]) for name in channels}
         fitter = Fitter(self.logs, self.start, self.priors, progress)
         slopes, promises = fitter.slopes_at_start(noises), []
         for sweep, motions in self.motions:
@@ -169,7 +169,9 @@ def fit_question(
     for run, _ in pairs:
         if run not in runs:
             runs[run] = given_run(deck, run, include_dirs=include_dirs, defines=defines, settings=settings)
-    swept = [swept_run(deck, each, include_dirs=include_dirs, defines=defines, settings=settings) for each in motions]
+    swept = [
+        swept_run(deck, motion, include_dirs=include_dirs, defines=defines, settings=settings) for motion in motions
+    ]
     first = runs[pairs[0][0]]
     every = [*runs.values(), *(run for run, _ in swept)]
     delays = [DELAY + log for _, log in pairs[: len(logs)]]
@@ -180,13 +182,13 @@ def fit_question(
     if unknown is not None:
         raise _wrong(f"`{unknown}` is no log of this command", "name it as it stands there")
     starts = {path: (0.0, "s") if path in delays else _start(path, every) for path in paths}
-    mapped = [mapped_column(each) for each in columns]
+    mapped = [mapped_column(column) for column in columns]
     read = [LoggedRun.read(runs[run], log, starts, mapped, begins.get(log, begins.get("", 0.0))) for run, log in pairs]
     for path in paths:
         if path not in delays and not any(path in each.used for each in read[: len(logs)]):
             _check_varies(path, starts[path], first)
             raise _wrong(f"`{path}` has no effect in a run that has a log", "leave it out")
-    given = [_prior(each, starts) for each in priors]
+    given = [_prior(prior, starts) for prior in priors]
     twice = next((path for path, _ in given if [each for each, _ in given].count(path) > 1), None)
     if twice is not None:
         raise _wrong(f"`{twice}` has two priors", "give one")
@@ -216,7 +218,7 @@ def _motion(
     if more or sweep.cases.choices:
         path = sweep.cases.choices[0].path if sweep.cases.choices else ""
         raise _wrong(f"`{sweep.sweep}` varies `{path}`, which decides the program", "let it vary numbers")
-    varied = next((each.path for each in sweep.cases.coordinates if each.path in starts), None)
+    varied = next((coordinate.path for coordinate in sweep.cases.coordinates if coordinate.path in starts), None)
     if varied is not None:
         raise _wrong(f"`{sweep.name}` varies `{varied}`, which is estimated", "let it vary numbers of commands alone")
     return sweep, LoggedRun.imagined(run, starts, start, measured, sweep)
@@ -231,21 +233,21 @@ def _paths(estimates: Sequence[str], runs: Sequence[GivenRun], delays: Sequence[
     """Paths without wildcards, each once: parameters of a form, or else names of definitions and values of that form.
     delays: those of logs. Raises Problem E480 where a form has none, or some that a fit cannot move"""
     found = []
-    for each in estimates:
-        matching = [each]
-        if any(letter in each for letter in "*?["):
+    for estimate in estimates:
+        matching = [estimate]
+        if any(letter in estimate for letter in "*?["):
             own = [*delays, *(path for run in runs for path in run.experiment.parameters)]
             names = [name for run in runs for name in _names(run)]
-            like = [path for path in own if fnmatchcase(path, each)] or [
-                name for name in names if fnmatchcase(name, each)
+            like = [path for path in own if fnmatchcase(path, estimate)] or [
+                name for name in names if fnmatchcase(name, estimate)
             ]
             matching = list(dict.fromkeys(like))
             if not matching:
-                raise _wrong(f"no parameter of `{runs[0].name}` is like `{each}`", _listing(each, runs[0]))
+                raise _wrong(f"no parameter of `{runs[0].name}` is like `{estimate}`", _listing(estimate, runs[0]))
             movable = [path for path in matching if path in {*delays, *_movable(matching, runs)}]
             if movable != matching:
                 still = next(path for path in matching if path not in movable)
-                message = f"a fit cannot move all that is like `{each}`: not `{still}`"
+                message = f"a fit cannot move all that is like `{estimate}`: not `{still}`"
                 raise _wrong(message, known_words("estimate of these", movable, len(movable)))
         found += matching
     return list(dict.fromkeys(found))
@@ -286,7 +288,7 @@ def _start(path: str, runs: Sequence[GivenRun]) -> tuple[float, str]:
     values = {name: each.value for name, each in found.items() if each is not None}
     if not values:
         _check_varies(path, (0.0, "1"), owner)
-    if not values or not all(isinstance(each, float) for each in values.values()):
+    if not values or not all(isinstance(value, float) for value in values.values()):
         shows = f"`met explain {quoted(owner.deck.file)} {path} --run {owner.name}` shows it"
         helps = shows if values else _listing(path, owner)
         raise _wrong(f"`{path}` is no number, and a fit moves numbers", helps)
@@ -302,12 +304,12 @@ def _check_varies(path: str, start: tuple[float, str], run: GivenRun) -> None:
         run.vary({path: start})
     except Problem as problem:
         first = problem.diagnostics[0]
-        if any(each.code == "E434" for each in problem.diagnostics):
+        if any(diagnostic.code == "E434" for diagnostic in problem.diagnostics):
             raise _wrong(f"`{path}` decides the program, and a fit moves numbers of one", "leave it out") from None
         if f"`{path}`" in first.message:
             raise Problem(error(first.code, first.message, help=first.help)) from None
-        parts = [each for each in run.experiment.parameters if each.startswith(f"{path}.")]
-        helps = f"it has {', '.join(f'`{each}`' for each in parts[:6])}" if parts else _listing(path, run)
+        parts = [parameter for parameter in run.experiment.parameters if parameter.startswith(f"{path}.")]
+        helps = f"it has {', '.join(f'`{part}`' for part in parts[:6])}" if parts else _listing(path, run)
         raise _wrong(f"`{path}` is no number, and a fit moves numbers", helps) from None
 
 

@@ -35,7 +35,10 @@ def to_dataset(experiment: Experiment, found: MetricGradients) -> xarray.Dataset
             "metric": list(found.metrics),
             "number": list(found.paths),
             "unit": ("metric", [units[name] for name in found.metrics]),
-            "number_unit": ("number", [coordinate_unit(experiment, each) for each in experiment.cases.coordinates]),
+            "number_unit": (
+                "number",
+                [coordinate_unit(experiment, coordinate) for coordinate in experiment.cases.coordinates],
+            ),
         },
         {"experiment": experiment.name},
     )

@@ -125,7 +125,7 @@ def clock_doubts(pairs: Mapping[str, Pair]) -> list[str]:
     usual, gaps = gaps_of(max((pair.instants for pair in pairs.values()), key=len))
     jumps = [(instant, length - usual) for instant, length in gaps]
     if 0 < len(jumps) <= MOST_JUMPS:
-        left, (instant, length) = min((share(jump=each), each) for each in jumps)
+        left, (instant, length) = min((share(jump=jump), jump) for jump in jumps)
         if left <= min(LATE * now, late, fast):
             return [f"the log fits best with its times after {instant:.4g} s {length:.3g} s less: {_left(left, now)}"]
     span, step = float(longest[-1] - longest[0]), float(np.median(np.diff(longest)))

@@ -89,7 +89,7 @@ def read_log(
     log = _csv_signals(path, columns, mapped) if ending == ".csv" else mcap_signals(path, columns)
     if not log.signals:
         what = "column" if ending == ".csv" else "topic"
-        channels = [each["channel"] for each in columns]
+        channels = [column["channel"] for column in columns]
         more = ["or say which it is: `--column 'CHANNEL=COLUMN [UNIT]'`"] if ending == ".csv" else []
         raise Problem(
             error(
@@ -105,7 +105,7 @@ def read_log(
 def _csv_signals(
     path: str | Path, columns: Sequence[Mapping[str, str]], mapped: Sequence[MappedColumn]
 ) -> MeasuredSignals:
-    table = _with_names(read_csv(str(path)), mapped, [TIME, *(each["channel"] for each in columns)])
+    table = _with_names(read_csv(str(path)), mapped, [TIME, *(column["channel"] for column in columns)])
     changes = {each.channel: each for each in mapped}
     head = table.columns[0].place
     time_column = table.column(TIME)
@@ -123,18 +123,18 @@ def _csv_signals(
     case = table.column(CASE)
     if case is not None:
         texts = [table.cell(case, number) for number in range(len(table.rows))]
-        other = next((each for each in texts if each.text != texts[0].text), None)
+        other = next((text for text in texts if text.text != texts[0].text), None)
         if other is not None:
             helps = "export one: `met export ARCHIVE --case '#0' -o log.csv`"
             raise Problem(error("E478", f"`{path}` has several cases, and a log is of one", other.place, help=helps))
     time = table.numbers(time_column, "s", parse_unit("s").dimension, Label(time_column.place, "times of the log"))
     table.rising(time_column, time)
     instants = _changed(time_column, time, changes)
-    found = {each["channel"]: _column(table, each, changes) for each in columns}
+    found = {column["channel"]: _column(table, column, changes) for column in columns}
     signals = {name: (instants, numbers) for name, numbers in found.items() if numbers is not None}
     known, sources = {TIME, *found}, {each.column for each in mapped}
-    used = [f"{each.name} [{each.unit or '1'}]" for each in table.columns if each.name in known]
-    unused = [visible(each.name) for each in table.columns if each.name not in {*known, *sources}]
+    used = [f"{column.name} [{column.unit or '1'}]" for column in table.columns if column.name in known]
+    unused = [visible(column.name) for column in table.columns if column.name not in {*known, *sources}]
     return MeasuredSignals(signals, [visible(each) for each in used], unused, time_column.place if signals else head)
 
 

@@ -97,8 +97,8 @@ class _Log:
         self.path = path
         self.units = {each["channel"]: each["unit"] for each in columns}
         self.signals: dict[str, set[str]] = {}
-        for each in columns:
-            self.signals.setdefault("/" + each["signal"].replace(".", "/"), set()).add(each["channel"])
+        for column in columns:
+            self.signals.setdefault("/" + column["signal"].replace(".", "/"), set()).add(column["channel"])
         self.schemas: dict[int, Any] = {}
         self.topics: dict[int, str] = {}
         self.readings: dict[int, Reading | None] = {}
@@ -229,7 +229,7 @@ class _Log:
 
     def found(self) -> MeasuredSignals:
         """All data read, at ascending times."""
-        unused = [visible(_short(each)) for each in dict.fromkeys(self.topics.values()) if each not in self.shown]
+        unused = [visible(_short(topic)) for topic in dict.fromkeys(self.topics.values()) if topic not in self.shown]
         first = min((min(times) for times, _ in self.taken.values()), default=0)
         begin = first if first / SECOND >= CLOCK else 0
         signals = {}

@@ -53,7 +53,7 @@ class ComputedChannel:
 def computed(group: ArchiveGroup, position: int, columns: Sequence[Mapping[str, str]]) -> dict[str, ComputedChannel]:
     """The channels of a recorded case as far as they are finite. columns: those of `described_columns`, in order"""
     times = group.values("time")
-    signals = list(dict.fromkeys(each["signal"] for each in columns))
+    signals = list(dict.fromkeys(column["signal"] for column in columns))
     found = np.hstack([group.signal(name, position).reshape(len(times), -1) for name in signals])
     out = {}
     for each, values in zip(columns, found.T.astype(np.float64), strict=True):

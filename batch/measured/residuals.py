@@ -135,14 +135,14 @@ def compare(
     """
     pairs = {name: Pair.of(*log.signals[name], courses[name]) for name in courses if name in log.signals}
     pairs = {name: pair for name, pair in pairs.items() if len(pair.instants)}
-    units = {each["channel"]: each["unit"] for each in columns}
-    kinds = {each["channel"]: (each["signal"], each["unit"]) for each in columns}
+    units = {column["channel"]: column["unit"] for column in columns}
+    kinds = {column["channel"]: (column["signal"], column["unit"]) for column in columns}
     residuals = []
     for name, pair in pairs.items():
         joint = next((each for each in joints if name.startswith(f"{each}.")), "")
         residuals.append(_residual(name, pair, courses, units, joint))
     usual = {name: pair.usual() for name, pair in pairs.items()}
-    white = {each.channel for each in residuals if each.white}
+    white = {residual.channel for residual in residuals if residual.white}
     times = [log.signals[name][0] for name in courses if name in log.signals]
     longest = max(times, key=len, default=np.empty(0))
     step, gaps = gaps_of(longest)
@@ -152,17 +152,20 @@ def compare(
         gaps,
         len(gaps) > UNEVEN * (len(longest) - 1),
         step,
-        max((float(np.median(np.diff(each.times))) for each in courses.values() if len(each.times) > 1), default=0.0),
+        max(
+            (float(np.median(np.diff(course.times))) for course in courses.values() if len(course.times) > 1),
+            default=0.0,
+        ),
         _span(times),
-        _span([each.times for each in courses.values()]),
-        sum(len(time) for time in times) - sum(each.rows for each in residuals),
-        tuple(each["channel"] for each in columns if each["channel"] not in log.signals),
+        _span([course.times for course in courses.values()]),
+        sum(len(time) for time in times) - sum(residual.rows for residual in residuals),
+        tuple(column["channel"] for column in columns if column["channel"] not in log.signals),
         tuple(log.unused),
     )
 
 
 def _span(times: Sequence[np.ndarray]) -> tuple[float, float]:
-    found = [each for each in times if len(each)]
+    found = [time for time in times if len(time)]
     return (min(float(each[0]) for each in found), max(float(each[-1]) for each in found)) if found else (0.0, 0.0)
 
 
@@ -269,8 +272,8 @@ def _explained(pair: Pair, features: Sequence[_Feature]) -> tuple[FollowedCause,
     if count < SHORTEST:
         return None
     halves = np.arange(len(residual)) * count // len(residual) % 2
-    numbers = {each: each.at(instants) for each in features}
-    left = [each for each in features if _told(each, numbers[each], residual)]
+    numbers = {feature: feature.at(instants) for feature in features}
+    left = [feature for feature in features if _told(feature, numbers[feature], residual)]
     chosen: list[_Feature] = []
     gains: list[tuple[float, tuple[str, ...]]] = []
     explained = 0.0

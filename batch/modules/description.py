@@ -62,8 +62,13 @@ def described(prepared: Prepared, module: WasmModule) -> dict[str, Any]:
             "unheld": _place(outputs, UNHELD),
         },
         "requirements": [
-            {"text": each.text, "metric": each.metric, "comparison": each.comparison, "limit": each.limit}
-            for each in experiment.requirements
+            {
+                "text": requirement.text,
+                "metric": requirement.metric,
+                "comparison": requirement.comparison,
+                "limit": requirement.limit,
+            }
+            for requirement in experiment.requirements
         ],
         "cases": {"count": experiment.cases.count, "inputs": inputs(experiment, rows).tolist()},
     }
@@ -77,8 +82,8 @@ def _inputs(experiment: Experiment) -> list[dict[str, Any]]:
     cases = experiment.cases
     return [
         *(
-            {"name": each.path, "is": "coordinate", "unit": each.unit, "scale": each.scale}
-            for each in cases.coordinates
+            {"name": coordinate.path, "is": "coordinate", "unit": coordinate.unit, "scale": coordinate.scale}
+            for coordinate in cases.coordinates
         ),
         *({"name": n, "is": "repeat" if n == REPEAT else "seed", "unit": "1", "scale": 1.0} for n in cases.noise),
     ]

@@ -104,10 +104,10 @@ class Accessor(Generic[Data]):
         units = {**(wanted or {}), **more}
         parts = self._parts()
         known = {name: [each for each in units if quantities.named(data, each)] for name, data in parts.items()}
-        for each in units:
-            if not any(each in names for names in known.values()):
+        for unit in units:
+            if not any(unit in names for names in known.values()):
                 raise unknown_name(
-                    list(parts.values()), each, "no variable", [str(v) for d in parts.values() for v in d]
+                    list(parts.values()), unit, "no variable", [str(v) for d in parts.values() for v in d]
                 )
         return self._whole(
             {

@@ -161,7 +161,7 @@ def _named(parts: Parts, dims: Mapping[str, str], wanted: Any) -> dict[str, np.n
             helps = 'a position, 7; "#7"; or the beginning of a case_id'
             raise Problem(error("E386", f"`{CASE}` = {each!r} names no case", help=helps))
         out[found_cases(text, every, every_id, where)] = True
-    return dict(zip(rows, np.split(out, np.cumsum([len(each) for each in rows.values()])[:-1]), strict=True))
+    return dict(zip(rows, np.split(out, np.cumsum([len(row) for row in rows.values()])[:-1]), strict=True))
 
 
 def _ids(data: xarray.Dataset, dim: str) -> np.ndarray:

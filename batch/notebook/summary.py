@@ -56,7 +56,10 @@ def _answered(data: xarray.Dataset) -> list[str]:
         return []
     if found is None:
         return []
-    return [f"  {found.headline}", *(f"  require {each.text}: {each.said}" for each in found.requirements)]
+    return [
+        f"  {found.headline}",
+        *(f"  require {requirement.text}: {requirement.said}" for requirement in found.requirements),
+    ]
 
 
 def _cases(data: xarray.Dataset) -> str:

@@ -60,7 +60,7 @@ class Histories:
         self.archive, self.group, self.sheet, self.other = archive, group, sheet, other
         panels(group)  # refuses an archive without histories
         self.units = DeckUnits(archive, group)
-        found = [self.units.panel(each) for each in panels(group, signals)]
+        found = [self.units.panel(panel) for panel in panels(group, signals)]
         chosen = [group.recorded_position(case) for case in cases]
         self.positions: list[int] = chosen or group.recorded_positions.tolist()
         self.single, self.fan = len(self.positions) == 1, len(self.positions) > OVERLAID

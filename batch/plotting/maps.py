@@ -109,14 +109,14 @@ def description(found: MapLayout, metrics: Sequence[MapMetric], third: CaseColum
         text = "a cell a case"
     else:
         text = f"up to {found.several:,} cases in a cell, which shows {_stands(metrics, found)}"
-    required = [each.about.rpartition(" · ")[2] for each in metrics if each.column.limits and found.other is None]
+    required = [metric.about.rpartition(" · ")[2] for metric in metrics if metric.column.limits and found.other is None]
     return "; ".join([text, *(required if third is not None else [])])
 
 
 def _stands(metrics: Sequence[MapMetric], found: MapLayout) -> str:
     if found.other is not None:
         return "the one that differs most"
-    judged = {bool(each.column.limits) for each in metrics}
+    judged = {bool(metric.column.limits) for metric in metrics}
     worst, middle = "the worst by what is required", "the middle one"
     return worst if judged == {True} else middle if judged == {False} else f"{worst}, or {middle} where nothing is"
 
@@ -309,16 +309,16 @@ def _marks(metrics: Sequence[MapMetric], found: MapLayout) -> dict[str, Any]:
         sign = dot(marker, **style)
         return (Patch(facecolor=tone), sign) if found.filled else sign
 
-    stripes = [marked for each in metrics for marked in _striped(each, found)]
+    stripes = [marked for metric in metrics for marked in _striped(metric, found)]
     texts = ["misses what is required"] if found.other is None else [f"missed in {name} alone" for name in found.other]
     for hatch, text in zip((STRIPES, DOTTED), texts, strict=False):
         if any(marked.any() for marked, which in stripes if which == hatch):
             out[text] = patch(hatch) if found.filled else dot(RINGS[hatch], markerfacecolor="none", markersize=5)
-    shown = [_shown(each, found) for each in metrics]
+    shown = [_shown(metric, found) for metric in metrics]
     if any(np.isinf(each).any() for each in shown):
         down = not any(np.isposinf(each).any() for each in shown)
         out["infinite"] = signed(cells.INFINITE, infinity("−∞" if down else "∞"), markersize=9, markeredgewidth=0.0)
-    if any(each.failed.any() for each in metrics):
+    if any(metric.failed.any() for metric in metrics):
         out["failed"] = signed(cells.FAILED, "x", markersize=4.5)
     both = metrics[0].both if metrics else True
     empty = len(distinct(found.cells[both & (found.cells >= 0)])) < np.prod(found.shape)

@@ -111,6 +111,10 @@ def _theirs(
         places = other.places[pool.position_of[here]]
         here, places = here[places >= 0], places[places >= 0]
         out[here] = drawable(other.group.values(name)[places] / deck_unit(mine)[0])
-        columns = [each.place for each in requirements.group_requirements(other.group) if each.metric == name]
+        columns = [
+            group_requirement.place
+            for group_requirement in requirements.group_requirements(other.group)
+            if group_requirement.metric == name
+        ]
         missed[here] = (requirements.outcomes(other.group)[places][:, columns] == 0).any(axis=1)
     return (out, missed) if found else (None, None)

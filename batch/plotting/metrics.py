@@ -51,7 +51,7 @@ def draw(
         below = f"{count}; {' and '.join(besides)} varied too" if besides else count
     else:
         if files is not None:
-            metrics = [each for each in metrics if each.theirs is not None]
+            metrics = [metric for metric in metrics if metric.theirs is not None]
         third = found[2] if len(found) > 2 else None
         planned = maps.plan(found[0], found[1], third, files)
         figure, _ = maps.draw(sheet, planned, metrics, third)

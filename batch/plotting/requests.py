@@ -148,7 +148,7 @@ def _is_parameter(archive: ArchiveFile, pool: Pool, name: str) -> bool:
     except Problem:
         return False
     names = {group.name for group in pool.groups}
-    return any(name in each.parameters for each in experiments if each.name in names)
+    return any(name in experiment.parameters for experiment in experiments if experiment.name in names)
 
 
 def _here(known: Sequence[str]) -> str:

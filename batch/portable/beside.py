@@ -26,7 +26,7 @@ def other_group(archive: ArchiveFile, group: ArchiveGroup, other: ArchiveFile) -
     where they have no case in common."""
     (found,) = beside(archive, [group], other)
     assert found is not None
-    theirs = next(each for each in other.plan().experiments if each.name == found.group.name)
+    theirs = next(experiment for experiment in other.plan().experiments if experiment.name == found.group.name)
     return found.group, theirs
 
 
@@ -51,7 +51,7 @@ def log_data(path: str | Path, columns: Sequence[Mapping[str, str]], rows: np.nd
     CSV files.
     """
     log = read_log(path, columns)
-    channels = [each["channel"] for each in columns]
+    channels = [column["channel"] for column in columns]
     begin, end = (pick(time[at] for time, _ in log.signals.values()) for pick, at in ((min, 0), (max, -1)))
     if not (begin < rows[-1] and end > rows[0]):
         message = _spans(begin, end, rows)

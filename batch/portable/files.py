@@ -47,11 +47,11 @@ def _the_one(experiments: tuple[Experiment, ...], source: str) -> Experiment:
     """The experiment of a module. Raises Problem E472 where there are several."""
     if len(experiments) == 1:
         return experiments[0]
-    names = list(dict.fromkeys(each.name_in_deck for each in experiments))
+    names = list(dict.fromkeys(experiment.name_in_deck for experiment in experiments))
     if len(names) > 1:
         helps = [f"name one: {', '.join(names)}"]
     else:
-        groups = ", ".join(each.name for each in experiments)
+        groups = ", ".join(experiment.name for experiment in experiments)
         helps = [f"name a group: {groups}"]
         if not names_archive(source) and not names_plan(source):
             plan = f"`met plan {quoted(source)} {quoted(names[0])} -o plan.json`"

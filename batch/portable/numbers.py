@@ -64,10 +64,12 @@ def deck_of(
     the group has chosen. Raises Problem E479 where the deck is not the archive's, or nothing can vary."""
     plan = archive.plan(as_written=True)
     choices = experiment.cases.choices
-    macros = [f"{each.path.removeprefix(MACRO)}={each.value}" for each in choices if each.path.startswith(MACRO)]
-    words = [f"{each.path}={each.value}" for each in choices if not each.path.startswith(MACRO)]
+    macros = [
+        f"{choice.path.removeprefix(MACRO)}={choice.value}" for choice in choices if choice.path.startswith(MACRO)
+    ]
+    words = [f"{choice.path}={choice.value}" for choice in choices if not choice.path.startswith(MACRO)]
     defines = (*plan.defines, *macros)
-    settings = (*(each for each in plan.settings if not varies(each)), *words)
+    settings = (*(setting for setting in plan.settings if not varies(setting)), *words)
     name = experiment.name_in_deck
     if experiment.varies:
         name = (
@@ -80,7 +82,7 @@ def deck_of(
     if any(text not in texts for source, text in run.compiled.sources.items() if source != COMMAND_LINE):
         message = f"{deck} is not the deck that the archive was made with, or includes other files"
         raise Problem(error("E479", message, help="run it again, and view the new archive"))
-    return varied(run, tuple(f"{each.path} = {each.value}" for each in choices))
+    return varied(run, tuple(f"{choice.path} = {choice.value}" for choice in choices))
 
 
 def _run_of(deck: str | Path, sweep: str, defines: Sequence[str], include_dirs: Sequence[str | Path]) -> str:
@@ -103,14 +105,14 @@ def varied(run: GivenRun, fixed: tuple[str, ...] = ()) -> OtherNumbers:
         if isinstance(each.value, float) and each.origin.kind == "deck"
     }
     made, left_out = run.vary_most(numbers)
-    paths = [each.path for each in made.experiment.cases.coordinates]
+    paths = [coordinate.path for coordinate in made.experiment.cases.coordinates]
     if len(paths) > MOST:
         left_out = tuple(path for path in numbers if path not in paths[:MOST])
         made = run.vary({path: numbers[path] for path in paths[:MOST]})
     coordinates = made.experiment.cases.coordinates
     if not coordinates:
         raise Problem(error("E479", f"no number of `{run.name}` can vary", help="leave `--numbers` out"))
-    units = [run.written_in(each.path) for each in coordinates]
+    units = [run.written_in(coordinate.path) for coordinate in coordinates]
     shown = tuple(
         replace(each, unit=unit, scale=measure.scale)
         for each, (unit, measure) in zip(coordinates, units, strict=True)
@@ -124,8 +126,8 @@ def varied(run: GivenRun, fixed: tuple[str, ...] = ()) -> OtherNumbers:
 def limits(run: VariedRun) -> list[dict[str, Any]]:
     """The least and largest number of each input that the deck's checks allow while the others keep the deck's values,
     and the checks' messages beyond: SI."""
-    paths = [each.path for each in run.experiment.cases.coordinates]
-    own = np.array([float(each.values[0]) for each in run.experiment.cases.coordinates])
+    paths = [coordinate.path for coordinate in run.experiment.cases.coordinates]
+    own = np.array([float(coordinate.values[0]) for coordinate in run.experiment.cases.coordinates])
     count = len(paths)
 
     def broken(ends: np.ndarray) -> np.ndarray:

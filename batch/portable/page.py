@@ -103,7 +103,7 @@ def _numbers(numbers: OtherNumbers, of: Experiment) -> dict[str, Any]:
         each.unit: [str(measure.exact.numerator), str(measure.exact.denominator)]
         for each, measure in zip(experiment.cases.coordinates, numbers.measures, strict=True)
     }
-    data["exact"] = [exact[each.unit] for each in experiment.cases.coordinates]
+    data["exact"] = [exact[coordinate.unit] for coordinate in experiment.cases.coordinates]
     data["limits"] = limits(numbers.run)
     data["leftOut"] = [visible(path) for path in numbers.left_out]
     words = [
@@ -130,7 +130,7 @@ def _beside(
         with ArchiveFile(against) as other:
             other.need_every_row("a page that simulates")
             theirs, of = beside.other_group(file, group, other)
-            units = [each["unit"] for each in described_columns(experiment)]
+            units = [described_column["unit"] for described_column in described_columns(experiment)]
             found = data_of(of, other, theirs)
             found["arm"].pop("acting", None)  # of a second arm only the shape is drawn
             return {"name": name, "page": found | {"own": units}}
@@ -161,7 +161,9 @@ def data_of(
     """
     prepared = prepared or prepare(experiment)
     making = begun(prepared.recording, quick=quick)
-    arm = drawn_json(drawn_arm(experiment, [each["channel"] for each in described_columns(experiment)]))
+    arm = drawn_json(
+        drawn_arm(experiment, [described_column["channel"] for described_column in described_columns(experiment)])
+    )
     code_key, module = prepared.code_key, making()
     told = described(prepared, module)
     positions = group.values("case")[:MOST_CASES]
@@ -172,11 +174,11 @@ def data_of(
     shown: dict[str, Any] = visible_texts(told)
     metrics = [*told["metrics"], *told["not_computed"]]
     columns = _in_deck_units(DeckUnits(archive, group), told["columns"])
-    lacking = [each["name"] for each in metrics if each["name"] not in known]
+    lacking = [metric["name"] for metric in metrics if metric["name"] not in known]
     with reading(group.path):
         if lacking:
             raise Unlike(f"the plan of `{experiment.name}` has a metric `{lacking[0]}`, and it has none")
-        metric_units = [deck_unit(stored[known[each["name"]]]) for each in metrics]
+        metric_units = [deck_unit(stored[known[metric["name"]]]) for metric in metrics]
     return {
         "module": base64.b64encode(module.code).decode("ascii"),
         "description": shown,
@@ -186,16 +188,16 @@ def data_of(
         "count": group.count,
         "status": group.stretch("status", 0, len(positions)).tolist(),
         "metrics": [
-            doubles(group.stretch(known[each["name"]], 0, len(positions))) for each in metrics
+            doubles(group.stretch(known[metric["name"]], 0, len(positions))) for metric in metrics
         ],
         "labels": [visible(each["name"]) for each in told["inputs"]],
         "units": [_unit(each["unit"]) for each in told["inputs"]],
         "metricUnits": [visible(unit) for _, unit in metric_units],
         "metricScales": [scale for scale, _ in metric_units],
-        "metricAbout": [visible(stored[known[each["name"]]].long_name) for each in metrics],
+        "metricAbout": [visible(stored[known[metric["name"]]].long_name) for metric in metrics],
         "watched": [[use.model, visible(use.of)] for use in experiment.structure.metrics],
         "atLimits": {
-            visible(name): [visible(each.path) for each in uses] for name, uses in extremes(experiment).items()
+            visible(name): [visible(use.path) for use in uses] for name, uses in extremes(experiment).items()
         },
         "signalAbout": {visible(each.name): visible(each.doc) for each in experiment.structure.record},
         "springs": [f"{joint}.q" for joint in sorted(experiment.structure.springs)],
@@ -208,8 +210,8 @@ def data_of(
 def _in_deck_units(units: DeckUnits, columns: Sequence[Mapping[str, str]]) -> list[tuple[float, str]]:
     """The divisor of each column's SI values, and the unit they are then in."""
     out = []
-    for each in columns:
-        panel = Panel(each["signal"], "", each["unit"], each["signal"], (), ())
+    for column in columns:
+        panel = Panel(column["signal"], "", column["unit"], column["signal"], (), ())
         shown = units.panel(panel)
         out.append((shown.scale, shown.unit))
     return out

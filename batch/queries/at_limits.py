@@ -78,10 +78,10 @@ def _judged_at_a_limit(group: ArchiveGroup, experiment: Experiment | None) -> Di
     name."""
     at_extremes = {_of(variable): variable for variable in group.role("extreme")}
     judged = []
-    for each in group_requirements(group):
-        variable = at_extremes.get(group.variables[each.metric].path)
+    for group_requirement in group_requirements(group):
+        variable = at_extremes.get(group.variables[group_requirement.metric].path)
         if variable is not None and (at := group.values(variable.name)).any():
-            judged.append((each, variable, at))
+            judged.append((group_requirement, variable, at))
     if not judged:
         return None
     required, variable, at = max(judged, key=lambda found: int((found[2] > 0).sum()))
@@ -108,7 +108,10 @@ def _passed(group: ArchiveGroup, experiment: Experiment | None) -> Diagnostic | 
     """Limits of joints that cases exceed and no requirement judges: the one with most such cases, and the others by
     name."""
     shares = {_of(variable): variable.name for variable in group.role("limit")}
-    judged = {str(group.variables[each.metric].attributes.get("of")) for each in group_requirements(group)}
+    judged = {
+        str(group.variables[group_requirement.metric].attributes.get("of"))
+        for group_requirement in group_requirements(group)
+    }
     passed = []
     for variable in group.role("excess"):
         excess, joint = np.nan_to_num(group.values(variable.name)), _of(variable).rpartition(".")[0]

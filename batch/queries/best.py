@@ -95,7 +95,7 @@ class Designs:
         self.pool = pool
         varied = varied_columns(pool)
         check_varied(pool, (*over, *choose))
-        borne = {each.path for each in pool.variables("coordinate") if each.attributes.get("design")}
+        borne = {variable.path for variable in pool.variables("coordinate") if variable.attributes.get("design")}
         _check_chosen([column.label for column in varied if column.label in borne], choose)
         self.draws = bool(borne - {*choose})
         """True if a parameter is drawn that a design must withstand."""
@@ -135,7 +135,11 @@ class Designs:
     @cached_property
     def shares(self) -> np.ndarray:
         """[demand] the share of a design's cases that must meet it."""
-        known = {each.text: each.share for group in self.pool.groups for each in requirements.group_requirements(group)}
+        known = {
+            group_requirement.text: group_requirement.share
+            for group in self.pool.groups
+            for group_requirement in requirements.group_requirements(group)
+        }
         return np.array([known.get(text) or 1.0 for text in self.demands])
 
     @cached_property
@@ -178,10 +182,10 @@ class Designs:
         far = np.full(self.pool.count, -np.inf)
         for group_number, group in enumerate(self.pool.groups):
             here = self.pool.group_of == group_number
-            for each in requirements.group_requirements(group):
-                if each.share is None:
-                    values = group.values(each.metric)
-                    beyond = requirements.beyond(values, each.comparison, each.limit)
+            for group_requirement in requirements.group_requirements(group):
+                if group_requirement.share is None:
+                    values = group.values(group_requirement.metric)
+                    beyond = requirements.beyond(values, group_requirement.comparison, group_requirement.limit)
                     far[here] = np.maximum(far[here], beyond[self.pool.position_of[here]])
         return -self.worst(far, largest=True)
 

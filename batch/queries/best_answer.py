@@ -283,7 +283,7 @@ class BestAnswer:
         for goal in self.shown:
             unit, scale = self._unit(goal)
             values = self._worst(goal)[numbers] / scale
-            cells.append([goal.text, unit, *("-" if math.isnan(each) else number_text(each) for each in values)])
+            cells.append([goal.text, unit, *("-" if math.isnan(value) else number_text(value) for value in values)])
         return [list(row) for row in zip(*cells, strict=True)]
 
     def _worst(self, goal: Goal) -> np.ndarray:
@@ -299,7 +299,7 @@ class BestAnswer:
         return ("" if unit == "1" else pretty_unit(unit)), 1.0
 
     def _metrics(self) -> Iterator[tuple[CaseColumn, Stored]]:
-        variables = {each.path: each for each in self.designs.pool.variables("metric")}
+        variables = {variable.path: variable for variable in self.designs.pool.variables("metric")}
         return ((column, variables[column.label]) for column in self.designs.pool.metrics())
 
     def settings(self, design: int) -> list[tuple[str, str]]:
@@ -341,7 +341,7 @@ class BestAnswer:
 
     def command(self, design: int, *, seed: int | None = None) -> str:
         """The command that runs a design's cases again, with other draws where there is a seed."""
-        words = [f"-D {quoted(each)}" for each in self.defines]
+        words = [f"-D {quoted(define)}" for define in self.defines]
         chosen = dict(self.settings(design))
         replaced = {*chosen, *(["seed"] if seed is not None else [])}
         words += [setting_option(each) for each in self.given if setting_path(each) not in replaced]
@@ -403,7 +403,7 @@ def _least(goal: Goal) -> str:
 
 def _values(column: CaseColumn, places: Iterable[int]) -> list[str]:
     values = [float(column.values[place]) for place in places]
-    texts = [column.words[int(each)] if column.role == "choice" and each == each else "" for each in values]
+    texts = [column.words[int(value)] if column.role == "choice" and value == value else "" for value in values]
     numbers = texts if column.role == "choice" else number_texts(values)
     return ["" if math.isnan(each) else text for each, text in zip(values, numbers, strict=True)]
 

@@ -236,6 +236,8 @@ def _outcome(status: int, outcomes: np.ndarray) -> str:
 def _marks(group: ArchiveGroup, outcomes: np.ndarray) -> dict[str, np.ndarray]:
     """For each metric with requirements, the cases that miss one."""
     out: dict[str, np.ndarray] = {}
-    for each in requirements.group_requirements(group):
-        out[each.metric] = out.get(each.metric, False) | (outcomes[:, each.place] == 0)
+    for group_requirement in requirements.group_requirements(group):
+        out[group_requirement.metric] = out.get(group_requirement.metric, False) | (
+            outcomes[:, group_requirement.place] == 0
+        )
     return out

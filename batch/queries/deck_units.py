@@ -32,7 +32,7 @@ class DeckUnits:
     def __init__(self, archive: ArchiveFile | Plan | None, group: ArchiveGroup) -> None:
         self.group = group
         plan = written_plan(archive) if isinstance(archive, ArchiveFile) else archive
-        found = [] if plan is None else [each for each in plan.experiments if each.name == group.name]
+        found = [] if plan is None else [experiment for experiment in plan.experiments if experiment.name == group.name]
         self.experiment: Experiment | None = found[0] if found else None
         self._votes = _votes(self.experiment, plan) if plan is not None and self.experiment is not None else {}
         self._required = self._of_metrics()
@@ -53,7 +53,7 @@ class DeckUnits:
         if self.experiment is None:
             return out
         named = {metric.name: metric.of for metric in self.experiment.structure.metrics}
-        judged = {each.metric for each in self.experiment.requirements}
+        judged = {requirement.metric for requirement in self.experiment.requirements}
         for variable in self.group.role("metric"):
             of = named.get(variable.path, "")
             if of and variable.path in judged:

@@ -90,7 +90,14 @@ def evidence(group: ArchiveGroup) -> list[EvidenceRow]:
     reading values, where it has no such requirement, or is a search, whose cases an optimiser chose."""
     if is_search(group):
         return []
-    return evidence_for(group, [each for each in requirements.group_requirements(group) if each.share is not None])
+    return evidence_for(
+        group,
+        [
+            group_requirement
+            for group_requirement in requirements.group_requirements(group)
+            if group_requirement.share is not None
+        ],
+    )
 
 
 def evidence_for(group: ArchiveGroup, found: Sequence[GroupRequirement]) -> list[EvidenceRow]:

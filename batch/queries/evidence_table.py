@@ -108,7 +108,8 @@ def requirement_evidence(
             found = _of_metric(group, row, ", ".join(at), errors.get(row.requirement.metric), archive, several)
             out.append(found if alike else replace(found, sigmas=None))
         out += [
-            _of_step_error(group, each, ", ".join(structure), archive, several) for each in verdicts(group, verified)
+            _of_step_error(group, verdict, ", ".join(structure), archive, several)
+            for verdict in verdicts(group, verified)
         ]
     order = list(dict.fromkeys(row.requirement for row in out))
     return sorted(out, key=lambda row: order.index(row.requirement))

@@ -40,12 +40,12 @@ class CaseExpressions:
     def _variables(self) -> Mapping[str, Stored]:
         """Numbers of the cases by the names that a deck gives them."""
         roles = ("metric", "coordinate")
-        return {each.path: each for role in roles for each in self.pool.variables(role)}
+        return {variable.path: variable for role in roles for variable in self.pool.variables(role)}
 
     def holds(self, condition: str) -> np.ndarray:
         """The cases in which a condition holds, [case]: not those in which it compares a missing value. Raises
         Problem."""
-        choices = {each.label: each for each in self.pool.columns if each.role == "choice"}
+        choices = {column.label: column for column in self.pool.columns if column.role == "choice"}
         words = {
             name: np.array([*each.words, ""])[np.nan_to_num(each.values, nan=len(each.words)).astype(int)]
             for name, each in choices.items()
@@ -66,7 +66,7 @@ class CaseExpressions:
 
     def is_margin(self, expression: str) -> bool:
         """True for the name of a metric that is a margin, which should be large, by its model's declaration."""
-        named = [each for each in self.pool.variables("metric") if each.path == expression.strip()]
+        named = [variable for variable in self.pool.variables("metric") if variable.path == expression.strip()]
         model = str(named[0].attributes.get("model", "")) if named else ""
         figure, metric = FIGURES.get(model), models.available("metric").get(model)
         return figure.margin if figure is not None else metric is not None and metric.margin
@@ -74,7 +74,7 @@ class CaseExpressions:
     def _find(self, name: Name) -> Value:
         variable = self._variables.get(name.text)
         if variable is None:
-            known = [*self._variables, *(each.label for each in self.pool.columns if each.role == "choice")]
+            known = [*self._variables, *(column.label for column in self.pool.columns if column.role == "choice")]
             helps = [*did_you_mean(name.text, known), known_words("here", known)]
             raise Problem(error("D065", f"no metric or varied parameter `{name.text}`", name.place, help=helps))
         if name.text not in self._columns:

@@ -12,7 +12,7 @@ def given(archive: ArchiveFile) -> list[str]:
     defines = str(archive.provenance.get("defines") or "")
     settings = _settings(archive.sources().get(COMMAND_LINE, "").splitlines(), defines)
     kinds = (("set", False), ("varied", True))
-    found = [(kind, [_spaced(each) for each in settings if varies(each) == wanted]) for kind, wanted in kinds]
+    found = [(kind, [_spaced(setting) for setting in settings if varies(setting) == wanted]) for kind, wanted in kinds]
     return [f"{kind}: {'; '.join(lines)}" for kind, lines in (*found, ("-D", [defines])) if any(lines)]
 
 

@@ -43,14 +43,14 @@ def limits_of(experiment: Experiment, panel: Panel, line: int) -> tuple[LimitMar
 
 def _required(experiment: Experiment, channel: str, panel: Panel) -> Iterator[LimitMark]:
     watched = {metric.name: metric for metric in experiment.structure.metrics}
-    for each in experiment.requirements:
-        metric = watched.get(each.metric)
+    for requirement in experiment.requirements:
+        metric = watched.get(requirement.metric)
         if metric is None or metric.of != channel:
             continue
         if metric.model == "settling_time":
-            yield LimitMark(each.text, each.limit, time=True)
+            yield LimitMark(requirement.text, requirement.limit, time=True)
         for sign in POINTWISE.get(metric.model, ()):
-            yield LimitMark(each.text, sign * each.limit / panel.scale)
+            yield LimitMark(requirement.text, sign * requirement.limit / panel.scale)
 
 
 def _stops(experiment: Experiment, joint: str, panel: Panel) -> Iterator[LimitMark]:

@@ -28,7 +28,7 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
     done = group.values("status") == DONE
     metrics = [group.values(variable.name)[done] for variable in group.role("metric")]
     axes = {variable.path: group.values(variable.name)[done] for variable in group.role("coordinate")}
-    if group.allows("D329") or not all(np.isfinite(each).all() for each in metrics):
+    if group.allows("D329") or not all(np.isfinite(metric).all() for metric in metrics):
         return []  # of a metric that is not finite nobody knows what changes it
     idle = _idle(axes, metrics)
     if not idle:
@@ -44,7 +44,9 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
     helps = ["is it what was meant to vary? a metric of what it changes would show it"]
     if others:
         helps.append(f"the same of {', '.join(f'`{path}`' for path in others)}")
-    places = {} if experiment is None else {each.path: each.place for each in experiment.cases.coordinates}
+    places = (
+        {} if experiment is None else {coordinate.path: coordinate.place for coordinate in experiment.cases.coordinates}
+    )
     place = places.get(first)
     return [Diagnostic("D329", message, None if place is None else Label(place), (), tuple(helps), "warning")]
 
@@ -75,12 +77,12 @@ def _idle(axes: dict[str, np.ndarray], metrics: list[np.ndarray]) -> list[str]:
 def _numbered(codes: Iterable[np.ndarray], count: int) -> np.ndarray:
     """A number for each case, equal for cases that have all these codes equal."""
     found = np.zeros(count, np.int64)
-    for each in codes:
-        found = np.unique(found * (each.max() + 1) + each, return_inverse=True)[1]
+    for code in codes:
+        found = np.unique(found * (code.max() + 1) + code, return_inverse=True)[1]
     return found
 
 
 def _same(of: np.ndarray, values: Iterable[np.ndarray]) -> bool:
     """True where cases with the same number `of` have the same values, but for rounding."""
     _, first, number = np.unique(of, return_index=True, return_inverse=True)
-    return all(np.isclose(each[first[number]], each, rtol=ROUNDING, atol=0.0).all() for each in values)
+    return all(np.isclose(value[first[number]], value, rtol=ROUNDING, atol=0.0).all() for value in values)

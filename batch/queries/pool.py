@@ -68,8 +68,8 @@ class Pool:
         order = np.argsort(np.concatenate(numbers), kind="stable")
         self.cases = np.concatenate(numbers)[order]
         """Numbers of the cases in the case table."""
-        self.group_of = np.repeat(np.arange(len(numbers)), [len(each) for each in numbers])[order]
-        self.position_of = np.concatenate([np.arange(len(each)) for each in numbers])[order]
+        self.group_of = np.repeat(np.arange(len(numbers)), [len(number) for number in numbers])[order]
+        self.position_of = np.concatenate([np.arange(len(number)) for number in numbers])[order]
 
     @property
     def count(self) -> int:
@@ -146,9 +146,9 @@ class Pool:
         """For each metric's variable, its requirements, limits in SI."""
         out: dict[str, dict[str, RequirementLimit]] = {}
         for group in self.groups:
-            for each in requirements.group_requirements(group):
-                out.setdefault(each.metric, {})[each.text] = RequirementLimit(
-                    each.text, each.limit, each.comparison[:1]
+            for group_requirement in requirements.group_requirements(group):
+                out.setdefault(group_requirement.metric, {})[group_requirement.text] = RequirementLimit(
+                    group_requirement.text, group_requirement.limit, group_requirement.comparison[:1]
                 )
         return {metric: tuple(found.values()) for metric, found in out.items()}
 

@@ -96,9 +96,11 @@ class SearchAnswer:
         """The requirements by which each case is judged: one over a share of cases applies to every case, and each
         occurs once."""
         found: dict[tuple[str, str, float], GroupRequirement] = {}
-        for each in group_requirements(self.group):
-            one = replace(each, text=OVER_CASES.sub("", each.text), share=None, confidence=None)
-            found.setdefault((each.metric, each.comparison, each.limit), one)
+        for group_requirement in group_requirements(self.group):
+            one = replace(
+                group_requirement, text=OVER_CASES.sub("", group_requirement.text), share=None, confidence=None
+            )
+            found.setdefault((group_requirement.metric, group_requirement.comparison, group_requirement.limit), one)
         return list(found.values())
 
     @cached_property
@@ -211,7 +213,7 @@ class SearchAnswer:
 
     def _nearest(self, what: str, place: int, distance: float) -> list[str]:
         case, away = int(self.group.values("case")[place]), f"{100.0 * distance:.2g} % of a range away"
-        values = ", ".join(f"{each.path} = {each.text}".replace(" ", KEPT) for each in self.values(place))
+        values = ", ".join(f"{value.path} = {value.text}".replace(" ", KEPT) for value in self.values(place))
         return wrapped(f"nearest tried that {what}: {away}, case #{case} with {values}")
 
     @property

@@ -152,7 +152,7 @@ def _inputs(group: ArchiveGroup, positions: np.ndarray) -> list[VariedInput]:
     """The inputs that vary in these cases, each once. Raises Problem E361 where nothing varies, or there are too few
     cases."""
     variables = group.role("coordinate")
-    values = [np.asarray(group.values(each.name), float)[positions] for each in variables]
+    values = [np.asarray(group.values(variable.name), float)[positions] for variable in variables]
     found = [VariedInput(tuple(variables[i].path for i in part), values[part[0]]) for part in in_step(values)]
     if not len(positions):
         raise Problem(error("E361", f"no case of `{group.name}` is in both archives"))

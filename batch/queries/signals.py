@@ -168,8 +168,8 @@ def number_text(value: float) -> str:
 def number_texts(values: Iterable[float]) -> list[str]:
     """Numbers as `number_text` writes them, and those that it would write alike in as many digits as tell them
     apart."""
-    values = [float(each) for each in values]
-    texts = {each: number_text(each) for each in values}
+    values = [float(value) for value in values]
+    texts = {value: number_text(value) for value in values}
     alike: dict[str, list[float]] = {}
     for each, text in texts.items():
         alike.setdefault(text, []).append(each)
@@ -178,7 +178,7 @@ def number_texts(values: Iterable[float]) -> list[str]:
         while len({texts[each] for each in those}) < len(those) and digits < 17:
             digits += 1
             texts.update((each, f"{each:.{digits}g}") for each in those)
-    return [texts[each] if each in texts else number_text(each) for each in values]
+    return [texts[value] if value in texts else number_text(value) for value in values]
 
 
 def deck_unit(variable: Stored) -> tuple[float, str]:

@@ -40,7 +40,7 @@ def _of_rows(group: ArchiveGroup) -> CaseSummary | None:
     coordinates = group.role("coordinate")
     repeats = any(group.stretch("repeat", p.start, p.stop).any() for p in blocks(group.count) if _repeats(group))
     drawn = any(variable.attributes.get("design") for variable in coordinates) or repeats
-    chosen = [each for each in coordinates if not each.attributes.get("design")] if drawn else []
+    chosen = [coordinate for coordinate in coordinates if not coordinate.attributes.get("design")] if drawn else []
     try:
         sizes = _sizes(group, chosen)
         points = PointNumbers()

@@ -22,12 +22,12 @@ def structures(archive: ArchiveFile) -> Iterator[list[str]]:
 
 def _all_of(sweep: str, summaries: Sequence[Summary]) -> list[str]:
     """Lines about the sweep as a whole: the number of cases that reached their end, and that met each requirement."""
-    cases, failed = (sum(getattr(each, name) for each in summaries) for name in ("cases", "failed"))
+    cases, failed = (sum(getattr(summary, name) for summary in summaries) for name in ("cases", "failed"))
     out = [f"{sweep}: {cases - failed:,} of {cases:,} cases reached their end, of {len(summaries)} structures"]
-    texts = list(dict.fromkeys(r.text for each in summaries for r in each.requirements))
+    texts = list(dict.fromkeys(r.text for summary in summaries for r in summary.requirements))
     wide = max(map(len, texts), default=0)
     for text in texts:
-        found = [(each.cases, r.met) for each in summaries for r in each.requirements if r.text == text]
+        found = [(summary.cases, r.met) for summary in summaries for r in summary.requirements if r.text == text]
         of, met = map(sum, zip(*found, strict=True))
         out.append(f"  require {text:<{wide}}  met by {met:,} of {of:,} ({100 * met / of:.3g} %)")
     return out

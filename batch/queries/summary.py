@@ -170,7 +170,7 @@ class Summary:
     @property
     def untrue(self) -> tuple[StepErrorVerdict, ...]:
         """Requirements on errors due to the step that are missed, or not known to be met."""
-        return tuple(each for each in self.step_errors if not each.met)
+        return tuple(step_error for step_error in self.step_errors if not step_error.met)
 
 
 def summarise(archive: ArchiveFile) -> tuple[Summary, ...]:
@@ -353,8 +353,10 @@ def as_json(summary: Summary) -> dict[str, Any]:
     """Plain data for `--format json`; a number that is not finite is null."""
     plain = asdict(replace(summary, verified=None, warnings=(), step_errors=(), answer=None))
     del plain["answer"]  # `met show` and `met run` print all of it
-    warned = [{"code": each.code, "message": each.message, "help": each.help} for each in summary.warnings]
-    limits = [{"text": each.text, "met": each.met, "said": each.said} for each in summary.step_errors]
+    warned = [{"code": warning.code, "message": warning.message, "help": warning.help} for warning in summary.warnings]
+    limits = [
+        {"text": step_error.text, "met": step_error.met, "said": step_error.said} for step_error in summary.step_errors
+    ]
     told = {"verified": figures.as_json(summary.verified), "step_errors": limits, "warnings": warned}
     data: dict[str, Any] = finite({**plain, "metrics": [_named_first(asdict(m)) for m in summary.metrics], **told})
     return {**data, "ok": summary.ok}

@@ -160,7 +160,7 @@ class CaseTallies:
     ) -> None:
         self._requirements = tuple(requirements)
         self.metrics = {name: MetricTally() for name in metrics}
-        self._everywhere = [Judged(each, 0) for each in requirements]
+        self._everywhere = [Judged(requirement, 0) for requirement in requirements]
         self._at_points = {
             number: [Judged(each, _most(each, int(size))) for size in sizes]
             for number, each in enumerate(requirements)

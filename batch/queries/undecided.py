@@ -74,7 +74,7 @@ def _told(
     helps: list[str],
 ) -> list[Diagnostic]:
     if others:
-        helps.append(f"the same of {', '.join(f'`require {each.text}`' for each in others)}")
+        helps.append(f"the same of {', '.join(f'`require {other.text}`' for other in others)}")
     place = None if experiment is None else experiment.requirements[first.place].place
     return [Diagnostic("D341", message, None if place is None else Label(place), (), tuple(helps), "warning")]
 

@@ -24,10 +24,10 @@ def campaign_warnings(groups: Iterable[ArchiveGroup], experiments: Mapping[str, 
     first: dict[object, Diagnostic] = {}
     more: dict[object, int] = {}
     for group in groups:
-        for each in warnings(group, experiments.get(group.name)):
-            key = (each.code, each.at if each.at is not None else each.message)
+        for warning in warnings(group, experiments.get(group.name)):
+            key = (warning.code, warning.at if warning.at is not None else warning.message)
             more[key] = more.get(key, -1) + 1
-            first.setdefault(key, each)
+            first.setdefault(key, warning)
     said = (
         (each, f"the same of {counted(more[key], 'other structure')}, which `met show` lists" if more[key] else "")
         for key, each in first.items()

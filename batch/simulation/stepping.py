@@ -112,7 +112,7 @@ class SteppedRun:
         self._program, self._prepared = program, program.prepared
         experiment = self._prepared.experiment
         self.joints, self.period = program.joints, program.divisor / experiment.structure.schedule.base_hz
-        given = [float(table[each.path][0]) for each in experiment.cases.coordinates]
+        given = [float(table[coordinate.path][0]) for coordinate in experiment.cases.coordinates]
         given += [float(repeat) if name == REPEAT else float(experiment.cases.seed) for name in experiment.cases.noise]
         self._block = block = self._prepared.kernel.block(np.array([given]).reshape(1, -1))
         names, cells = self._prepared.program.inputs, self._prepared.recording.cells

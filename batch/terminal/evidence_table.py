@@ -54,7 +54,7 @@ def _half(
 ) -> list[str]:
     """Some columns of the table, after the numbers of its rows; with signs in place of words where they are too
     wide."""
-    cells = [[getattr(each, field) for _, field in which] for each in texts]
+    cells = [[getattr(text, field) for _, field in which] for text in texts]
     rows = [["", *(head for head, _ in which)], *([number, *row] for number, row in zip(numbers, cells, strict=True))]
     lines = columns(rows, right=right)
     if max(map(len, lines)) <= width:

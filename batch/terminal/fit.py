@@ -64,7 +64,7 @@ def rounded(si: float, half: float, unit: str) -> WrittenValue:
 
 def written_values(question: FitQuestion, answer: FitAnswer) -> list[FittedValue]:
     """The fitted values, rounded to a hundredth of their intervals, to be written into the deck."""
-    logs = ", ".join(Path(each.file).name for each in question.runs)
+    logs = ", ".join(Path(run.file).name for run in question.runs)
     found = []
     for place, path in enumerate(question.paths):
         if path.startswith(DELAY):
@@ -78,7 +78,7 @@ def written_values(question: FitQuestion, answer: FitAnswer) -> list[FittedValue
 
 def written_motion(promise: Promise) -> list[FittedValue]:
     """The values that make the best case of a sweep, to be written into the deck."""
-    return [FittedValue(each, f"of {promise.sweep.cases.count:,}: {promise.motion.file}") for each in promise.values]
+    return [FittedValue(value, f"of {promise.sweep.cases.count:,}: {promise.motion.file}") for value in promise.values]
 
 
 def identifiable_lines(question: FitQuestion, found: Known, promised: Sequence[Promise]) -> Iterator[str]:
@@ -109,7 +109,7 @@ def identifiable_lines(question: FitQuestion, found: Known, promised: Sequence[P
 
 def _choice_lines(promise: Promise) -> Iterator[str]:
     """Lines that name the best case of a sweep, and the command that runs it; none for a run."""
-    cases, settings = promise.sweep.cases.count, [each.setting for each in promise.values]
+    cases, settings = promise.sweep.cases.count, [value.setting for value in promise.values]
     if not settings:
         return
     judged, others = f"{cases:,} cases", ""
@@ -117,8 +117,8 @@ def _choice_lines(promise: Promise) -> Iterator[str]:
         judged, others = f"{promise.judged:,} of {judged}", ": the others fail, leave limits or miss requirements"
     yield f"{promise.motion.file} is the best of {judged}{others}"
     given = promise.motion.given
-    words = [f"-D {quoted(each)}" for each in given.defines]
-    words += [setting_option(each) for each in (*given.settings, *settings)]
+    words = [f"-D {quoted(define)}" for define in given.defines]
+    words += [setting_option(setting) for setting in (*given.settings, *settings)]
     yield f"its motion: {' '.join(['met run', quoted(given.deck.file), given.name, *words])}"
     yield ""
 
@@ -219,7 +219,7 @@ def as_data(question: FitQuestion, answer: FitAnswer) -> dict[str, Any]:
     ]
     data: dict[str, Any] = {
         "certain": is_certain(question, answer),
-        "doubts": [line.strip() for each in _all_doubts(question, answer) for line in each],
+        "doubts": [line.strip() for all_doubt in _all_doubts(question, answer) for line in all_doubt],
         "parameters": parameters,
         "covariance": fit.covariance.tolist(),
         "converged": fit.converged,
@@ -299,14 +299,16 @@ def _together(question: FitQuestion, found: Known) -> Iterator[str]:
 def _residual_lines(title: str, before: Comparison, after: Comparison, doubts: Sequence[str]) -> Iterator[str]:
     earlier = {each.channel: each for each in before.residuals}
     rows = [[title, "before", "after", "", "of spread", "", "what is left follows"]]
-    for each in after.residuals:
-        was = earlier.get(each.channel)
-        share = f"{each.rms / each.spread:.3g}" if each.spread else "-"
-        white = "white" if each.white else "" if each.white is None else f"not white ({each.correlation:.2g})"
-        follows = f"{each.explained[0].what}: {each.explained[0].means}" if each.explained else ""
-        unit = "" if each.unit == "1" else each.unit
+    for residual in after.residuals:
+        was = earlier.get(residual.channel)
+        share = f"{residual.rms / residual.spread:.3g}" if residual.spread else "-"
+        white = (
+            "white" if residual.white else "" if residual.white is None else f"not white ({residual.correlation:.2g})"
+        )
+        follows = f"{residual.explained[0].what}: {residual.explained[0].means}" if residual.explained else ""
+        unit = "" if residual.unit == "1" else residual.unit
         first = "" if was is None else f"{was.rms:.3g}"
-        rows.append([f"  {each.channel}", first, f"{each.rms:.3g}", unit, share, white, follows])
+        rows.append([f"  {residual.channel}", first, f"{residual.rms:.3g}", unit, share, white, follows])
     yield from columns(rows, right=(1, 2, 4))
     yield from dict.fromkeys([*doubts, *note_lines(after)])
 
@@ -318,9 +320,11 @@ def _deck_value(question: FitQuestion, place: int) -> str:
 def _doubts(before: Comparison, after: Comparison) -> list[str]:
     """The reasons to doubt a log: those after the fit, and those before it unless the fit removed most of what was left
     of the channels that a doubt names, or of all."""
-    sizes = {each.channel: each.rms for each in before.residuals}
-    left = {each.channel for each in after.residuals if each.rms > REMOVED * sizes.get(each.channel, 0.0)}
-    left -= {each.channel for each in after.residuals if each.white}
+    sizes = {residual.channel: residual.rms for residual in before.residuals}
+    left = {
+        residual.channel for residual in after.residuals if residual.rms > REMOVED * sizes.get(residual.channel, 0.0)
+    }
+    left -= {residual.channel for residual in after.residuals if residual.white}
     found = {doubt.rpartition(": ")[0]: doubt for doubt in doubt_lines(after)}
     for doubt in doubt_lines(before):
         named = set(re.findall("`([^`]+)`", doubt)) & sizes.keys() or set(sizes)
@@ -332,7 +336,7 @@ def _doubts(before: Comparison, after: Comparison) -> list[str]:
 def _late_doubt(run: LoggedRun, path: str, delay: float, after: Comparison) -> list[str]:
     """A doubt about a log that is late by as much in most channels after a fit. path, delay: of its delay, and the
     fitted one, s"""
-    first = [each.explained[0] for each in after.residuals if each.explained]
+    first = [residual.explained[0] for residual in after.residuals if residual.explained]
     sizes = [each.size for each in first if each.means == "a delay" and each.size is not None]
     if 2 * len(sizes) <= len(after.residuals) or min(sizes) * max(sizes) <= 0.0:
         return []
@@ -349,7 +353,11 @@ def _all_doubts(question: FitQuestion, answer: FitAnswer) -> list[list[str]]:
     delays, found = dict(zip(question.paths, answer.fit.values.tolist(), strict=True)), []
     for run, before, after in zip(question.runs, answer.before, answer.after, strict=True):
         path, doubts = DELAY + run.file, _doubts(before, after)
-        left = [each.rms / each.spread for each in after.residuals if each.white is False and each.spread]
+        left = [
+            residual.rms / residual.spread
+            for residual in after.residuals
+            if residual.white is False and residual.spread
+        ]
         if 2 * len(left) > len(after.residuals) and not doubts and np.median(left) > MOST_LEFT:
             words = f"the fit leaves {np.median(left):.2g} of what was measured in most channels"
             doubts.append(f"  doubt: {words}: is the log of this run, and of an arm like this?")

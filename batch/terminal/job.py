@@ -117,7 +117,7 @@ def merge_campaign(path: Path) -> int:
     if performed.warned:
         from met.messages.render import render
 
-        say(render(performed.warned, {each.name: each.text for each in campaign.plan.sources}), err=True)
+        say(render(performed.warned, {source.name: source.text for source in campaign.plan.sources}), err=True)
     return _say_result(campaign.output)
 
 

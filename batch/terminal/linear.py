@@ -30,7 +30,7 @@ def linear_lines(found: Linearized, cases: int = 1) -> Iterator[str]:
         yield f"  at its limit: {path}"
     yield ""
     yield "poles of the program"
-    yield from _table([("z", *_HEAD)], [(_complex(each.z), *_row(found, each)) for each in found.poles])
+    yield from _table([("z", *_HEAD)], [(_complex(pole.z), *_row(found, pole)) for pole in found.poles])
     natural = found.natural
     if natural:
         yield ""

@@ -42,8 +42,8 @@ def margin_lines(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> I
     for one in tightest:
         if not one.stable:
             yield f"  {one.joint}: {remedy(one)} may help"
-    for each in joints:
-        if early := next((one for one in each if one.delay < pace(one.rate_hz).late(False)), None):
+    for joint in joints:
+        if early := next((one for one in joint if one.delay < pace(one.rate_hz).late(False)), None):
             own = f"`bed = {early.bed}(delay = 1, ...)`, which has another margin"
             yield f"  {early.joint}: `met bed run` refuses this delay on a line, where commands act a tick later: {own}"
     for each in joints:

@@ -24,11 +24,13 @@ def as_data(found: Comparison) -> dict[str, Any]:
 def residual_lines(found: Comparison) -> Iterator[str]:
     """The residuals, what they follow, and what makes the log doubtful, in lines."""
     rows = [["", "rms", "", "of spread", "mean", "largest", "at", ""]]
-    for each in found.residuals:
-        spread = f"{each.rms / each.spread:.3g}" if each.spread else "-"
-        rms, mean, largest = (f"{value:.3g}" for value in (each.rms, each.mean, each.largest))
-        unit = "" if each.unit == "1" else each.unit
-        rows.append([f"  {each.channel}", rms, unit, spread, mean, largest, f"{each.at:g} s", _whiteness(each)])
+    for residual in found.residuals:
+        spread = f"{residual.rms / residual.spread:.3g}" if residual.spread else "-"
+        rms, mean, largest = (f"{value:.3g}" for value in (residual.rms, residual.mean, residual.largest))
+        unit = "" if residual.unit == "1" else residual.unit
+        rows.append(
+            [f"  {residual.channel}", rms, unit, spread, mean, largest, f"{residual.at:g} s", _whiteness(residual)]
+        )
     yield from columns(rows, right=(1, 3, 4, 5, 6))
     if followed := [each for each in found.residuals if each.explained]:
         yield ""
@@ -61,9 +63,9 @@ def _size(cause: FollowedCause) -> str:
 
 def doubt_lines(found: Comparison) -> Iterator[str]:
     """Lines that say why a log is doubtful."""
-    for each in found.doubts:
-        yield f"  doubt: {each}"
-    far = [each.channel for each in found.residuals if each.spread and each.rms > each.spread]
+    for doubt in found.doubts:
+        yield f"  doubt: {doubt}"
+    far = [residual.channel for residual in found.residuals if residual.spread and residual.rms > residual.spread]
     if len(far) > max(1, len(found.residuals) // 2):
         what = f"{len(far)} of {len(found.residuals)} residuals are larger than what was measured varies"
         yield f"  doubt: {what}: is the log of this run?"
@@ -85,12 +87,12 @@ def note_lines(found: Comparison) -> Iterator[str]:
     elif found.gaps:
         longest = max(length for _, length in found.gaps)
         yield f"  note: the log's time is uneven: its steps are {found.step:.3g} s, and up to {longest:.3g} s"
-    if outlying := [f"{each.channel} {each.outliers:,}" for each in found.residuals if each.outliers]:
+    if outlying := [f"{residual.channel} {residual.outliers:,}" for residual in found.residuals if residual.outliers]:
         yield f"  note: instants far from all others, left out of what a residual follows: {_listed(outlying)}"
     if 0.0 < found.step < 0.5 * found.run_step:
         steps = f"every {number_text(found.run_step)} s, and the log has an instant every {found.step:.3g} s"
         yield f"  note: the run is recorded {steps}: between its rows, it is on straight lines"
-    if short := [each.channel for each in found.residuals if each.too_short]:
+    if short := [residual.channel for residual in found.residuals if residual.too_short]:
         yield f"  note: the log is too short to say what these follow: {_listed(short)}"
     if found.missing:
         yield f"  note: not in the log: {_listed(found.missing)}"

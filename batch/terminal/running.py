@@ -262,7 +262,7 @@ def _exported(
     except Problem as problem:
         if not json:
             _complain(problem, json)
-        return None, [each.message for each in problem.diagnostics]
+        return None, [diagnostic.message for diagnostic in problem.diagnostics]
     except KeyboardInterrupt as interrupt:
         command = export_command(campaign, target, histories=histories)
         say(f"{campaign.output} is whole; {target} is missing: `{command}`")

@@ -249,7 +249,7 @@ def heading(group: ArchiveGroup, width: int) -> list[str]:
         unit = pretty_unit(str(variable.attributes.get("deck_unit", variable.unit)))
         if is_streamed(group):
             stretches = (group.stretch(variable.name, piece.start, piece.stop) for piece in blocks(group.count))
-            ends = np.array([(each.min(), each.max()) for each in stretches]) / scale
+            ends = np.array([(stretch.min(), stretch.max()) for stretch in stretches]) / scale
             low, high = number_text(ends[:, 0].min()), number_text(ends[:, 1].max())
             out.append(f"  {variable.name} = values from {low} to {high} {unit}".removesuffix(" 1"))
             continue
@@ -278,7 +278,7 @@ def verdict(summary: Summary, width: int) -> list[str]:
         out += _metric_table(summary)
     if summary.verified is not None:
         out += textwrap.wrap(about(summary.verified), width, initial_indent="  ", subsequent_indent="    ")
-    texts = [each.text for each in summary.requirements if not each.evidence]
+    texts = [requirement.text for requirement in summary.requirements if not requirement.evidence]
     wide = max(map(len, (*texts, *(each.text for each in summary.step_errors))), default=0)
     if summary.answer is not None:
         out += textwrap.wrap(f"{summary.answer.headline}.", width, initial_indent="  ", subsequent_indent="    ")
@@ -297,8 +297,8 @@ def verdict(summary: Summary, width: int) -> list[str]:
             said += f", not known of {r.unknown:,}" if r.unknown else ""
             said += f" (its metric has no value in {r.no_value:,})" if r.no_value else ""
         out.append(f"  require {r.text:<{wide}}  {said}")
-    for each in summary.step_errors:
-        out.append(f"  require {each.text:<{wide}}  {each.word}: {each.said}")
+    for step_error in summary.step_errors:
+        out.append(f"  require {step_error.text:<{wide}}  {step_error.word}: {step_error.said}")
     verdicts = [row for r in summary.requirements for row in r.evidence if row.lower is not None]
     if len(verdicts) > 1:
         tested = len({row.requirement.text for row in verdicts})
@@ -310,8 +310,8 @@ def verdict(summary: Summary, width: int) -> list[str]:
 def warning_lines(summary: Summary, width: int) -> list[str]:
     """Lines of the warnings due to errors by the step, with remedies."""
     out = []
-    for each in summary.warnings:
-        said = [f"warning[{each.code}]: {each.message}", *(f"  help: {text}" for text in each.help)]
+    for warning in summary.warnings:
+        said = [f"warning[{warning.code}]: {warning.message}", *(f"  help: {text}" for text in warning.help)]
         for text in said:
             out += textwrap.wrap(text, width, initial_indent="  ", subsequent_indent="      ")
     return out

@@ -78,7 +78,7 @@ def _part_lines(part: CampaignPart, verbose: bool) -> list[str]:
         out += [f"  {note.removeprefix(OF_CASES)}" for note in experiment.notes if note.startswith(OF_CASES)]
     recorded = ", ".join(recorded.name for recorded in experiment.structure.record)
     if part.searches and experiment.search is not None:
-        paths = ", ".join(each.path for each in experiment.search.parameters)
+        paths = ", ".join(parameter.path for parameter in experiment.search.parameters)
         against = f", against {len(experiment.search.plants):,} cases of {experiment.search.against}"
         out.append(f"  {experiment.search.goal} by {paths}{against * bool(experiment.search.against)}")
     if part.searches and part.keeps_best:

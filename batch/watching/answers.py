@@ -87,7 +87,12 @@ def check(deck: WatchedDeck, name: str | None = None) -> None:
     watched until they are corrected. Raises Problem."""
     is_named_so = deck.file.suffix == ENDING
     try:
-        tree = read(deck.name, [Path(each) for each in deck.include_dirs], deck.defines, despite_errors=is_named_so)
+        tree = read(
+            deck.name,
+            [Path(include_dir) for include_dir in deck.include_dirs],
+            deck.defines,
+            despite_errors=is_named_so,
+        )
     except Problem as problem:
         if is_named_so:
             return
@@ -122,7 +127,7 @@ def compiled(
     memo   answers of the analysis from earlier times; those that are found are added
     """
     try:
-        folders = [Path(each) for each in deck.include_dirs]
+        folders = [Path(include_dir) for include_dir in deck.include_dirs]
         tree = read(deck.name, folders, deck.defines, despite_errors=True)
     except Problem as problem:
         return DeckAnswer(_words(problem.diagnostics, problem.sources), (), tuple(problem.sources))
@@ -228,7 +233,7 @@ def numbers(experiment: Experiment, run: Run) -> str:
         "metrics": metrics,
         "done": done,
         "failed": int((run.status != DONE).sum()),
-        "failures": [[each.count, visible(each.cause), each.row] for each in pool.failures[:5]],
+        "failures": [[failure.count, visible(failure.cause), failure.row] for failure in pool.failures[:5]],
         "doubtful": sorted({visible(each) for each in run.warning if each})[:5],
         "verdicts": [
             [visible(text), *(int((pool.outcomes[:, n] == value).sum()) for value in (1, 0, -1))]

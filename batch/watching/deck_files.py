@@ -116,10 +116,10 @@ class DeckFiles:
         """Folders in which a file is searched: beside the watched ones, in the `-I` folders and those of MET_DECK_PATH,
         and in folders that a deck names in these, existing or not."""
         named = [
-            base / each
+            base / name
             for path, names in self._named.items()
             for base in (path.parent, *self._folders)
-            for each in names
+            for name in names
         ]
         return list(dict.fromkeys([*(path.parent for path in self._stamps), *self._folders, *named]))
 

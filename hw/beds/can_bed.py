@@ -122,13 +122,13 @@ class CanBed(BedDriver):
         current = min(load.drive.entry.figures["current_max"], load.facts.torque_max / self._kt_load)
         self._rated = load.drive.entry.figures["current_rated"]
         self._acceleration = (self._most + self._kt_load * current) / bench.shaft["inertia"]
-        self._supply_max = min([bench.supply["voltage_max"], *(each.supply_max for each in facts if each.supply_max)])
+        self._supply_max = min([bench.supply["voltage_max"], *(fact.supply_max for fact in facts if fact.supply_max)])
         by_voltage = self._kind == "voltage"
         count = drive.facts.torque_count * (self._resistance / self._kt if by_voltage else 1.0)
         count = drive.facts.rate_told_count if by_rate else count
         scales = Scales(count or FINE, load.facts.torque_count / self._kt_load or FINE, FINE, FINE_ANGLE, FINE, FINE)
-        hz = min(each.control_hz for each in facts)
-        rate = min(bench.shaft["rate_max"], *(each.rate_max for each in facts))
+        hz = min(fact.control_hz for fact in facts)
+        rate = min(bench.shaft["rate_max"], *(fact.rate_max for fact in facts))
         most = rate if by_rate else figures["voltage_max"] if by_voltage else WIDE * self._most
         slews = 2.0 * most * hz, 2.0 * current * hz
         limits = Limits(most, current, rate, bench.shaft["arming_rate"], *slews, load.drive.entry.figures["heat"])
@@ -144,7 +144,7 @@ class CanBed(BedDriver):
         if not greeting.DEADMAN[0] <= about.deadman <= greeting.DEADMAN[1] or min(f.watchdog for f in facts) < 0.002:
             helps = "`watchdog` of the bench file: 10 to 20 ms"
             raise Problem(error("E404", f"bed `{about.name}` would stop {1e3 * about.deadman:g} ms late", help=helps))
-        coarse = max(each.rate_count for each in facts)
+        coarse = max(fact.rate_count for fact in facts)
         if coarse > bench.shaft["arming_rate"]:
             helps = "a finer unit of velocity in the drive: a shaft that turns would pass for one at rest"
             message = f"bed `{about.name}` has its rate in steps of {coarse:.3g} rad/s, more than `arming_rate`"
@@ -170,7 +170,7 @@ class CanBed(BedDriver):
         questions."""
         check = 0.0 if self._bench.bus["interface"] == SERIAL else 2.0 * on_bus(CanFrame(0, bytes(8)))
         self._asks = self._on_bus() + check <= ASKED_SHARE * self.period
-        self.unseen = "; ".join(dict.fromkeys((each if self._asks else CanDrive).unseen for each in self._drives))
+        self.unseen = "; ".join(dict.fromkeys((drive if self._asks else CanDrive).unseen for drive in self._drives))
         share = self._on_bus() / self.period
         if share > LONGEST_SHARE:
             message = (
@@ -189,7 +189,7 @@ class CanBed(BedDriver):
 
     def _exchanged(self) -> list[CanFrame]:
         """Frames like those of an exchange, both ways."""
-        asked = [() if each.answers_commands else each.asked() for each in self._drives]
+        asked = [() if drive.answers_commands else drive.asked() for drive in self._drives]
         return [
             frame
             for each, asks in zip(self._drives, asked, strict=True)
@@ -398,7 +398,7 @@ class CanBed(BedDriver):
         talk.pump(since + self.patience, settled)
         if not self._answered(since):
             return False
-        if commands and max(each.time for each in self._readings()) > since + self.period:
+        if commands and max(reading.time for reading in self._readings()) > since + self.period:
             return False
         stale = talk.line.now() - min(drive.stated for drive in self._drives) > STALE
         if stale or not self._agree():
@@ -528,9 +528,9 @@ class CanBed(BedDriver):
         """Latch that a drive has failed or another master commands it, where the bed is disarmed."""
         if self._state == BedState.DISARMED and (other := self._talk.other_master):
             self._latch(Fault.OTHER_MASTER, other)
-        for each in self._drives:
-            if each.state == DriveState.FAILED and self._state == BedState.DISARMED:
-                self._latch(Fault.DEADMAN if each.starved else Fault.DRIVE, f"{each.words}: {each.errors}")
+        for drive in self._drives:
+            if drive.state == DriveState.FAILED and self._state == BedState.DISARMED:
+                self._latch(Fault.DEADMAN if drive.starved else Fault.DRIVE, f"{drive.words}: {drive.errors}")
 
     def _stopped(self, fault: Fault, why: str) -> None:
         self._latch(fault, why)

@@ -144,7 +144,7 @@ def loop_warning(who: str, gain: float, integral: float, believed: BelievedLoop)
 
 
 def _use(experiment: Experiment, joint: str) -> Substitution:
-    return next(each for each in experiment.structure.substitutions if each.joint == joint)
+    return next(substitution for substitution in experiment.structure.substitutions if substitution.joint == joint)
 
 
 def _value(opening: Opening, name: str, default: float | None = None) -> float:
@@ -154,7 +154,7 @@ def _value(opening: Opening, name: str, default: float | None = None) -> float:
         return default
     value = experiment.parameters[path].value
     if isinstance(value, Formula):
-        inputs = {each.path: float(each.values[opening.row]) for each in experiment.cases.coordinates}
+        inputs = {coordinate.path: float(coordinate.values[opening.row]) for coordinate in experiment.cases.coordinates}
         value = experiment.formulas.replay(inputs)[value.output]
     assert isinstance(value, float | int)
     return float(value)

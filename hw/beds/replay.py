@@ -143,7 +143,7 @@ def is_transcript(name: str) -> bool:
 
 def _was_in_lock_step(name: str, requested: bool) -> bool:
     """True where a transcript has a STEP: its bed had no time of its own, whatever is requested now."""
-    sent = (unframed(each.data[:-1]) for each in read(name).records if each.kind == SENT)
+    sent = (unframed(record.data[:-1]) for record in read(name).records if record.kind == SENT)
     return any(payload is not None and payload[0] == messages.StepMessage.kind for payload in sent)
 
 

@@ -336,7 +336,7 @@ def guard(config: Config) -> dict[str, int]:
         # the certain change in a tick, summed while a rate is awaited
         (found["most"] + load + viscous) * (lag + 2.0),
     )
-    if not all(each <= _ROOM // 8 for each in products):
+    if not all(product <= _ROOM // 8 for product in products):
         raise Uncountable(
             "the scales are too fine, or the shaft too light, for the tachometer's guard",
             "a larger `inertia` or `converter_in`",

@@ -270,7 +270,7 @@ class Talk:
     @property
     def other_master(self) -> str:
         """The sign of another master on the line, in words; "" where none was noticed."""
-        return self._heard or next((each.disturbed for each in self.drives if each.disturbed), "")
+        return self._heard or next((drive.disturbed for drive in self.drives if drive.disturbed), "")
 
     def forget_other_master(self) -> None:
         self._heard = ""

@@ -113,7 +113,7 @@ class FdcanusbLine:
     def _keep(self, data: bytes) -> None:
         """Cut the input into lines."""
         *lines, self._rest = (self._rest + data).split(b"\n")
-        self._lines += [each.strip(b"\r") for each in lines if len(each) <= LONGEST_LINE]
+        self._lines += [line.strip(b"\r") for line in lines if len(line) <= LONGEST_LINE]
         if len(self._rest) > LONGEST_LINE:  # after its end a new line begins
             self._rest = bytes(LONGEST_LINE + 1)
 
@@ -182,7 +182,7 @@ def frame_of(text: bytes, time: float) -> CanFrame | None:
     if found is None:
         return None
     number, data, flags = int(found[1], 16), bytes.fromhex(found[2].decode()), found[3].decode().split()
-    if sorted(each.upper() for each in flags) != ["B", "E", "F", "R"]:
+    if sorted(flag.upper() for flag in flags) != ["B", "E", "F", "R"]:
         return None
     extended, fd = "E" in flags, "F" in flags
     if number >= 1 << (29 if extended else 11) or len(data) not in SIZES or (len(data) > 8 and not fd):

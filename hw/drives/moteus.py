@@ -219,7 +219,7 @@ class MoteusDrive(CanDrive):
             self._about = {MODEL + n: found[MODEL + n] for n in range(3)}
             return True
         values = [found.get(each, math.nan) for each in (MODE, POSITION, VELOCITY, VOLTAGE, FAULT)]
-        if not all(math.isfinite(each) for each in values):
+        if not all(math.isfinite(value) for value in values):
             return False
         mode, position, velocity, supply, fault = values
         if self.has_said((position, velocity), _TURN * velocity, frame.time):

@@ -78,9 +78,9 @@ class OdriveAsciiDrive(OdriveAxis):
         if not isinstance(talk.line, OdriveLines):
             raise self.wrong("it is not on a serial line", '`interface = "serial"` of `[bus]`')
         numbers = [self._read(talk, path) for path in (*FIRMWARE_NUMBERS, *HARDWARE_NUMBERS)]
-        if not all(math.isfinite(each) for each in numbers):
+        if not all(math.isfinite(number) for number in numbers):
             raise self.other("its version is no number", "MET speaks to firmware 0.6")
-        firmware, hardware = (tuple(int(each) for each in numbers[at : at + 3]) for at in (0, 3))
+        firmware, hardware = (tuple(int(number) for number in numbers[at : at + 3]) for at in (0, 3))
         self._check_firmware(firmware)
         took, most = talk.line.fastest(self.node), talk.line.late
         if took > most:

@@ -98,7 +98,7 @@ def run(request: CaseRequest) -> loop.LoopEnd:
             "lock_step": lock_step,
             "joints": list(joints),
             "tick_hz": abouts[0].tick_hz,
-            "beds": [{"name": each.name, "firmware": each.firmware} for each in abouts],
+            "beds": [{"name": about.name, "firmware": about.firmware} for about in abouts],
         }
         with recording(Path(request.records), head, (driven.exchanges + 1) * len(beds)) as put:
             process.say(began=True)
@@ -141,7 +141,7 @@ def _greeted(bed: BedDriver, joint: str, experiment: Experiment, request: CaseRe
 
 def _check_drive(about: About, experiment: Experiment, joint: str) -> None:
     """Raise Problem E438 where a bed's drive is commanded another quantity than in the deck's bed model."""
-    use = next(each for each in experiment.structure.substitutions if each.joint == joint)
+    use = next(substitution for substitution in experiment.structure.substitutions if substitution.joint == joint)
     told = models.find("bed", use.bed, use.place).drive
     if told != about.drive:
         message = f"bed `{about.name}` takes a {about.drive}, and `{use.bed}` of joint `{joint}` sends it a {told}"

@@ -143,8 +143,8 @@ def _mixed() -> list[Move]:
         (2.9, 5.3, 9.1, 1.1, 10.7),
     ]
     return [
-        Move("mixed", 1.2, sines((sign * 0.3, 0.2, sign * 0.15), (0.3, sign * 0.3), each))
-        for each in tones
+        Move("mixed", 1.2, sines((sign * 0.3, 0.2, sign * 0.15), (0.3, sign * 0.3), tone))
+        for tone in tones
         for sign in (1.0, -1.0)
     ]
 

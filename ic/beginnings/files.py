@@ -17,7 +17,7 @@ from met.diagnostic import Problem, error
 from met.host.files import new_file
 from met.outputs import path_of, quoted, refusal_text
 
-PARTS = [each.name for each in dataclasses.fields(Beginning)]
+PARTS = [field.name for field in dataclasses.fields(Beginning)]
 
 
 def deck(name: str, path: str | None) -> dict[str, str]:
@@ -32,7 +32,7 @@ def model(kind: str, name: str, folder: str | None) -> dict[str, str]:
     Raises Problem E343 where no model may be called so, or one is.
     """
     check_name("a model", name)
-    of_models = next(each for each in get_args(models.Kind) if each == kind)
+    of_models = next(known_kind for known_kind in get_args(models.Kind) if known_kind == kind)
     if name in models.available(of_models):
         help = f"choose another name; `met doc {kind} {name}` says what that one is"
         raise Problem(error("E343", f"there is a {kind} model `{name}` already", help=help))

@@ -118,7 +118,7 @@ class DefinitionChecks:
             with complaints.gather():
                 check_params(definitions, complaints)
                 lets = Scope(definitions, complaints).names.check_lets()
-                complaints.add(*(each for problem in lets for each in problem.diagnostics))
+                complaints.add(*(diagnostic for problem in lets for diagnostic in problem.diagnostics))
                 remark_degrees(self._deck, definitions, complaints)
                 for kind in ("arm", "servo", "run"):
                     for definition in definitions.of_kind(kind).values():
@@ -187,7 +187,7 @@ class _Keys:
         )
         told_of, values = pickle.dumps(shared), [pickle.dumps(lets), *arms.values()]
         plain = {name: name.rpartition(".")[2].encode() for name in servos}  # as its own deck calls it
-        named = [body for name, body in servos.items() if any(plain[name] in each for each in values)]
+        named = [body for name, body in servos.items() if any(plain[name] in value for value in values)]
         self._shared = {
             "arm": _digest([told_of, *arms.values(), *named]),
             "servo": _digest([told_of, *servos.values()]),
@@ -222,9 +222,9 @@ class _Keys:
 def _chooses_macros(entries: Iterable[Entry]) -> bool:
     """True for a sweep over macros, which reads the deck again: then nothing is known about text that is left out."""
     return any(
-        any(word.text == "macro" for word in getattr(each, "words", ()))
-        or (isinstance(each, Group) and _chooses_macros(each.body))
-        for each in entries
+        any(word.text == "macro" for word in getattr(entry, "words", ()))
+        or (isinstance(entry, Group) and _chooses_macros(entry.body))
+        for entry in entries
     )
 
 

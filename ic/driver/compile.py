@@ -78,7 +78,7 @@ def check(
     memo     answers of the analysis that are known, to which those are added that are found
     """
     try:
-        folders = [Path(each) for each in include_dirs]
+        folders = [Path(include_dir) for include_dir in include_dirs]
         deck = read(Path(path), folders, defines, despite_errors=True, text=text, unsaved=unsaved)
     except Problem as problem:
         return Compiled(None, problem.diagnostics, problem.sources)
@@ -172,7 +172,7 @@ def compile_deck(
     texts = {source.name: source.text for source in sources}
     if not complaints.errors:
         complaints.admit_remarks()
-        silence_of_all([each.allowances for each in experiments], complaints)
+        silence_of_all([experiment.allowances for experiment in experiments], complaints)
         for look in (misspelt_params, skipped_elements, macros_taken_apart):
             complaints.add(*look(deck.entries))
         if select == "all":
@@ -211,7 +211,7 @@ def _with_settings(deck: Deck, settings: Sequence[str], complaints: Complaints) 
     deck = replace(deck, sources=(*files, command_line(settings, before)))
     with complaints.gather():
         read_entries = read_settings(settings, before, edition=deck.edition, units=deck.units)
-        return deck, tuple(each for each in with_full_names(read_entries, deck.roofs) if isinstance(each, Setting))
+        return deck, tuple(entry for entry in with_full_names(read_entries, deck.roofs) if isinstance(entry, Setting))
     return deck, ()
 
 

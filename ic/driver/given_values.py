@@ -134,7 +134,7 @@ class GivenRun:
 
     def sets(self, path: str) -> bool:
         """True where the settings contain exactly this path."""
-        return any(_path(each) == path for each in self.settings)
+        return any(_path(setting) == path for setting in self.settings)
 
     def vary(
         self, values: Mapping[str, tuple[float | str, str]], *, repeat: int = 1, words: Mapping[str, str] | None = None
@@ -151,7 +151,7 @@ class GivenRun:
         if not values and repeat == 1:
             return VariedRun(self.experiment, None, self.compiled.sources)
         words = {**self._set_around(values), **(words or {})}  # a `--set` around a varied path is refused
-        settings = [each for each in self.settings if _path(each) not in (*words, *values)]
+        settings = [setting for setting in self.settings if _path(setting) not in (*words, *values)]
         name = f"{self.name}_given"
         while name in _names(self.deck):
             name += "_"
@@ -182,9 +182,9 @@ class GivenRun:
     def _set_around(self, values: Iterable[str]) -> dict[str, str]:
         """The settings of things of which these paths are parts, by path: a command with one of its values given."""
         return {
-            _path(each): each.partition("=")[2]
-            for each in self.settings
-            if any(path.startswith(f"{_path(each)}.") for path in values)
+            _path(setting): setting.partition("=")[2]
+            for setting in self.settings
+            if any(path.startswith(f"{_path(setting)}.") for path in values)
         }
 
 
@@ -198,7 +198,7 @@ def given_run(
     settings: Sequence[str] = (),
 ) -> GivenRun:
     """A run of a deck. run: None for the deck's only one, else the one that it marks `default`. Raises Problem."""
-    deck = read(Path(path), [Path(each) for each in include_dirs], tuple(defines), text=text)
+    deck = read(Path(path), [Path(include_dir) for include_dir in include_dirs], tuple(defines), text=text)
     definitions = Definitions(deck, Complaints(deck.warnings))
     return _given(deck, _name_of(definitions, run, deck), tuple(defines), tuple(settings))
 
@@ -212,7 +212,7 @@ def swept_run(
     settings: Sequence[str] = (),
 ) -> tuple[GivenRun, tuple[Experiment, ...]]:
     """A run of a deck and the run itself, or the run of a sweep and the experiments of the sweep. Raises Problem."""
-    deck = read(Path(path), [Path(each) for each in include_dirs], tuple(defines))
+    deck = read(Path(path), [Path(include_dir) for include_dir in include_dirs], tuple(defines))
     sweep = Definitions(deck, Complaints(deck.warnings)).of_kind("sweep").get(name)
     run = name if sweep is None else _run_of(sweep) or name
     given = given_run(path, run, include_dirs=include_dirs, defines=defines, settings=settings)
@@ -240,7 +240,7 @@ def _name_of(definitions: Definitions, run: str | None, deck: Deck) -> str:
         if len(own) == 1:
             return next(iter(own))
         ours = [each for each in (*runs.values(), *sweeps.values()) if each.name in own or definitions.writes(each)]
-        default = next((each for each in ours if each.default), None)
+        default = next((run_or_sweep for run_or_sweep in ours if run_or_sweep.default), None)
         if default is None or default.name not in own:
             why = f"it marks a sweep, `{default.name}`, `default`" if default else "none is marked `default`"
             message = f"this deck has {len(own)} runs, and {why}" if own else "this deck has no run"
@@ -273,7 +273,7 @@ def _path(setting: str) -> str:
 
 
 def _errors(compiled: Compiled) -> list[Diagnostic]:
-    return [each for each in compiled.diagnostics if each.severity == "error"]
+    return [diagnostic for diagnostic in compiled.diagnostics if diagnostic.severity == "error"]
 
 
 def _names(deck: Deck) -> set[str]:

@@ -73,7 +73,7 @@ def upgrades(paths: Sequence[str]) -> Upgrades:
     for path, compiled in before.items():
         files = {os.path.realpath(name) for name in compiled.sources} & new.keys()
         if compiled.plan is not None and not compiled.plan.experiments:
-            files = {each for each in files if not _depends_on_its_decks(old[each])}
+            files = {file for file in files if not _depends_on_its_decks(old[file])}
         if compiled.plan is None or not files:
             continue
         difference = _difference(path, compiled, new)
@@ -84,7 +84,7 @@ def upgrades(paths: Sequence[str]) -> Upgrades:
     for path in _decks_beside(proved - wrong.keys(), {os.path.realpath(each) for each in found}):
         compiled = _compiled(path)
         files = {os.path.realpath(name) for name in compiled.sources} & proved - wrong.keys()
-        parts = ", ".join(sorted(os.path.relpath(each) for each in files))
+        parts = ", ".join(sorted(os.path.relpath(file) for file in files))
         difference = _difference(path, compiled, new, parts) if compiled.plan is not None and files else None
         if difference is not None:
             wrong.update(dict.fromkeys(files, difference))
@@ -109,7 +109,7 @@ def _decks_beside(reals: Iterable[str], named: Collection[str]) -> Iterator[str]
 
     The files' folders and those around and inside of these are searched.
     """
-    folders = {os.path.dirname(each) for each in reals}
+    folders = {os.path.dirname(path) for path in reals}
     around = sorted({*folders, *map(os.path.dirname, folders), *(each for f in folders for each in _folders_in(f))})
     texts: dict[str, str] = {}
     for path in (os.path.join(folder, name) for folder in around for name in sorted(os.listdir(folder))):
@@ -118,7 +118,7 @@ def _decks_beside(reals: Iterable[str], named: Collection[str]) -> Iterator[str]
                 texts[os.path.relpath(path)] = Files().text(FoundFile(path, path))
             except Problem:
                 continue
-    wanted = {os.path.basename(each) for each in reals}
+    wanted = {os.path.basename(path) for path in reals}
     includes = {path: {os.path.basename(each) for each in _INCLUDED.findall(text)} for path, text in texts.items()}
     waiting = dict.fromkeys(path for path in texts if os.path.realpath(path) not in named)
     while found := [path for path in waiting if includes[path] & wanted]:
@@ -130,7 +130,7 @@ def _decks_beside(reals: Iterable[str], named: Collection[str]) -> Iterator[str]
 
 def _folders_in(folder: str) -> Iterator[str]:
     with os.scandir(folder) as entries:
-        yield from (each.path for each in entries if each.is_dir() and not each.name.startswith("."))
+        yield from (entry.path for entry in entries if entry.is_dir() and not entry.name.startswith("."))
 
 
 # The text
@@ -191,7 +191,7 @@ def _difference(path: str, before: Compiled, new: Mapping[str, str], parts: str 
     if not all"""
     after = _compiled(path, new)
     if after.plan is None:
-        found = next(each for each in after.diagnostics if each.severity == "error")
+        found = next(diagnostic for diagnostic in after.diagnostics if diagnostic.severity == "error")
         return Problem(_left(path, f"{found.code}, {found.message}", found, parts=parts), after.sources)
     assert before.plan is not None
     olds, news = before.plan.experiments, after.plan.experiments
@@ -215,7 +215,7 @@ def _left(path: str, why: str, found: Diagnostic | None = None, *, parts: str = 
 
 def _not_proved(path: str, compiled: Compiled) -> Problem:
     """The reason why a file that no deck proves is not changed: it cannot be read, does not compile, or has no run."""
-    first = next((each for each in compiled.diagnostics if each.severity == "error"), None)
+    first = next((diagnostic for diagnostic in compiled.diagnostics if diagnostic.severity == "error"), None)
     at = Label(first.at.place, f"{first.code}, {first.message}") if first is not None and first.at is not None else None
     include = "name a deck that includes it, too: `met fmt --upgrade DECK PART`; or write the line by hand"
     why, helps = "it does not compile by itself", ["what it means cannot be compared before and after", include]

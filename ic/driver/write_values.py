@@ -73,7 +73,7 @@ def with_values(
         copy.write(text)
         deck = copy.read()
         run = _run_of(deck, experiment)
-        runs = [each.words[-1].text for each in deck.entries if isinstance(each, Group) and _word(each) == "run"]
+        runs = [entry.words[-1].text for entry in deck.entries if isinstance(entry, Group) and _word(entry) == "run"]
         before = copy.compiled(text, runs)
         wanted = copy.compiled(text, (run,), [value.setting for value in values])
         after = text
@@ -102,7 +102,7 @@ class _Copy:
         self.write(text)
         found = check(self.path, include_dirs=(self.folder,), defines=self.defines, select=select, settings=settings)
         if found.plan is None:
-            first = next(each for each in found.diagnostics if each.severity == "error")
+            first = next(diagnostic for diagnostic in found.diagnostics if diagnostic.severity == "error")
             raise Problem(error("E397", f"the deck cannot be compiled: {first.code}, {first.message}"))
         return found
 
@@ -116,7 +116,9 @@ class _Copy:
 
 def _run_of(deck: Deck, name: str) -> str:
     """The run of a sweep, or of the sweep that it is of. Raises Problem E397 for a sum of sweeps."""
-    groups = {each.words[-1].text: each for each in deck.entries if isinstance(each, Group) and _word(each) != "arm"}
+    groups = {
+        entry.words[-1].text: entry for entry in deck.entries if isinstance(entry, Group) and _word(entry) != "arm"
+    }
     for _ in groups:
         if name in groups and _word(groups[name]) == "run":
             return name
@@ -133,12 +135,12 @@ def _meaning(compiled: Compiled, run: str) -> object:
     assert compiled.plan is not None
     return [
         (
-            structure_key(each.structure),
-            {path: (quantity.value, quantity.unit) for path, quantity in each.parameters.items()},
-            [(one.text, one.comparison, one.limit, one.share, one.confidence) for one in each.requirements],
+            structure_key(experiment.structure),
+            {path: (quantity.value, quantity.unit) for path, quantity in experiment.parameters.items()},
+            [(one.text, one.comparison, one.limit, one.share, one.confidence) for one in experiment.requirements],
         )
-        for each in compiled.plan.experiments
-        if each.name == run
+        for experiment in compiled.plan.experiments
+        if experiment.name == run
     ]
 
 
@@ -154,7 +156,7 @@ def _written_in(copy: _Copy, text: str, value: WrittenValue, run: str, remark: s
     place = places.pop() if len(places) == 1 else None
     source, deck = Text(str(copy.path), text), copy.read()
     home, _, rest = value.path.partition(".")
-    owners = [each for each in deck.entries if copy.is_own(each.place) and _may_own(each, home, run)]
+    owners = [entry for entry in deck.entries if copy.is_own(entry.place) and _may_own(entry, home, run)]
     for owner in owners:
         first, last = _extent(source, owner)
         if place is not None and copy.is_own(place) and first <= _offset(source, place) < last:
@@ -162,7 +164,7 @@ def _written_in(copy: _Copy, text: str, value: WrittenValue, run: str, remark: s
     blocks = [each for each in owners if isinstance(each, Group) and _word(each) == "servo"]
     if blocks and rest.isidentifier():
         first, last = _extent(source, blocks[0])
-        uses = [each.use for each in place.expansions] if place is not None else []
+        uses = [expansion.use for expansion in place.expansions] if place is not None else []
         if not any(copy.is_own(use) and first <= _offset(source, use) < last for use in uses):
             return _added(source, last, rest, value, remark)
     raise _by_hand(value, _why(copy, place, home))

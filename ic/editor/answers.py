@@ -113,7 +113,7 @@ class Asked:
         meant = self.names.meant_in(self.text, token)
         defined = {id(each.token) for each in self.names.by_name[token.text]}
         return [
-            self.location(each) for each in self._uses(token.text, meant) if also_definitions or id(each) not in defined
+            self.location(use) for use in self._uses(token.text, meant) if also_definitions or id(use) not in defined
         ]
 
     def _uses(self, name: str, meant: list[NameInText]) -> Iterator[Token]:

@@ -34,7 +34,7 @@ class OpenCall:
     @property
     def wanted(self) -> Parameter | None:
         """The parameter whose value is written."""
-        return next((each for each in self.parameters if each.name == self.argument), None)
+        return next((parameter for parameter in self.parameters if parameter.name == self.argument), None)
 
 
 def open_call(texts: Sequence[str]) -> OpenCall | None:

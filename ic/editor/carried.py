@@ -58,11 +58,11 @@ def carried_over(last: CheckReply, now: CheckReply) -> CheckReply:
 
     told = {(each.code, each.at.place) for each in now.diagnostics if each.at is not None}
     kept: list[Diagnostic] = []
-    for each in last.diagnostics:
+    for diagnostic in last.diagnostics:
         try:
-            at = label(each.at) if each.at is not None else None
-            if at is not None and (each.code, at.place) not in told:
-                kept.append(replace(each, at=at, also=tuple(map(label, each.also))))
+            at = label(diagnostic.at) if diagnostic.at is not None else None
+            if at is not None and (diagnostic.code, at.place) not in told:
+                kept.append(replace(diagnostic, at=at, also=tuple(map(label, diagnostic.also))))
         except _Changed:
             continue
     return replace(now, diagnostics=(*now.diagnostics, *kept), edits=(*now.edits, *(() for _ in kept)))
@@ -102,4 +102,4 @@ class LastAudit:
 
 
 def _has_errors(reply: CheckReply) -> bool:
-    return any(each.severity == "error" for each in reply.diagnostics)
+    return any(diagnostic.severity == "error" for diagnostic in reply.diagnostics)

@@ -137,7 +137,7 @@ def first_replies(request: CheckRequest, clock: Callable[[], float] = time.monot
     try:
         deck = read(
             Path(request.name),
-            [Path(each) for each in request.include_dirs],
+            [Path(include_dir) for include_dir in request.include_dirs],
             request.defines,
             despite_errors=True,
             text=request.text,

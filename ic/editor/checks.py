@@ -142,14 +142,14 @@ class DeckChecks:
 
     def unsaved(self) -> dict[str, str]:
         """The open texts of files, by the files' real paths."""
-        return {each.identity: each.text for each in self.texts.values() if each.path is not None}
+        return {text.identity: text.text for text in self.texts.values() if text.path is not None}
 
     def deck_of(self, uri: str) -> CheckedDeck | None:
         """The deck that a text is part of, as last checked."""
         text = self.texts.get(uri)
         if uri in self.checked:
             return self.checked[uri]
-        return next((each for each in self.decks() if text is not None and text.identity in each.files), None)
+        return next((deck for deck in self.decks() if text is not None and text.identity in deck.files), None)
 
     def decks(self) -> list[CheckedDeck]:
         """The known decks among the open texts that no other one includes."""

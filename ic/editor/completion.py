@@ -95,9 +95,12 @@ def _of_directive(line: str, files: Iterable[str]) -> Iterator[Offer]:
     if word == "include" or word.startswith(("include<", 'include"')):
         rest = rest or word.removeprefix("include")
         if "<" in rest:
-            yield from (Offer(each, types.CompletionItemKind.File, "standard library") for each in library_files())
+            yield from (
+                Offer(library_file, types.CompletionItemKind.File, "standard library")
+                for library_file in library_files()
+            )
         elif '"' in rest:
-            yield from (Offer(each, types.CompletionItemKind.File) for each in files)
+            yield from (Offer(file, types.CompletionItemKind.File) for file in files)
     elif not rest and " " not in line.lstrip():
         yield from (Offer(each, types.CompletionItemKind.Keyword) for each in DIRECTIVES)
 
@@ -292,10 +295,10 @@ def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> 
     head = "".join(reversed(parts))
     about: dict[str, str] = {}
     signals_alone = words[0].text in _SIGNALS_ALONE
-    for each in index.values:
-        if not signals_alone and each.path.startswith(head):
-            part, _, more = each.path[len(head) :].partition(".")
-            about.setdefault(part, "" if more else f"{each.value}; {each.doc}")
+    for value in index.values:
+        if not signals_alone and value.path.startswith(head):
+            part, _, more = value.path[len(head) :].partition(".")
+            about.setdefault(part, "" if more else f"{value.value}; {value.doc}")
     signals = index.signals
     if words[0].text in _OF_SIGNALS and not any(path.startswith(head) for path in signals):
         signals = tuple(f"{head}{name}" for name, *_ in (*MOTION, *OF_JOINT) if _names_a_joint(head, names))
@@ -328,7 +331,7 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
     key = texts[0]
     wanted = _parameter(texts, around, names)
     if wanted is not None and wanted.words:
-        yield from (Offer(each, types.CompletionItemKind.EnumMember, wanted.doc) for each in wanted.words)
+        yield from (Offer(word, types.CompletionItemKind.EnumMember, wanted.doc) for word in wanted.words)
         return
     where = around.kind if around is not None else ""
     call = open_call(texts)
@@ -381,15 +384,15 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
     watches = key == "metric" and call is not None and call.argument == WATCHES.name
     if key in _PATHS or key in _SIGNALS_ALONE or watches:
         values = () if key in _SIGNALS_ALONE else index.values
-        heads = dict.fromkeys(each.path.partition(".")[0] for each in values)
+        heads = dict.fromkeys(value.path.partition(".")[0] for value in values)
         heads |= dict.fromkeys(path.partition(".")[0] for path in index.signals)
-        yield from (Offer(each, types.CompletionItemKind.Field, "the first word of a path") for each in heads)
+        yield from (Offer(head, types.CompletionItemKind.Field, "the first word of a path") for head in heads)
         if key in _SIGNALS_ALONE:
             yield from _named(names, "joint", "macro", around=around)
             return
         yield from _named(names, "joint", "metric", "servo", around=around)
     if call is not None and texts[-1] in ("(", ",", ";") and not call.argument:
-        yield from (_of_parameter(each) for each in call.parameters if each.name not in call.given)
+        yield from (_of_parameter(parameter) for parameter in call.parameters if parameter.name not in call.given)
         if key == "shape":
             return
     yield from _of_expression(names)
@@ -407,9 +410,9 @@ def _of_goal(texts: list[str], around: TextEntry | None, names: NamesInTexts, in
     if texts.count("(") > texts.count(")"):
         heads = dict.fromkeys(path.partition(".")[0] for path in index.signals)
         yield from _named(names, "metric", "linear", "joint", around=around)
-        yield from (Offer(each, types.CompletionItemKind.Field, "the first word of a path") for each in heads)
+        yield from (Offer(head, types.CompletionItemKind.Field, "the first word of a path") for head in heads)
         yield from _of_expression(names)
-    elif any(each in COMPARISONS for each in texts):
+    elif any(text in COMPARISONS for text in texts):
         yield from _named(names, "servo")
         yield from _of_expression(names)
     else:
@@ -423,10 +426,10 @@ def _of_goal(texts: list[str], around: TextEntry | None, names: NamesInTexts, in
 def _of_varied(texts: list[str], names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
     """The words after `vary`, `with` and `exclude when`: a path of a parameter, then its values."""
     if "=" not in texts:
-        heads = dict.fromkeys(each.path.partition(".")[0] for each in index.values)
-        for each in heads:
-            if texts[0] != "vary" or each not in _NOT_VARIED:
-                yield Offer(each, types.CompletionItemKind.Field, "the first word of a path")
+        heads = dict.fromkeys(value.path.partition(".")[0] for value in index.values)
+        for head in heads:
+            if texts[0] != "vary" or head not in _NOT_VARIED:
+                yield Offer(head, types.CompletionItemKind.Field, "the first word of a path")
         if texts == ["vary"]:
             yield Offer("macro", types.CompletionItemKind.Keyword, "a macro of the deck: `vary macro NAME = [...];`")
         yield from _named(names, "joint", "servo", "let", "macro", "roof")

@@ -105,7 +105,7 @@ class MacrosInTexts:
                 made += self.expanded(pasted(macro.body), room, within | {token.text})
             elif at < len(tokens) and tokens[at].text == "(":
                 arguments, at = arguments_at(tokens, at)
-                given = dict(zip((each.text for each in macro.parameters), arguments, strict=False))
+                given = dict(zip((parameter.text for parameter in macro.parameters), arguments, strict=False))
                 made += self.expanded(pasted(_filled(macro.body, given)), room, within | {token.text})
             else:
                 made.append(token)

@@ -209,7 +209,7 @@ class NamesInTexts:
             bases += self._named_behind("of", entry, "run") if entry.kind in OF_A_RUN else ()
             for inner in entry.entries:
                 bases += self._named_behind("=", inner, "arm") if inner.texts[:2] == ["arm", "="] else ()
-            waiting += [each.entry for each in bases if each.entry is not None]
+            waiting += [base.entry for base in bases if base.entry is not None]
         return owners
 
     def _named_behind(self, word: str, entry: TextEntry, kind: str) -> list[NameInText]:
@@ -260,7 +260,7 @@ class NamesInTexts:
     def _defined(self, text: DeckText) -> Iterator[NameInText]:
         yield from _named(text.all_entries(), made=False)
         yield from (NameInText("roof", use.roof, None) for use in uses_in(text))
-        parameters = {each.text for macro in text.macros for each in macro.parameters or ()}
+        parameters = {parameter.text for macro in text.macros for parameter in macro.parameters or ()}
         for macro in text.macros:
             yield NameInText("macro", macro.name, None)
         known: set[tuple[str, int]] = set()

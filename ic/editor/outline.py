@@ -53,7 +53,7 @@ def _symbols(entries: Iterable[TextEntry], position: Position, levels: int = DEP
             _KINDS.get(entry.kind, types.SymbolKind.Object),
             types.Range(position(entry.words[0].offset), position(max(entry.closed, shown.end))),
             types.Range(position(shown.offset), position(shown.end)),
-            detail=" ".join(each for each in entry.texts if each != shown.text)[:80] or None,
+            detail=" ".join(text for text in entry.texts if text != shown.text)[:80] or None,
             children=list(_symbols(entry.entries, position, levels - 1)) if levels else [],
         )
 

@@ -113,7 +113,7 @@ class _Deck:
 
     @property
     def codes(self) -> list[str]:
-        return [each.code for each in self.compiled.diagnostics if each.severity == "error"]
+        return [diagnostic.code for diagnostic in self.compiled.diagnostics if diagnostic.severity == "error"]
 
 
 def _is_deck(name: str) -> bool:
@@ -214,7 +214,9 @@ def _is_proved(deck: _Deck, edits: Mapping[str, tuple[tuple[int, int], ...]], ol
     after = _compiled(replace(request, unsaved={**request.unsaved, **changed}))
     before = deck.compiled
     if before.plan is None or after.plan is None:
-        if [each.code for each in after.diagnostics] != [each.code for each in before.diagnostics]:
+        if [diagnostic.code for diagnostic in after.diagnostics] != [
+            diagnostic.code for diagnostic in before.diagnostics
+        ]:
             raise NotRenamed(f"`{old}` would not be found everywhere: {after.diagnostics[0].message}")
         return False
     one, other = (encode(type(each), each) for each in (before.plan, after.plan))

@@ -88,9 +88,9 @@ def _parameter_or_index(text: DeckText, token: Token, loops: list[TextEntry]) ->
     """True where a word is the parameter of a macro, or the index of a loop around it."""
     for macro in text.macros:
         if macro.name.offset < token.offset <= macro.end:
-            for each in macro.parameters or ():
-                if each.text == token.text:
-                    return "parameter", DEFINES if each.offset == token.offset else 0
+            for parameter in macro.parameters or ():
+                if parameter.text == token.text:
+                    return "parameter", DEFINES if parameter.offset == token.offset else 0
     for loop in loops:
         index = loop.words[1]
         if index.text == token.text and index.offset <= token.offset < loop.closed:

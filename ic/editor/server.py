@@ -52,7 +52,7 @@ class DeckServer(LanguageServer):
             self.publish,
             self.log,
             self.refresh,
-            include_dirs=[os.path.abspath(each) for each in include_dirs],
+            include_dirs=[os.path.abspath(include_dir) for include_dir in include_dirs],
             defines=defines,
         )
         self._last_runs = last_runs
@@ -81,7 +81,7 @@ class DeckServer(LanguageServer):
             self._warn(f"no option `{name}`; there are: {', '.join(OPTIONS)}")
         for name in ("includeDirs", "defines"):
             words = options.get(name, [])
-            if not isinstance(words, list) or not all(isinstance(each, str) for each in words):
+            if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
                 self._warn(f"the option `{name}` is a list of texts")
             elif name == "defines":
                 self.checks.defines = (*self.checks.defines, *words)
@@ -125,7 +125,7 @@ class DeckServer(LanguageServer):
         if path is None:
             return None
         real = real_path(path)
-        return next((each.uri for each in self.checks.texts.values() if each.identity == real), uri_of(path))
+        return next((text.uri for text in self.checks.texts.values() if text.identity == real), uri_of(path))
 
     def _as_checked(self, deck: CheckedDeck, uri: str) -> bool:
         """True where a text is the same as when the deck was checked."""

@@ -74,7 +74,7 @@ class TextEntry:
             if self.within is not None and self.within.kind == "servos":
                 return "servo"
             return self.kind if self.texts[2:3] == ["="] and self.kind in BLOCKS else ""
-        behind = next((each for each in self.texts[2:3] if each in BLOCKS), "")  # `link NAME boom { ... }`
+        behind = next((text for text in self.texts[2:3] if text in BLOCKS), "")  # `link NAME boom { ... }`
         if behind and BLOCKS[behind].written.startswith(f"{self.kind} "):
             return behind
         return self.kind if self.kind in BLOCKS else ""
@@ -231,7 +231,7 @@ def through_loops(entries: Iterable[TextEntry]) -> Iterator[TextEntry]:
 def indices_around(entries: Iterable[TextEntry], offset: int) -> set[str]:
     """The indices of the loops in whose bodies an offset is."""
     loops = (each for each in flattened(entries) if _no_loop(each) is not each and each.opened is not None)
-    return {each.texts[1] for each in loops if each.opened is not None and each.opened.end <= offset < each.closed}
+    return {loop.texts[1] for loop in loops if loop.opened is not None and loop.opened.end <= offset < loop.closed}
 
 
 @frozen

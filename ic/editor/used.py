@@ -55,7 +55,7 @@ class DecksUsed:
     """
 
     def __init__(self, texts: Sequence[DeckText]) -> None:
-        self._uses = {each.source.name: list(uses_in(each)) for each in texts}
+        self._uses = {text.source.name: list(uses_in(text)) for text in texts}
         self._beside: dict[str, set[str]] = {name: set() for name in self._uses}  # includes, or is included by
         reached: set[str] = set()
         for each in texts if any(self._uses.values()) else ():

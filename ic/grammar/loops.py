@@ -177,7 +177,7 @@ class Loops(Expressions):
                 place,
                 help=f"change its ends, or take larger steps: `{longer}` is the smallest that fits",
             )
-        return [str(each) for each in iterations]
+        return [str(iteration) for iteration in iterations]
 
     def whole(self, help: str = _ENDS) -> int:
         """The whole number that begins here. help: what to write where there is none."""

@@ -168,7 +168,7 @@ class _Parser(Uses):
         sets = bool(names) and behind < len(tokens) and tokens[behind].text in ("=", "+=")
         end = last.place.macros[-1].use if last.place.macros else last.place
         at = first.place.macros[-1].use if first.place.macros else first.place
-        known = [each.text for each in names[1:] or names]
+        known = [name.text for name in names[1:] or names]
         if len(names) == 1 and behind == 1 and tokens[behind:] and tokens[behind].text == "(":  # likewise, misspelt
             known += [token.text for token in tokens if token.kind == NAME]
         if any(token.kind == BAD for token in tokens):  # a macro's use, perhaps: its arguments may be names

@@ -15,7 +15,11 @@ def print_assumptions(compiled: Compiled) -> list[str]:
     assert compiled.plan is not None
     lines: list[str] = []
     for experiment in compiled.plan.experiments:
-        lines += [*([""] if lines else []), experiment.name, *columns([_row(each) for each in assumptions(experiment)])]
+        lines += [
+            *([""] if lines else []),
+            experiment.name,
+            *columns([_row(assumption) for assumption in assumptions(experiment)]),
+        ]
     return lines
 
 
@@ -31,6 +35,6 @@ def assumptions_json(compiled: Compiled) -> list[dict[str, Any]]:
     """The same for programs, a list a run."""
     assert compiled.plan is not None
     return [
-        {"run": experiment.name, "assumptions": [asdict(each) for each in assumptions(experiment)]}
+        {"run": experiment.name, "assumptions": [asdict(assumption) for assumption in assumptions(experiment)]}
         for experiment in compiled.plan.experiments
     ]

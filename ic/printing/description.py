@@ -50,8 +50,12 @@ def description() -> dict[str, Any]:
             }
             for block in BLOCKS.values()
         ],
-        "top_level": [{key: each[key] for key in ("name", "written", "doc")} for each in block_page(TOP_LEVEL).records],
-        "anywhere": [{key: each[key] for key in ("name", "written", "doc")} for each in block_page(ANYWHERE).records],
+        "top_level": [
+            {key: record[key] for key in ("name", "written", "doc")} for record in block_page(TOP_LEVEL).records
+        ],
+        "anywhere": [
+            {key: record[key] for key in ("name", "written", "doc")} for record in block_page(ANYWHERE).records
+        ],
         "models": [
             {**model_record(kind, model), "written": where_written(kind, model)}
             for kind in KINDS
@@ -65,9 +69,9 @@ def description() -> dict[str, Any]:
         "units": subjects.unit_table(),
         "unit_words": {**UNIT_WORDS, **subjects.MORE_WORDS},
         "functions": [
-            {**each, "arguments": list(USAGE[each["name"]])}
-            for each in sweeps.functions_page().records
-            if each["name"] in USAGE
+            {**record, "arguments": list(USAGE[record["name"]])}
+            for record in sweeps.functions_page().records
+            if record["name"] in USAGE
         ],
         "constants": dict(CONSTANTS),
         "comparisons": list(COMPARISONS),

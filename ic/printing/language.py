@@ -13,11 +13,11 @@ from ic.text.complaints import with_article
 def block_page(block: BlockDeclaration) -> Page:
     """The page of a block."""
     numbers = [
-        (each.name, type_of(each), "" if each.parameter.words else range_(each.parameter))
-        for each in block.entries
-        if each.parameter
+        (entry.name, type_of(entry), "" if entry.parameter.words else range_(entry.parameter))
+        for entry in block.entries
+        if entry.parameter
     ]
-    varying = [(_path(each), _varies(each)) for each in block.entries if each.path and each.varies != "never"]
+    varying = [(_path(entry), _varies(entry)) for entry in block.entries if entry.path and entry.varies != "never"]
     return Page(
         subject=block.name,
         title=f"block {block.name}",
@@ -26,7 +26,7 @@ def block_page(block: BlockDeclaration) -> Page:
         parts=(
             Table(
                 head=("written", "default", "meaning"),
-                rows=[(each.written, each.default, each.doc) for each in block.entries],
+                rows=[(entry.written, entry.default, entry.doc) for entry in block.entries],
             ),
             f"Also {block.free}." if block.free else "",
             Table(
@@ -39,7 +39,7 @@ def block_page(block: BlockDeclaration) -> Page:
                 caption="What a sweep varies and `--set` replaces",
             ),
         ),
-        records=[_entry_record(each) for each in block.entries],
+        records=[_entry_record(entry) for entry in block.entries],
     )
 
 

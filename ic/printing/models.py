@@ -209,7 +209,7 @@ def meaning(parameter: Parameter) -> str:
 def sources(parameters: Iterable[Parameter]) -> list[str]:
     """The sources of parameters, a line for each: `Source of kp, ki: ...`."""
     named: dict[str, list[str]] = {}
-    for each in parameters:
-        if each.source and each.name not in named.setdefault(each.source, []):
-            named[each.source].append(each.name)
+    for parameter in parameters:
+        if parameter.source and parameter.name not in named.setdefault(parameter.source, []):
+            named[parameter.source].append(parameter.name)
     return [f"Source of {', '.join(names)}: {source}" for source, names in named.items()]

@@ -79,7 +79,7 @@ def print_plan(plan: Plan, *, verbose: bool = False) -> Iterator[str]:
     if plan.settings:
         yield ""
         yield "Set on the command line"
-        yield from (f"  {each}" for each in plan.settings)
+        yield from (f"  {setting}" for setting in plan.settings)
 
 
 def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False) -> Iterator[str]:
@@ -109,7 +109,7 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
         yield from _sensors(experiment)
         yield ""
     yield from _environment(experiment)
-    chosen = [each for each in kept_keys(experiment) if each[0].listed and each[1] != each[0].parameter.default]
+    chosen = [entry for entry in kept_keys(experiment) if entry[0].listed and entry[1] != entry[0].parameter.default]
     if chosen:
         yield "Set by the run, and not the default"
         rows = []
@@ -128,7 +128,7 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
     if experiment.tolerances:
         yield ""
         yield "Tolerances: by how much another version may differ before `met diff` says so"
-        yield from columns([(each.of, each.text) for each in experiment.tolerances])
+        yield from columns([(tolerance.of, tolerance.text) for tolerance in experiment.tolerances])
     yield ""
     yield from _cases(experiment)
     if experiment.allowances:
@@ -416,8 +416,8 @@ def _metrics(experiment: Experiment) -> Iterator[str]:
     yield "Metrics and what is required of them"
     rows = []
     for use in experiment.metrics:
-        required = [each.text for each in experiment.requirements if each.metric == use.name]
-        required += [each.text for each in experiment.step_errors if each.metric == use.name]
+        required = [requirement.text for requirement in experiment.requirements if requirement.metric == use.name]
+        required += [step_error.text for step_error in experiment.step_errors if step_error.metric == use.name]
         rows.append((use.name, f"{use.model} of {use.of}", ", ".join(f"require {text}" for text in required)))
     yield from columns(rows)
 

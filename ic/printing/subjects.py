@@ -77,14 +77,14 @@ def channels_page() -> Page:
     records = channels()
     rows = [
         (
-            each["path"],
-            unit_in_words(each["unit"]),
-            each["components"],
-            "; ".join(filter(None, (each["meaning"], each["frame"]))),
+            record["path"],
+            unit_in_words(record["unit"]),
+            record["components"],
+            "; ".join(filter(None, (record["meaning"], record["frame"]))),
         )
-        for each in records
+        for record in records
     ]
-    words = words_in([each["unit"] for each in records], {**UNIT_WORDS, **MORE_WORDS})
+    words = words_in([record["unit"] for record in records], {**UNIT_WORDS, **MORE_WORDS})
     return Page(
         subject="channels",
         title="Channels",
@@ -128,7 +128,7 @@ def shapes_page() -> Page:
         usage="link NAME { mass = 2 kg;  shape = rod(length = 1 m, along = x); }",
         parts=[parameter_table(shape.parameters, caption=name) for name, shape in shapes.SHAPES.items()],
         records=[
-            {"name": name, "parameters": [parameter_record(each) for each in shape.parameters]}
+            {"name": name, "parameters": [parameter_record(parameter) for parameter in shape.parameters]}
             for name, shape in shapes.SHAPES.items()
         ],
     )
@@ -176,7 +176,7 @@ def linear_page() -> Page:
 
 def units_page() -> Page:
     records = unit_table()
-    rows = [(each["name"], each["word"], in_si(each)) for each in records]
+    rows = [(record["name"], record["word"], in_si(record)) for record in records]
     return Page(
         subject="units",
         title="Units",

@@ -107,10 +107,10 @@ def _of_blocks() -> Iterator[tuple[str, Row]]:
     """The words of the grammar and of the entries of blocks, with their meanings."""
     yield from SYNTAX.items()
     for block in (*BLOCKS.values(), TOP_LEVEL, ANYWHERE):
-        for each in block.entries:
-            yield each.name.split()[0], (each.written, in_block(block), f"{each.doc}\ndefault: {each.default}")
-            for word in each.parameter.words if each.parameter else ():
-                yield word, (f"{each.name} = {word};", in_block(block), each.doc)
+        for entry in block.entries:
+            yield entry.name.split()[0], (entry.written, in_block(block), f"{entry.doc}\ndefault: {entry.default}")
+            for word in entry.parameter.words if entry.parameter else ():
+                yield word, (f"{entry.name} = {word};", in_block(block), entry.doc)
 
 
 def _of_values() -> Iterator[tuple[str, Row]]:
@@ -119,7 +119,7 @@ def _of_values() -> Iterator[tuple[str, Row]]:
         for record in words_page().records:
             yield record["name"], (record["written"], f"a value: `met doc {subject}`", record["doc"])
     for name, shape in shapes.SHAPES.items():
-        for word in (name, *(each.name for each in shape.parameters)):
+        for word in (name, *(parameter.name for parameter in shape.parameters)):
             yield word, (f"shape = {name}(...)", "a link or payload", "`met doc shapes` shows it")
     for convention in dh.CONVENTIONS:
         yield convention, (f"dh = {convention}(...)", "a joint", "`met doc dh` shows its numbers")

@@ -189,7 +189,7 @@ def _filled_in(element: Element, attribute: str) -> str:
 def _numbers(element: Element, attribute: str, known: Attribute) -> Numbers:
     """The numbers of an attribute. Raises Problem D203, D206."""
     words, place = _filled_in(element, attribute).split(), element.place_of(attribute)
-    found = [_number(each, attribute, place, known, count=len(words)) for each in words]
+    found = [_number(word, attribute, place, known, count=len(words)) for word in words]
     if len(words) != known.count:
         wanted = "one number is" if known.count == 1 else f"{known.count} numbers are"
         raise Problem(
@@ -239,7 +239,7 @@ def _other_attribute(element: Element, name: str, text: str, dropped: dict[str, 
     if not alike and not kind.refuses:
         dropped.setdefault(f"{name} of {element.tag}", []).append(element)
         return
-    listed = ", ".join(f"`{each}`" for each in kind.attributes)
+    listed = ", ".join(f"`{attribute}`" for attribute in kind.attributes)
     raise Problem(
         error(
             "D208",

@@ -65,7 +65,7 @@ def remarks(body: ArmEntries) -> Iterator[str]:
     attributes = {what: elements for what, elements in body.robot.dropped.items() if " of " in what}
     if attributes:
         yield f"attributes not read, and not in the deck: {_counted(attributes)}"
-    yield from (each.text for each in in_other_units(body.robot))
+    yield from (remark.text for remark in in_other_units(body.robot))
     yield from incomplete(body.robot)
     if body.no_body:
         yield f"the inertia of `{shown(body.robot.root.name.text)}`, the base, is not in the deck: {body.no_body}"
@@ -98,9 +98,9 @@ def _block(part: RobotEntry, notes: list[str]) -> Iterator[str]:
 def _rows(settings: list[tuple[str, str]]) -> list[list[tuple[str, str]]]:
     """The settings of a block, by line: a joint's parent and child, and its limits, each on one line if that is
     short."""
-    limited = [each for each in settings if each[0] in LIMITS.values()]
-    ends = [each for each in settings if each[0] in ("parent", "child")]
-    others = [[each] for each in settings if each not in ends and each not in limited]
+    limited = [setting for setting in settings if setting[0] in LIMITS.values()]
+    ends = [setting for setting in settings if setting[0] in ("parent", "child")]
+    others = [[setting] for setting in settings if setting not in ends and setting not in limited]
     short = sum(len(f"  {key} = {value}") for key, value in limited) <= WIDE
     return [*([ends] if ends else []), *others, *([limited] if limited and short else [[each] for each in limited])]
 

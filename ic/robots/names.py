@@ -51,7 +51,7 @@ def deck_names(robot: Robot) -> DeckNames:
     links |= _named([link.name for link in robot.carried], "link", {"base"})
     joints = _named([joint.name for joint in robot.joints], "joint", set(links.values()))
     changed = [ChangedName("link", each.name, links[each.name.text]) for each in robot.carried]
-    changed += [ChangedName("joint", each.name, joints[each.name.text]) for each in robot.joints]
+    changed += [ChangedName("joint", joint.name, joints[joint.name.text]) for joint in robot.joints]
     return DeckNames(links, joints, tuple(each for each in changed if each.name != each.written.text))
 
 

@@ -219,7 +219,7 @@ def _root(element: Element, links: Sequence[Link], joints: Sequence[Joint]) -> L
                 "D209",
                 f"{len(roots)} links of this robot hang on no other, and an arm has one base",
                 Label(roots[0].name.place, shown(roots[0].name.text)),
-                also=[Label(each.name.place, shown(each.name.text)) for each in roots[1:MOST_NAMED]],
+                also=[Label(root.name.place, shown(root.name.text)) for root in roots[1:MOST_NAMED]],
                 help='join them by a `<joint type="fixed">`, or take one of the robots out of the file',
             )
         )

@@ -137,9 +137,9 @@ def _is_word(path: str) -> bool:
     else:
         available = [model for kind in models.GROUPS for model in models.available(kind).values()]
         declared = [p for model in available for p in models.written(model)]
-        entries = [each for block in BLOCKS.values() for each in block.entries]
+        entries = [entry for block in BLOCKS.values() for entry in block.entries]
     are_words = [p.shape in ("word", "words") for p in declared if p.name == name]
-    are_words += [each.varies != "number" for each in entries if each.name == name]
+    are_words += [entry.varies != "number" for entry in entries if entry.name == name]
     return bool(are_words) and all(are_words)
 
 

@@ -101,7 +101,7 @@ def _has_noise(experiment: Experiment) -> bool:
 def _fewest_of_a_point(experiment: Experiment) -> int:
     """The number of cases of the smallest design point."""
     cases = experiment.cases
-    chosen = [each.values for each in cases.coordinates if not each.design]
+    chosen = [coordinate.values for coordinate in cases.coordinates if not coordinate.design]
     if not chosen:
         return cases.count
     if all(isinstance(values, AxisColumn) for values in chosen):

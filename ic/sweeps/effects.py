@@ -209,7 +209,7 @@ def _idle(scope: Scope, run: Definition, settings: Mapping[str, Setting], memo: 
         return None
     cases = Cases(1, tuple(Coordinate(path, "1", 1.0, each.values[:1], ()) for path, each in varied.items()))
     made = experiment(trial, run.name, run.place, resolved, cases)
-    zero = tuple(replace(each, values=np.zeros(1)) for each in cases.coordinates)
+    zero = tuple(replace(coordinate, values=np.zeros(1)) for coordinate in cases.coordinates)
     asked = replace(made, cases=replace(cases, coordinates=zero))  # the program's answer, independent of the values
     return memo.answer("idle settings", asked, lambda: without_effect(made))
 

@@ -182,7 +182,7 @@ class _Sweep:
         resolved = resolve_run(scope, read.base)
         check_coordinates(scope, complete=resolved is not None)
         lost = varied_paths(read.definitions, self.definition) - set(varied)
-        excludes = [each for each in sweep.excludes if not names_in(each.value) & lost]
+        excludes = [exclude for exclude in sweep.excludes if not names_in(exclude.value) & lost]
         if resolved is not None and excludes and not self.complaints.is_known_to_lack(read.base.place):
             first = SweptRows(sweep.sizes, tuple(np.zeros(1, np.int64) for _ in sweep.sizes))
             kept(scope, replace(sweep, excludes=tuple(excludes)), first, (), resolved.structure)

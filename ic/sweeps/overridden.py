@@ -71,5 +71,5 @@ def _places_in(expression: Expression) -> Iterator[Place]:
     if isinstance(expression, Call):
         yield from (word.place for word, _ in expression.named)
         yield from _places(expression.body or ())
-    for each in children(expression):
-        yield from _places_in(each)
+    for child in children(expression):
+        yield from _places_in(child)

@@ -385,7 +385,7 @@ def _against(
         return None
     cannot = [
         *((column.place, "it chooses what decides the program") for column in sweep.chosen),
-        *((each.place, "it leaves cases out") for each in sweep.excludes),
+        *((exclude.place, "it leaves cases out") for exclude in sweep.excludes),
         *([(sweep.repeated, "it repeats cases")] if sweep.repeated is not None else []),
         *([(sweep.independent, "each of its cases has noise of its own")] if sweep.independent is not None else []),
         *([(axis.until_shown, "it runs cases until something is shown") for axis in sweep.axes if axis.until_shown]),
@@ -462,7 +462,7 @@ def _plants(sweep: Sweep | None) -> tuple[tuple[float, ...], ...]:
 def with_corners(search: Search, columns: Mapping[str, CaseValues]) -> tuple[dict[str, np.ndarray], int]:
     """The cases of the first generation, then others that may occur: at the bounds of the chosen parameters, and with
     each plant; and their total number. Results for these are assumed to hold in between."""
-    ends = [(each.low, each.high) for each in search.parameters]
+    ends = [(parameter.low, parameter.high) for parameter in search.parameters]
     if len(ends) <= MOST_CORNERS:
         corners = list(itertools.product(*ends))
     else:
@@ -497,8 +497,9 @@ def each_case(requirements: tuple[Requirement, ...]) -> tuple[tuple[Requirement,
     from dataclasses import replace
 
     notes = [
-        f"`{each.text}` is of a share of cases, of which chosen cases show nothing: each is held against its limit"
-        for each in requirements
-        if each.share is not None
+        f"`{requirement.text}` is of a share of cases, of which chosen cases show nothing: "
+        "each is held against its limit"
+        for requirement in requirements
+        if requirement.share is not None
     ]
-    return tuple(replace(each, share=None, confidence=None) for each in requirements), notes
+    return tuple(replace(requirement, share=None, confidence=None) for requirement in requirements), notes

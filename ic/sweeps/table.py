@@ -230,7 +230,9 @@ class _Truths(Truths):
         try:
             return scope.names.find(name)
         except Problem as problem:
-            if not any(each.at is not None and each.at.place == name.place for each in problem.diagnostics):
+            if not any(
+                diagnostic.at is not None and diagnostic.at.place == name.place for diagnostic in problem.diagnostics
+            ):
                 raise  # it has one, which is wrong
             later = "a metric" if name.text in {use.name for use in self.structure.metrics} else ""
             later = later or ("a channel" if name.text in channels(self.structure, [name.text]) else "")

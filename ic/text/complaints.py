@@ -220,8 +220,8 @@ class Complaints:
         not reported."""
         self._spots.update(_spot(each.at.place) for each in self.errors if each.at is not None)
         self._unreadable += stretches
-        self._torn.update(each.within for each in stretches if each.within is not None)
-        self.note_lost_names(*(name for each in stretches for name in each.names))
+        self._torn.update(stretch.within for stretch in stretches if stretch.within is not None)
+        self.note_lost_names(*(name for stretch in stretches for name in stretch.names))
 
     def note_lost_names(self, *names: str) -> None:
         """Note names that may be defined by something that could not be taken in, already reported."""
@@ -396,7 +396,9 @@ class Complaints:
 
         allowed the places of each `allow` by the code
         """
-        for diagnostic in [each for each in self.warnings if each in self._of_no_run and each.code in allowed]:
+        for diagnostic in [
+            warning for warning in self.warnings if warning in self._of_no_run and warning.code in allowed
+        ]:
             places = tuple(allowed[diagnostic.code])
             self.needed_allowances.update(places)
             self._silenced[diagnostic] = places[0]

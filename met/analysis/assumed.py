@@ -72,7 +72,7 @@ class _Along:
         self.tree = self.system.tree(tape.read).each(lambda _, value: float(value))
         self.t = np.linspace(0.0, experiment.structure.schedule.duration, INSTANTS)
         motions = [self._course(each, joint) for each, joint in zip(self.system.actuators, self.names, strict=True)]
-        self.q, self.qd, self.qdd = ([each[k] for each in motions] for k in range(3))
+        self.q, self.qd, self.qdd = ([motion[k] for motion in motions] for k in range(3))
         moving, turning = (
             self.system.followed(tape.read, Motion(tuple(self.q), tuple(rates)))  # type: ignore[arg-type]
             for rates in (self.qd, self.qdd)
@@ -124,7 +124,7 @@ class _Along:
 
     def largest(self, subject: str, assumed: str, meaning: str, torques: Sequence[Any]) -> Iterator[Assumption]:
         """An assumption with the largest of these torques by joint, over all instants; one with forces besides."""
-        sizes = [float(np.max(np.abs(each))) for each in torques]
+        sizes = [float(np.max(np.abs(torque))) for torque in torques]
         for unit in ("N*m", "N"):
             of = [i for i, joint in enumerate(self.system.joints) if _unit(joint) == unit]
             if of:
@@ -202,7 +202,8 @@ class _Along:
         joints: dict[str, list[str]] = {}
         for actuator in self.system.working:
             known = {
-                each.name: self.parameters.get(f"{actuator.path}.{each.name}") for each in actuator.parts.parameters
+                parameter.name: self.parameters.get(f"{actuator.path}.{parameter.name}")
+                for parameter in actuator.parts.parameters
             }
             zeros = [name for name, x in known.items() if x and x.origin.kind == "default" and x.value == 0.0]
             if zeros and actuator.use.joint not in self.system.structure.springs:

@@ -28,7 +28,7 @@ def idle_inputs(experiment: Experiment, memo: AnalysisMemo | None = None) -> tup
     recorded.
     """
     memo = memo if memo is not None else AnalysisMemo()
-    every = {*(each.path for each in experiment.cases.coordinates), *experiment.cases.noise}
+    every = {*(coordinate.path for coordinate in experiment.cases.coordinates), *experiment.cases.noise}
     for chain in chains(experiment):
         alike, _ = numbered(chain)
         every &= set(memo.answer("idle inputs of a chain", alike, partial(_idle_inputs_of_chain, alike)))

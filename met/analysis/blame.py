@@ -117,8 +117,8 @@ class _Growing:
     def beyond(self, without: _Growing) -> float:
         """The largest growth rate that does not occur without a loop."""
         left = list(self.rates)
-        for each in without.rates[: max(0, len(left) - 1)]:
-            left.remove(min(left, key=lambda one: abs(one - each)))
+        for rate in without.rates[: max(0, len(left) - 1)]:
+            left.remove(min(left, key=lambda one: abs(one - rate)))
         return max(left)
 
 
@@ -142,7 +142,7 @@ class Lane:
     @cached_property
     def size(self) -> int:
         """States and memory of the largest part that is coupled."""
-        return max(each.states + len(each.held) for each in self._parts)
+        return max(part.states + len(part.held) for part in self._parts)
 
     def growing(
         self,
@@ -309,15 +309,15 @@ class Opened:
         (joint,), own = found.joints, lane.growing()
         aim = min(own.count - 1, lane.growing({joint: 0.0}).count)
         several = {}
-        for each in self._opened.gains(joint):
+        for gain in self._opened.gains(joint):
 
-            def count(share: float, name: str = each.name) -> float:
+            def count(share: float, name: str = gain.name) -> float:
                 scaled = Lane(self._with({joint: {name: share}}), lane.lane, lane.limit, lane.ticks)
                 return scaled.growing().count
 
             share = fitting(count, aim)
             if share is not None:
-                several[each.name] = share
+                several[gain.name] = share
         return replace(found, parameters=several)
 
 

@@ -39,7 +39,7 @@ def chains(experiment: Experiment) -> tuple[Experiment, ...]:
 def ticks_and_steps(structure: Structure) -> int:
     """The number of ticks of servos, and of steps, until all of these coincide again."""
     divisors = [structure.schedule.dynamics, *(use.divisor for use in structure.servos)]
-    return sum(math.lcm(*divisors) // each for each in divisors)
+    return sum(math.lcm(*divisors) // divisor for divisor in divisors)
 
 
 def numbered(chain: Experiment) -> tuple[Experiment, Mapping[str, str]]:
@@ -64,12 +64,12 @@ def numbered(chain: Experiment) -> tuple[Experiment, Mapping[str, str]]:
         parameters[path] = quantity
     made = replace(
         structure,
-        links=tuple(replace(each, name=links[each.name]) for each in structure.links),
+        links=tuple(replace(link, name=links[link.name]) for link in structure.links),
         joints=tuple(
-            replace(each, name=joints[each.name], parent=links[each.parent], child=links[each.child])
-            for each in structure.joints
+            replace(joint, name=joints[joint.name], parent=links[joint.parent], child=links[joint.child])
+            for joint in structure.joints
         ),
-        servos=tuple(replace(each, joint=joints[each.joint]) for each in structure.servos),
+        servos=tuple(replace(servo, joint=joints[servo.joint]) for servo in structure.servos),
     )
     formulas = Formulas(chain.formulas.inputs, chain.formulas.nodes, tuple(outputs))
     found = replace(chain, structure=made, parameters=parameters, formulas=formulas)
@@ -119,9 +119,9 @@ def _of(experiment: Experiment, joints: frozenset[str]) -> Experiment:
         experiment,
         structure=replace(
             structure,
-            links=tuple(each for each in structure.links if each.name in links),
-            joints=tuple(each for each in structure.joints if each.name in joints),
-            servos=tuple(each for each in structure.servos if each.joint in joints),
+            links=tuple(link for link in structure.links if link.name in links),
+            joints=tuple(joint for joint in structure.joints if joint.name in joints),
+            servos=tuple(servo for servo in structure.servos if servo.joint in joints),
             metrics=(),
             record=(),
             expressions=(),

@@ -115,7 +115,7 @@ def _is_own(experiment: Experiment, command: object) -> bool:
 def _is_required(experiment: Experiment, joint: str, kind: str) -> bool:
     """True where a requirement judges the joint's position or rate by more than a limit: it says how close is close
     enough."""
-    most = {each.metric for each in experiment.requirements if each.comparison.startswith(">")}
+    most = {requirement.metric for requirement in experiment.requirements if requirement.comparison.startswith(">")}
     channel = f"{joint}.{'q' if kind == 'position' else 'qd'}"
     return any(use.name in most and use.of == channel for use in experiment.structure.metrics)
 
@@ -130,7 +130,7 @@ def _lanes(
     """A lane for each instant of each case, with the case's memory and its own parameters."""
     experiment = system.experiment
     rows = np.repeat(cases, len(ticks))
-    given = {each.path: each.values[rows] for each in experiment.cases.coordinates}
+    given = {coordinate.path: coordinate.values[rows] for coordinate in experiment.cases.coordinates}
     tape = LaneTape(experiment.structure.schedule.base_hz, given, len(rows))
     tape.k = np.tile(np.asarray(ticks), len(cases))
     values = experiment.formulas.replay(given)
@@ -173,9 +173,9 @@ def _limit(experiment: Experiment, joint: str, counted: Mapping[str, float], ste
     counted  change of the memory over these steps, by cell
     """
     servo = [
-        each.path
-        for each in limits(experiment.structure, experiment.parameters)
-        if each.joint == joint and each.machine and each.channels
+        limit.path
+        for limit in limits(experiment.structure, experiment.parameters)
+        if limit.joint == joint and limit.machine and limit.channels
     ]
     half = 0.5 * steps
     return next((path for path in reversed(servo) if counted.get(cell_names.AT_LIMIT(path), 0.0) > half), "")

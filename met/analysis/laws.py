@@ -54,7 +54,7 @@ class SampledLaw:
 def memory(actuator: Actuator) -> tuple[str, ...]:
     """The cells of a law's memory and of its sensors' memory."""
     own = [f"{actuator.path}.{name}" for name in _held(actuator.parts)]
-    return (*own, *(f"{each.path}.{part.name}" for each in actuator.sensors for part in each.memory))
+    return (*own, *(f"{sensor.path}.{part.name}" for sensor in actuator.sensors for part in sensor.memory))
 
 
 def linearised(
@@ -100,11 +100,11 @@ def gains(builder: Builder, actuator: Actuator, tape: LaneTape) -> tuple[Paramet
     found = _Linearised(builder, actuator, tape, ())
     law_now, drive_now = found.law({}), found.drive({})
     told = []
-    for each in actuator.parts.parameters:
-        if each.shape == "number" and each.at_least == 0.0:
-            scaled = {each.name: 0.5}
+    for parameter in actuator.parts.parameters:
+        if parameter.shape == "number" and parameter.at_least == 0.0:
+            scaled = {parameter.name: 0.5}
             if not np.array_equal(found.law(scaled), law_now) and found.drive(scaled) == drive_now:
-                told.append(each)
+                told.append(parameter)
     return tuple(told)
 
 
@@ -180,7 +180,7 @@ class _Linearised:
         p = self._values(1, scaled)
         found = answer(actuator.owner, actuator.servo.drive, p, NamedValues(actuator.owner, held), states, motion)
         numbers = (found.torque, found.rotor, found.dry, found.qdd, *found.slopes.values(), *found.friction.values())
-        return tuple(tuple(np.atleast_1d(np.asarray(each, dtype=float)).tolist()) for each in numbers)
+        return tuple(tuple(np.atleast_1d(np.asarray(number, dtype=float)).tolist()) for number in numbers)
 
     def _seen(self) -> list[np.ndarray]:
         """The law's inputs without its sensors: the joint's motion as measured, then states of the servo."""
@@ -197,7 +197,7 @@ class _Linearised:
         p = self.system.servo_values(self.actuator, read)
         if not scaled:
             return p
-        numbers = {each.name: getattr(p, each.name) for each in self.actuator.parts.parameters}
+        numbers = {parameter.name: getattr(p, parameter.name) for parameter in self.actuator.parts.parameters}
         numbers |= {name: numbers[name] * share for name, share in scaled.items()}
         return NamedValues(self.actuator.owner, numbers)
 

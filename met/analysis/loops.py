@@ -147,7 +147,7 @@ def _phases(
     places = [np.array([n + held.index(name) for name in law.memory], dtype=int) for law in laws]
     slopes = [_rows(law, lane, gains, direct)[..., cells] for law in laws]
     ticks: dict[tuple[float, tuple[bool, ...]], np.ndarray] = {}
-    length = math.lcm(d, *(each.divisor for each in laws))
+    length = math.lcm(d, *(law.divisor for law in laws))
     for k in sorted({k for each in (d, *(law.divisor for law in laws)) for k in range(0, length, each)}):
         if k % d == 0:
             yield step, ()
@@ -212,7 +212,7 @@ def seconds(found: SampledLoops) -> float:
 
 def _length(found: SampledLoops) -> int:
     """The number of base-rate ticks in a frame."""
-    return math.lcm(found.divisor, *(each.divisor for each in found.laws if not each.continuous))
+    return math.lcm(found.divisor, *(law.divisor for law in found.laws if not law.continuous))
 
 
 def growths(
@@ -224,7 +224,7 @@ def growths(
     """
     parts = uncoupled(found)
     if len(parts) > 1:
-        return np.concatenate([growths(each, lanes, gains, ticks=ticks, direct=direct) for each in parts], axis=1)
+        return np.concatenate([growths(part, lanes, gains, ticks=ticks, direct=direct) for part in parts], axis=1)
     return rates_of(found, spectrum(found, lanes, gains, ticks=ticks, direct=direct), ticks=ticks)
 
 
@@ -346,7 +346,7 @@ def fastest(found: SampledLoops) -> np.ndarray:
     """The largest growth rate of each lane, 1/s: infinite where it is not finite, or a frame is too long to be
     analysed."""
     length, rates = _length(found), np.full(len(found.case), math.inf)
-    if length // found.divisor + sum(length // each.divisor for each in found.laws) <= MOST_EVENTS:
+    if length // found.divisor + sum(length // law.divisor for law in found.laws) <= MOST_EVENTS:
         lanes = np.flatnonzero(_numbers(found))
         if len(lanes):
             rates[lanes] = growths(found, lanes, ticks=True).max(1, initial=-math.inf)

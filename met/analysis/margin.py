@@ -135,7 +135,7 @@ def margins(
 def rotor_inertias(experiment: Experiment, case: int) -> np.ndarray:
     """N^2 J_m of the substituted joints of a case, kg m^2 (prismatic: kg): [joint]."""
     on_beds = BedExperiment(experiment)
-    return np.array([_rotor(each) for each in on_beds.motors(on_beds.begun(case))])
+    return np.array([_rotor(motor) for motor in on_beds.motors(on_beds.begun(case))])
 
 
 def ends_of_motion(Lambda: np.ndarray, rotors: np.ndarray) -> tuple[float, float]:
@@ -190,7 +190,7 @@ class BedExperiment:
     def given(self, case: int) -> dict[str, float]:
         """The inputs of a case. Any value serves as its noise seed: beds have no faults here."""
         cases = self.experiment.cases
-        values = {each.path: float(each.values[case]) for each in cases.coordinates}
+        values = {coordinate.path: float(coordinate.values[case]) for coordinate in cases.coordinates}
         return values | dict.fromkeys(cases.noise, 0.0)
 
     def begun(self, case: int) -> PlainTape:

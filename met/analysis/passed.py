@@ -312,7 +312,7 @@ def _news(experiment: Experiment, found: Sequence[Lasting]) -> tuple[Lasting, ..
     if not found:
         return ()
     begun = step_size(experiment, chosen_cases(experiment))
-    told = {each.kind for each in begun.faults}
+    told = {fault.kind for fault in begun.faults}
     if "grows" in told or "misses" in told:
         told.add("fast")
     loops = bool(begun.loops) or "grows" in told

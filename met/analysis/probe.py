@@ -47,7 +47,11 @@ def reads(use: ServoUse, values: Mapping[str, Any]) -> frozenset[str] | None:
 
 def of_law(use: ServoUse, values: Mapping[str, Any]) -> Hashable:
     """The part of a servo's use that determines `reads`: uses with equal parts read the same."""
-    decides = tuple((each.name, values[each.name]) for each in servo_parts(use).parameters if not _is_input(each))
+    decides = tuple(
+        (parameter.name, values[parameter.name])
+        for parameter in servo_parts(use).parameters
+        if not _is_input(parameter)
+    )
     kind = use.command.kind if use.command is not None else "none"
     return use.model, use.words, use.continuous, kind, decides
 

@@ -190,7 +190,7 @@ def profile(experiment: Experiment) -> RunProfile:
         steps=steps,
         ns=seconds * 1e9 / (len(cases) * steps),
         peak=2.0 * fused / fastest,
-        constants=sum(not isinstance(each.value, Formula | str) for each in experiment.parameters.values()),
+        constants=sum(not isinstance(parameter.value, Formula | str) for parameter in experiment.parameters.values()),
         inputs=tuple(hoisted(experiment, recording)),
         parts=_parts(recording, {key: count / steps for key, count in calls.items()}, ns),
     )
@@ -256,7 +256,7 @@ def _reads(section: CodeSection, cells: set[str]) -> int:
     for i in operations(section):
         node = section.nodes[i]
         operands = (section.nodes[ref >> 1] for ref in node[1 : 1 + OPERANDS[node[0]]])
-        found += any(each[0] == "cell" and each[1] in cells for each in operands)
+        found += any(operand[0] == "cell" and operand[1] in cells for operand in operands)
     return found
 
 

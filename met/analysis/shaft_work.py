@@ -243,7 +243,7 @@ def motor_of(experiment: Experiment, joint: str, rows: np.ndarray) -> dict[str, 
         if path.startswith(head) and isinstance(each.value, float | int | Formula)
     }
     motor: Motor = models.find("servo", use.model, use.place).motor(SimpleNamespace(**numbers))
-    return {each.name: np.asarray(getattr(motor, each.name)) for each in fields(motor)}
+    return {field.name: np.asarray(getattr(motor, field.name)) for field in fields(motor)}
 
 
 def parameter(experiment: Experiment, path: str, rows: np.ndarray) -> np.ndarray:

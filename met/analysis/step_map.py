@@ -109,7 +109,7 @@ class Linearizer:
         self.system = System(replace(experiment, structure=replace(structure, metrics=())))
         self.builder = Builder(self.system)
         self.cases = np.asarray(cases, dtype=np.int64)
-        table = {each.path: each.values[self.cases] for each in experiment.cases.coordinates}
+        table = {coordinate.path: coordinate.values[self.cases] for coordinate in experiment.cases.coordinates}
         lanes = len(self.cases)
         # any value serves as the noise seed: none of it is changed
         given = table | dict.fromkeys(experiment.cases.noise, np.zeros(lanes))
@@ -135,10 +135,10 @@ class Linearizer:
             driven = []
         self.has_laws = bool(driven)
         self.laws = tuple(each for each in driven if each.ticks)
-        self.held = tuple(name for each in self.laws for name in laws.memory(each))
+        self.held = tuple(name for law in self.laws for name in laws.memory(law))
         if len(self.cells) > most:
             raise TooLarge(f"{len(self.cells):,} states, and {most:,} is the most")
-        own = tuple(f"{each.path}.{part.name}" for each in self.laws for part in each.parts.memory)
+        own = tuple(f"{law.path}.{part.name}" for law in self.laws for part in law.parts.memory)
         self.slope = np.zeros((2 * lanes, len(self.cells), len(self.cells) + len(self.held)))
         numbers = {name: at for at, name in enumerate((*self.cells, *self.held))}
         places = np.array([numbers[name] for name in (*self.cells, *own)], dtype=int)
@@ -181,13 +181,13 @@ class Linearizer:
             found = tuple(
                 laws.linearised(
                     self.builder,
-                    each,
+                    law,
                     tape,
                     (*self.cells, *self.held),
-                    continuous=each.use.joint in self.continuous,
-                    scaled=(scaled or {}).get(each.use.joint),
+                    continuous=law.use.joint in self.continuous,
+                    scaled=(scaled or {}).get(law.use.joint),
                 )
-                for each in self.laws
+                for law in self.laws
             )
         return SampledLoops(
             self.cases, len(self.cells), len(step.coordinates), self.held, self.slope[here], found,
@@ -196,7 +196,7 @@ class Linearizer:
 
     def gains(self, joint: str) -> tuple[Parameter, ...]:
         """The parameters of a joint's servo that only its law uses."""
-        (actuator,) = (each for each in self.laws if each.use.joint == joint)
+        (actuator,) = (law for law in self.laws if law.use.joint == joint)
         with np.errstate(all="ignore"):
             return laws.gains(self.builder, actuator, self.tape.only(self.loose))
 
@@ -261,7 +261,7 @@ class Linearizer:
         tape, step, loose = self.tape, self.builder.step, self.loose
         memory = [f"{each.path}.{part.name}" for each in self.system.working for part in each.parts.memory]
         first = [cell_names.FIRST(name) for name in memory]
-        for name in (*(f"{each}.qd" for each in step.coordinates), *memory, *first):
+        for name in (*(f"{coordinate}.qd" for coordinate in step.coordinates), *memory, *first):
             if name in tape.cells:
                 tape.cells[name] = np.where(loose, 0.0, tape.lane(name))
         for each in step.sticking:

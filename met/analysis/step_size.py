@@ -164,14 +164,14 @@ def _named(found: StepSize, names: Mapping[str, str]) -> StepSize:
 def _together(parts: Sequence[StepSize]) -> StepSize:
     """The findings on an arm without faults, from those on its chains."""
     first = parts[0].without_matrices()
-    shown = max((each for each in parts if each.mode is not None), key=_shown, default=first)
+    shown = max((part for part in parts if part.mode is not None), key=_shown, default=first)
     return replace(
         first,
         mode=shown.mode,
         owner=shown.owner,
         joint=shown.joint,
-        fastest=max(each.fastest for each in parts),
-        grown=max(each.grown for each in parts),
+        fastest=max(part.fastest for part in parts),
+        grown=max(part.grown for part in parts),
     )
 
 
@@ -325,8 +325,8 @@ def _cause(experiment: Experiment, mode: Mode, kind: str, memory: Mapping[str, n
         except Problem:
             continue
         lanes = [each for each in modes(found, integrator) if each.loose == mode.loose]
-        if kind == "grows" and all(each.growth < 0.5 * mode.growth for each in lanes):
+        if kind == "grows" and all(lane.growth < 0.5 * mode.growth for lane in lanes):
             return use.name
-        if kind != "grows" and all(abs(each.root) < 0.8 * abs(mode.root) for each in lanes):
+        if kind != "grows" and all(abs(lane.root) < 0.8 * abs(mode.root) for lane in lanes):
             return use.name
     return ""

@@ -93,7 +93,7 @@ def _stretch(
             return entry and (*entry, change.new)
         return (*_with_its_line(text, *entry), "")
     if change.old is not None:
-        words = [each for each in _words(change.old, text[slice(*line)], line[0]) if _meet(each, first, last)]
+        words = [word for word in _words(change.old, text[slice(*line)], line[0]) if _meet(word, first, last)]
         return (*words[0], change.new) if len(words) == 1 else None
     if change.where in ("value", "behind") and not _is_whole_value(text, first, last):
         return None

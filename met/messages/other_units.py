@@ -207,7 +207,7 @@ def remedy(name: str, number: str = "", *, alone: bool = True) -> tuple[str, ...
             else f"1 {name} is {written}: put that into the number",
         )
     splits = _splits(name) if len(name) <= LONGEST else []
-    return (f"did you mean {' or '.join('`' + '*'.join(each) + '`' for each in splits[:3])}?",) if splits else ()
+    return (f"did you mean {' or '.join('`' + '*'.join(words) + '`' for words in splits[:3])}?",) if splits else ()
 
 
 def _with_prefix(name: str) -> tuple[str, int] | None:

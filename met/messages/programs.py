@@ -148,7 +148,10 @@ def _result(diagnostic: Diagnostic, sources: Mapping[str, str], rule: int) -> di
         place = diagnostic.at.place
         shown = shown_place(place)
         result["locations"] = [_location(shown, diagnostic.at.text)]
-        loops = [_location(shown_place(each.use), f"in `for {each.macro}`, {each}") for each in place.iterations]
+        loops = [
+            _location(shown_place(iteration.use), f"in `for {iteration.macro}`, {iteration}")
+            for iteration in place.iterations
+        ]
         related = loops + related
         if shown is not place:
             related.insert(0, _location(place, f"written here, in macro {place.expansions[0].macro}"))
@@ -206,7 +209,7 @@ def to_github(diagnostics: Iterable[Diagnostic]) -> str:
 
     A place in a deck of MET's own, or on the command line, is no file of the repository: it stands in the message.
     """
-    return "".join(_command(each) + "\n" for each in diagnostics)
+    return "".join(_command(diagnostic) + "\n" for diagnostic in diagnostics)
 
 
 def _command(diagnostic: Diagnostic) -> str:

@@ -552,7 +552,7 @@ class Experiment:
 
     def allows(self, code: str) -> bool:
         """Return True if warnings with this code are suppressed for this experiment, at a check or at a run."""
-        return any(each.code == code for each in self.allowances)
+        return any(allowance.code == code for allowance in self.allowances)
 
     def column(self, formula: Formula) -> CaseValues:
         """The values of a parameter that varies, one a case."""

@@ -49,8 +49,8 @@ def straightened(links: Iterable[Link], joints: Iterable[Joint]) -> tuple[tuple[
     return (
         tuple(link for link in links if link.name not in booms),
         tuple(
-            replace(each, parent=booms.get(each.parent, each.parent), child=booms.get(each.child, each.child))
-            for each in joints
-            if each.name not in own
+            replace(joint, parent=booms.get(joint.parent, joint.parent), child=booms.get(joint.child, joint.child))
+            for joint in joints
+            if joint.name not in own
         ),
     )

@@ -135,7 +135,7 @@ def _check_step_errors(experiment: Experiment, where: str) -> None:
             raise Damaged(f"{where}[{index}].metric", f"there is no metric `{each.metric}`")
         if not 0.0 < each.limit < math.inf:
             raise Damaged(f"{where}[{index}].limit", "it should be a finite number above 0")
-    if len({each.text for each in experiment.step_errors}) < len(experiment.step_errors):
+    if len({step_error.text for step_error in experiment.step_errors}) < len(experiment.step_errors):
         raise Damaged(where, "two have the same text")
 
 
@@ -284,9 +284,9 @@ def _words(model: Any, chosen: Iterable[tuple[str, str]]) -> Iterator[tuple[str,
     """Every word of a model that a structure decides: the chosen one, else the default."""
     deciding = getattr(model, "deciding", [each.name for each in model.parameters if each.shape == "word"])
     given = dict(chosen)
-    for each in model.parameters:
-        if each.name in deciding and isinstance(each.default, str):
-            yield each.name, given.get(each.name, each.default)
+    for parameter in model.parameters:
+        if parameter.name in deciding and isinstance(parameter.default, str):
+            yield parameter.name, given.get(parameter.name, parameter.default)
 
 
 def _is_word(parameters: Mapping[str, Quantity], path: str, word: str, where: str) -> None:

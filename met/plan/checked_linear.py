@@ -19,7 +19,7 @@ def check_linear(experiment: Experiment, where: str) -> None:
     """Check that every answer is about signals of the run, at an instant of it, and that every metric is a figure of
     one."""
     structure, names = experiment.structure, list[str]()
-    known = {each.path: each for each in input_signals(structure)} if experiment.linear else {}
+    known = {input_signal.path: input_signal for input_signal in input_signals(structure)} if experiment.linear else {}
     for index, use in enumerate(experiment.linear):
         place = f"{where}.linear[{index}]"
         check_name(use.name, f"{place}.name", names)

@@ -251,7 +251,9 @@ def _beginning(experiment: Experiment) -> Experiment:
     cases = experiment.cases
     if cases.count <= LISTED_ROWS or any(column.size != cases.count for column in columns(experiment)):
         return experiment
-    coordinates = tuple(replace(each, values=np.asarray(each.values[:LISTED_ROWS])) for each in cases.coordinates)
+    coordinates = tuple(
+        replace(coordinate, values=np.asarray(coordinate.values[:LISTED_ROWS])) for coordinate in cases.coordinates
+    )
     repeats, positions = (
         None if column is None else np.asarray(column[:LISTED_ROWS]) for column in (cases.repeats, cases.positions)
     )

@@ -58,7 +58,7 @@ def limits(structure: Structure, parameters: Mapping[str, Quantity]) -> tuple[Li
 def extremes(experiment: Experiment) -> dict[str, tuple[LimitUse, ...]]:
     """The required metrics that state an extreme, by name, each with the machines' limits that may have cut it: those
     of its channel's joint, or all where the channel belongs to no joint."""
-    required = {each.metric for each in experiment.requirements}
+    required = {requirement.metric for requirement in experiment.requirements}
     known, found = channels(experiment.structure), limits(experiment.structure, experiment.parameters)
     out = {}
     for use in experiment.structure.metrics:
@@ -97,15 +97,15 @@ def _of_servos(structure: Structure) -> Iterator[LimitUse]:
 def _of_commands(structure: Structure) -> Iterator[LimitUse]:
     for use in structure.servos:
         if use.command is not None and not use.command.guide:
-            for each in models.find("command", use.command.model, use.place).limits:
-                yield LimitUse(f"{use.joint}.servo.command.{each.parameter}", use.joint, declared=each, machine=False)
+            for limit in models.find("command", use.command.model, use.place).limits:
+                yield LimitUse(f"{use.joint}.servo.command.{limit.parameter}", use.joint, declared=limit, machine=False)
 
 
 def _of_environment(structure: Structure, parameters: Mapping[str, Quantity]) -> Iterator[LimitUse]:
     for use in structure.environment:
         model, path = models.find("environment", use.model, use.place), f"environment.{use.name}"
-        named = next((each.name for each in model.parameters if each.names == "joint"), "")
+        named = next((parameter.name for parameter in model.parameters if parameter.names == "joint"), "")
         joint = parameters[f"{path}.{named}"].value if named and f"{path}.{named}" in parameters else ""
-        for each in model.limits:
-            table = any(one.name == each.parameter and one.shape == "list" for one in model.parameters)
-            yield LimitUse(f"{path}.{each.parameter}", str(joint), declared=each, owner=use.name, machine=not table)
+        for limit in model.limits:
+            table = any(one.name == limit.parameter and one.shape == "list" for one in model.parameters)
+            yield LimitUse(f"{path}.{limit.parameter}", str(joint), declared=limit, owner=use.name, machine=not table)

@@ -35,14 +35,14 @@ def _of_servo(use: ServoUse) -> list[InputSignal]:
         return []
     asked = [InputSignal(f"{use.joint}.servo.command", use.joint, use.divisor, False)] if use.command else []
     return asked + [
-        InputSignal(f"{use.joint}.servo.{each.name}", use.joint, use.divisor, True) for each in parts.outputs
+        InputSignal(f"{use.joint}.servo.{output.name}", use.joint, use.divisor, True) for output in parts.outputs
     ]
 
 
 def no_computer(structure: Structure, name: str = "") -> tuple[str, ...]:
     """The help where a run has no computer whose loop could be opened, or the joint of this signal has none: what to do
     if the law is continuous. Empty where there is one."""
-    ticks = any(each.is_output for each in input_signals(structure))
+    ticks = any(input_signal.is_output for input_signal in input_signals(structure))
     laws = {use.joint for use in structure.servos if use.continuous}
     joint = name.partition(".")[0]
     if joint in laws or (laws and not ticks):

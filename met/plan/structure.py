@@ -238,7 +238,7 @@ def _check_link_sensors(structure: Structure, where: str) -> None:
         model = models.find("sensor", use.model, use.place)
         if model.measures is None:
             raise Damaged(f"{path}.model", f"`{use.model}` is a sensor of a joint: it stands in a servo")
-        words = [each.name for each in model.parameters if each.shape == "word" and not each.names]
+        words = [parameter.name for parameter in model.parameters if parameter.shape == "word" and not parameter.names]
         if unknown := [name for name, _ in use.words if name not in words]:
             raise Damaged(f"{path}.words", f"`{use.model}` has no word `{unknown[0]}`")
         check_whole(use.divisor, 1, MOST_TICKS, f"{path}.divisor")

@@ -22,7 +22,9 @@ def quantities(use: ServoUse) -> dict[str, str]:
 def sensor_parts(use: SensorUse | LinkSensor, group: str) -> tuple[Any, ...]:
     """The parts of a sensor's `parameters`, `states` or `memory` that are present under this use's words."""
     sensor = models.find("sensor", use.model, use.place)
-    defaults = {each.name: each.default for each in sensor.parameters if isinstance(each.default, str)}
+    defaults = {
+        parameter.name: parameter.default for parameter in sensor.parameters if isinstance(parameter.default, str)
+    }
     return tuple(part for part in getattr(sensor, group) if is_present(part, defaults | dict(use.words)))
 
 
@@ -36,19 +38,21 @@ def servo_parts(use: ServoUse) -> Parts:
 def packages(structures: Iterable[Structure]) -> tuple[str, ...]:
     """The other packages whose models these structures use, by name."""
     used: dict[models.Kind, set[str]] = {kind: set() for kind in models.GROUPS}
-    for each in structures:
-        used["servo"] |= {servo.model for servo in each.servos}
-        used["sensor"] |= {sensor.model for servo in each.servos for sensor in servo.sensors}
-        used["sensor"] |= {sensor.model for sensor in each.sensors}
-        commands = [servo.command for servo in each.servos if servo.command is not None]
+    for structure in structures:
+        used["servo"] |= {servo.model for servo in structure.servos}
+        used["sensor"] |= {sensor.model for servo in structure.servos for sensor in servo.sensors}
+        used["sensor"] |= {sensor.model for sensor in structure.sensors}
+        commands = [servo.command for servo in structure.servos if servo.command is not None]
         used["command"] |= {command.model for command in commands if not command.guide}
-        used["command"] |= {course.model for use in (each.base, *each.guides) if use for course in use.courses}
-        used["environment"] |= {use.model for use in each.environment}
-        used["guide"] |= {use.model for use in each.guides}
-        used["metric"] |= {use.model for use in each.metrics}
-        used["integrator"].add(each.integrator)
-        used["bed"] |= {use.bed for use in each.substitutions}
-        used["law"] |= {use.law for use in each.substitutions}
+        used["command"] |= {
+            course.model for use in (structure.base, *structure.guides) if use for course in use.courses
+        }
+        used["environment"] |= {use.model for use in structure.environment}
+        used["guide"] |= {use.model for use in structure.guides}
+        used["metric"] |= {use.model for use in structure.metrics}
+        used["integrator"].add(structure.integrator)
+        used["bed"] |= {use.bed for use in structure.substitutions}
+        used["law"] |= {use.law for use in structure.substitutions}
     found = set()
     for kind, names in used.items():
         if theirs := names - models.find_own(kind).keys():

@@ -160,19 +160,19 @@ def _loads(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[st
         )
 
     others = [each for each in sticking(system) if not each.state and each.actuator not in still]
-    levels = {each.name: _level(system, tape, y, each, held) for each in others}
-    modes = {each.name: where(levels[each.name] > 0.0, sign(each.rate(y)), 1.0) for each in others}
+    levels = {other.name: _level(system, tape, y, other, held) for other in others}
+    modes = {other.name: where(levels[other.name] > 0.0, sign(other.rate(y)), 1.0) for other in others}
     found = moved(modes)
     if others:
         modes = {
-            each.name: friction.decide(
-                modes[each.name],
-                both(levels[each.name] > 0.0, each.rate(y) == 0.0),
-                found.need[each.name],
-                levels[each.name],
-                found.slope.qdd[each.number],
+            other.name: friction.decide(
+                modes[other.name],
+                both(levels[other.name] > 0.0, other.rate(y) == 0.0),
+                found.need[other.name],
+                levels[other.name],
+                found.slope.qdd[other.number],
             )
-            for each in others
+            for other in others
         }
         found = moved(modes)
     return found.loads

@@ -75,7 +75,9 @@ class Builder:
         tick += self.step.begin()
         if held:
             tick.append(Every(instant, (CallPhase(Phase("observe", self._observe(held))),)))
-        for divisor in sorted({self.system.channels[each.name].divisor for each in self.system.structure.expressions}):
+        for divisor in sorted(
+            {self.system.channels[expression.name].divisor for expression in self.system.structure.expressions}
+        ):
             phase = Phase(f"expressions_{divisor}", self._expressions(divisor))
             tick.append(Every(divisor, (RunPhase(phase),)))
         for divisor in sorted({channel.divisor for _, _, channel in self.system.metrics}):
@@ -347,16 +349,16 @@ class Builder:
         """Signals that are computed from channels, as these were last sampled."""
 
         def body(tape: Tape) -> None:
-            for each in self.system.structure.expressions:
-                if self.system.channels[each.name].divisor == divisor:
+            for expression in self.system.structure.expressions:
+                if self.system.channels[expression.name].divisor == divisor:
                     values = {
                         name: tape.read(name.removeprefix(CHANNEL_INPUT))
                         if name.startswith(CHANNEL_INPUT)
                         else tape.input(name)
-                        for name in each.formula.inputs
+                        for name in expression.formula.inputs
                     }
-                    (value,) = each.formula.replay(values)
-                    tape.write(each.name, value)
+                    (value,) = expression.formula.replay(values)
+                    tape.write(expression.name, value)
 
         return body
 

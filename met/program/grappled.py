@@ -46,7 +46,7 @@ class GrappleWatch:
     @property
     def outputs(self) -> tuple[str, ...]:
         """Outputs: the figures of each payload's grapple, 0 where it never came."""
-        return tuple(cell_names.GRAPPLED(each.name, name) for each in self.payloads for name in GRAPPLE_FIGURES)
+        return tuple(cell_names.GRAPPLED(payload.name, name) for payload in self.payloads for name in GRAPPLE_FIGURES)
 
     def before(self, tape: Tape) -> None:
         """Keep the poses and velocities of payloads that are grappled at this instant."""

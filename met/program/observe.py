@@ -157,7 +157,7 @@ class Observed:
             case ["energy", "potential"]:
                 return self.energy.potential + self.derivative.stored[1]
             case ["limits", "margin"]:
-                return reduce(minimum, [self._margin(each.name) for each in self.system.joints if each.limits])
+                return reduce(minimum, [self._margin(joint.name) for joint in self.system.joints if joint.limits])
             case ["momentum", kind, axis]:
                 return (self.energy.linear if kind == "linear" else self.energy.angular)[XYZ.index(axis)]
         raise KeyError(".".join(parts))
@@ -208,10 +208,10 @@ class Observed:
     def seen(self) -> dict[str, LinkMotion]:
         """Every payload in the world, by name."""
         return {
-            each.name: payloads.payload_motion(self.system, each, self.read, self.y, self.motions)
-            if each.flies
-            else self.motions[each.name]
-            for each in self.system.structure.payloads
+            payload.name: payloads.payload_motion(self.system, payload, self.read, self.y, self.motions)
+            if payload.flies
+            else self.motions[payload.name]
+            for payload in self.system.structure.payloads
         }
 
     @cached_property

@@ -111,7 +111,7 @@ class Actuator:
     def states(self) -> tuple[str, ...]:
         """Channels of the servo's states, then those of its sensors."""
         own = [f"{self.path}.{state.name}" for state in self.parts.states]
-        return (*own, *(name for each in self.sensors for name in each.channels))
+        return (*own, *(name for sensor in self.sensors for name in sensor.channels))
 
     @property
     def command_kind(self) -> str:
@@ -249,7 +249,7 @@ class System:
     def states(self) -> tuple[str, ...]:
         """Channels of the states of servos and their sensors, then of links' sensors, in the order of `Motion.x`."""
         of_servos = (name for actuator in self.working for name in actuator.states)
-        return (*of_servos, *(name for each in self.sensors for name in each.channels))
+        return (*of_servos, *(name for sensor in self.sensors for name in sensor.channels))
 
     @cached_property
     def sensors(self) -> tuple[Fitted, ...]:
@@ -325,7 +325,9 @@ class System:
 
     def _head(self, link: str) -> str:
         """Prefix of the paths of a link's or payload's parameters."""
-        return f"payloads.{link}" if any(each.name == link for each in self.structure.payloads) else f"links.{link}"
+        return (
+            f"payloads.{link}" if any(payload.name == link for payload in self.structure.payloads) else f"links.{link}"
+        )
 
     def servo_values(self, actuator: Actuator, read: ReadCell) -> NamedValues:
         return parameters(actuator.owner, actuator.path, actuator.parts.parameters, lambda path: self.value(path, read))
@@ -403,7 +405,7 @@ class System:
         servo = models.find("servo", use.model, use.place)
         has_course = use.command is not None and not use.command.guide
         profile = models.find("command", use.command.model, use.place) if use.command and has_course else None
-        sensors = tuple(self._fitted(each, f"{use.joint}.servo.sensor.{each.of}") for each in use.sensors)
+        sensors = tuple(self._fitted(sensor, f"{use.joint}.servo.sensor.{sensor.of}") for sensor in use.sensors)
         bare = Actuator(index, use, servo, profile, servo_parts(use), None, False, False, {}, sensors)
         drive, level, levels = self._probe(bare)
         if drive.given is not None and (level != 0.0 or use.joint in self.braked):

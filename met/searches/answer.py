@@ -122,8 +122,14 @@ def answer(
         worth = hurt(goal, search.largest, done)
         case = int(np.argmin(worth))
         cases, every = np.array([case]), 1
-    missed = [each.text for each in requirements if not _met(each, metrics[each.metric][cases], done[cases]).all()]
-    rooms = [Room(each.text, _room(each, metrics[each.metric][cases])) for each in requirements]
+    missed = [
+        requirement.text
+        for requirement in requirements
+        if not _met(requirement, metrics[requirement.metric][cases], done[cases]).all()
+    ]
+    rooms = [
+        Room(requirement.text, _room(requirement, metrics[requirement.metric][cases])) for requirement in requirements
+    ]
     return Answer(
         search,
         case,
@@ -165,7 +171,9 @@ def _nearest_miss(
 ) -> NearestMiss | None:
     """The candidate nearest to that of a case among those of which some case fails, or misses a requirement; None where
     there is none."""
-    met = np.array([_met(each, metrics[each.metric], done) for each in requirements]).reshape(-1, len(done))
+    met = np.array([_met(requirement, metrics[requirement.metric], done) for requirement in requirements]).reshape(
+        -1, len(done)
+    )
     bad = np.flatnonzero(~(done & met.all(axis=0)))
     if not len(bad):
         return None

@@ -163,7 +163,7 @@ class RobustTuning:
 
     def _of_points(self, points: np.ndarray) -> list[tuple[Candidate, int]]:
         """Points of the cube as candidates of the next generation: the new ones, with the active plants."""
-        self._batch = [each.tobytes() for each in self._search.values(points)]
+        self._batch = [value.tobytes() for value in self._search.values(points)]
         for candidate, point in zip(self._batch, points, strict=True):
             self._points.setdefault(candidate, point)
             self._known.setdefault(candidate, {})

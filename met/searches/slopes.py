@@ -82,23 +82,23 @@ def local_model(
     elif not np.isfinite(goal_slopes).all():
         return found.why_not.get(search.metric, f"`{search.metric}` has no slope")
     hinges, slopes, weights = [np.zeros(0)], [np.zeros((0, dimension))], [np.zeros(0)]
-    for each in requirements:
-        values = found.values[each.metric]
+    for requirement in requirements:
+        values = found.values[requirement.metric]
         if not np.isfinite(values).all():
-            return f"`{each.metric}` has no value"
-        falls = -1.0 if each.comparison.startswith("<") else 1.0
-        size = abs(each.limit) or 1.0
-        out = -falls * found.slopes[each.metric] * per_share / size
-        beyond = -falls * (values - each.limit) / size
+            return f"`{requirement.metric}` has no value"
+        falls = -1.0 if requirement.comparison.startswith("<") else 1.0
+        size = abs(requirement.limit) or 1.0
+        out = -falls * found.slopes[requirement.metric] * per_share / size
+        beyond = -falls * (values - requirement.limit) / size
         far = beyond < -max(2.0 * search.margin, 10.0 * WITHIN)
         if not np.isfinite(out).all(axis=1)[~far].all():
-            return found.why_not.get(each.metric, f"`{each.metric}` has no slope")
+            return found.why_not.get(requirement.metric, f"`{requirement.metric}` has no slope")
         out = np.where(np.isfinite(out), out, 0.0)
         keep = WITHIN + (0.5 * search.margin if misses else 0.0)
         hinges.append(beyond + keep)
         slopes.append(out)
         weights.append(np.full(count, 1.0) if misses else PENALTY * np.maximum(np.abs(goal), 1e-12))
-        if search.margin > 0.0 and each.limit != 0.0 and not misses:
+        if search.margin > 0.0 and requirement.limit != 0.0 and not misses:
             hinges.append(1.0 + beyond / search.margin)
             slopes.append(out / search.margin)
             weights.append(np.abs(goal) * search.margin)

@@ -75,14 +75,14 @@ def served(
     """The worth of cases to a tuning, [case]. metrics: their values by name, SI."""
     least = -goal if largest else goal
     shape = (len(limits), len(goal))
-    far = np.array([missed(each, metrics[each.metric]) for each in limits]).reshape(shape)
-    near = np.array([short(each, metrics[each.metric], margin) for each in limits]).reshape(shape)
+    far = np.array([missed(limit, metrics[limit.metric]) for limit in limits]).reshape(shape)
+    near = np.array([short(limit, metrics[limit.metric], margin) for limit in limits]).reshape(shape)
     with np.errstate(invalid="ignore"):
         held = np.where(np.isinf(least), least, least + np.abs(least) * margin * near.sum(axis=0))
         tame = np.where(np.isinf(held), np.sign(held), held / (1.0 + np.abs(held)))
     without = np.isnan(np.concatenate([far, least[None]])).mean(axis=0)
-    strict = np.array([each.comparison in ("<", ">") for each in limits], bool)
-    on_limit = np.array([metrics[each.metric] == each.limit for each in limits]).reshape(shape)[strict].any(axis=0)
+    strict = np.array([limit.comparison in ("<", ">") for limit in limits], bool)
+    on_limit = np.array([metrics[limit.metric] == limit.limit for limit in limits]).reshape(shape)[strict].any(axis=0)
     total = far.sum(axis=0)
     value = np.where((total > 0.0) | on_limit, 2.0 - 1.0 / (1.0 + total), tame)
     value = np.where(without > 0.0, 2.0 + without, value)

@@ -253,7 +253,9 @@ def parts(servo: Servo, words: Mapping[str, str], *, continuous: bool = False) -
 def _parts(servo: Servo, words: Mapping[str, str], continuous: bool) -> Parts:
     groups = (servo.parameters, servo.outputs, servo.integrals, servo.states, servo.signals)
     if any(part.only is not None for group in groups for part in group):
-        words = {each.name: each.default for each in servo.parameters if isinstance(each.default, str)} | dict(words)
+        words = {
+            parameter.name: parameter.default for parameter in servo.parameters if isinstance(parameter.default, str)
+        } | dict(words)
         groups = tuple(tuple(part for part in group if is_present(part, words)) for group in groups)  # type: ignore[assignment]
     return Parts(*groups, continuous)
 

@@ -339,10 +339,10 @@ def means_of_ends(values: np.ndarray, output: np.ndarray) -> tuple[float, float,
     difference where the cases were drawn. What differs from 0, or from one another, by rounding alone does not."""
     cell = cells(values, max(4, min(CELLS, len(output) // 16)))
     ends = [output[cell == number] for number in (cell.min(), cell.max())]
-    low, high = (float(each.mean()) for each in ends)
+    low, high = (float(end.mean()) for end in ends)
     rounding = ROUNDING * float(np.abs(output).max())
     low, high = (0.0 if abs(mean) <= rounding else mean for mean in (low, high))
-    by = QUANTILE * math.sqrt(sum(float(each.var()) / max(1, len(each) - 1) for each in ends))
+    by = QUANTILE * math.sqrt(sum(float(end.var()) / max(1, len(end) - 1) for end in ends))
     return low, low if abs(high - low) <= rounding else high, by
 
 

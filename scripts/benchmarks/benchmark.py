@@ -83,7 +83,7 @@ def take(
     """
     measures: dict[str, Callable[[], float]] = {}
     untaken: dict[str, str] = {}
-    measured = [each for each in benchmarks if isinstance(each, Benchmark)]
+    measured = [benchmark for benchmark in benchmarks if isinstance(benchmark, Benchmark)]
     for each in measured:
         say(f"preparing {each.name}")
         try:
@@ -99,10 +99,10 @@ def take(
             if each.name not in untaken and turn < each.turns:
                 values[each.name].append(measures[each.name]())
     return [
-        _derived(each, values, untaken) if isinstance(each, Derived)
-        else _untaken(each, untaken[each.name]) if each.name in untaken
-        else _figure(each, values[each.name])
-        for each in benchmarks
+        _derived(benchmark, values, untaken) if isinstance(benchmark, Derived)
+        else _untaken(benchmark, untaken[benchmark.name]) if benchmark.name in untaken
+        else _figure(benchmark, values[benchmark.name])
+        for benchmark in benchmarks
     ]  # fmt: skip
 
 

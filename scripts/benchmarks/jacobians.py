@@ -127,7 +127,7 @@ def _panda() -> engine.Prepared:
 def _period(*, abreast: bool) -> Callable[[], float]:
     """CPU milliseconds for the map of a period of a case."""
     experiment = _panda().experiment
-    laws = [each for each in input_signals(experiment.structure) if each.is_output]
+    laws = [input_signal for input_signal in input_signals(experiment.structure) if input_signal.is_output]
     program = PeriodProgram(experiment, laws)
     begun = at_instants(program, engine.inputs(experiment, np.arange(ABREAST if abreast else 1)), STEPS, threads=1)
     flows = [flow for flow in begun if flow is not None]

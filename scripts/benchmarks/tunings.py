@@ -211,7 +211,7 @@ def compare(name: str, seeds: int) -> None:
     assert search is not None
     prepared, slopes = engine.prepare(experiment), TuningSlopes(experiment)
     prepared.kernel  # noqa: B018  # compiled before time is taken
-    first = np.array([np.asarray(each.values)[:1] for each in experiment.cases.coordinates]).T
+    first = np.array([np.asarray(coordinate.values)[:1] for coordinate in experiment.cases.coordinates]).T
     slopes.slopes(first)
     found: dict[str, list[Tuned]] = {"off": [], "on": [], "long": []}
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):

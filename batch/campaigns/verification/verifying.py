@@ -90,4 +90,4 @@ def _is_seen_at_steps(experiment: Experiment, name: str) -> bool:
 
 
 def _use(experiment: Experiment, name: str) -> MetricUse:
-    return next(each for each in experiment.structure.metrics if each.name == name)
+    return next(metric for metric in experiment.structure.metrics if metric.name == name)

@@ -43,19 +43,19 @@ class StepErrorVerdict:
 
 def verdicts(group: ArchiveGroup, found: Verification | None) -> tuple[StepErrorVerdict, ...]:
     """The verdicts on an experiment's requirements on errors due to the step."""
-    return tuple(_verdict(group, each, found) for each in group.step_errors)
+    return tuple(_verdict(group, step_error, found) for step_error in group.step_errors)
 
 
 def _verdict(group: ArchiveGroup, limit: StepErrorLimit, found: Verification | None) -> StepErrorVerdict:
     if found is None:
         return StepErrorVerdict(limit.text, None, "nothing is verified: `met run --verify some`", limit)
     metric = found.metrics.get(limit.metric)
-    cases = [each for each in metric.cases if not _has_none(each)] if metric is not None else []
+    cases = [case for case in metric.cases if not _has_none(case)] if metric is not None else []
     if not cases:
         return StepErrorVerdict(limit.text, None, "no verified case has a finite value", limit)
     worst = max(cases, key=lambda each: _size(each, limit.share))
     size = _size(worst, limit.share)
-    missed = sum(not _is_within(_size(each, limit.share), limit) for each in cases)
+    missed = sum(not _is_within(_size(case, limit.share), limit) for case in cases)
     if worst.error is None:
         said = worst.why
     elif limit.share:

@@ -32,12 +32,12 @@ def about(found: Verification) -> str:
     cases = "1 case" if found.cases == 1 else f"{found.cases:,} cases"
     said = f"± by the step: {cases} at half and a quarter of the step"
     orders = sorted(
-        {f"{each.order:.1f}" for each in found.metrics.values() if each.clear and math.isfinite(each.order)}
+        {f"{metric.order:.1f}" for metric in found.metrics.values() if metric.clear and math.isfinite(metric.order)}
     )
     if orders:
         said += f", order {_between(orders)}"
     if unclear := [name for name, each in found.metrics.items() if not each.clear]:
-        known = [one.error for each in found.metrics.values() for one in each.cases if one.error is not None]
+        known = [one.error for metric in found.metrics.values() for one in metric.cases if one.error is not None]
         of = f"{sum(not error.clear for error in known):,} of {len(known):,} numbers"
         said += f"; order unclear in {of}, where it is a rough bound: {', '.join(unclear)}"
     for name, each in found.metrics.items():

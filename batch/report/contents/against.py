@@ -77,7 +77,7 @@ class EarlierCases:
     def experiments(self) -> dict[str, Experiment]:
         """The experiments of the other archive's plan, by name; none where the plan cannot be read here."""
         try:
-            return {each.name: each for each in self.file.plan().experiments}
+            return {experiment.name: experiment for experiment in self.file.plan().experiments}
         except Problem:
             return {}
 
@@ -93,7 +93,7 @@ class EarlierCases:
             ]
             for pool in (self.now, self.pool)
         )
-        if not theirs or {each.unit for each in theirs} != {each.unit for each in mine}:
+        if not theirs or {metric.unit for metric in theirs} != {each.unit for each in mine}:
             return None
         before = self.pool.gathered(name) / deck_unit(mine[0])[0]
         return np.where(self.there, before[self.place], np.nan)
@@ -146,11 +146,11 @@ def rename_archives(found: Diff, before: str, now: str) -> Diff:
 
     experiments = tuple(
         replace(
-            each,
-            signals=[replace(signal, why=said(signal.why)) for signal in each.signals],
-            notes=[said(note) for note in each.notes],
+            experiment,
+            signals=[replace(signal, why=said(signal.why)) for signal in experiment.signals],
+            notes=[said(note) for note in experiment.notes],
         )
-        for each in found.experiments
+        for experiment in found.experiments
     )
     return replace(found, a=Path(before), b=Path(now), experiments=experiments)
 
@@ -158,6 +158,6 @@ def rename_archives(found: Diff, before: str, now: str) -> Diff:
 def of_groups(found: Diff, groups: Sequence[ArchiveGroup]) -> Diff:
     """The differences restricted to these runs and sweeps of the second archive."""
     names = {group.name for group in groups}
-    experiments = tuple(each for each in found.experiments if each.name_b in names)
+    experiments = tuple(experiment for experiment in found.experiments if experiment.name_b in names)
     only_b = tuple(name for name in found.only_b if name in names)
     return replace(found, experiments=experiments, only_a=(), only_b=only_b)

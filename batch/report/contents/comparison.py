@@ -40,9 +40,9 @@ def archive_changes(found: Diff) -> ArchiveChanges:
     )
     decks = tuple(
         DeckTextChange(
-            visible(each.said), tuple(map(visible, each.lines[:MOST_LINES])), max(0, len(each.lines) - MOST_LINES)
+            visible(deck.said), tuple(map(visible, deck.lines[:MOST_LINES])), max(0, len(deck.lines) - MOST_LINES)
         )
-        for each in found.changed.decks
+        for deck in found.changed.decks
     )
     return ArchiveChanges(str(found.a), str(found.b), origins, decks, tuple(words.unmatched_runs(found)))
 
@@ -93,7 +93,7 @@ def verdict(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases |
     found = against.found
     both = [(pool, before) for pool, before in pairs if before is not None]
     said = words.verdict(found).removeprefix(found.verdict).lstrip(",;: ")
-    if not any(each.cases.count for each in found.experiments):
+    if not any(experiment.cases.count for experiment in found.experiments):
         said = "the two have no case in common"
     return Verdict(
         kind="comparison",
@@ -110,12 +110,12 @@ def verdict(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases |
 
 def _parts(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases | None]]) -> tuple[OutcomeCount, ...]:
     found = against.found
-    how = np.concatenate([np.zeros(0, np.int8), *(each.how for each in found.experiments)])
+    how = np.concatenate([np.zeros(0, np.int8), *(experiment.how for experiment in found.experiments)])
     counts = {word: int((how == VERDICTS.index(word)).sum()) for word in (IDENTICAL, EQUIVALENT, DIFFERENT)}
     gone = sum(group.count for group in against.file.groups if group.name in found.only_a)
     new = sum(group.count for pool, _ in pairs for group in pool.groups if group.name in found.only_b)
-    counts["only before"] = sum(len(each.only_a) for each in found.experiments) + gone
-    counts["only now"] = sum(len(each.only_b) for each in found.experiments) + new
+    counts["only before"] = sum(len(experiment.only_a) for experiment in found.experiments) + gone
+    counts["only now"] = sum(len(experiment.only_b) for experiment in found.experiments) + new
     return tuple(OutcomeCount(word, count) for word, count in counts.items() if count)
 
 
@@ -135,7 +135,9 @@ def _flows(pool: Pool, before: EarlierCases, *, named: bool) -> list[Requirement
     """For each common requirement, the cases that meet it now, and those that no longer do. named: True to name the
     run"""
     out = []
-    pairs = {each.now: each for _, _, experiment in before.pairs for each in experiment.requirements}
+    pairs = {
+        requirement.now: requirement for _, _, experiment in before.pairs for requirement in experiment.requirements
+    }
     for place, text in enumerate(pool.requirements):
         if text not in pairs or not before.there.any():
             continue

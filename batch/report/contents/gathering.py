@@ -226,7 +226,7 @@ def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Fact, ...
         Fact("rate of the record", _all(pool, "record_hz", "{:g} Hz")),
         Fact("velocity products", _all(pool, "velocity_products")),
     ]
-    facts += [Fact("allowed", each) for each in dict.fromkeys(line for group in pool.groups for line in group.allowed)]
+    facts += [Fact("allowed", line) for line in dict.fromkeys(line for group in pool.groups for line in group.allowed)]
     servos: dict[str, dict[str, None]] = {}  # joints by their servo
     others: dict[str, dict[str, None]] = {}
     for experiment in experiments.values():

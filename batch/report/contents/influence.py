@@ -36,7 +36,7 @@ def influences(pool: Pool) -> tuple[InfluencePart, ...]:
 
 def _metrics(group: ArchiveGroup) -> list[str]:
     """The group's metrics, those with requirements first."""
-    required = dict.fromkeys(each.metric for each in group_requirements(group))
+    required = dict.fromkeys(group_requirement.metric for group_requirement in group_requirements(group))
     return list(dict.fromkeys([*required, *(variable.name for variable in group.role("metric"))]))
 
 

@@ -72,10 +72,12 @@ def ruler(found: Levels) -> Ruler:
     choices = [found.values] if not found.stretches else []
     if found.scale == "log":
         choices += [np.array(round_numbers(low, high, steps)) for steps in ROUND]
-    choices = [each for each in choices if len(each) > 1] or [_steps(low, high)]
+    choices = [choice for choice in choices if len(choice) > 1] or [_steps(low, high)]
     if found.scale == "linear":
         choices.append(_steps(low, high))
-    ticks = tuple(tuple(zip(where(each).tolist(), map(number_text, each.tolist()), strict=True)) for each in choices)
+    ticks = tuple(
+        tuple(zip(where(choice).tolist(), map(number_text, choice.tolist()), strict=True)) for choice in choices
+    )
     return Ruler(tuple(where(ends).tolist()), ticks)
 
 

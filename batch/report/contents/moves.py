@@ -33,7 +33,9 @@ def _beyond(pool: Pool, before: EarlierCases, column: CaseColumn) -> np.ndarray:
     was = np.where(before.there, before.pool.gathered(name)[before.place], np.nan)
     out = np.zeros(pool.count, bool)
     for number, _, experiment in before.pairs:
-        told = next((each for each in experiment.signals if each.metric and each.name == name and not each.why), None)
+        told = next(
+            (signal for signal in experiment.signals if signal.metric and signal.name == name and not signal.why), None
+        )
         if told is not None:
             here = (pool.group_of == number) & before.there
             a, b, allowed = was[here], now[here], told.tolerance

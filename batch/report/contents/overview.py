@@ -53,7 +53,7 @@ def overview(pool: Pool, before: EarlierCases | None = None) -> Overview | None:
     judged = max(metrics, key=lambda column: _interest(pool, column))
     return Overview(
         cases=pool.cases[places],
-        ids=tuple(each[:8] for each in pool.texts("case_id", places)),
+        ids=tuple(text[:8] for text in pool.texts("case_id", places)),
         ended=pool.ended[places],
         columns=shown,
         causes=dict(zip(failed, causes, strict=False)),
@@ -67,7 +67,7 @@ def overview(pool: Pool, before: EarlierCases | None = None) -> Overview | None:
 def _interest(pool: Pool, column: CaseColumn) -> tuple[bool, int]:
     """The rank of a metric to be drawn first: it has a requirement, and cases do not meet it."""
     outcomes = [pool.outcomes[:, pool.requirements.index(limit.text)] for limit in column.limits]
-    return bool(outcomes), max((int((each == 0).sum()) for each in outcomes), default=0)
+    return bool(outcomes), max((int((outcome == 0).sum()) for outcome in outcomes), default=0)
 
 
 def _at(column: CaseColumn, places: np.ndarray) -> CaseColumn:

@@ -119,8 +119,13 @@ def _of_answer(pool: Pool, answer: SearchAnswer, experiments: Mapping[str, Exper
 
 def _report_warnings(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[ReportWarning, ...]:
     return tuple(
-        ReportWarning(each.code, each.message, each.help, spot(None if each.at is None else each.at.place))
-        for each in campaign_warnings(pool.groups, experiments)
+        ReportWarning(
+            campaign_warning.code,
+            campaign_warning.message,
+            campaign_warning.help,
+            spot(None if campaign_warning.at is None else campaign_warning.at.place),
+        )
+        for campaign_warning in campaign_warnings(pool.groups, experiments)
     )
 
 
@@ -162,9 +167,13 @@ def _demand(pool: Pool, place: int, text: str) -> RequirementCounts:
 def _failing(pool: Pool) -> tuple[FailureRow, ...]:
     return tuple(
         FailureRow(
-            each.status, each.cause.removeprefix(f"{each.status}: "), len(each.cases), ranges(each.cases), each.row
+            failure.status,
+            failure.cause.removeprefix(f"{failure.status}: "),
+            len(failure.cases),
+            ranges(failure.cases),
+            failure.row,
         )
-        for each in pool.failures
+        for failure in pool.failures
     )
 
 

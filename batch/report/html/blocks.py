@@ -80,7 +80,7 @@ def verdict(found: Verdict, anchors: Anchors, *, tried: bool = False, again: str
     evidence = [_parts(found) if found.cases > 1 else None, _demands(found)]
     if found.failing:
         evidence.append(_failing(found.failing, single=found.cases == 1))
-    evidence += [_warning(each, anchors) for each in found.warnings]
+    evidence += [_warning(warning, anchors) for warning in found.warnings]
     evidence += [el("p", note, cls="note") for note in found.notes]
     kind = "" if tried else " yes" if found.ok else " no"
     return el("div", answer, el("div", evidence, cls="evidence"), cls=f"verdict{kind}")
@@ -101,7 +101,7 @@ def _words(found: Verdict) -> tuple[str, str]:
     if not found.demands:
         return NOTHING_ASKED
     of_all = {"demonstrated", "not shown", "refuted"}  # cases that may be drawn
-    return ALL_SHOWN if any(each.verdict in of_all for each in found.demands) else ALL_MET
+    return ALL_SHOWN if any(demand.verdict in of_all for demand in found.demands) else ALL_MET
 
 
 def _warning(each: ReportWarning, anchors: Anchors) -> Html:
@@ -240,9 +240,9 @@ def _demands(found: Verdict) -> Html | None:
     if found.kind == "answer":
         return _answered(found.demands)
     single = found.cases == 1
-    missed = not single and any(each.missed for each in found.demands)
-    unknown = not single and any(each.unknown for each in found.demands)
-    shares = not single and any(each.verdict for each in found.demands)
+    missed = not single and any(demand.missed for demand in found.demands)
+    unknown = not single and any(demand.unknown for demand in found.demands)
+    shares = not single and any(demand.verdict for demand in found.demands)
     heads = [
         "requirement",
         *(["outcome"] if single else ["met by", "yield"]),
@@ -251,7 +251,7 @@ def _demands(found: Verdict) -> Html | None:
         *(["not known"] if unknown else []),
         "value" if single else "worst value",
     ]
-    rows = [el("tr", _demand(each, single, shares, missed, unknown)) for each in found.demands]
+    rows = [el("tr", _demand(demand, single, shares, missed, unknown)) for demand in found.demands]
     right = {n for n, head in enumerate(heads) if head not in ("requirement", "outcome", "verdict")}
     return rows_under(headings(heads, right), rows, "Requirements")
 
@@ -364,21 +364,21 @@ def metrics(section: ReportSection) -> Html | None:
     """The table of metrics, each with its spread, and the shape of it."""
     if not section.metrics:
         return None
-    compared = any(each.before for each in section.metrics)
+    compared = any(metric.before for metric in section.metrics)
     values = [*(each.page_head for each in SPREAD_COLUMNS), *(["median before"] if compared else [])]
     if section.single:
         values = ["before", "now"] if compared else ["value"]
-    verified = any(each.by_step for each in section.metrics)
+    verified = any(metric.by_step for metric in section.metrics)
     values += ["± by the step"] if verified else []
     heads = ["metric", *values, "unit"]
     heads += [] if section.single else ["how often"]
-    remarks = any(each.remark for each in section.metrics)
+    remarks = any(metric.remark for metric in section.metrics)
     heads += [""] if remarks else []
-    rows = [el("tr", _metric(each, section.single, remarks, compared, verified)) for each in section.metrics]
+    rows = [el("tr", _metric(metric, section.single, remarks, compared, verified)) for metric in section.metrics]
     made = rows_under(
         headings(heads, range(1, len(values) + 1)), rows, "Metrics", cls="few" if section.single else None
     )
-    outline = any(each.bars_before for each in section.metrics)
+    outline = any(metric.bars_before for metric in section.metrics)
     said = el("p", "Bars: how often now. Outline: before.", cls="said") if outline else None
     by_step = el("p", f"{section.by_step}.", cls="said") if section.by_step else None
     return join([made, said, by_step])

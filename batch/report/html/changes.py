@@ -36,19 +36,21 @@ def origins(found: ArchiveChanges) -> Html:
     """The section on the provenance of the two archives, without their parameters, and on runs that only one of them
     has."""
     rows = [
-        el("div", el("dt", each.about), el("dd", _lines(each))) for each in found.origins if each.about != PARAMETERS
+        el("div", el("dt", origin.about), el("dd", _lines(origin)))
+        for origin in found.origins
+        if origin.about != PARAMETERS
     ]
     same = el("p", SAME[0].upper() + SAME[1:], ".", cls="said") if not found.origins and not found.decks else None
-    decks = [el("h3", "The decks' text"), [_deck(each) for each in found.decks]] if found.decks else None
+    decks = [el("h3", "The decks' text"), [_deck(deck) for deck in found.decks]] if found.decks else None
     return join([el("dl", rows, cls="facts made") if rows else None, same, _noted(found.alone), decks])
 
 
 def parameters(found: ArchiveChanges) -> list[Child]:
     """The parameters and models that differ, to stand beside the verdict of the comparison."""
     return [
-        el("div", el("p", f"{each.about}:", cls="said"), _lines(each), cls="changed")
-        for each in found.origins
-        if each.about == PARAMETERS
+        el("div", el("p", f"{origin.about}:", cls="said"), _lines(origin), cls="changed")
+        for origin in found.origins
+        if origin.about == PARAMETERS
     ]
 
 
@@ -95,7 +97,7 @@ def run_changes(found: RunChanges) -> Html:
         [
             head,
             _noted(found.alone),
-            [_ended(each) for each in found.endings],
+            [_ended(ending) for ending in found.endings],
             [el("p", f"Note: {note}", cls="said") for note in found.notes],
             [el("p", line, ".", cls="said") for line in found.allowed],
             signals,
@@ -146,7 +148,7 @@ def _samples(found: RunChanges) -> Html | None:
     if not found.samples:
         return None
     heads = tuple(head for _, head in DISTRIBUTION_HEADS)
-    rows = tuple(each.cells for each in found.samples)
+    rows = tuple(sample.cells for sample in found.samples)
     return table(
         TextTable(heads, ("",) * len(heads), rows, frozenset(range(1, len(heads)))), "Metrics as distributions"
     )

@@ -109,7 +109,7 @@ def _verdict_name(report: Report) -> str:
 
 def _signals_name(section: ReportSection) -> str:
     found = section.simulation
-    drawn = found is not None and any(each.arm.scene is not None for each in found.structures)
+    drawn = found is not None and any(structure.arm.scene is not None for structure in found.structures)
     return "Arm and signals" if drawn else "Signals"
 
 
@@ -120,12 +120,12 @@ def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
     out: list[Child] = [] if first is None else [_designs(0, first, "h2")]
     if report.changes is not None:
         compared = [
-            blocks.comparison(each, changes.parameters(report.changes), report.again)
-            for each in report.verdicts
-            if each.kind == "comparison"
+            blocks.comparison(verdict, changes.parameters(report.changes), report.again)
+            for verdict in report.verdicts
+            if verdict.kind == "comparison"
         ]
         out.append(el("section", el("h2", "What changed"), compared, changes.origins(report.changes), id="changed"))
-    own = [each for each in report.verdicts if each.kind != "comparison"]
+    own = [verdict for verdict in report.verdicts if verdict.kind != "comparison"]
     again = "" if report.changes is not None or (first is not None and first.command) else report.again[0]
     answers = [blocks.verdict(each, anchors, tried=tried, again="" if n else again) for n, each in enumerate(own)]
     out.append(el("section", el("h2", name, cls="" if tried else "quiet"), answers, id="verdict"))
@@ -160,7 +160,7 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
         out.append(
             el(
                 "section",
-                [changes.run_changes(each) for each in section.changes],
+                [changes.run_changes(change) for change in section.changes],
                 id=f"s{number}-compared",
                 cls="compared",
             )
@@ -199,7 +199,7 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
         out.append(part("overview", "Metrics", table))
     out += [] if section.single else drawn
     if section.influences:
-        shown = [tables.influence(each) for each in section.influences]
+        shown = [tables.influence(influence) for influence in section.influences]
         out.append(part("influence", "Which parameters matter", shown, said=ABOUT_INFLUENCE))
     if section.structures is not None:
         out.append(part("structures", "Structures side by side", tables.table(section.structures, "Structures")))

@@ -84,7 +84,7 @@ def exact(values: np.ndarray) -> dict[str, Any]:
 
 def modules_script(sections: Sequence[ReportSection]) -> str:
     """The WebAssembly modules of all sections by their digests, for the page's script, whose own digest covers them."""
-    here = [each for section in sections if section.simulation for each in section.simulation.structures]
+    here = [structure for section in sections if section.simulation for structure in section.simulation.structures]
     all_ = [each for one in here for each in (one, one.before) if each is not None]
     found = {each.told["kernel"]["module"]: base64.b64encode(each.code).decode("ascii") for each in all_}
     return f"MET.modules = {json.dumps(found)};"
@@ -152,7 +152,7 @@ def _map(each: Map) -> dict[str, Any]:
 
 
 def _ruler(found: Ruler) -> dict[str, Any]:
-    return {"edges": list(found.edges), "ticks": [[[at, visible(text)] for at, text in each] for each in found.ticks]}
+    return {"edges": list(found.edges), "ticks": [[[at, visible(text)] for at, text in tick] for tick in found.ticks]}
 
 
 def _reach(found: Reach | None) -> dict[str, Any] | None:
@@ -187,8 +187,13 @@ def _signals(signals: Signals) -> dict[str, Any]:
             for panel in signals.panels
         ],
         "histories": [
-            {"case": each.case, **_history(each), "before": _history(each.before), "change": _history(each.change)}
-            for each in signals.histories
+            {
+                "case": history.case,
+                **_history(history),
+                "before": _history(history.before),
+                "change": _history(history.change),
+            }
+            for history in signals.histories
         ],
         "shown": list(signals.shown),
         "most": list(signals.most),
@@ -207,7 +212,7 @@ def _history(each: History | None) -> dict[str, Any]:
 
 
 def _simulation(found: PageSimulation) -> dict[str, Any]:
-    return {"structures": [_structure(each) for each in found.structures]}
+    return {"structures": [_structure(structure) for structure in found.structures]}
 
 
 def _structure(found: SimulatedStructure) -> dict[str, Any]:

@@ -131,7 +131,7 @@ def influence(found: InfluencePart) -> Html:
     ]
     heads = ["parameter", "", "alone", *(["with others"] if together else []), "mean, from low to high", "rank"]
     made = rows_under(headings(heads, range(2, len(heads))), rows, f"What explains {found.metric}")
-    return join([el("h4", head), made, [el("p", each, cls="said") for each in found.notes]])
+    return join([el("h4", head), made, [el("p", note, cls="said") for note in found.notes]])
 
 
 def _tornado(row: InfluenceRow, mean: float, low: float, high: float) -> Html:
@@ -184,7 +184,7 @@ def parameters(found: Sequence[ParameterRow], anchors: Anchors) -> Html:
 def _overrides(row: ParameterRow, anchors: Anchors) -> Html | None:
     if not row.overrides:
         return None
-    found = [part for each in row.overrides for part in (spot_link(each, anchors), " ")]
+    found = [part for override in row.overrides for part in (spot_link(override, anchors), " ")]
     return el("span", "overrides ", found, cls="under")
 
 

@@ -68,7 +68,7 @@ def spreads(run: RunNumbers) -> Iterator[Scale]:
             )
     usual = "of one shape, a heavier body has more inertia"
     heads = [f"links.{link}" for link in sorted(run.moved)]
-    for head in [*heads, *(f"payloads.{each.name}" for each in run.structure.payloads)]:
+    for head in [*heads, *(f"payloads.{payload.name}" for payload in run.structure.payloads)]:
         least, most = run.ranges.get(f"{head}.mass", (0.0, 0.0))
         moments = [run.ranges.get(f"{head}.inertia.{part}", (0.0, 0.0)) for part in INERTIA[:3]]
         stays, lever = max(moments)[1], run.length(f"{head}.com") + run.length(f"{head}.at")

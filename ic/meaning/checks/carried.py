@@ -52,7 +52,7 @@ def uncarried(
     """
     if len(points) < 2:
         return []
-    inner = [each for each in humps_of_turns(points) if each.times[0] >= 0.0 and each.times[-1] <= duration]
+    inner = [hump for hump in humps_of_turns(points) if hump.times[0] >= 0.0 and hump.times[-1] <= duration]
     known = {(float(each.times[0]), float(each.times[-1])) for each in inner}
     from_zero = humps_from_zero(points, duration) if integral else ()
     every = [*inner, *(each for each in from_zero if (float(each.times[0]), float(each.times[-1])) not in known)]

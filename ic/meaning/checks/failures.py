@@ -43,7 +43,7 @@ def check_failures(
 ) -> None:
     """Report models about servos that are missing, lack the affected part, or are on a bed."""
     servos = {use.joint: use for use in uses}
-    beds = {each.joint: each.place for each in structure.substitutions}
+    beds = {substitution.joint: substitution.place for substitution in structure.substitutions}
     joints = {joint.name: joint for joint in structure.moving}
     sound = []
     for failure in _about(scope, structure.environment, "servo_of"):
@@ -104,7 +104,7 @@ def _check_follower(
 ) -> None:
     """Report dry friction of a follower that would not act: where no torque of its leader's feels it."""
     leading = leaders(follower.name, {joint.name: joint for joint in structure.moving})
-    on_beds = {each.joint for each in structure.substitutions}
+    on_beds = {substitution.joint for substitution in structure.substitutions}
     reason = "it follows more than one joint" if len(leading) > 1 else ""
     for name in leading:
         servo = servos.get(name)
@@ -178,9 +178,9 @@ def _check_full(scope: Scope, failure: ServoFailure, servo: Use) -> None:
 
     if endless(numbers):
         lacking = [
-            each
-            for each in servo.servo.parameters
-            if numbers.get(each.name) == math.inf and not endless({**numbers, each.name: 1.0})
+            parameter
+            for parameter in servo.servo.parameters
+            if numbers.get(parameter.name) == math.inf and not endless({**numbers, parameter.name: 1.0})
         ]
         scope.complaints.error(
             "D292",

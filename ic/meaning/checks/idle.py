@@ -71,7 +71,7 @@ def remark_beginnings(scope: Scope, joints: Iterable[Joint], uses: Iterable[Envi
         _observe_beginning(scope, joint.name, ends, f"joint:{joint.name}", "its range", joint.place, help)
     for use in uses:
         model = models.find("environment", use.model)
-        of = [each.name for each in model.parameters if each.names == "joint"]
+        of = [parameter.name for parameter in model.parameters if parameter.names == "joint"]
         named = [settled for each in of if (settled := scope.parameters.get(f"environment.{use.name}.{each}"))]
         if named and len(model.initial_range) == 2:
             ends = [scope.parameters.get(f"environment.{use.name}.{each}") for each in model.initial_range]

@@ -142,7 +142,7 @@ def check_magnitudes(scope: Scope, structure: Structure) -> None:
         _observe(scope, kind, those)
     bodies = list(_bodies(scope, structure.straight))
     _observe_densities(scope, [body for body in bodies if body.sizes and body.may_be_odd])
-    of_their_own = [body for body in bodies if any(each.origin.kind != "derived" for each in body.moments)]
+    of_their_own = [body for body in bodies if any(moment.origin.kind != "derived" for moment in body.moments)]
     # the inertia of a shape follows from it; a base may be of any size, and so may a payload
     small = [body for body in of_their_own if body.sizes or (body.head.startswith("links.") and body.head != OF_BASE)]
     _observe_inertias(scope, structure, small)
@@ -234,8 +234,8 @@ class WeighedBody:
     @property
     def may_be_odd(self) -> bool:
         """True where the density is not that of a solid, or varies."""
-        numbers = [self.mass.value, *(each.value for each in self.sizes.values())]
-        if any(isinstance(each, Scalar) for each in numbers):
+        numbers = [self.mass.value, *(size.value for size in self.sizes.values())]
+        if any(isinstance(number, Scalar) for number in numbers):
             return True
         volume = self.volume(numbers[1:])
         thin, dense = self.densities
@@ -249,8 +249,8 @@ class WeighedBody:
 
 def _bodies(scope: Scope, structure: Structure) -> Iterator[WeighedBody]:
     """Links and payloads with known numbers, but for lumped links, whose numbers are no body's."""
-    named = [("link", "links", each.name) for each in structure.links if not each.lumped]
-    named += [("payload", "payloads", each.name) for each in structure.payloads]
+    named = [("link", "links", link.name) for link in structure.links if not link.lumped]
+    named += [("payload", "payloads", payload.name) for payload in structure.payloads]
     shapes: dict[str, dict[str, Settled]] = {}
     for path, settled in scope.auxiliary.items():
         owner, shape, size = path.partition(".shape.")
@@ -264,7 +264,9 @@ def _bodies(scope: Scope, structure: Structure) -> Iterator[WeighedBody]:
         written = [*sizes.values(), *moments]
         place = next((each.origin.place for each in written if each is not None and each.origin.place), None)
         if mass is not None and place is not None and None not in moments:
-            yield WeighedBody(f"{word} `{name}`", head, place, mass, tuple(each for each in moments if each), sizes)
+            yield WeighedBody(
+                f"{word} `{name}`", head, place, mass, tuple(moment for moment in moments if moment), sizes
+            )
 
 
 def _observe_densities(scope: Scope, bodies: Sequence[WeighedBody]) -> None:
@@ -305,7 +307,7 @@ def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[Weigh
     """Check that bodies are no denser and no thinner than solids by their inertia alone."""
     if not bodies:
         return
-    paths = [f"{joint.name}.at" for joint in structure.joints] + [f"links.{each.name}.com" for each in structure.links]
+    paths = [f"{joint.name}.at" for joint in structure.joints] + [f"links.{link.name}.com" for link in structure.links]
     vectors = [scope.parameters.get(f"{path}.{axis}") for path in paths for axis in XYZ]
     if None in vectors:
         return
@@ -349,11 +351,11 @@ def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[Weigh
                 "D298",
                 f"{body.name} has the inertia of a body of {odd.radius:.4g} m (its radius of gyration){where}"
                 f"{_others(len(those))}, and {beside}",
-                next((each.origin.place for each in body.moments if each.origin.place), body.place),
+                next((moment.origin.place for moment in body.moments if moment.origin.place), body.place),
                 help=[*helps[:1], "look at the units of its mass and of its inertia", MEANT.format("D298")],
             )
 
-    _together(scope, [*settled, *(each for each in vectors if each is not None)], warn, bodies)
+    _together(scope, [*settled, *(vector for vector in vectors if vector is not None)], warn, bodies)
 
 
 @frozen

@@ -39,12 +39,12 @@ def flies_from_afar(experiment: Experiment, name: str) -> bool:
     looked_at = grapple_numbers(structure, payload, experiment.parameters) if payload is not None else None
     if looked_at is None or experiment.allows("D339"):
         return False
-    inputs = {each.path: each.values for each in experiment.cases.coordinates}
+    inputs = {coordinate.path: coordinate.values for coordinate in experiment.cases.coordinates}
     outputs, columns = experiment.formulas.replay(inputs), []
     for path in looked_at.paths:
         value = experiment.parameters[path].value
         columns.append(outputs[value.output] if isinstance(value, Formula) else value)
-    rows = np.stack(np.broadcast_arrays(*(np.atleast_1d(each) for each in columns)), axis=1).astype(float)
+    rows = np.stack(np.broadcast_arrays(*(np.atleast_1d(column) for column in columns)), axis=1).astype(float)
     return bool(looked_at.away(rows, structure.schedule.duration)[0].size)
 
 
@@ -65,7 +65,7 @@ class GrappleNumbers:
         at, position, velocity, rate, com, middle, *others = np.moveaxis(rows[:, 9:].reshape(len(rows), -1, 3), 1, 0)
         g = sum(others[: self.gravities], np.zeros_like(at))
         away = _length(position + velocity * time[:, None] + 0.5 * g * (time * time)[:, None])
-        reach = sum((_length(each) for each in others[self.gravities :]), _length(at))
+        reach = sum((_length(other) for other in others[self.gravities :]), _length(at))
         reach = reach + 2.0 * _length(middle) + _size(of_link)
         # its frame goes round its centre, which flies straight; and as far again as its body is large
         loose = _length(com) * (2.0 + _length(rate) * time) + _size(own)
@@ -85,8 +85,13 @@ def grapple_numbers(structure: Structure, payload: Payload, parameters: Mapping[
     sizes = ("mass", *(f"inertia.{x}{x}" for x in "xyz"))
     gravity = [f"environment.{load.name}.g" for load in structure.environment if load.model == "gravity"]
     numbers = [f"{head}.grapple", *(f"{each}.{name}" for each in (head, link) for name in sizes)]
-    vectors = [*(f"{head}.{name}" for name in _OF_PAYLOAD), f"{link}.com", *gravity, *(f"{each}.at" for each in joints)]
-    return GrappleNumbers((*numbers, *(f"{each}.{x}" for each in vectors for x in "xyz")), len(gravity))
+    vectors = [
+        *(f"{head}.{name}" for name in _OF_PAYLOAD),
+        f"{link}.com",
+        *gravity,
+        *(f"{joint}.at" for joint in joints),
+    ]
+    return GrappleNumbers((*numbers, *(f"{vector}.{x}" for vector in vectors for x in "xyz")), len(gravity))
 
 
 def _way_to(structure: Structure, link: str) -> list[str] | None:
@@ -107,8 +112,8 @@ def _is_pushed(structure: Structure, payload: Payload, parameters: Mapping[str, 
     known = models.find_own("environment")
     for load in structure.environment:
         model = models.find("environment", load.model, load.place)
-        links = [each.name for each in model.parameters if each.names == "link"]
-        named = [parameters.get(f"environment.{load.name}.{each}") for each in links]
+        links = [parameter.name for parameter in model.parameters if parameter.names == "link"]
+        named = [parameters.get(f"environment.{load.name}.{link}") for link in links]
         if load.model not in known or model.free_fall is not None:
             return True
         if any(each is not None and each.value == payload.name for each in named):

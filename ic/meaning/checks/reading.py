@@ -63,7 +63,7 @@ def _kept(structure: Structure, servo: ServoUse, of: str) -> bool:
     path = f"{servo.joint}.servo.sensor.{of}"
     channels = [channel for each in structure.record for channel in each.channels]
     channels += [channel for expression in structure.expressions for channel in expression.channels]
-    return any(f"{each}.".startswith(f"{path}.") for each in (*channels, *(each.of for each in structure.metrics)))
+    return any(f"{each}.".startswith(f"{path}.") for each in (*channels, *(metric.of for metric in structure.metrics)))
 
 
 def _dead(scope: Scope, structure: Structure, joint: str) -> Iterable[tuple[str, Any]]:

@@ -75,14 +75,14 @@ def _remark_contradictions(scope: Scope, requirements: Iterable[Requirement]) ->
     """Report two requirements of which one is always missed, or of which one decides nothing beside the other."""
     lowest: dict[str, Requirement] = {}
     highest: dict[str, Requirement] = {}
-    for each in requirements:
-        upper = each.comparison.startswith("<")
-        kept = (highest if upper else lowest).setdefault(each.metric, each)
-        tighter = (each.limit < kept.limit) if upper else (each.limit > kept.limit)
+    for requirement in requirements:
+        upper = requirement.comparison.startswith("<")
+        kept = (highest if upper else lowest).setdefault(requirement.metric, requirement)
+        tighter = (requirement.limit < kept.limit) if upper else (requirement.limit > kept.limit)
         if tighter:
-            (highest if upper else lowest)[each.metric] = each
-        if kept is not each:
-            _remark_looser(scope, *((kept, each) if tighter else (each, kept)))
+            (highest if upper else lowest)[requirement.metric] = requirement
+        if kept is not requirement:
+            _remark_looser(scope, *((kept, requirement) if tighter else (requirement, kept)))
     for name in lowest.keys() & highest.keys():
         low, high = lowest[name], highest[name]
         strict = "=" not in low.comparison or "=" not in high.comparison

@@ -144,7 +144,7 @@ class RunNumbers:
     def is_written(self, path: str) -> bool:
         """True where the deck wrote a number of this vector, or of this tensor."""
         ends = [f"{path}.{part}" for part in (*XYZ, *INERTIA)]
-        found = [self.settled[each] for each in ends if each in self.settled]
+        found = [self.settled[end] for end in ends if end in self.settled]
         return any(each.origin.place is not None and each.origin.kind != "derived" for each in found)
 
     def gyration(self, head: str) -> float:
@@ -256,12 +256,12 @@ class RunNumbers:
         if profile is None:
             return None
         p = SimpleNamespace()
-        for each in profile.parameters:
-            path = f"{use.joint}.servo.command.{each.name}"
+        for parameter in profile.parameters:
+            path = f"{use.joint}.servo.command.{parameter.name}"
             value = self.numbers.get(path, self.settled[path].value if path in self.settled else None)
             if value is None:
                 return None
-            setattr(p, each.name, value)
+            setattr(p, parameter.name, value)
         t = self.instants
         with np.errstate(all="ignore"):  # of a swing at 1e308 Hz there are no numbers
             values, slopes = (np.broadcast_to(np.asarray(each, float), t.shape) for each in profile.course(p, t))

@@ -96,7 +96,7 @@ class Swing:
 def check_sampling(scope: Scope, structure: Structure, requirements: Iterable[Requirement] = ()) -> None:
     """Warn about changes that begin or go on after the run's end, and swings and pulses between the sampling
     instants."""
-    schedule, named = structure.schedule, {each.metric for each in requirements}
+    schedule, named = structure.schedule, {requirement.metric for requirement in requirements}
     judged = {use.of for use in structure.metrics if use.name in named}
     finishing = {f"{of.rpartition('.')[0]}.servo.command" for of in judged if of.endswith((".q", ".qd"))}
     recorded = schedule.record / schedule.base_hz if structure.record else 0.0
@@ -116,7 +116,10 @@ def _observe_filter(
     scope: Scope, use: SensorUse | LinkSensor, label: str, path: str, divisor: int, by: str, schedule: Schedule
 ) -> None:
     """Warn about a sensor whose filter passes what its instants, every `divisor` base ticks, take for slower swings."""
-    found = {each.name: scope.parameters.get(f"{path}.{each.name}") for each in sensor_parts(use, "parameters")}
+    found = {
+        sensor_part.name: scope.parameters.get(f"{path}.{sensor_part.name}")
+        for sensor_part in sensor_parts(use, "parameters")
+    }
     settled = {name: each for name, each in found.items() if each is not None}
     values = {name: each.value for name, each in settled.items()}
     rate = evaluate_declared(scope, models.find("sensor", use.model).fastest, values, path)

@@ -137,9 +137,9 @@ def _levers(run: RunNumbers) -> Iterator[Scale]:
     """Points at which models of the environment act on links."""
     usual = "what acts on an arm acts on it, or on what it carries"
     for use in run.structure.environment:
-        for each in models.find("environment", use.model).parameters:
-            path = f"environment.{use.name}.{each.name}"
-            if each.name in ("point", "at") and each.unit == "m" and run.reach > 0.0:
+        for parameter in models.find("environment", use.model).parameters:
+            path = f"environment.{use.name}.{parameter.name}"
+            if parameter.name in ("point", "at") and parameter.unit == "m" and run.reach > 0.0:
                 far, other = run.length(path), run.reach_words
                 yield Scale("point of a load", path, far, "m", run.reach, other, 0.0, 10.0, usual, meant="m")
 
@@ -411,7 +411,7 @@ def _gravities(run: RunNumbers) -> Iterator[Scale]:
             path = f"environment.{use.name}.g"
             size, other = run.length(path), "that on the Earth"
             yield Scale("gravity", path, size, "m/s^2", EARTH, other, 0.0, 30.0, usual, meant="m/s^2", typical=1.0)
-            up, feet = run.vector(path)[2], [each for each in run.structure.joints if each.parent == BASE]
+            up, feet = run.vector(path)[2], [joint for joint in run.structure.joints if joint.parent == BASE]
             upright = all(rotation_rpy(*run.vector(f"{joint.name}.rpy"))[2][2] > -0.5 for joint in feet)
             if 0.0 < size <= up and run.structure.base is None and upright:
                 said, cure = f"leads up: its z is {up:.4g} m/s^2", f"where z is up, its z is -{up:.4g} m/s^2"

@@ -67,8 +67,8 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
     except TooLarge as reason:
         complaints.settle()
         return replace(experiment, notes=(*experiment.notes, f"{NOT_LOOKED_AT}{reason}"))
-    grows = any(each.kind == "grows" for each in found.faults)
-    fast = any(each.kind == "fast" for each in found.faults)
+    grows = any(fault.kind == "grows" for fault in found.faults)
+    fast = any(fault.kind == "fast" for fault in found.faults)
     refuted = set()
     if found.finite:
         # a released payload leaves a lighter arm than that of the start
@@ -85,7 +85,9 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
 
         better = memo.answer(f"remedy for what {each.kind}", full, better_step, rows)
         complaints.pass_on(fault_warning(experiment, each, better, scope.rate_place, _where(experiment, each, found)))
-    if "D104" not in kept and not any(each.kind == "grows" and not _is_of_loops(each, found) for each in found.faults):
+    if "D104" not in kept and not any(
+        fault.kind == "grows" and not _is_of_loops(fault, found) for fault in found.faults
+    ):
 
         def find_usual() -> list[str]:
             return usual_number(scope, full, lambda changed: not step_size(changed, rows).loops)
@@ -157,7 +159,8 @@ def _looked_at(experiment: Experiment, rows: Sequence[int]) -> str:
     if len(rows) >= cases.count:
         return ""
     both = [
-        np.ptp(each.values[list(rows)]) == np.ptp(each.values[list(ends(each.values))]) for each in cases.coordinates
+        np.ptp(coordinate.values[list(rows)]) == np.ptp(coordinate.values[list(ends(coordinate.values))])
+        for coordinate in cases.coordinates
     ]
     of = "all that varies" if all(both) else f"{sum(both)} of the {len(both)} that vary"
     those = f", with the least and the largest of {of}" if any(both) else ""

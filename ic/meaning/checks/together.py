@@ -35,7 +35,7 @@ def _remark_stop(scope: Scope, load: EnvironmentUse, servos: dict[str, Use], dur
     """Report a model that would keep a joint between two ends, where the servo moves on against any torque; not where
     its positions, during the run, are all between them."""
     model = models.find("environment", load.model, load.place)
-    named = next((each.name for each in model.parameters if each.names == "joint"), None)
+    named = next((parameter.name for parameter in model.parameters if parameter.names == "joint"), None)
     settled = scope.parameters.get(f"environment.{load.name}.{named}") if model.initial_range and named else None
     servo = servos.get(str(settled.value)) if settled is not None else None
     place = (settled.origin.place if settled is not None else None) or load.place

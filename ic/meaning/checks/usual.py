@@ -39,7 +39,7 @@ def _factor(scale: Scale) -> float:
     """The factor of the number that makes it usual: that of the first other unit that does, else to the typical one."""
     units = [factor for _, factor in OTHER_UNITS.get(scale.meant, ())]
     needed = float((scale.typical / scale.multiple) ** (1.0 / scale.power))
-    return next((each for each in units if each < FAR * needed and needed < FAR * each), needed)
+    return next((unit for unit in units if unit < FAR * needed and needed < FAR * unit), needed)
 
 
 def _distance(scale: Scale) -> float:

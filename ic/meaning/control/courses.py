@@ -79,7 +79,7 @@ def use_course(
 
 def _check_wraps(scope: Scope, owner: Owner, profile: Profile, values: Mapping[str, Any], body: MergedBlock) -> None:
     """Warn where angles that a deck lists over time are those of a wrapped log."""
-    declared = next(each for each in profile.parameters if each.name == "values")
+    declared = next(parameter for parameter in profile.parameters if parameter.name == "values")
     times, angles = values["times"], values["values"]
     if owner.unit(declared)[0] == "rad" and len(times) == len(angles):
         written = components(body.get("values"), len(angles))

@@ -241,7 +241,9 @@ def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any]
     found = guide.idle(SimpleNamespace(**values), duration)
     if found is not None:
         written = [part for name in found[0] if (part := (item.body or MergedBlock()).get(name)) is not None]
-        needed = [each for each in guide.parameters if each.name in found[0] and each.default is None]
+        needed = [
+            parameter for parameter in guide.parameters if parameter.name in found[0] and parameter.default is None
+        ]
         scope.complaints.remark(
             "D301",
             f"guide `{item.name}` {found[1]}",

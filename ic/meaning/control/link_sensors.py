@@ -101,7 +101,7 @@ def _sensor(scope: Scope, item: Item, arm: ResolvedArm, payloads: tuple[Payload,
     scope.not_sweepable[owner.path] = not_sweepable.model("a sensor", owner.path)
     given = body.get("rate")
     rate = fixed_rate(scope, owner, given, owner.label, doc="how often it reads") if given is not None else None
-    words = [each for each in sensor.parameters if each.shape == "word" and not each.names]
+    words = [parameter for parameter in sensor.parameters if parameter.shape == "word" and not parameter.names]
     return Sensing(item.name, sensor.name, words_chosen(words, body), rate, values or {}, item.place)
 
 

@@ -78,5 +78,5 @@ def use_sensor(scope: Scope, servo: Owner, use: ServoUse, item: Item) -> SensorU
     body = item.body or MergedBlock()
     use_model(scope, owner, sensor.parameters, body)
     scope.keep_setting(f"{owner.path}.model", sensor.name, item=item)
-    words = [each for each in sensor.parameters if each.shape == "word"]
+    words = [parameter for parameter in sensor.parameters if parameter.shape == "word"]
     return SensorUse(item.name, sensor.name, words_chosen(words, body), item.place)

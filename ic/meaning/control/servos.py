@@ -116,9 +116,9 @@ def _spring(scope: Scope, joint: Joint) -> Use:
     """The servo of a boom's spring, whose stiffness and damping are the boom's."""
     assert joint.place is not None  # joints from a deck have one
     servo, owner = models.find("servo", "passive"), Owner(f"joint `{joint.name}`", joint.place, f"{joint.name}.servo")
-    others = [each for each in servo.parameters if f"{owner.path}.{each.name}" not in scope.parameters]
+    others = [parameter for parameter in servo.parameters if f"{owner.path}.{parameter.name}" not in scope.parameters]
     parameters = use_model(scope, owner, others, MergedBlock()) or {}
-    parameters |= {each.name: scope.parameters[owner.join(each.name)].value for each in servo.parameters}
+    parameters |= {parameter.name: scope.parameters[owner.join(parameter.name)].value for parameter in servo.parameters}
     return Use(joint.name, "boom", servo, None, None, parameters, joint.place)
 
 
@@ -219,7 +219,7 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
         )
     scope.keep_setting(f"{item.name}.servo.model", servo.name, item=model)
     scope.not_sweepable[f"{item.name}.servo.model"] = not_sweepable.chosen(f"{item.name}.servo", "definitions")
-    words = words_chosen([each for each in servo.parameters if each.name in servo.deciding], block)
+    words = words_chosen([parameter for parameter in servo.parameters if parameter.name in servo.deciding], block)
     bare = ServoUse(item.name, name, servo.name, command, 1, words=words)
     sensors = tuple(use for each in sensed if (use := use_sensor(scope, owner, bare, each)) is not None)
     return Use(item.name, name, servo, command, rate, parameters, item.place, words, sensors)

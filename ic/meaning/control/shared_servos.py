@@ -78,7 +78,7 @@ def _renamed(scope: Scope, shared: SharedServo, kind: str, joint: str) -> Shared
 
 def _on_joint(why: NotSweepable, on_joint: Callable[[str], str]) -> NotSweepable:
     words = (why.reason, why.sweep, why.one_of, why.setting)
-    return NotSweepable(*map(on_joint, words)) if any(ANY in each for each in words) else why
+    return NotSweepable(*map(on_joint, words)) if any(ANY in word for word in words) else why
 
 
 def _shared(scope: Scope, item: Item, kind: str, resolve: Resolve) -> SharedServo | None:

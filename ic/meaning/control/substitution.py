@@ -201,7 +201,7 @@ def _substitution(
             "D246",
             f"the servo of joint `{item.name}` has a sensor, and its motor is on a bed, which has its own",
             item.place,
-            also=[Label(each.place, "the sensor") for each in use.sensors if each.place],
+            also=[Label(sensor.place, "the sensor") for sensor in use.sensors if sensor.place],
             help="leave the sensor out in this run: `remove QUANTITY;`, or a servo `like` it without",
         )
         return None

@@ -47,7 +47,7 @@ def use_file(
         scope,
         owner,
         others,
-        MergedBlock({key: item for key, item in body.items.items() if key in [each.name for each in others]}),
+        MergedBlock({key: item for key, item in body.items.items() if key in [other.name for other in others]}),
     )
     for each in (FILE.name, COLUMN.name, *LISTS):
         scope.not_sweepable[owner.join(each)] = not_sweepable.FILE

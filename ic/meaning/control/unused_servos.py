@@ -64,7 +64,7 @@ def check_on_a_joint(scope: Scope, name: str) -> None:
     told: list[tuple[Diagnostic, ...]] = []
     for joint in KINDS:
         complaints = Complaints()
-        lacking = (*NOT_PARAMETERS, *(each.name for each in servo.parameters))
+        lacking = (*NOT_PARAMETERS, *(parameter.name for parameter in servo.parameters))
         complaints.known_missing |= {(definition.place, each) for each in lacking}
         here = Scope(scope.definitions.reporting_to(complaints), complaints)
         homes = scope.definitions.homes(definition)

@@ -249,7 +249,7 @@ def _table(file: str, text: str, declared: Collection[str] = ()) -> CsvTable:
 def _with_units(file: str, text: str, head: int, columns: tuple[CsvColumn, ...]) -> tuple[CsvColumn, ...]:
     """The columns with the units of a line `# units: s,rad` above their head, as `met export` writes them, where none
     has a unit in the head. Raises Problem D197 where that line does not have a unit for each column."""
-    if head < 2 or any(each.unit is not None for each in columns):
+    if head < 2 or any(column.unit is not None for column in columns):
         return columns
     above = text.split("\n", min(head - 1, MOST_REMARKS))[: head - 1]
     line, told = next(((n, each) for n, each in enumerate(above, 1) if each.startswith(UNITS)), (0, ""))

@@ -200,7 +200,10 @@ class _Merger:
 
     def _stated(self, name: str) -> Statement | None:
         """The statement of a name."""
-        return next((each for each in self.statements if each.name is not None and each.name.text == name), None)
+        return next(
+            (statement for statement in self.statements if statement.name is not None and statement.name.text == name),
+            None,
+        )
 
     def _drop(self, statement: Statement) -> None:
         at = next(at for at, each in enumerate(self.statements) if each is statement)

@@ -147,7 +147,7 @@ class Definitions:
 
     def under(self, roof: str, names: Iterable[str]) -> list[str]:
         """The full names that are under a roof, as its own deck writes them; all of them where it is ""."""
-        return [each[len(roof) + 1 :] for each in names if each.startswith(f"{roof}.")] if roof else list(names)
+        return [name[len(roof) + 1 :] for name in names if name.startswith(f"{roof}.")] if roof else list(names)
 
     def definition_named(self, value: Expression | None) -> str | None:
         """The full name of a definition as a value, alone or with a block; None where the deck has no roof, and names
@@ -222,7 +222,7 @@ class Definitions:
                 and (not roof or each.startswith(f"{roof}."))
             ]
             near = meant(name.text, known)
-            if near is None or any(each.code != "D041" for each in problem.diagnostics):
+            if near is None or any(diagnostic.code != "D041" for diagnostic in problem.diagnostics):
                 raise
             complaints.add(*problem.diagnostics)
             self._meant[(kind, name.text)] = near
@@ -282,8 +282,8 @@ class Definitions:
         """The block made from a definition's file, as its base; None where that failed (already reported)."""
         with self._complaints.gather():
             body = self.robot_files.arm_entries(call)
-            for each in self.robot_files.remarks(call):
-                self._complaints.remark(each.code, each.message, each.at, also=each.also, help=each.help)
+            for remark in self.robot_files.remarks(call):
+                self._complaints.remark(remark.code, remark.message, remark.at, also=remark.also, help=remark.help)
             return merge(None, body.entries, home=definition.name, base_name=None, complaints=self._complaints)
         return None
 
@@ -494,13 +494,13 @@ class Definitions:
 
     def _check_defaults(self) -> None:
         first: dict[str, Definition] = {}  # of each file: decks that can be included together have one each
-        for each in self._defaults():
-            known = first.setdefault(each.place.file, each)
-            if known is not each:
+        for default in self._defaults():
+            known = first.setdefault(default.place.file, default)
+            if known is not default:
                 self._complaints.error(
                     "D050",
-                    f"`{each.name}` is a second default",
-                    each.place,
+                    f"`{default.name}` is a second default",
+                    default.place,
                     also=[Label(known.place, "the first")],
                     help="keep one `default`",
                 )

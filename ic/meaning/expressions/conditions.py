@@ -157,7 +157,7 @@ class Checks:
         path   what the check is about; needs: paths whose own checks must hold for this one to say anything
         warns  whether some of very many cases are enough for it
         """
-        if any(self.failed(each) for each in needs):
+        if any(self.failed(need) for need in needs):
             return
         check = Check(
             values, test, code, message, place, (help,) if isinstance(help, str) else help, path, needs, warns
@@ -254,7 +254,7 @@ class Checks:
         self, check: Check, cases: Mapping[str, CaseValues], row: int, count: int, causes: Sequence[str]
     ) -> None:
         """Report a check that fails in some cases, of which this is the first."""
-        if any(self.failed(each) for each in check.needs):
+        if any(self.failed(need) for need in check.needs):
             return
         self.fail(check.path)
         where = ", ".join(f"{path} = {self.shown(path, cases[path][row])}" for path in cases)

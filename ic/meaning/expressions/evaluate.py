@@ -137,7 +137,7 @@ def _leaf(expression: Expression, lookup: Lookup) -> Value | ValueList:
             return ValueList(tuple(_items(expression, lookup)), expression.place)
         case Range():
             parts = (expression.first, expression.last, expression.step)
-            first, last, step = (evaluate_number(each, lookup) for each in parts)
+            first, last, step = (evaluate_number(part, lookup) for part in parts)
             written = expression.step
             if isinstance(written, Number) and written.unit and first.bare and last.bare and step.dimension != PURE:
                 # the unit at the end applies to all, as in `0 .. 90 by 5 deg`
@@ -283,9 +283,9 @@ def _of_numbers(node: Binary, left: Value, right: Value) -> Value:
 
 def _made_alike(node: Binary, left: Value, right: Value) -> Help:
     """The remedy where a bare number is added to a quantity, or two dimensions are."""
-    of_macro = [each.macro for each in node.place.macros]
+    of_macro = [macro.macro for macro in node.place.macros]
     outside = [each for each in (node.left, node.right) if not place_of(each).macros]
-    if of_macro and (outside or any(place_of(each).expansions != node.place.expansions for each in children(node))):
+    if of_macro and (outside or any(place_of(child).expansions != node.place.expansions for child in children(node))):
         return Help(f"`{node.operator}` comes from macro `{of_macro[0]}`: put brackets around the macro's body")
     other, bare_one, written = (right, left, node.left) if left.bare else (left, right, node.right)
     if not bare_one.bare or isinstance(bare_one.number, Scalar):

@@ -51,10 +51,10 @@ def list_arithmetic(
         return _made([of_numbers(node, a, b) for a, b in pairs], place)
     if isinstance(left, ValueList) and isinstance(right, Value) and operator in ("*", "/"):
         kept = left.unit if right.dimension == PURE else None
-        return replace(_made([of_numbers(node, each, right) for each in _numbers(left)], place), unit=kept)
+        return replace(_made([of_numbers(node, number, right) for number in _numbers(left)], place), unit=kept)
     if isinstance(left, Value) and isinstance(right, ValueList) and operator == "*":
         kept = right.unit if left.dimension == PURE else None
-        return replace(_made([of_numbers(node, left, each) for each in _numbers(right)], place), unit=kept)
+        return replace(_made([of_numbers(node, left, number) for number in _numbers(right)], place), unit=kept)
     message = f"`{operator}` of {_what(left)} and {_what(right)}"
     helps = "a list is multiplied with a number and divided by one; lists of as many numbers are added and subtracted"
     raise Problem(error("D071", message, node.place, also=_labels(left, right), help=helps))
@@ -64,7 +64,7 @@ def signed(operator: str, written: ValueList, place: Place) -> ValueList:
     """A list behind a sign."""
     if operator == "+":
         return replace(written, place=place)
-    items = [replace(each, number=-each.number, decimal="") for each in _numbers(written)]
+    items = [replace(number, number=-number.number, decimal="") for number in _numbers(written)]
     return replace(_made(items, place), unit=written.unit)
 
 
@@ -101,13 +101,13 @@ def indexed(node: Indexed, written: Value | ValueList, index: Value) -> Value | 
 
 def _made(items: list[Value], place: Place) -> ValueList:
     """The list of computed numbers, each at the place of the whole, where its unit would be corrected."""
-    bare = len(items) > 1 and all(each.bare for each in items)
-    return ValueList(tuple(replace(each, place=place, bare=bare) for each in items), place)
+    bare = len(items) > 1 and all(item.bare for item in items)
+    return ValueList(tuple(replace(item, place=place, bare=bare) for item in items), place)
 
 
 def _numbers(written: ValueList) -> list[Value]:
-    numbers = [each for each in written.items if isinstance(each, Value)]
-    inner = next((each for each in written.items if isinstance(each, ValueList)), None)
+    numbers = [item for item in written.items if isinstance(item, Value)]
+    inner = next((item for item in written.items if isinstance(item, ValueList)), None)
     if inner is not None:
         raise Problem(error("D071", "a list inside a list", inner.place))
     return numbers

@@ -26,7 +26,7 @@ DEEPEST = 64  # depth of lets that need lets: far more than in decks, far less t
 
 def _uses(place: Place) -> list[Place]:
     """The places at which the macros of a place were used."""
-    return [each.use for each in place.macros]
+    return [macro.use for macro in place.macros]
 
 
 def _macro(place: Place) -> str:

@@ -86,7 +86,7 @@ def representable(number: Real, place: Place, *factors: Real) -> Real:
         return number
     if not math.isfinite(number):
         raise too_large(place)
-    if factors and number == 0.0 and all(not isinstance(each, Scalar) and each != 0.0 for each in factors):
+    if factors and number == 0.0 and all(not isinstance(factor, Scalar) and factor != 0.0 for factor in factors):
         raise Problem(
             error(
                 "D067",

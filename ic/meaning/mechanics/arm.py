@@ -215,7 +215,7 @@ def _resolved(
         made = part(item)
         check_names(scope, item, made, block)
         links += [each for each in made if isinstance(each, Link)]
-        ends |= {each.name: None for each in links if each.shape is not None}
+        ends |= {link.name: None for link in links if link.shape is not None}
         of_booms += [each for each in made if isinstance(each, Joint)]
     roots = {link.name: link.root for link in links if link.root}
     written = [part(item) for item in block.of_kind("joint")]

@@ -242,7 +242,7 @@ PLACES = {"link": ("at", "point"), "to": ("to_at", "to_point"), "nozzle_link": (
 
 def check_places(scope: Scope, structure: Structure) -> None:
     """Check that what stands on a boom is at its tip, for the boom's frame moves with its last piece."""
-    things = [(f"joint `{each.name}`", f"{each.name}.at", each.parent, each.place) for each in structure.joints]
+    things = [(f"joint `{joint.name}`", f"{joint.name}.at", joint.parent, joint.place) for joint in structure.joints]
     for payload in structure.payloads:
         things.append((f"payload `{payload.name}`", f"payloads.{payload.name}.at", payload.link, payload.place))
     for head, group in (("environment", structure.environment), ("sensors", structure.sensors)):
@@ -273,7 +273,7 @@ def check_places(scope: Scope, structure: Structure) -> None:
 def _is_moment_alone(scope: Scope, path: str) -> bool:
     """True of a wrench without a force in any case, which acts on a boom wherever it is."""
     forces = [each.value for key, each in scope.parameters.items() if key.startswith(f"{path}.force")]
-    return bool(forces) and all(not any(each) if isinstance(each, tuple) else _is_zero(each) for each in forces)
+    return bool(forces) and all(not any(force) if isinstance(force, tuple) else _is_zero(force) for force in forces)
 
 
 def _is_zero(value: Real | str) -> bool:

@@ -98,7 +98,7 @@ def check_followers(scope: Scope, joints: Sequence[Joint]) -> None:
                 "D213",
                 f"joint `{joint.name}` follows itself by way of others",
                 joint.place,
-                also=[Label(each.place, "which follows it") for each in others if each.place is not None],
+                also=[Label(other.place, "which follows it") for other in others if other.place is not None],
                 help="one of them should follow none: that one leads",
             )
             return

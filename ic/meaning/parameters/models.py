@@ -42,8 +42,8 @@ def overriding_place(item: Item) -> Place | None:
 
 def words_chosen(parameters: Sequence[Parameter], body: MergedBlock) -> tuple[tuple[str, str], ...]:
     """The words that a body writes for these parameters, without defaults."""
-    found = ((each.name, word_written(each, body)) for each in parameters)
-    defaults = {each.name: each.default for each in parameters}
+    found = ((parameter.name, word_written(parameter, body)) for parameter in parameters)
+    defaults = {parameter.name: parameter.default for parameter in parameters}
     return tuple((name, word) for name, word in found if word != defaults[name])
 
 
@@ -180,7 +180,9 @@ def use_model(
     extra = list(extra)
     check_keys(scope, body, [*known, *extra], owner)
     if FILE.name in extra and scope.complaints.is_known_to_lack(owner.place, FILE.name):  # which would have the lists
-        scope.complaints.known_missing |= {(owner.place, each.name) for each in parameters if each.shape == "list"}
+        scope.complaints.known_missing |= {
+            (owner.place, parameter.name) for parameter in parameters if parameter.shape == "list"
+        }
     here = [p.name for p in parameters if is_present(p, words)]
     owner = replace(owner, others=parameters)
     values: dict[str, Any] = {}
@@ -205,7 +207,7 @@ def use_model(
             values[wanted.name] = scope.number(owner, wanted, item)
     if any(value is None for value in values.values()):
         return None
-    check_relations(scope, owner, [each for each in parameters if each.name in values], body, values)
+    check_relations(scope, owner, [parameter for parameter in parameters if parameter.name in values], body, values)
     return values
 
 

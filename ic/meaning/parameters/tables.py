@@ -27,7 +27,7 @@ TIME = "time"
 
 def use_table(scope: Scope, owner: Owner, environment: Environment, body: MergedBlock) -> dict[str, Any] | None:
     """Every parameter of a model whose body names a file, entered in the scope; None where one is missing or wrong."""
-    lists = [each for each in environment.parameters if each.shape == "list"]
+    lists = [parameter for parameter in environment.parameters if parameter.shape == "list"]
     check_keys(scope, body, [each.name for each in environment.written], owner)
     for each in lists:
         item = body.get(each.name)
@@ -39,11 +39,11 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Merged
                 also=[Label(body.items[FILE.name].place, "which is named here")],
                 help=leave_out("leave one of the two out"),
             )
-    own = [each.name for each in environment.parameters if each.shape != "list"]
+    own = [parameter.name for parameter in environment.parameters if parameter.shape != "list"]
     values = use_model(
         scope,
         owner,
-        [each for each in environment.parameters if each.shape != "list"],
+        [parameter for parameter in environment.parameters if parameter.shape != "list"],
         MergedBlock({key: item for key, item in body.items.items() if key in own}),
     )
     for name in (FILE.name, *(each.name for each in lists)):

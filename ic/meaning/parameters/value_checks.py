@@ -69,8 +69,8 @@ class ValueChecks:
             if not isinstance(value.number, Scalar):
                 written = units.ONE.decimal(value.number)
                 stands = (iteration.macro for iteration in value.place.iterations if iteration.iteration == written)
-                index = next((each for each in stands if each == self.definitions.text_at(value.place)), written)
-                wrote = write_either((f"{index} {each}" for each in in_degrees(text)), where="value")
+                index = next((macro for macro in stands if macro == self.definitions.text_at(value.place)), written)
+                wrote = write_either((f"{index} {degrees}" for degrees in in_degrees(text)), where="value")
             read = [value.place, *(label.place for label in self.names.label_of_cell(value.number, value.place))]
             files = {source.name for source in self.definitions.csv_files.sources} if value.bare else set()
             if any(place.file in files for place in read):
@@ -267,12 +267,12 @@ class ValueChecks:
     def _other(self, owner: Owner, wanted: Parameter, value: Value) -> list[str]:
         """The one optional parameter of the model for which a number with this unit may be meant."""
         found = [
-            each
-            for each in owner.others
-            if each.shape == "number"
-            and each.default is not None
-            and each.name != wanted.name
-            and units.same(value.dimension, owner.unit(each)[1])
+            other
+            for other in owner.others
+            if other.shape == "number"
+            and other.default is not None
+            and other.name != wanted.name
+            and units.same(value.dimension, owner.unit(other)[1])
         ]
         if len(found) != 1:
             return []

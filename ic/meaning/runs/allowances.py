@@ -61,7 +61,7 @@ def _read(body: Iterable[Entry], complaints: Complaints) -> dict[str, Allowance]
 
 def places_of(allowances: Iterable[Allowance]) -> Mapping[str, Place]:
     """The place of each by its code, as `Complaints.allowing` takes them."""
-    return {each.code: each.place for each in allowances if each.place is not None}
+    return {allowance.code: allowance.place for allowance in allowances if allowance.place is not None}
 
 
 def silence_of_all(allowances: Sequence[tuple[Allowance, ...]], complaints: Complaints) -> None:
@@ -83,7 +83,7 @@ def allowed_warnings(
     experiments: Iterable[Experiment], complaints: Complaints
 ) -> tuple[tuple[Diagnostic, Allowance], ...]:
     """The suppressed warnings, each with its allowance."""
-    found = {each.place: each for experiment in experiments for each in experiment.allowances}
+    found = {allowance.place: allowance for experiment in experiments for allowance in experiment.allowances}
     return tuple((warning, found[place]) for warning, place in complaints.allowed.items() if place in found)
 
 

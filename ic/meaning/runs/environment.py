@@ -87,8 +87,8 @@ def _environment_use(
         return None
     body = item.body or MergedBlock()
     # a payload called `world` is already reported, and is no reason to report uses that mean the ground
-    bodies = [*(link.name for link in arm.links), *(each.name for each in payloads if each.name != WORLD)]
-    failed = (*arm.failed, *(each.name for each in payloads if each.name == WORLD))
+    bodies = [*(link.name for link in arm.links), *(payload.name for payload in payloads if payload.name != WORLD)]
+    failed = (*arm.failed, *(payload.name for payload in payloads if payload.name == WORLD))
     known = {"joint": [joint.name for joint in arm.moving if joint.name not in arm.springs], "link": bodies}
     named = check_names(scope, owner, environment.parameters, body, arm=arm.name, known=known, failed=failed)
     about = next((named[p.name] for p in environment.parameters if p.names == "joint" and p.name in named), None)
@@ -99,7 +99,7 @@ def _environment_use(
             scope.checks.fail(owner.path)
             return EnvironmentUse(item.name, environment.name, None, item.place)
         owner = replace(owner, joint=kinds[about])
-    lists = [each for each in environment.parameters if each.shape == "list" and environment.from_file]
+    lists = [parameter for parameter in environment.parameters if parameter.shape == "list" and environment.from_file]
     if report_named_lists(scope, owner, lists, body):
         scope.checks.fail(owner.path)
         return EnvironmentUse(item.name, environment.name, None, item.place)

@@ -148,8 +148,8 @@ class ChannelTable:
             raise Problem(error("D356", message, place_of(expression), help="name one joint"))
         else:
             name = f"{metric.over_joints.word}({name})"
-        mixed = next((each.mixed for each in margins if each.mixed), ())
-        other = next((each for each in margins if not units.same(each.dimension, margins[0].dimension)), None)
+        mixed = next((margin.mixed for margin in margins if margin.mixed), ())
+        other = next((margin for margin in margins if not units.same(margin.dimension, margins[0].dimension)), None)
         if other is not None and not mixed:
             mixed = tuple(Value(0.0, each.dimension, each.place) for each in (margins[0], other))
         if mixed and "of" in metric.unit:
@@ -165,7 +165,7 @@ class ChannelTable:
                     ],
                 )
             )
-        numbers = [_truth(each.number) for each in margins] if mixed else [each.number for each in margins]
+        numbers = [_truth(margin.number) for margin in margins] if mixed else [margin.number for margin in margins]
         number = metric.over_joints.of(numbers) if metric.over_joints is not None else numbers[0]
         return self._made(
             name, Value(number, PURE if mixed else margins[0].dimension, place_of(expression)), expression

@@ -43,9 +43,9 @@ def value_of_command(scope: Scope, owner: Owner, wanted: Parameter, item: Item, 
         return None
     profile = models.find("command", use.command.model)
     head = f"{use.joint}.servo.command"
-    if any(scope.checks.failed(f"{head}.{each.name}") for each in profile.parameters):
+    if any(scope.checks.failed(f"{head}.{parameter.name}") for parameter in profile.parameters):
         return None
-    asked = {each.name: scope.settled(f"{head}.{each.name}") for each in profile.parameters}
+    asked = {parameter.name: scope.settled(f"{head}.{parameter.name}") for parameter in profile.parameters}
     known = {name: settled.value for name, settled in asked.items() if settled is not None}
     if len(known) < len(asked):
         return None

@@ -47,7 +47,11 @@ def is_figure_metric(item: Item) -> bool:
 
 def resolve_linear(scope: Scope, block: MergedBlock, structure: Structure) -> tuple[LinearUse, ...]:
     """The linear answers that a run asks for."""
-    known = {each.path: each for each in input_signals(structure)} if any(block.of_kind("linear")) else {}
+    known = (
+        {input_signal.path: input_signal for input_signal in input_signals(structure)}
+        if any(block.of_kind("linear"))
+        else {}
+    )
     found = (_answer(scope, item, structure, known) for item in block.of_kind("linear"))
     return tuple(use for use in found if use is not None)
 
@@ -105,7 +109,7 @@ def _pose(scope: Scope, owner: Owner, item: Item, structure: Structure) -> tuple
     with scope.complaints.gather():
         given = scope.evaluate(entry)
         values = given.items if isinstance(given, ValueList) else (given,)
-        if len(values) != len(joints) or any(isinstance(each, ValueList) for each in values):
+        if len(values) != len(joints) or any(isinstance(value, ValueList) for value in values):
             message = f"`q` of an {EQUILIBRIUM} is a position of each joint that follows none, {len(joints)} in all"
             helps = f"write `q = [...] deg`, in the order {', '.join(joint.name for joint in joints)}"
             raise Problem(error("D375", message, given.place, help=helps))
@@ -176,7 +180,7 @@ def _metric(
     scope: Scope, item: Item, block: MergedBlock, structure: Structure, answers: Sequence[LinearUse]
 ) -> MetricUse | None:
     """The metric of a figure."""
-    places = [each.path for each in input_signals(structure) if each.is_output]
+    places = [input_signal.path for input_signal in input_signals(structure) if input_signal.is_output]
     figure = FIGURES[word_of(item.value) or ""]
     body = item.body or MergedBlock()
     if item.value is None or refuse_values(scope, item.value, ["of"]):
@@ -196,7 +200,7 @@ def _metric(
                 helps = [f"write `linear {name} {{ open = {opened}; }}` in the run, and `of = {name};` here"]
         scope.complaints.error("D376", message, _place(item, of), help=helps)
         return None
-    use = next((each for each in answers if each.name == of.value.text), None)
+    use = next((answer for answer in answers if answer.name == of.value.text), None)
     if use is None:
         return None  # it failed (already reported)
     if figure.of_loops and not use.opened:

@@ -97,10 +97,10 @@ def _figure_metric(name: str, call: Call, statement: Statement) -> Item:
 def _metric(name: str, call: Call, statement: Statement) -> Item:
     """The metric of a call. Raises D355 for other forms."""
     metric: Metric = models.find("metric", call.name.text)
-    order = ["of", *(each.name for each in metric.parameters if each.default is None)]
+    order = ["of", *(parameter.name for parameter in metric.parameters if parameter.default is None)]
     if not call.positional or len(call.positional) > len(order):
         usage = ", ".join(["CONDITION", *(each.upper() for each in order[1:])])
-        rest = [each.name for each in metric.parameters if each.default is not None]
+        rest = [parameter.name for parameter in metric.parameters if parameter.default is not None]
         helps = f"write `{metric.name}({usage})`; by name it takes {', '.join(f'`{each} = ...`' for each in rest)}"
         message = f"`{metric.name}` takes {'a condition' if len(order) == 1 else f'a condition and `{order[1]}`'}"
         raise Problem(error("D355", message, call.place, help=helps))

@@ -142,7 +142,7 @@ def nearest_channels(name: Name, known: dict[str, tuple[Recorded, ...]], structu
     joints = [each for each in whole if known[each][0].joints and not each.startswith("links.")]
     arm = [each for each in whole if each in FAMILIES and not known[each][0].joints]
     links = [each for each in whole if each.startswith("links.")]
-    some = [each for each in links if each.split(".")[1] == links[0].split(".")[1]]
+    some = [link for link in links if link.split(".")[1] == links[0].split(".")[1]]
     payloads = [f"payloads.{payload.name}" for payload in structure.payloads[:1]]
     of_payload = [each for each in whole for payload in payloads if each.startswith(f"{payload}.")]
     return [

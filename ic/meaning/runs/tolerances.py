@@ -95,7 +95,7 @@ def _nearest(item: Item, structure: Structure, known: dict[str, tuple[str, ...]]
     name = item.name
     found = recordable(structure).get(name, ())
     variables = [each.name for each in found]
-    if len(variables) > 1 and any(each in known for each in variables):
+    if len(variables) > 1 and any(variable in known for variable in variables):
         return [known_words(f"`{name}` is several signals", variables)]
     inherited = f", or `remove {name};` here" if len(item.homes) > 1 else ""
     record = [f"only what is recorded can differ: `record += [{name}];`{inherited}"] if found else []

@@ -54,7 +54,7 @@ class FlowAbreast(Flow):
     @classmethod
     def of(cls, flows: Sequence[Flow]) -> FlowAbreast:
         """Flows of one program at one tick, side by side, without their tangents."""
-        inputs, cells = _joined([each.inputs for each in flows]), _joined([each.cells for each in flows])
+        inputs, cells = _joined([flow.inputs for flow in flows]), _joined([flow.cells for flow in flows])
         return cls(flows[0].program, inputs, cells, flows[0].tick, len(flows))
 
     def case(self, place: int) -> Flow:

@@ -260,7 +260,7 @@ class LinearQuestion:
 
     def _answer(self, case: int, lifted: LiftedPeriod, slow: tuple[CreepingRate, ...], plant: PlantModel) -> Linearized:
         program, inputs, found = self.program, self.inputs, lifted.found
-        paths = [program.inputs[each.entry].path for each in found.ticks]
+        paths = [program.inputs[tick.entry].path for tick in found.ticks]
 
         def summed(columns: np.ndarray) -> np.ndarray:
             own = [columns[:, [k for k, each in enumerate(paths) if each == path]].sum(1) for path in inputs]
@@ -269,7 +269,7 @@ class LinearQuestion:
         return Linearized(
             self.experiment.name, case, found.tick / program.schedule.base_hz, found.seconds, lifted.states, inputs,
             found.outputs, lifted.A, summed(lifted.B), lifted.C, summed(found.D), plant,
-            tuple(lifted.opened(each) for each in self.loops), found.held, slow, found.at_limit,
+            tuple(lifted.opened(loop) for loop in self.loops), found.held, slow, found.at_limit,
             {name: program.joint_of(name) for name in program.states}, self.stands, found.locked,
         )  # fmt: skip
 

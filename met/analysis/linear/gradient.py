@@ -92,7 +92,7 @@ class GradientProgram:
     @property
     def paths(self) -> tuple[str, ...]:
         """The numbers by which there are gradients."""
-        return tuple(each.path for each in self.experiment.cases.coordinates)[: self.first]
+        return tuple(coordinate.path for coordinate in self.experiment.cases.coordinates)[: self.first]
 
     @cached_property
     def dependences(self) -> dict[str, Dependence]:

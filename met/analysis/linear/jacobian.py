@@ -209,7 +209,7 @@ class _Carried:
     @property
     def finite(self) -> Any:
         """True where all numbers are finite."""
-        return reduce(and_, (np.isfinite(each).all((-2, -1)) for each in self._matrices()))
+        return reduce(and_, (np.isfinite(matrix).all((-2, -1)) for matrix in self._matrices()))
 
     def differs(self, other: _Carried) -> Any:
         """True where the derivatives differ: of states, of inputs, of outputs by states, or the cells that they belong
@@ -220,7 +220,7 @@ class _Carried:
 
     def map_of(self, held: _Held, place: int | None = None) -> PeriodMap:
         """The map; of a `FlowAbreast`, that of the case at a place."""
-        program, own = self.flow.program, [each if place is None else each[place] for each in self._matrices()]
+        program, own = self.flow.program, [matrix if place is None else matrix[place] for matrix in self._matrices()]
         A, B, C, Wx, Wu, D = own
         at_limit = tuple(path for path, steps in self.at_limit.items() if of_case(steps, place or 0))
         return PeriodMap(
@@ -279,7 +279,7 @@ def _carried(begin: Callable[[], Flow], states: tuple[str, ...], opposite: Mappi
     ends = end_tangents(program, flow, states, width)
     rows = tangent_rows(flow, [flow.row_tangents.get(column, 0.0) for column in range(len(program.columns))], width)
     own = tangent_rows(flow, W, width)
-    reached = [flow.cells[each] for each in states if each in flow.cells] + list(flow.rows.values())
+    reached = [flow.cells[state] for state in states if state in flow.cells] + list(flow.rows.values())
     numbers = np.concatenate([np.broadcast_to(each, (*flow.shape, 1)) for each in (*reached, 0.0)], axis=-1)
     return _Carried(
         tick, states, ticks, ends[..., :n], ends[..., n:], rows[..., :n], rows[..., n:], own[..., :n], own[..., n:],

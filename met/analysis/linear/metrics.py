@@ -80,7 +80,7 @@ def check(prepared: engine.Prepared) -> None:
 
 def _asked(prepared: engine.Prepared) -> list[LinearUse]:
     """The linear answers of which an experiment has metrics; none where it is driven on beds."""
-    named = {each.of for each in prepared.experiment.linear_metrics}
+    named = {linear_metric.of for linear_metric in prepared.experiment.linear_metrics}
     return [use for use in prepared.experiment.linear if use.name in named and not prepared.wire]
 
 
@@ -106,7 +106,7 @@ def _answer(
 ) -> None:
     """Write the metrics of one question into the outputs of these cases."""
     asked, names = question(prepared, use), prepared.outputs
-    wanted = [each for each in prepared.experiment.linear_metrics if each.of == use.name]
+    wanted = [linear_metric for linear_metric in prepared.experiment.linear_metrics if linear_metric.of == use.name]
     columns, why = [names.index(METRIC + each.name) for each in wanted], names.index(WHY_ANSWER + use.name)
     done = np.flatnonzero(outputs[:, names.index("failure")] == 0.0)
     given = engine.inputs(prepared.experiment, rows[done])
@@ -135,7 +135,7 @@ def _figures(
     or why it has none"""
     if not isinstance(lifted, LiftedPeriod):
         return [math.nan] * len(wanted), float(EVENT if isinstance(lifted, Problem) else lifted)
-    loops = [lifted.opened(each) for each in asked.loops] if any(FIGURES[e.model].of_loops for e in wanted) else []
+    loops = [lifted.opened(loop) for loop in asked.loops] if any(FIGURES[e.model].of_loops for e in wanted) else []
     found = [_figure(FIGURES[each.model], lifted, loops) for each in wanted]
     return [value for value, _ in found], float(max(why for _, why in found))
 
@@ -144,12 +144,12 @@ def _figure(figure: LinearFigure, lifted: LiftedPeriod, loops: Sequence[OpenLoop
     if not figure.of_loops:
         if lifted.found.at_limit:
             return math.nan, AT_LIMIT
-        poles = [each for each in lifted.poles if not each.stays(lifted.found.seconds)]
+        poles = [pole for pole in lifted.poles if not pole.stays(lifted.found.seconds)]
         if not poles:
             return math.nan, NOTHING_DECAYS
         if figure.name == "damping":
-            return min(each.damping for each in poles), ANSWERED
-        return max(math.inf if each.s.real > 0.0 else each.seconds for each in poles), ANSWERED
+            return min(pole.damping for pole in poles), ANSWERED
+        return max(math.inf if pole.s.real > 0.0 else pole.seconds for pole in poles), ANSWERED
     if any(loop.unstable for loop in loops):
         return figure.unstable, ANSWERED
     if not all(loop.returns for loop in loops):

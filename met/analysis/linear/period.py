@@ -54,7 +54,7 @@ class PeriodProgram:
         self.recording = record(replace(program, counters=(*program.counters, *added)), fuse=False)
         finish, *rest = self.recording.tick
         self.finish, self.rest = (finish,), tuple(rest)
-        self.columns = tuple(path for each in outputs for path in each.channels)
+        self.columns = tuple(path for output in outputs for path in output.channels)
         self.bodies = bodies.bodies(self.system)
         turned = {name for body in self.bodies for name in body.coordinates[3:]}
         self.positions = tuple(f"{name}.q" for name in self.builder.step.coordinates)

@@ -41,7 +41,7 @@ def standing(experiment: Experiment, q: Sequence[float] = ()) -> Experiment:
     """The experiment begun at rest at these positions of its joints that follow none, rad (m), in their order; by
     default those that it begins with. Servos are asked to stay; guides, and signals made of them, are removed."""
     structure = experiment.structure
-    lost = tuple(f"guides.{each.name}." for each in structure.guides)
+    lost = tuple(f"guides.{guide.name}." for guide in structure.guides)
     servos = tuple(
         use if use.command is None else replace(use, command=Command(use.command.kind, "constant"))
         for use in structure.servos
@@ -60,11 +60,13 @@ def standing(experiment: Experiment, q: Sequence[float] = ()) -> Experiment:
             parameters[f"{use.joint}.servo.command.value"] = stays
     for path in [path for path in parameters if path.startswith(("initial.base.velocity.", "initial.base.rate."))]:
         parameters[path] = replace(parameters[path], value=0.0)
-    kept = tuple(
-        each for each in structure.expressions if not any(path.startswith(lost) for path in each.channels)
-    ) if lost else structure.expressions  # fmt: skip
+    expressions = [
+        expression
+        for expression in structure.expressions
+        if not any(path.startswith(lost) for path in expression.channels)
+    ]
     stood: Structure = replace(
-        structure, servos=servos, guides=(), metrics=(), record=(), expressions=kept, balanced=True
+        structure, servos=servos, guides=(), metrics=(), record=(), expressions=tuple(expressions), balanced=True
     )  # fmt: skip
     return replace(
         experiment, structure=stood, parameters=parameters, requirements=(), linear=(), linear_metrics=(),

@@ -53,7 +53,7 @@ def body_of(system: System, payload: Payload, read: ReadCell) -> Rigid:
 
 def free_body(system: System, payload: Payload) -> FreeBody:
     """The body of a payload in flight, with its coordinates."""
-    return next(each for each in bodies(system) if each.name == PAYLOAD + payload.name)
+    return next(body for body in bodies(system) if body.name == PAYLOAD + payload.name)
 
 
 def carried(payload: Payload, read: ReadCell) -> Truth:

@@ -34,7 +34,7 @@ class ArmWorld:
         self.step = system.structure.schedule.step
         self._names = tuple(joint.name for joint in system.joints)
         self.joints = tuple(name for name in self._names if name not in system.structure.springs)
-        self.links = (*(each.name for each in system.structure.links), *(p.name for p in system.structure.payloads))
+        self.links = (*(link.name for link in system.structure.links), *(p.name for p in system.structure.payloads))
         self._sliding = {joint.name: joint.kind == "prismatic" for joint in system.joints}
         self._system, self._read = system, read
         n = len(self._names)
