@@ -30,6 +30,7 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
 ENVIRONMENT = Environment(
     name="dead_sensor",
     doc=__doc__,
+    at_rest="nothing",
     parameters=(
         Parameter(name="joint", shape="word", names="joint", doc="joint whose control law does not see the quantity"),
         Parameter(

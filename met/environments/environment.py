@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import field
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from met.content import Content
 from met.frozen import frozen
@@ -159,6 +159,8 @@ class Environment:
     """The declaration of an environment model; one a file.
 
     loads  (p, world) -> Loads. None: it is no load
+    at_rest  what it may put on an arm that stands still: `nothing`; a `weight`, which acts on every part; or a `force`,
+           which may also bear the arm
     idle   (p, duration) -> the parameters because of which it never acts in a run of that length (s), and why, in
            words; None where it may act. Asked where all its numbers are constants. None: it always may
     pushed_links  (p) -> the parameters that name the links that it acts upon: a deck in which all of these are part of
@@ -211,6 +213,7 @@ class Environment:
     doc: str
     parameters: tuple[Parameter, ...] = ()
     loads: Callable[[Any, World], Loads] | None = None
+    at_rest: Literal["nothing", "weight", "force"] = "force"
     idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None
     pushed_links: Callable[[Any], tuple[str, ...]] | None = None
     initial_range: tuple[str, ...] = ()

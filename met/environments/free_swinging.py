@@ -28,6 +28,7 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
 ENVIRONMENT = Environment(
     name="free_swinging",
     doc=__doc__,
+    at_rest="nothing",
     parameters=(Parameter(name="joint", shape="word", names="joint", doc="joint that swings freely"), *WINDOW),
     idle=idle,
     servo_of="joint",

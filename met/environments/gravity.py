@@ -15,6 +15,7 @@ def loads(p: Any, world: World) -> Loads:
 ENVIRONMENT = Environment(
     name="gravity",
     doc=__doc__,
+    at_rest="weight",
     parameters=(Parameter(name="g", unit="m/s^2", shape="vector", doc="acceleration of free fall, in world axes"),),
     loads=loads,
     alone=lambda p: "gravity" if any(p.g) else "",

@@ -114,6 +114,7 @@ def _sum(A: Matrix, B: Matrix) -> Matrix:
 ENVIRONMENT = Environment(
     name="gravity_gradient",
     doc=__doc__,
+    at_rest="weight",
     parameters=(
         Parameter(name="radius", unit="m", above=0.0, doc="radius of the orbit, from the centre of attraction"),
         Parameter(

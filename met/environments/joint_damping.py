@@ -16,6 +16,7 @@ def loads(p: Any, world: World) -> Loads:
 ENVIRONMENT = Environment(
     name="joint_damping",
     doc=__doc__,
+    at_rest="nothing",
     parameters=(
         Parameter(
             name="damping",

@@ -31,6 +31,7 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
 ENVIRONMENT = Environment(
     name="runaway",
     doc=__doc__,
+    at_rest="nothing",
     parameters=(
         Parameter(name="joint", shape="word", names="joint", doc="joint whose drive runs away"),
         Parameter(

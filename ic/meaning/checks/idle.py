@@ -22,8 +22,10 @@ from met.trace import Real, Scalar
 ENDS = ("q_min", "q_max")
 """The ends of a joint's range, which an arm gives it."""
 
-UNLOADING = ("joint_damping", "dead_sensor", "free_swinging", "runaway")
-"""Models of the environment that put no load on an arm at rest."""
+
+def at_rest(use: EnvironmentUse) -> str:
+    """What a model in use may put on an arm that stands still (`Environment.at_rest`)."""
+    return str(models.find("environment", use.model, use.place).at_rest)
 
 
 def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str, Any], duration: float) -> bool:

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ic.meaning.checks.idle import UNLOADING
+from ic.meaning.checks.idle import at_rest
 from ic.meaning.control.servos import Use
 from ic.meaning.parameters.owner import XYZ, Settled
 from met import models
@@ -21,9 +21,6 @@ from met.vectors import rotation_about, rotation_rpy
 
 INSTANTS = 1000
 """Number of instants of a run at which a command is looked at."""
-
-BEARING_NOTHING = ("gravity", "gravity_gradient", *UNLOADING)
-"""Models of the environment that bear no load of an arm at rest."""
 
 
 class RunNumbers:
@@ -228,10 +225,10 @@ class RunNumbers:
         return turned, at, lines
 
     def is_helped(self, joint: str) -> bool:
-        """True where a model of the environment may bear a joint's load at the start: one that is not of
-        BEARING_NOTHING, nor of another joint alone, and does not begin later."""
-        models = [use.name for use in self.structure.environment if use.model not in BEARING_NOTHING]
-        others = [name for name in models if not self.numbers.get(f"environment.{name}.from", 0.0) > 0.0]
+        """True where a model of the environment may bear a joint's load at the start: one that puts a force
+        on an arm at rest, not of another joint alone, and does not begin later."""
+        bearing = [use.name for use in self.structure.environment if at_rest(use) == "force"]
+        others = [name for name in bearing if not self.numbers.get(f"environment.{name}.from", 0.0) > 0.0]
         joints = [self.settled.get(f"environment.{name}.joint") for name in others]
         return any(each is None or each.value == joint for each in joints)
 

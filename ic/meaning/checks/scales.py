@@ -18,8 +18,9 @@ import numpy as np
 
 from ic.meaning.checks.asked import grapples, spreads, targets
 from ic.meaning.checks.bodies import booms, centres, forgotten, held, masses, shared_lines
+from ic.meaning.checks.idle import at_rest
 from ic.meaning.checks.magnitudes import LENGTHS, MASSES, MEANT, SMALLEST_GYRATION
-from ic.meaning.checks.run_numbers import BEARING_NOTHING, RunNumbers
+from ic.meaning.checks.run_numbers import RunNumbers
 from ic.meaning.checks.scale import TURN, Scale, inside
 from ic.meaning.control.servos import Use, unit_written
 from ic.meaning.parameters.scope import Scope
@@ -304,7 +305,7 @@ def _brakes(run: RunNumbers) -> Iterator[Scale]:
 
 def _falls(run: RunNumbers) -> Iterator[Scale]:
     """The fall of a free base under gravity with nothing else that acts on it."""
-    base, bearing = run.structure.base, [use for use in run.structure.environment if use.model not in BEARING_NOTHING]
+    base, bearing = run.structure.base, [use for use in run.structure.environment if at_rest(use) == "force"]
     for use in run.structure.environment:
         if use.model == "gravity" and base is not None and base.kind == "free" and not bearing and run.reach > 0.0:
             path, usual = f"environment.{use.name}.g", "what floats falls with its orbit, which is no gravity to it"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ic.language.runs import INITIAL
-from ic.meaning.checks.idle import UNLOADING
+from ic.meaning.checks.idle import at_rest
 from ic.meaning.control.servos import Use
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.quantity import Value, ValueList
@@ -125,7 +125,7 @@ def check_balanced(scope: Scope, item: Item | None, uses: Sequence[Use], structu
             item.place,
             help=known_words("models that can", able),
         )
-    elif structure.base is None and all(use.model in UNLOADING for use in structure.environment):
+    elif structure.base is None and all(at_rest(use) == "nothing" for use in structure.environment):
         scope.complaints.remark(
             "D248",
             "the servos begin balanced, and there is no load: no gravity and nothing else acts on the arm",
