@@ -50,102 +50,109 @@ class AnswerOutcome:
 def answer_outcome(group_answer: SearchAnswer) -> AnswerOutcome:
     """The verdict on an answer: of a tuning in the cases of the sweep that it is held against, of a search in the worst
     case that was found, and in others where one misses what that case meets."""
-    found = tuple(_required(group_answer, each) for each in group_answer.required)
+    judged = tuple(_required(group_answer, requirement) for requirement in group_answer.required)
     headline = _of_tuning if group_answer.search.kind == "tune" else _of_worst
-    return AnswerOutcome(headline(group_answer, found), group_answer.ok, found)
+    return AnswerOutcome(headline(group_answer, judged), group_answer.ok, judged)
 
 
-def _required(answer: SearchAnswer, each: GroupRequirement) -> AnswerRequirement:
-    group, here = answer.group, np.array(answer.found.cases)
-    variable, values = group.variables[each.metric], group.values(each.metric)
-    met, numbers = outcomes(group)[:, each.place], group.values("case")
+def _required(answer: SearchAnswer, requirement: GroupRequirement) -> AnswerRequirement:
+    group, cases = answer.group, np.array(answer.found.cases)
+    variable, values = group.variables[requirement.metric], group.values(requirement.metric)
+    met, numbers = outcomes(group)[:, requirement.place], group.values("case")
     scale, unit = deck_unit(variable)
 
-    def shown(place: int) -> str:
+    def value_text(place: int) -> str:
         return goal_text(float(values[place]), unit or "1", scale)
 
-    far = beyond(values, each.comparison, each.limit)
-    worst = int(here[np.argmax(far[here])])
-    missed, unknown = (int((met[here] == outcome).sum()) for outcome in (0, -1))
+    far = beyond(values, requirement.comparison, requirement.limit)
+    worst = int(cases[np.argmax(far[cases])])
+    missed, unknown = (int((met[cases] == outcome).sum()) for outcome in (0, -1))
     if answer.search.kind == "search":
         came = f"{'met' if met[worst] == 1 else 'missed' if met[worst] == 0 else 'not known'} in the worst case found"
-        said = f"{came}: {shown(worst)}, case #{numbers[worst]}"
+        text = f"{came}: {value_text(worst)}, case #{numbers[worst]}"
     else:
         came = _came_out(answer, missed, unknown)
-        said = f"{came}; worst {shown(worst)}, case #{numbers[worst]}"
+        text = f"{came}; worst {value_text(worst)}, case #{numbers[worst]}"
     others = np.flatnonzero(met != 1) if answer.search.kind == "search" and met[worst] == 1 else np.array([], int)
     if len(others):
         other = int(others[np.argmax(far[others])])
-        more = f"; but missed in another: {shown(other)}, case #{numbers[other]}"
-        came, said = came + more, said + more
-    no_value = int(((met[here] == -1) & (group.values("status")[here] == 0)).sum())
-    counts = int((met[here] == 1).sum()), missed, unknown, no_value
-    return AnswerRequirement(each.text, *counts, shown(worst), int(numbers[worst]), came, said, bool(len(others)))
+        more = f"; but missed in another: {value_text(other)}, case #{numbers[other]}"
+        came, text = came + more, text + more
+    no_value = int(((met[cases] == -1) & (group.values("status")[cases] == 0)).sum())
+    counts = int((met[cases] == 1).sum()), missed, unknown, no_value
+    return AnswerRequirement(
+        requirement.text, *counts, value_text(worst), int(numbers[worst]), came, text, bool(len(others))
+    )
 
 
 def _came_out(answer: SearchAnswer, missed: int, unknown: int) -> str:
     """The outcome in words: `met in all 32 cases of spread`; `missed in 3 of 32 cases of spread, not known in 1 of 32
     cases of spread`."""
     if not missed and not unknown:
-        return f"met{(of := _cases(answer)) and f' in {of}'}"
-    of = _cases(answer, every=False)
-    found = [("missed", missed), ("not known", unknown)]
-    return ", ".join(f"{word}{of and f' in {count:,} of {of}'}" for word, count in found if count)
+        return f"met{(cases := _cases(answer)) and f' in {cases}'}"
+    cases = _cases(answer, every=False)
+    counts = [("missed", missed), ("not known", unknown)]
+    return ", ".join(f"{word}{cases and f' in {count:,} of {cases}'}" for word, count in counts if count)
 
 
 def _cases(answer: SearchAnswer, *, every: bool = True) -> str:
     """The cases of a tuning's answer: `all 32 cases of spread`; empty where it is judged against no sweep."""
-    found, sweep = answer.found, answer.search.against
-    if found.all == 1:
+    best, sweep = answer.found, answer.search.against
+    if best.all == 1:
         return ""
-    if not found.confirmed:
-        return f"{found.tried:,} cases of {sweep}, of {found.all:,}"
-    return f"{'all ' * every}{found.all:,} cases of {sweep}"
+    if not best.confirmed:
+        return f"{best.tried:,} cases of {sweep}, of {best.all:,}"
+    return f"{'all ' * every}{best.all:,} cases of {sweep}"
 
 
 def _all(answer: SearchAnswer) -> str:
     return f"{'meets' if answer.required else 'reaches'} {'all requirements' if answer.required else 'its end'}"
 
 
-def _misses(found: tuple[AnswerRequirement, ...], *, named: bool) -> str:
+def _misses(judged: tuple[AnswerRequirement, ...], *, named: bool) -> str:
     """The missed requirements in words: `misses settle < 5 s in case #2521, over < 10 % in 3 cases`. named: False where
     the case is known"""
 
-    def where(each: AnswerRequirement) -> str:
-        count = each.missed + each.unknown
-        return f" in case #{each.case}" if count == 1 else f" in {count:,} cases"
+    def where(requirement: AnswerRequirement) -> str:
+        count = requirement.missed + requirement.unknown
+        return f" in case #{requirement.case}" if count == 1 else f" in {count:,} cases"
 
-    bad = [each for each in found if each.missed or each.unknown]
-    return f"misses {', '.join(f'{each.text}{where(each) * named}' for each in bad)}"
+    bad = [requirement for requirement in judged if requirement.missed or requirement.unknown]
+    return f"misses {', '.join(f'{requirement.text}{where(requirement) * named}' for requirement in bad)}"
 
 
-def _of_tuning(answer: SearchAnswer, found: tuple[AnswerRequirement, ...]) -> str:
+def _of_tuning(answer: SearchAnswer, judged: tuple[AnswerRequirement, ...]) -> str:
     best, sweep = answer.found, answer.search.against
     if best.failed:
         return f"The answer fails in case #{answer.position}"
     if best.missed:
-        return f"The answer {_misses(found, named=True)}{f' of {sweep}' if best.all > 1 else ''}"
+        return f"The answer {_misses(judged, named=True)}{f' of {sweep}' if best.all > 1 else ''}"
     if not best.confirmed:
         return f"The answer was tried in {best.tried:,} of {best.all:,} cases of {sweep} alone"
     if not best.stands:
         return f"The answer has no {answer.search.metric} in case #{answer.position}"
     if best.stability is not None and best.stability.margins is not None and not best.serves:
         margins = f"disk margin of {best.stability.margins.disk:.3g} is below the least, {answer.search.least_margin:g}"
-        return f"The answer {_all(answer)}{(of := _cases(answer)) and f' in {of}'}, but its {margins}"
-    text = f"The answer {_all(answer)}{(of := _cases(answer)) and f' in {of}'}"
-    for each in answer.search.confirmation:
+        return f"The answer {_all(answer)}{(cases := _cases(answer)) and f' in {cases}'}, but its {margins}"
+    text = f"The answer {_all(answer)}{(cases := _cases(answer)) and f' in {cases}'}"
+    for confirmation in answer.search.confirmation:
         text += (
-            "" if each.withstood else f", but not in {each.failed + each.missed:,} of {each.cases:,} of {each.against}"
+            ""
+            if confirmation.withstood
+            else (
+                f", but not in {confirmation.failed + confirmation.missed:,} of {confirmation.cases:,}"
+                f" of {confirmation.against}"
+            )
         )
     return text
 
 
-def _of_worst(answer: SearchAnswer, found: tuple[AnswerRequirement, ...]) -> str:
+def _of_worst(answer: SearchAnswer, judged: tuple[AnswerRequirement, ...]) -> str:
     worst = f"The worst case found, #{answer.position},"
     if answer.found.failed:
         return f"{worst} fails"
     if answer.found.missed:
-        return f"{worst} {_misses(found, named=False)}"
-    if (others := [each.text for each in found if each.elsewhere]) and not answer.ok:
+        return f"{worst} {_misses(judged, named=False)}"
+    if (others := [requirement.text for requirement in judged if requirement.elsewhere]) and not answer.ok:
         return f"{worst} {_all(answer)}, but another that was tried misses {', '.join(others)}"
     return f"{worst} {_all(answer)}"

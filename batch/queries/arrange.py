@@ -26,13 +26,13 @@ class Cell:
     title: str
 
 
-def panel_grid(group: ArchiveGroup, found: Sequence[Panel]) -> list[list[Cell | None]]:
+def panel_grid(group: ArchiveGroup, panels: Sequence[Panel]) -> list[list[Cell | None]]:
     """The grid of plots: a row for each quantity, a column for each joint; `q` in metres and in radians stand side by
     side, each with its axis, and `elbow.servo.voltage` under the elbow. None where a joint lacks a quantity. Other
     signals fill rows of their own, components side by side."""
     joints = joints_of(group)
     placed: list[tuple[str, str, Cell]] = []
-    for panel in found:
+    for panel in panels:
         for line, (label, joint) in enumerate(zip(panel.lines, panel.joints, strict=True)):
             quantity = panel.name.removeprefix(joint + ".") if joint else panel.name
             named = f"{quantity}.{label}" if panel.joints.count(joint) > 1 else quantity
@@ -79,7 +79,7 @@ class CommandCurve:
 
 
 def command_curves(
-    group: ArchiveGroup, found: Sequence[Panel], positions: Sequence[int], *, apart: bool
+    group: ArchiveGroup, panels: Sequence[Panel], positions: Sequence[int], *, apart: bool
 ) -> dict[tuple[str, str, int], CommandCurve]:
     """The recorded commands of the same kind as a line of q, qd or tau, by panel (name, unit) and line.
 
@@ -95,7 +95,7 @@ def command_curves(
             units = variable.units_by_joint or (variable.unit,) * len(names)
             commands |= {(j, u): (variable.name, i) for i, (j, u) in enumerate(zip(names, units, strict=True))}
     out = {}
-    for panel in found:
+    for panel in panels:
         for line, name in enumerate(panel.joints):
             command = commands.get((name, panel.si))
             if panel.variable.rpartition(".")[2] in ("q", "qd", "tau") and command is not None:

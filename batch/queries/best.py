@@ -124,8 +124,8 @@ class Designs:
 
     def _axis(self, columns: Sequence[CaseColumn]) -> DesignAxis:
         own = columns[0].values[self.first]
-        found = levels(own)
-        return DesignAxis(tuple(columns), found, np.searchsorted(found, own))
+        axis_levels = levels(own)
+        return DesignAxis(tuple(columns), axis_levels, np.searchsorted(axis_levels, own))
 
     @cached_property
     def demands(self) -> tuple[str, ...]:
@@ -163,7 +163,7 @@ class Designs:
         ended = (self.of_case == design) & (self.pool.status == DONE)
         outcomes = self.pool.outcomes[ended] if self.pool.requirements else np.ones((int(ended.sum()), 1))
         short = ~self.meets[design] & (outcomes != 1).any(axis=0)
-        return [text for text, each in zip(self.demands, short, strict=True) if each]
+        return [text for text, falls_short in zip(self.demands, short, strict=True) if falls_short]
 
     def _share(self, holds: np.ndarray) -> np.ndarray:
         """The share of each design's cases in which each of these holds."""
@@ -181,12 +181,12 @@ class Designs:
         infinite where there is none."""
         far = np.full(self.pool.count, -np.inf)
         for group_number, group in enumerate(self.pool.groups):
-            here = self.pool.group_of == group_number
+            in_group = self.pool.group_of == group_number
             for group_requirement in requirements.group_requirements(group):
                 if group_requirement.share is None:
                     values = group.values(group_requirement.metric)
                     beyond = requirements.beyond(values, group_requirement.comparison, group_requirement.limit)
-                    far[here] = np.maximum(far[here], beyond[self.pool.position_of[here]])
+                    far[in_group] = np.maximum(far[in_group], beyond[self.pool.position_of[in_group]])
         return -self.worst(far, largest=True)
 
     def worst(self, values: np.ndarray, *, largest: bool) -> np.ndarray:
@@ -200,10 +200,10 @@ class Designs:
         """The goal of the text `METRIC`, `EXPRESSION` or `METRIC:largest`: by default the largest for a margin, and
         else the least. Raises Problem."""
         name, colon, way = text.rpartition(":")
-        expressions, said = CaseExpressions(self.pool), bool(colon) and way.strip() in ("largest", "smallest")
-        if not said:
+        expressions, has_way = CaseExpressions(self.pool), bool(colon) and way.strip() in ("largest", "smallest")
+        if not has_way:
             name = text
-        largest = way.strip() == "largest" if said else expressions.is_margin(name)
+        largest = way.strip() == "largest" if has_way else expressions.is_margin(name)
         values, dimension = expressions.values(name)
         return Goal(name.strip(), largest, values, dimension)
 
@@ -215,24 +215,24 @@ class Designs:
         designs do not form a grid."""
         from scipy.ndimage import distance_transform_cdt
 
-        there = self._grid
-        if there is None:
+        grid = self._grid
+        if grid is None:
             return None
-        good = there >= 0
-        good[good] = self.good[there[good]]
+        good = grid >= 0
+        good[good] = self.good[grid[good]]
         steps = np.zeros(self.count, np.int64)
         kinds = [number for number, axis in enumerate(self.axes) if not axis.ordered]
         shape = [len(self.axes[number].values) for number in kinds]
         for kind in np.ndindex(*shape):
-            at: list[int | slice] = [slice(None)] * len(self.axes)
+            cell: list[int | slice] = [slice(None)] * len(self.axes)
             for number, level in zip(kinds, kind, strict=True):
-                at[number] = level
-            part = there[tuple(at)]
+                cell[number] = level
+            part = grid[tuple(cell)]
             if part.ndim == 0:  # choices alone: none is next to another
                 if part >= 0:
-                    steps[int(part)] = int(good[tuple(at)])
+                    steps[int(part)] = int(good[tuple(cell)])
                 continue
-            near = distance_transform_cdt(np.pad(good[tuple(at)], 1), metric="chessboard")
+            near = distance_transform_cdt(np.pad(good[tuple(cell)], 1), metric="chessboard")
             inner = near[(slice(1, -1),) * part.ndim]
             steps[part[part >= 0]] = inner[part >= 0]
         return steps
@@ -255,10 +255,10 @@ class Designs:
         """The range of a good design along an axis; None where that has no order, or the designs do not form a grid."""
         if self._grid is None or not self.axes[axis].ordered:
             return None
-        at: list[int | slice] = [int(each.level[design]) for each in self.axes]
+        line_index: list[int | slice] = [int(axis_.level[design]) for axis_ in self.axes]
         own = int(self.axes[axis].level[design])
-        at[axis] = slice(None)
-        line = self._grid[tuple(at)]
+        line_index[axis] = slice(None)
+        line = self._grid[tuple(line_index)]
         ends = []
         for step in (-1, 1):
             level = own
@@ -292,19 +292,19 @@ class Designs:
 
     def _wanted(self, goal: Goal) -> np.ndarray:
         """[design] a goal in the worst of its cases, as a number to minimise; designs without one come last."""
-        found = self.worst(-goal.values if goal.largest else goal.values, largest=True)
-        return np.where(np.isnan(found), np.inf, found)
+        worst_values = self.worst(-goal.values if goal.largest else goal.values, largest=True)
+        return np.where(np.isnan(worst_values), np.inf, worst_values)
 
     def front(self, goals: Sequence[Goal]) -> np.ndarray:
         """The Pareto front: good designs that no other dominates in all goals, by the first goal."""
         good = np.flatnonzero(self.good)
         numbers = np.stack([self._wanted(goal)[good] for goal in goals], axis=1)
         order = np.lexsort(numbers.T[::-1])
-        kept: list[int] = []
+        front: list[int] = []
         for i in order.tolist():
-            if (numbers[i] < np.inf).all() and not any((numbers[j] <= numbers[i]).all() for j in kept):
-                kept.append(i)
-        return good[kept]
+            if (numbers[i] < np.inf).all() and not any((numbers[j] <= numbers[i]).all() for j in front):
+                front.append(i)
+        return good[front]
 
 
 def varied_columns(pool: Pool) -> list[CaseColumn]:

@@ -51,11 +51,11 @@ class BestRow:
 class BestAnswer:
     """The answer on the designs of one run or sweep.
 
-    deck     of the archive;  name: of the sweep;  seed: the campaign's
-    defines  what `-D` defined for it, `NAME=VALUE`;  remarks: what else is to be known of it
-    given    what `--set` and `--vary` set and varied for it (`met.settings`)
-    front    goals that are traded off against each other
-    judged   the stability of designs, by their numbers, the best by the goals first, until one keeps `least_margin`
+    deck       of the archive;  name: of the sweep;  seed: the campaign's
+    defines    what `-D` defined for it, `NAME=VALUE`;  remarks: what else is to be known of it
+    overrides  what `--set` and `--vary` set and varied for it (`met.settings`)
+    front      goals that are traded off against each other
+    judged     the stability of designs, by their numbers, the best by the goals first, until one keeps `least_margin`
     """
 
     def __init__(
@@ -68,18 +68,18 @@ class BestAnswer:
         name: str,
         seed: int,
         defines: Sequence[str] = (),
-        given: Sequence[str] = (),
+        overrides: Sequence[str] = (),
         remarks: Sequence[str] = (),
         judged: Mapping[int, JudgedDesign] | None = None,
         least_margin: float = 0.0,
     ) -> None:
         self.designs, self.goals, self.front = designs, tuple(goals), tuple(front)
         self.deck, self.name, self.seed = deck, name, seed
-        self.defines, self.given, self.remarks = tuple(defines), tuple(given), tuple(remarks)
+        self.defines, self.overrides, self.remarks = tuple(defines), tuple(overrides), tuple(remarks)
         self.judged, self.least_margin = dict(judged or {}), least_margin
         order = designs.order(goals)
-        kept = [number for number, each in self.judged.items() if each.keeps(least_margin)]
-        self.order = np.concatenate([np.array(kept, order.dtype), order[~np.isin(order, kept)]])
+        keeping = [number for number, judged_design in self.judged.items() if judged_design.keeps(least_margin)]
+        self.order = np.concatenate([np.array(keeping, order.dtype), order[~np.isin(order, keeping)]])
         required = [
             goal
             for column in designs.pool.metrics()
@@ -113,17 +113,17 @@ class BestAnswer:
         first = f"{_least(self.goals[0])}" if self.goals else "farthest from the border"
         if not self.goals and designs.steps is None:
             first = "most room"
-        found = {int(self.order[0]): first}
+        labels = {int(self.order[0]): first}
         if (better := self.left) is not None:
-            found = {int(self.order[0]): "keeps the margin", better: first}
+            labels = {int(self.order[0]): "keeps the margin", better: first}
         for goal in self.shown:
-            if all(goal is not each for each in self.goals):
-                found.setdefault(int(designs.order([goal])[0]), _least(goal))
+            if all(goal is not shown_goal for shown_goal in self.goals):
+                labels.setdefault(int(designs.order([goal])[0]), _least(goal))
         for number, design in enumerate(self.order[1 : 1 + RUNNERS_UP].tolist(), start=2):
             judged = self.judged.get(design)
             place = f"{number}{ {2: 'nd', 3: 'rd'}.get(number, 'th') }"
-            found.setdefault(design, place if judged is None or judged.keeps(self.least_margin) else "not advised")
-        return [BestRow(design, label) for design, label in found.items()]
+            labels.setdefault(design, place if judged is None or judged.keeps(self.least_margin) else "not advised")
+        return [BestRow(design, label) for design, label in labels.items()]
 
     # Text
 
@@ -138,8 +138,8 @@ class BestAnswer:
         if stretches := self.stretches():
             out += ["", "how far each may go by itself:", *columns(stretches)]
         out += ["", *self.table(self.rows()), ""]
-        said, command = self.confirmation()
-        out += [f"{said} {command}"] if said.endswith("it:") else [said, f"  {command}"]
+        sentence, command = self.confirmation()
+        out += [f"{sentence} {command}"] if sentence.endswith("it:") else [sentence, f"  {command}"]
         return [*out, *self.notes()]
 
     @property
@@ -170,23 +170,25 @@ class BestAnswer:
         there."""
         assert self.best is not None
         return [
-            [axis.columns[0].label, _at(axis.columns[0], axis.values, found), _ends(found)]
+            [axis.columns[0].label, _range_text(axis.columns[0], axis.values, stretch), _ends(stretch)]
             for number, axis in enumerate(self.designs.axes)
-            if (found := self.designs.stretch(self.best, number)) is not None
+            if (stretch := self.designs.stretch(self.best, number)) is not None
         ]
 
     def notes(self) -> list[str]:
         """Further notes: that better designs may lie beyond the sweep, or that all parameters count as chosen."""
         assert self.best is not None
         designs = self.designs
-        at = [
+        ended = [
             axis.columns[0].label
             for number, axis in enumerate(designs.axes)
             if len(axis.values) > 2
-            and (found := designs.stretch(self.best, number)) is not None
-            and _at_an_end(found, int(axis.level[self.best]))
+            and (stretch := designs.stretch(self.best, number)) is not None
+            and _at_an_end(stretch, int(axis.level[self.best]))
         ]
-        out = [f"it lies where the sweep of {' and of '.join(at)} ends: a wider one may find better"] if at else []
+        out = (
+            [f"it lies where the sweep of {' and of '.join(ended)} ends: a wider one may find better"] if ended else []
+        )
         if not designs.against and len(designs.axes) > 1:
             last = quoted(designs.axes[-1].columns[0].label)
             out.append(f"all that varies is taken for chosen; `--over {last}` of `met best` holds designs against it")
@@ -202,8 +204,8 @@ class BestAnswer:
         what = "it reaches the end"
         if number:
             what = f"it meets {'the requirement' if number == 1 else f'all {number} requirements'}"
-        of = "both" if cases == 2 else f"all {cases:,}"
-        where = "" if cases == 1 else f" in {of} of its cases"
+        cases_text = "both" if cases == 2 else f"all {cases:,}"
+        where = "" if cases == 1 else f" in {cases_text} of its cases"
         if cases > 1 and (designs.shares < 1.0).any():
             where = f", each in the share of its {cases:,} cases that is asked for"
         if designs.against:
@@ -248,11 +250,11 @@ class BestAnswer:
         return ", ".join(faults)
 
     def _trade_off(self) -> list[str]:
-        found = self.designs.front(self.front)
-        some = found[np.unique(np.linspace(0, len(found) - 1, min(len(found), MOST_ON_FRONT)).astype(int))]
+        front = self.designs.front(self.front)
+        some = front[np.unique(np.linspace(0, len(front) - 1, min(len(front), MOST_ON_FRONT)).astype(int))]
         names = " against ".join(goal.text for goal in self.front)
         head = f"{names}: no good design is better in one and as good in the other"
-        left = f"; {len(some)} of {len(found):,} are shown" if len(some) < len(found) else ""
+        left = f"; {len(some)} of {len(front):,} are shown" if len(some) < len(front) else ""
         return [f"{head}{left}", *self.table([BestRow(int(design), "") for design in some])]
 
     def table(self, rows: Sequence[BestRow]) -> list[str]:
@@ -327,7 +329,7 @@ class BestAnswer:
     def _chosen(self, design: int) -> Iterator[tuple[CaseColumn, float, str]]:
         """The parameters and choices that make a design, with SI value (of a choice its word's place), and unit."""
         pool, place = self.designs.pool, int(self.designs.first[design])
-        variables = {each.path: each for each in pool.variables("coordinate")}
+        variables = {coordinate.path: coordinate for coordinate in pool.variables("coordinate")}
         for axis in self.designs.axes:
             for column in axis.columns:
                 if np.isnan(column.values[place]):
@@ -344,7 +346,7 @@ class BestAnswer:
         words = [f"-D {quoted(define)}" for define in self.defines]
         chosen = dict(self.settings(design))
         replaced = {*chosen, *(["seed"] if seed is not None else [])}
-        words += [setting_option(each) for each in self.given if setting_path(each) not in replaced]
+        words += [setting_option(setting) for setting in self.overrides if setting_path(setting) not in replaced]
         for path, value in chosen.items():
             option = "-D" if path.startswith(MACRO) else "--set"
             words.append(f"{option} {quoted(f'{path.removeprefix(MACRO)}={value}')}")
@@ -357,8 +359,11 @@ class BestAnswer:
         assert self.best is not None
         if not self.designs.draws:
             return "run it:", f"{self.command(self.best)} -o chosen.h5"
-        said = f"it was picked out of {self.designs.count:,} by these very cases, so its numbers flatter it: "
-        return f"{said}other draws confirm it or not", f"{self.command(self.best, seed=self.seed + 1)} -o confirmed.h5"
+        reason = f"it was picked out of {self.designs.count:,} by these very cases, so its numbers flatter it: "
+        return (
+            f"{reason}other draws confirm it or not",
+            f"{self.command(self.best, seed=self.seed + 1)} -o confirmed.h5",
+        )
 
     # Data
 
@@ -405,7 +410,7 @@ def _values(column: CaseColumn, places: Iterable[int]) -> list[str]:
     values = [float(column.values[place]) for place in places]
     texts = [column.words[int(value)] if column.role == "choice" and value == value else "" for value in values]
     numbers = texts if column.role == "choice" else number_texts(values)
-    return ["" if math.isnan(each) else text for each, text in zip(values, numbers, strict=True)]
+    return ["" if math.isnan(value) else text for value, text in zip(values, numbers, strict=True)]
 
 
 def _range(column: CaseColumn) -> str:
@@ -417,20 +422,20 @@ def _range(column: CaseColumn) -> str:
     return f"{column.label} {low} .. {high} {column.unit}".rstrip()
 
 
-def _at(column: CaseColumn, values: np.ndarray, found: Stretch) -> str:
-    low, high = number_texts(float(values[level]) for level in (found.first, found.last))
+def _range_text(column: CaseColumn, values: np.ndarray, stretch: Stretch) -> str:
+    low, high = number_texts(float(values[level]) for level in (stretch.first, stretch.last))
     return f"{low} .. {high} {column.unit}".rstrip()
 
 
-def _at_an_end(found: Stretch, level: int) -> bool:
+def _at_an_end(stretch: Stretch, level: int) -> bool:
     """True if a level is the first or the last of the sweep."""
-    return (found.first == level and found.below == ENDS) or (found.last == level and found.above == ENDS)
+    return (stretch.first == level and stretch.below == ENDS) or (stretch.last == level and stretch.above == ENDS)
 
 
-def _ends(found: Stretch) -> str:
-    if found.below == found.above == ENDS:
+def _ends(stretch: Stretch) -> str:
+    if stretch.below == stretch.above == ENDS:
         return f"on both sides {ENDS}"
-    return f"below: {_beyond(found.below)}; above: {_beyond(found.above)}"
+    return f"below: {_beyond(stretch.below)}; above: {_beyond(stretch.above)}"
 
 
 def _beyond(why: str) -> str:
@@ -449,14 +454,14 @@ def context(archive: ArchiveFile, pool: Pool) -> dict[str, Any]:
     remarks = []
     if any(group.attributes.get("step_errors") for group in pool.groups):
         remarks.append("requirements on errors by the step are not looked at here: `met show --evidence`")
-    given: tuple[str, ...] = ()
+    settings: tuple[str, ...] = ()
     try:
-        given = archive.plan(as_written=True).settings
+        settings = archive.plan(as_written=True).settings
     except Problem:  # for instance, a model of the plan is not installed here
         remarks.append("the plan in this archive cannot be read: what `--set` set, if it did, is not in the command")
     seed = int(pool.groups[0].at("seed", [0])[0])
-    name = varied_run(pool.name) if any(map(varies, given)) else pool.name
+    name = varied_run(pool.name) if any(map(varies, settings)) else pool.name
     return {
-        "deck": archive.deck.strip("<>"), "name": name, "seed": seed, "defines": defines, "given": given,
+        "deck": archive.deck.strip("<>"), "name": name, "seed": seed, "defines": defines, "overrides": settings,
         "remarks": remarks,
     }  # fmt: skip

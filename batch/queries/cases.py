@@ -111,8 +111,8 @@ def title(group: ArchiveGroup, most: int | None = None, *, by: CaseOrder | None 
     are listed"""
     if is_streamed(group) and by is None and not every:
         return f"of {group.count:,} cases those that stand out:"
-    found = _title(group, most, by)
-    return found if group.summary is None else f"of the rows that are kept, {found}"
+    text = _title(group, most, by)
+    return text if group.summary is None else f"of the rows that are kept, {text}"
 
 
 def _listed(group: ArchiveGroup, by: CaseOrder | None, among: np.ndarray | None, most: int | None) -> np.ndarray:
@@ -138,8 +138,8 @@ MOST_STANDING_OUT = 100
 
 
 def _title(group: ArchiveGroup, most: int | None, by: CaseOrder | None) -> str:
-    if (found := ordering.order_of([group], by)) is not None:
-        return found.title
+    if (order := ordering.order_of([group], by)) is not None:
+        return order.title
     outcomes = requirements.outcomes(group)
     number = f"{min(most, group.count)} " if most is not None else ""
     failed = bool((group.values("status") != 0).any())
@@ -176,7 +176,7 @@ def rows_json(
         {
             "row": int(values["case"][i]),
             "case_id": str(values["case_id"][i]),
-            **{each: int(found[i]) for each, found in repeats.items()},
+            **{name: int(repeat[i]) for name, repeat in repeats.items()},
             "status": STATUS.get(int(values["status"][i]), "unknown"),
             "cause": str(values["cause"][i]),
             "coordinates": {v.path: finite(float(values[v.name][i])) for v in group.role("coordinate")},
@@ -214,10 +214,10 @@ def varied_lines(archive: ArchiveFile, group: ArchiveGroup, position: int) -> li
         followers = parameters(archive, group, position)
     except Problem:  # a model of the plan is not installed here; the varied values are known all the same
         followers = {}
-    for path, given in followers.items():
-        if given["varies"] and path not in group.variables:
-            plain = Stored(path, (), "", given["unit"], (), "", {})
-            rows.append([path, value_text(given["value"], plain)])
+    for path, follower in followers.items():
+        if follower["varies"] and path not in group.variables:
+            plain = Stored(path, (), "", follower["unit"], (), "", {})
+            rows.append([path, value_text(follower["value"], plain)])
     out = ["varied, and what follows from it:", *columns(rows)]
     return [*out, f"  of {len(followers)} parameters; --format json lists them all"] if followers else out
 

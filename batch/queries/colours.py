@@ -114,11 +114,11 @@ def _thinned(finite: np.ndarray) -> np.ndarray:
 def _inner(finite: np.ndarray) -> tuple[float, float, bool]:
     """The range of sorted values in which they are distinguishable, and whether by their logarithms."""
     part = _without_far(finite)
-    if _told(part) < TENTH:
-        found = _shortest(part)
-        if found is not None:
-            part = found
-        elif part[0] > 0.0 and part[-1] >= DECADES * part[0] and _told(np.log(part)) >= TOLD:
+    if _spread_share(part) < TENTH:
+        shortest = _shortest(part)
+        if shortest is not None:
+            part = shortest
+        elif part[0] > 0.0 and part[-1] >= DECADES * part[0] and _spread_share(np.log(part)) >= TOLD:
             return float(part[0]), float(part[-1]), True
     return float(part[0]), float(part[-1]), False
 
@@ -128,13 +128,13 @@ def _without_far(part: np.ndarray) -> np.ndarray:
     count = len(part)
     while len(part) > 2:
         gaps = np.diff(part)
-        at = int(gaps.argmax()) + 1
-        few, rest = sorted((part[:at], part[at:]), key=len)
+        gap = int(gaps.argmax()) + 1
+        few, rest = sorted((part[:gap], part[gap:]), key=len)
         out = (count - len(rest)) / count
-        factor = next(each for share, each in APART if out <= share)
+        factor = next(factor_of_share for share, factor_of_share in APART if out <= share)
         if len(few) == 1:
             factor = min(factor, SINGLE_APART)
-        if len(few) == len(rest) or out > MOST_OUT or not _shows(rest) or gaps[at - 1] < factor * np.ptp(rest):
+        if len(few) == len(rest) or out > MOST_OUT or not _shows(rest) or gaps[gap - 1] < factor * np.ptp(rest):
             break
         part = rest
     return part
@@ -143,18 +143,18 @@ def _without_far(part: np.ndarray) -> np.ndarray:
 def _shortest(part: np.ndarray) -> np.ndarray | None:
     """The shortest range that holds all but the fewest values, in which the values are distinguishable."""
     for out in np.unique(np.geomspace(1, max(1.0, MOST_OUT * len(part)), 40).astype(int)):
-        kept = len(part) - int(out)
-        if kept < 2:
+        kept_count = len(part) - int(out)
+        if kept_count < 2:
             break
-        first = int((part[kept - 1 :] - part[: len(part) - kept + 1]).argmin())
-        found = part[first : first + kept]
-        if _shows(found) and _told(found) >= TOLD:
-            beside = np.ptp(found) / 2  # a range as near as that distinguishes the others as well
-            return part[(part >= found[0] - beside) & (part <= found[-1] + beside)]
+        first = int((part[kept_count - 1 :] - part[: len(part) - kept_count + 1]).argmin())
+        dense = part[first : first + kept_count]
+        if _shows(dense) and _spread_share(dense) >= TOLD:
+            beside = np.ptp(dense) / 2  # a range as near as that distinguishes the others as well
+            return part[(part >= dense[0] - beside) & (part <= dense[-1] + beside)]
     return None
 
 
-def _told(part: np.ndarray) -> float:
+def _spread_share(part: np.ndarray) -> float:
     """The share of sorted values outside of the densest tenth of their range."""
     ends = np.searchsorted(part, part + TENTH * np.ptp(part), side="right")
     return 1.0 - float((ends - np.arange(len(part))).max()) / len(part)

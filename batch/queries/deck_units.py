@@ -32,8 +32,10 @@ class DeckUnits:
     def __init__(self, archive: ArchiveFile | Plan | None, group: ArchiveGroup) -> None:
         self.group = group
         plan = written_plan(archive) if isinstance(archive, ArchiveFile) else archive
-        found = [] if plan is None else [experiment for experiment in plan.experiments if experiment.name == group.name]
-        self.experiment: Experiment | None = found[0] if found else None
+        experiments = (
+            [] if plan is None else [experiment for experiment in plan.experiments if experiment.name == group.name]
+        )
+        self.experiment: Experiment | None = experiments[0] if experiments else None
         self._votes = _votes(self.experiment, plan) if plan is not None and self.experiment is not None else {}
         self._required = self._of_metrics()
 
@@ -43,7 +45,7 @@ class DeckUnits:
             return panel
         required = [*self._required.get(panel.name, ()), *self._required.get(panel.variable, ())]
         usual = self._votes.get(panel.unit, ())
-        unit = next((each for each in (*required, *usual) if _scale(each, panel.unit)), "")
+        unit = next((deck_unit for deck_unit in (*required, *usual) if _scale(deck_unit, panel.unit)), "")
         scale = _scale(unit, panel.unit)
         return replace(panel, unit=unit, scale=scale, in_si=panel.unit) if scale not in (0.0, 1.0) else panel
 
@@ -55,9 +57,9 @@ class DeckUnits:
         named = {metric.name: metric.of for metric in self.experiment.structure.metrics}
         judged = {requirement.metric for requirement in self.experiment.requirements}
         for variable in self.group.role("metric"):
-            of = named.get(variable.path, "")
-            if of and variable.path in judged:
-                for signal in (of, of.rpartition(".")[2]):
+            signal_path = named.get(variable.path, "")
+            if signal_path and variable.path in judged:
+                for signal in (signal_path, signal_path.rpartition(".")[2]):
                     out.setdefault(signal, []).append(str(variable.attributes.get("deck_unit", variable.unit)))
         return out
 
@@ -80,10 +82,10 @@ def _votes(experiment: Experiment, plan: Plan) -> dict[str, tuple[str, ...]]:
         if place is None or not MOTION.match(path) or quantity.value == 0.0 or (quantity.unit, place) in seen:
             continue
         seen.add((quantity.unit, place))
-        found = WRITTEN.search(_text(place, texts))
-        if found:
-            counts.setdefault(quantity.unit, Counter())[found[1]] += 1
-    return {unit: tuple(each for each, _ in found.most_common()) for unit, found in counts.items()}
+        match_ = WRITTEN.search(_text(place, texts))
+        if match_:
+            counts.setdefault(quantity.unit, Counter())[match_[1]] += 1
+    return {unit: tuple(text for text, _ in counter.most_common()) for unit, counter in counts.items()}
 
 
 def _text(place: Place, texts: Mapping[str, list[str]]) -> str:

@@ -100,69 +100,85 @@ def evidence(group: ArchiveGroup) -> list[EvidenceRow]:
     )
 
 
-def evidence_for(group: ArchiveGroup, found: Sequence[GroupRequirement]) -> list[EvidenceRow]:
+def evidence_for(group: ArchiveGroup, judged_requirements: Sequence[GroupRequirement]) -> list[EvidenceRow]:
     """The rows of these requirements: one for each design point, and a single one where every case has to meet it."""
-    if not found:
+    if not judged_requirements:
         return []
     if (answer := SearchAnswer.of(group)) is not None:
         return _of_answer(answer)
     if is_search(group):  # a part of its cases: an optimiser chose them, so that each is judged by every requirement
-        found = [replace(each, share=None, confidence=None) for each in found]
+        judged_requirements = [replace(requirement, share=None, confidence=None) for requirement in judged_requirements]
     if (summed := summed_up(group)) is not None:
-        return _of_summary(group, summed, found)
+        return _of_summary(group, summed, judged_requirements)
     outcomes = requirements.outcomes(group)
     points, why = _design_points(group)
     early = bool(group.attributes.get("until_shown"))
     out = []
-    for each in found:
-        values = group.values(each.metric)
-        scale, unit = deck_unit(group.variables[each.metric])
-        for point in points if each.share is not None else [DesignPoint({}, np.arange(group.count))]:
-            judged = _judged(each, values[point.cases], outcomes[point.cases, each.place], why, early)
+    for judged_requirement in judged_requirements:
+        values = group.values(judged_requirement.metric)
+        scale, unit = deck_unit(group.variables[judged_requirement.metric])
+        for point in points if judged_requirement.share is not None else [DesignPoint({}, np.arange(group.count))]:
+            judged = _judged(
+                judged_requirement, values[point.cases], outcomes[point.cases, judged_requirement.place], why, early
+            )
             worst = int(point.cases[judged.pop("worst")])
             out.append(
-                EvidenceRow(requirement=each, unit=unit, scale=scale, chosen=point.chosen, worst=worst, **judged)
+                EvidenceRow(
+                    requirement=judged_requirement, unit=unit, scale=scale, chosen=point.chosen, worst=worst, **judged
+                )
             )
     return out
 
 
 def _of_answer(answer: SearchAnswer) -> list[EvidenceRow]:
     """The rows of the requirements in the cases of a search's answer, each asked of every one of these."""
-    group, here = answer.group, np.array(answer.found.cases)
+    group, cases = answer.group, np.array(answer.found.cases)
     met, out = requirements.outcomes(group), []
-    for each in answer.required:
-        judged = _judged(each, group.values(each.metric)[here], met[here, each.place], SEARCHED, early=False)
-        scale, unit = deck_unit(group.variables[each.metric])
-        worst = int(here[judged.pop("worst")])
-        out.append(EvidenceRow(requirement=each, unit=unit, scale=scale, chosen={}, worst=worst, **judged))
+    for requirement in answer.required:
+        judged = _judged(
+            requirement, group.values(requirement.metric)[cases], met[cases, requirement.place], SEARCHED, early=False
+        )
+        scale, unit = deck_unit(group.variables[requirement.metric])
+        worst = int(cases[judged.pop("worst")])
+        out.append(EvidenceRow(requirement=requirement, unit=unit, scale=scale, chosen={}, worst=worst, **judged))
     return out
 
 
-def _of_summary(group: ArchiveGroup, summary: CaseSummary, found: Sequence[GroupRequirement]) -> list[EvidenceRow]:
+def _of_summary(
+    group: ArchiveGroup, summary: CaseSummary, judged_requirements: Sequence[GroupRequirement]
+) -> list[EvidenceRow]:
     """The rows of requirements on all cases, from the summary that the archive keeps."""
     chosen = [group.variables[str(name)] for name in summary.values["chosen"]]
     why = _why_without_confidence(group, group.role("coordinate"))
     out = []
-    for each in found:
-        scale, unit = deck_unit(group.variables[each.metric])
-        sign = 1.0 if each.comparison.startswith("<") else -1.0
-        for row in summary.judged(each.place, whole=each.share is None):
+    for requirement in judged_requirements:
+        scale, unit = deck_unit(group.variables[requirement.metric])
+        sign = 1.0 if requirement.comparison.startswith("<") else -1.0
+        for row in summary.judged(requirement.place, whole=requirement.share is None):
             values = summary.values["chosen_value"][row["point"]] if row["point"] >= 0 else ()
             misses, spread = row["missed"] + row["unknown"], row["deviation"]
-            told: dict[str, Any] = {
+            verdict_fields: dict[str, Any] = {
                 "cases": row["cases"],
                 "missed": misses,
                 "value": row["worst"],
-                "margin": sign * (each.limit - row["worst"]),
-                "sigmas": sign * (each.limit - row["mean"]) / spread if spread > 0.0 else None,
+                "margin": sign * (requirement.limit - row["worst"]),
+                "sigmas": sign * (requirement.limit - row["mean"]) / spread if spread > 0.0 else None,
             }
-            if _without_confidence(each, why):
-                told |= _counted(each, row["cases"], misses, why)
+            if _without_confidence(requirement, why):
+                verdict_fields |= _counted(requirement, row["cases"], misses, why)
             else:
-                told |= _judged_by_counts(each, row["cases"], misses, None if np.isnan(row["bound"]) else row["bound"])
+                verdict_fields |= _judged_by_counts(
+                    requirement, row["cases"], misses, None if np.isnan(row["bound"]) else row["bound"]
+                )
             worst = group.position_of(row["worst_case"])
-            at = {variable.path: _shown(variable, value) for variable, value in zip(chosen, values, strict=False)}
-            out.append(EvidenceRow(requirement=each, unit=unit, scale=scale, chosen=at, worst=worst, **told))
+            chosen_texts = {
+                variable.path: _value_text(variable, value) for variable, value in zip(chosen, values, strict=False)
+            }
+            out.append(
+                EvidenceRow(
+                    requirement=requirement, unit=unit, scale=scale, chosen=chosen_texts, worst=worst, **verdict_fields
+                )
+            )
     return out
 
 
@@ -190,7 +206,10 @@ def _design_points(group: ArchiveGroup) -> tuple[list[DesignPoint], str]:
         return everything, why
     points = design_points([values for _, values in chosen], group.count)
     cases = np.split(np.argsort(points, kind="stable"), np.cumsum(np.bincount(points))[:-1])
-    return [DesignPoint({v.path: _shown(v, values[here[0]]) for v, values in chosen}, here) for here in cases], why
+    return [
+        DesignPoint({v.path: _value_text(v, values[case_places[0]]) for v, values in chosen}, case_places)
+        for case_places in cases
+    ], why
 
 
 def _why_without_confidence(group: ArchiveGroup, coordinates: Sequence[Stored]) -> str:
@@ -206,91 +225,103 @@ def _why_without_confidence(group: ArchiveGroup, coordinates: Sequence[Stored]) 
     return SOME_OF_THE_TABLE if some and not group.attributes.get("until_shown") else ""
 
 
-def _shown(variable: Stored, value: float) -> str:
+def _value_text(variable: Stored, value: float) -> str:
     """A value in the unit of the deck, in the fewest digits that give it again, with the unit typeset."""
     number, _, unit = written(value, str(variable.attributes.get("deck_unit", variable.unit))).partition(" ")
     return f"{number} {pretty_unit(unit)}".rstrip()
 
 
-def _judged(each: GroupRequirement, values: np.ndarray, outcomes: np.ndarray, why: str, early: bool) -> dict[str, Any]:
+def _judged(
+    requirement: GroupRequirement, values: np.ndarray, outcomes: np.ndarray, why: str, early: bool
+) -> dict[str, Any]:
     """The verdict at a design point and its grounds, by the fields of `EvidenceRow`; `worst` is a place in its cases.
 
     values  of the metric, SI, in the order in which the cases were drawn;  outcomes: 1 met, 0 missed, -1 unknown
     why     no confidence can be had, "" where one can;  early: True where cases were run until it was decided
     """
     cases, missed, unknown = len(values), int((outcomes != 1).sum()), outcomes == -1
-    worst = int(np.where(unknown, np.inf, requirements.beyond(values, each.comparison, each.limit)).argmax())
-    sign = 1.0 if each.comparison.startswith("<") else -1.0
+    worst = int(
+        np.where(unknown, np.inf, requirements.beyond(values, requirement.comparison, requirement.limit)).argmax()
+    )
+    sign = 1.0 if requirement.comparison.startswith("<") else -1.0
     finite = values[np.isfinite(values)]
     deviation = float(finite.std(ddof=1)) if len(finite) > 1 else 0.0
-    found: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "cases": cases,
         "missed": missed,
         "worst": worst,
         "value": float(values[worst]),
-        "margin": sign * (each.limit - float(values[worst])),
-        "sigmas": sign * (each.limit - float(finite.mean())) / deviation if deviation > 0.0 else None,
+        "margin": sign * (requirement.limit - float(values[worst])),
+        "sigmas": sign * (requirement.limit - float(finite.mean())) / deviation if deviation > 0.0 else None,
     }
-    if _without_confidence(each, why):
-        return {**found, **_counted(each, cases, missed, why)}
+    if _without_confidence(requirement, why):
+        return {**fields, **_counted(requirement, cases, missed, why)}
     judged = _judged_early if early else _judged_once
-    return {**found, **judged(each, values, outcomes != 1, unknown)}
+    return {**fields, **judged(requirement, values, outcomes != 1, unknown)}
 
 
-def _without_confidence(each: GroupRequirement, why: str) -> bool:
+def _without_confidence(requirement: GroupRequirement, why: str) -> bool:
     """True where the finished cases decide the requirement, without a statement about others."""
-    return each.share is None or each.confidence is None or bool(why)
+    return requirement.share is None or requirement.confidence is None or bool(why)
 
 
-def _counted(each: GroupRequirement, cases: int, missed: int, why: str) -> dict[str, Any]:
+def _counted(requirement: GroupRequirement, cases: int, missed: int, why: str) -> dict[str, Any]:
     """The verdict of the cases that were run. why: the reason why there is no confidence"""
-    share = each.share if each.share is not None and each.confidence is None else 1.0
+    share = requirement.share if requirement.share is not None and requirement.confidence is None else 1.0
     verdict = "met" if cases - missed >= share * cases * (1.0 - ROUNDING) else "missed"
-    return {"verdict": verdict, "why": why if each.confidence is not None else ""}
+    return {"verdict": verdict, "why": why if requirement.confidence is not None else ""}
 
 
-def _judged_once(each: GroupRequirement, values: np.ndarray, missed: np.ndarray, unknown: np.ndarray) -> dict[str, Any]:
+def _judged_once(
+    requirement: GroupRequirement, values: np.ndarray, missed: np.ndarray, unknown: np.ndarray
+) -> dict[str, Any]:
     """The verdict of cases whose number was fixed beforehand, and its bounds."""
-    assert each.share is not None and each.confidence is not None
-    rank = fixed.percentile_rank(len(values), each.share, each.confidence)
-    return _judged_by_counts(each, len(values), int(missed.sum()), _order_statistic(each, values, unknown, rank))
+    assert requirement.share is not None and requirement.confidence is not None
+    rank = fixed.percentile_rank(len(values), requirement.share, requirement.confidence)
+    return _judged_by_counts(
+        requirement, len(values), int(missed.sum()), _order_statistic(requirement, values, unknown, rank)
+    )
 
 
-def _judged_by_counts(each: GroupRequirement, cases: int, misses: int, bound: float | None) -> dict[str, Any]:
+def _judged_by_counts(requirement: GroupRequirement, cases: int, misses: int, bound: float | None) -> dict[str, Any]:
     """The verdict from the number of cases, the number of misses, and the order statistic that bounds the
     percentile."""
-    assert each.share is not None and each.confidence is not None
-    verdict = fixed.verdict(cases, misses, each.share, each.confidence)
+    assert requirement.share is not None and requirement.confidence is not None
+    verdict = fixed.verdict(cases, misses, requirement.share, requirement.confidence)
     return {
-        "lower": fixed.lower_bound(cases, misses, each.confidence),
-        "upper": fixed.upper_bound(cases, misses, each.confidence),
+        "lower": fixed.lower_bound(cases, misses, requirement.confidence),
+        "upper": fixed.upper_bound(cases, misses, requirement.confidence),
         "bound": bound,
         "verdict": verdict,
-        "more": fixed.cases_needed(each.share, each.confidence, misses) - cases if verdict == "not shown" else 0,
+        "more": fixed.cases_needed(requirement.share, requirement.confidence, misses) - cases
+        if verdict == "not shown"
+        else 0,
     }
 
 
 def _judged_early(
-    each: GroupRequirement, values: np.ndarray, missed: np.ndarray, unknown: np.ndarray
+    requirement: GroupRequirement, values: np.ndarray, missed: np.ndarray, unknown: np.ndarray
 ) -> dict[str, Any]:
     """The verdict of cases that were looked at one after the other, and its bounds.
 
     A bound may be taken after any number of cases: the tighter one of those when it was decided and in the end.
     """
-    assert each.share is not None and each.confidence is not None
-    share, confidence = each.share, each.confidence
+    assert requirement.share is not None and requirement.confidence is not None
+    share, confidence = requirement.share, requirement.confidence
     number, verdict = sequential.decided(missed, share, confidence)
     looks = [(cases, int(missed[:cases].sum())) for cases in {number, len(values)}]
     statistics = [
-        _order_statistic(each, values[:cases], unknown[:cases], sequential.percentile_rank(cases, share, confidence))
+        _order_statistic(
+            requirement, values[:cases], unknown[:cases], sequential.percentile_rank(cases, share, confidence)
+        )
         for cases, _ in looks
     ]
-    tightest = min if each.comparison.startswith("<") else max
+    tightest = min if requirement.comparison.startswith("<") else max
     open_yet = verdict == "not shown"
     return {
         "lower": max(sequential.lower_bound(*look, confidence) for look in looks),
         "upper": min(sequential.upper_bound(*look, confidence) for look in looks),
-        "bound": tightest((found for found in statistics if found is not None), default=None),
+        "bound": tightest((statistic for statistic in statistics if statistic is not None), default=None),
         "verdict": verdict,
         "more": sequential.cases_needed(share, confidence, int(missed.sum())) - len(values) if open_yet else 0,
         "sequential": True,
@@ -298,15 +329,15 @@ def _judged_early(
     }
 
 
-def _order_statistic(each: GroupRequirement, values: np.ndarray, unknown: np.ndarray, rank: int) -> float | None:
+def _order_statistic(requirement: GroupRequirement, values: np.ndarray, unknown: np.ndarray, rank: int) -> float | None:
     """The value of a rank, counted from the limit's side, which bounds the percentile; None where there are too few
     cases, or it falls among those without a value."""
     if not rank:
         return None
-    below = each.comparison.startswith("<")
+    below = requirement.comparison.startswith("<")
     known = np.where(unknown, np.inf if below else -np.inf, values)
-    found = float(np.sort(known)[rank - 1 if below else len(values) - rank])
-    return found if np.isfinite(found) else None
+    statistic = float(np.sort(known)[rank - 1 if below else len(values) - rank])
+    return statistic if np.isfinite(statistic) else None
 
 
 def percent_below(share: float) -> str:

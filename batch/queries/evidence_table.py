@@ -100,13 +100,17 @@ def requirement_evidence(
         if group.sweep and not structure:  # a sum of sweeps
             structure = [group.name.removeprefix(f"{group.sweep}.")]
         verified = figures(group)
-        errors = {} if verified is None else {name: each.error for name, each in verified.metrics.items()}
+        errors = (
+            {} if verified is None else {name: metric_error.error for name, metric_error in verified.metrics.items()}
+        )
         drawn, chosen = _designs(group)
         for row in evidence_for(group, group_requirements(group)):
-            at = [*structure, *(f"{path} = {text}" for path, text in row.chosen.items())]
+            conditions = [*structure, *(f"{path} = {text}" for path, text in row.chosen.items())]
             alike = drawn and (row.requirement.share is not None or not chosen)
-            found = _of_metric(group, row, ", ".join(at), errors.get(row.requirement.metric), archive, several)
-            out.append(found if alike else replace(found, sigmas=None))
+            evidence = _of_metric(
+                group, row, ", ".join(conditions), errors.get(row.requirement.metric), archive, several
+            )
+            out.append(evidence if alike else replace(evidence, sigmas=None))
         out += [
             _of_step_error(group, verdict, ", ".join(structure), archive, several)
             for verdict in verdicts(group, verified)
@@ -125,14 +129,14 @@ def _designs(group: ArchiveGroup) -> tuple[bool, bool]:
 
 
 def _of_metric(
-    group: ArchiveGroup, row: EvidenceRow, at: str, error: float | None, archive: str, several: bool
+    group: ArchiveGroup, row: EvidenceRow, condition: str, error: float | None, archive: str, several: bool
 ) -> RequirementEvidence:
     required, case = row.requirement, int(group.at("case", [row.worst])[0])
     variable = group.variables[required.metric]
     return RequirementEvidence(
         run=group.sweep or group.name,
         requirement=required.text,
-        at=at,
+        at=condition,
         metric=required.metric,
         unit=str(variable.attributes.get("deck_unit", variable.unit)),
         si_unit=variable.unit,
@@ -162,35 +166,35 @@ def _of_metric(
 
 
 def _of_step_error(
-    group: ArchiveGroup, found: StepErrorVerdict, at: str, archive: str, several: bool
+    group: ArchiveGroup, verdict: StepErrorVerdict, condition: str, archive: str, several: bool
 ) -> RequirementEvidence:
-    limit = found.limit
+    limit = verdict.limit
     variable = group.variables[limit.metric]
-    told = (
+    units = (
         ("%", "1", 0.01)
         if limit.share
         else (str(variable.attributes.get("deck_unit", variable.unit)), variable.unit, abs(deck_unit(variable)[0]))
     )
-    size = _known(found.size)
+    size = _known(verdict.size)
     return RequirementEvidence(
         run=group.sweep or group.name,
         requirement=limit.text,
-        at=at,
+        at=condition,
         metric=limit.metric,
-        unit=told[0],
-        si_unit=told[1],
-        scale=told[2],
+        unit=units[0],
+        si_unit=units[1],
+        scale=units[2],
         comparison=limit.comparison,
         limit=limit.limit,
-        verdict=found.word,
-        cases=found.cases,
-        missed=found.missed,
-        share_met=1.0 - found.missed / found.cases if found.cases else None,
+        verdict=verdict.word,
+        cases=verdict.cases,
+        missed=verdict.missed,
+        share_met=1.0 - verdict.missed / verdict.cases if verdict.cases else None,
         worst=size,
-        worst_case=found.worst if found.worst >= 0 else None,
+        worst_case=verdict.worst if verdict.worst >= 0 else None,
         margin=None if size is None else limit.limit - size,
-        why="" if found.met is not None else found.said,
-        again=_again(group, found.worst, archive, several) if found.worst >= 0 else "",
+        why="" if verdict.met is not None else verdict.said,
+        again=_again(group, verdict.worst, archive, several) if verdict.worst >= 0 else "",
     )
 
 
@@ -238,15 +242,15 @@ def texts_of(row: RequirementEvidence, number: Callable[[float], str] = number_t
     if row.at_least is not None and row.at_most is not None:
         refuted = row.verdict == "refuted"
         of_all = f"at most {percent_above(row.at_most)}" if refuted else f"at least {percent_below(row.at_least)}"
-    asked = "every case" if row.share is None else f"{100.0 * row.share:g} %"
+    demand = "every case" if row.share is None else f"{100.0 * row.share:g} %"
     if row.confidence is not None:
-        asked += f" with {100.0 * row.confidence:g} %"
+        demand += f" with {100.0 * row.confidence:g} %"
     return EvidenceTexts(
         verdict=row.verdict if row.decided in (None, row.cases) else f"{row.verdict} after {row.decided:,}",
         missed=f"{row.missed:,} of {row.cases:,}",
         share_met=NONE if row.share_met is None else percent_below(row.share_met).replace(".00 %", " %"),
         of_all=of_all,
-        asked=asked,
+        asked=demand,
         bound=quantity(row.percentile_bound),
         needed=f"{row.more_cases:,}" if row.more_cases else NONE,
         limit=f"{row.comparison} {quantity(row.limit)}",
@@ -271,9 +275,11 @@ def notes_of(rows: Sequence[RequirementEvidence]) -> list[str]:
         out.append("needed: so many more cases would show it if none of these misses it")
     if any(row.test == "sequential" for row in rows):
         out.append("sequential test: the bounds hold although it was looked at after every case")
-    told = sum(row.at_least is not None for row in rows)
-    if told > 1:
-        out.append(f"{told:,} verdicts with a confidence: it is that of each by itself; of all together it is less")
+    with_confidence = sum(row.at_least is not None for row in rows)
+    if with_confidence > 1:
+        out.append(
+            f"{with_confidence:,} verdicts with a confidence: it is that of each by itself; of all together it is less"
+        )
     return list(dict.fromkeys(out))
 
 

@@ -47,22 +47,22 @@ class CaseExpressions:
         Problem."""
         choices = {column.label: column for column in self.pool.columns if column.role == "choice"}
         words = {
-            name: np.array([*each.words, ""])[np.nan_to_num(each.values, nan=len(each.words)).astype(int)]
-            for name, each in choices.items()
+            name: np.array([*column.words, ""])[np.nan_to_num(column.values, nan=len(column.words)).astype(int)]
+            for name, column in choices.items()
         }
-        options = {name: each.words for name, each in choices.items()}
+        options = {name: column.words for name, column in choices.items()}
         truths = Truths(self._find, self._graph, words, options)
         truths.numeric = False  # an archive has only the words of a choice
         truths.take(self._columns, self.pool.count)
-        with _shown(condition):
+        with _about_expression(condition):
             return truths.of(read_expression(condition), np.ones(self.pool.count, bool))
 
     def values(self, expression: str) -> tuple[np.ndarray, Dimension]:
         """The value of an expression in each case, [case] in SI, and its dimension. Raises Problem."""
-        with _shown(expression):
-            found = evaluate_number(read_expression(expression), self._find)
-        [numbers] = Formulas.of(self._graph, [found.number]).replay(self._columns)
-        return np.array(np.broadcast_to(np.asarray(numbers, float), self.pool.count)), found.dimension
+        with _about_expression(expression):
+            number = evaluate_number(read_expression(expression), self._find)
+        [numbers] = Formulas.of(self._graph, [number.number]).replay(self._columns)
+        return np.array(np.broadcast_to(np.asarray(numbers, float), self.pool.count)), number.dimension
 
     def is_margin(self, expression: str) -> bool:
         """True for the name of a metric that is a margin, which should be large, by its model's declaration."""
@@ -88,7 +88,7 @@ class CaseExpressions:
 
 
 @contextmanager
-def _shown(expression: str) -> Iterator[None]:
+def _about_expression(expression: str) -> Iterator[None]:
     """Add the expression to a Problem about it."""
     try:
         yield

@@ -47,9 +47,9 @@ def failures(status: np.ndarray, cause: np.ndarray, case: np.ndarray, case_id: n
 
     status, cause, case, case_id   of failed cases, in order
     """
-    found: dict[tuple[int, str], list[int]] = {}
+    places_of: dict[tuple[int, str], list[int]] = {}
     for place in range(len(status)):
-        found.setdefault((int(status[place]), NUMBER.sub("#", str(cause[place]))), []).append(place)
+        places_of.setdefault((int(status[place]), NUMBER.sub("#", str(cause[place]))), []).append(place)
     return tuple(
         FailureGroup(
             STATUS.get(ended, str(ended)),
@@ -57,15 +57,15 @@ def failures(status: np.ndarray, cause: np.ndarray, case: np.ndarray, case_id: n
             str(case_id[places[0]]),
             tuple(int(case[place]) for place in places),
         )
-        for (ended, _), places in found.items()
+        for (ended, _), places in places_of.items()
     )
 
 
-def failure_lines(found: Sequence[FailureGroup], width: int) -> list[str]:
+def failure_lines(failure_groups: Sequence[FailureGroup], width: int) -> list[str]:
     """Lines with each cause and its cases, wrapped."""
     out = []
     width = max(width, 40)
-    for failure in found:
+    for failure in failure_groups:
         word = "" if failure.status == "failed" else f"{failure.status}: "
         cause = failure.cause.removeprefix(word)
         if failure.count == 1:

@@ -27,20 +27,26 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
     """
     figures: dict[str, dict[str, np.ndarray]] = {}
     for variable in group.role("grapple"):
-        of, name = (str(variable.attributes.get(each)) for each in ("of", "figure"))
-        figures.setdefault(of, {})[name] = group.values(variable.name)
+        grappled, name = (str(variable.attributes.get(attribute)) for attribute in ("of", "figure"))
+        figures.setdefault(grappled, {})[name] = group.values(variable.name)
     bad = {}
-    for payload, found in figures.items():
-        if set(found) != set(GRAPPLE_FIGURES) or (experiment is not None and flies_from_afar(experiment, payload)):
+    for payload, payload_figures in figures.items():
+        if set(payload_figures) != set(GRAPPLE_FIGURES) or (
+            experiment is not None and flies_from_afar(experiment, payload)
+        ):
             continue
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratios = [found["distance"] / found["near"], found["speed"] / FAST, found["rate"] / TURNING]
+            ratios = [
+                payload_figures["distance"] / payload_figures["near"],
+                payload_figures["speed"] / FAST,
+                payload_figures["rate"] / TURNING,
+            ]
         worst = np.nan_to_num(np.max(ratios, axis=0), posinf=np.finfo(float).max)
         if (worst > 1.0).any():
             bad[payload] = worst
     if not bad or group.allows("D347"):
         return []
-    payload = max(bad, key=lambda each: float(bad[each].max()))
+    payload = max(bad, key=lambda candidate: float(bad[candidate].max()))
     row, cases = int(bad[payload].argmax()), int((bad[payload] > 1.0).sum())
     distance, near, speed, rate, energy = (float(figures[payload][name][row]) for name in GRAPPLE_FIGURES)
     how, helps = [], []
@@ -57,9 +63,9 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
         helps.append("let the link go along with it by then: no gripper closes on what moves so fast")
     many = f", in {cases:,} of {group.count:,} cases, worst in #{group.values('case')[row]}"
     if len(bad) > 1:
-        helps.append(f"also grappled so: {', '.join(f'`{each}`' for each in bad if each != payload)}")
-    told = None if experiment is None else experiment.parameters.get(f"payloads.{payload}.grapple")
-    place = None if told is None else told.origin.place
+        helps.append(f"also grappled so: {', '.join(f'`{other}`' for other in bad if other != payload)}")
+    grapple = None if experiment is None else experiment.parameters.get(f"payloads.{payload}.grapple")
+    place = None if grapple is None else grapple.origin.place
     message = (
         f"payload `{payload}` is grappled {', '.join(how)}{many if group.count > 1 else ''}: momentum is kept, and "
         f"{number_text(energy)} J are lost at once"

@@ -62,22 +62,22 @@ def levels(values: np.ndarray) -> np.ndarray:
     return distinct(values[np.isfinite(values)])
 
 
-def spacing(found: np.ndarray) -> Scale:
+def spacing(numbers: np.ndarray) -> Scale:
     """The spacing of distinct ascending values: by equal steps, by equal factors, or neither."""
-    if len(found) < 2:
+    if len(numbers) < 2:
         return "place"
-    if _even(found, EVEN):
+    if _even(numbers, EVEN):
         return "linear"
-    return "log" if found[0] > 0.0 and _even(np.log(found), EVEN_LOG) else "place"
+    return "log" if numbers[0] > 0.0 and _even(np.log(numbers), EVEN_LOG) else "place"
 
 
-def is_log(found: np.ndarray) -> bool:
+def is_log(numbers: np.ndarray) -> bool:
     """True if points at these distinct ascending values lie on a logarithmic axis: they rise by factors, or span so
     many that the small ones would coincide."""
-    if len(found) < 3 or found[0] <= 0.0:
+    if len(numbers) < 3 or numbers[0] <= 0.0:
         return False
-    scale = spacing(found)
-    return scale == "log" or (scale == "place" and spans(found, SPAN))
+    scale = spacing(numbers)
+    return scale == "log" or (scale == "place" and spans(numbers, SPAN))
 
 
 def spans(values: np.ndarray, ratio: float) -> bool:
@@ -93,56 +93,62 @@ def column_levels(values: np.ndarray, words: Sequence[str] = (), most: int = MOS
     words  of a choice, what its numbers stand for
     most   so many levels of values that come again and again, as in a grid; samples share MOST_LEVELS at most
     """
-    found = levels(values)
+    distinct_values = levels(values)
     finite = np.isfinite(values)
-    scale: Scale = "place" if words else spacing(found)
-    again = scale != "place" or 2 * len(found) <= int(finite.sum())
+    scale: Scale = "place" if words else spacing(distinct_values)
+    again = scale != "place" or 2 * len(distinct_values) <= int(finite.sum())
     if not again:
         most = min(most, MOST_LEVELS)
     places = np.full(len(values), -1)
-    if len(found) <= most:
-        places[finite] = np.searchsorted(found, values[finite])
-        texts = [words[int(v)] if words else number_text(float(v)) for v in found]
-        return Levels(found, tuple(texts), places, scale)
+    if len(distinct_values) <= most:
+        places[finite] = np.searchsorted(distinct_values, values[finite])
+        texts = [words[int(v)] if words else number_text(float(v)) for v in distinct_values]
+        return Levels(distinct_values, tuple(texts), places, scale)
     if again:
-        return _neighbours(found, values, most, scale)
-    scale = "log" if is_log(found) else "linear"
-    edges = (np.geomspace if scale == "log" else np.linspace)(found[0], found[-1], most + 1)
+        return _neighbours(distinct_values, values, most, scale)
+    scale = "log" if is_log(distinct_values) else "linear"
+    edges = (np.geomspace if scale == "log" else np.linspace)(distinct_values[0], distinct_values[-1], most + 1)
     places[finite] = np.clip(np.searchsorted(edges, values[finite], side="right") - 1, 0, most - 1)
     texts = [f"{number_text(float(a))} … {number_text(float(b))}" for a, b in pairwise(edges)]
     return Levels(edges, tuple(texts), places, scale)
 
 
-def _neighbours(found: np.ndarray, values: np.ndarray, most: int, scale: Scale) -> Levels:
+def _neighbours(distinct_values: np.ndarray, values: np.ndarray, most: int, scale: Scale) -> Levels:
     """Stretches of neighbouring values, with equal numbers in each, so that none is empty; they meet half way between
     values."""
-    stretch = np.arange(len(found)) * most // len(found)
+    stretch = np.arange(len(distinct_values)) * most // len(distinct_values)
     first = np.searchsorted(stretch, np.arange(most))
-    last = np.append(first[1:], len(found)) - 1
-    edges = edges_of(found, scale)[np.append(first, len(found))]
+    last = np.append(first[1:], len(distinct_values)) - 1
+    edges = edges_of(distinct_values, scale)[np.append(first, len(distinct_values))]
     texts = [
         number_text(float(a)) if a == b else f"{number_text(float(a))} … {number_text(float(b))}"
-        for a, b in zip(found[first], found[last], strict=True)
+        for a, b in zip(distinct_values[first], distinct_values[last], strict=True)
     ]
     finite = np.isfinite(values)
     places = np.full(len(values), -1)
-    places[finite] = stretch[np.searchsorted(found, values[finite])]
+    places[finite] = stretch[np.searchsorted(distinct_values, values[finite])]
     return Levels(edges, tuple(texts), places, scale)
 
 
-def edges_of(found: np.ndarray, scale: Scale) -> np.ndarray:
+def edges_of(distinct_values: np.ndarray, scale: Scale) -> np.ndarray:
     """Edges half way between values, and as far beyond the first and the last; by factors on a logarithmic scale."""
     if scale == "log":
-        return np.asarray(np.exp(edges_of(np.log(found), "linear")))
-    middles = (found[1:] + found[:-1]) / 2
-    return np.concatenate([[1.5 * found[0] - 0.5 * found[1]], middles, [1.5 * found[-1] - 0.5 * found[-2]]])
+        return np.asarray(np.exp(edges_of(np.log(distinct_values), "linear")))
+    middles = (distinct_values[1:] + distinct_values[:-1]) / 2
+    return np.concatenate(
+        [
+            [1.5 * distinct_values[0] - 0.5 * distinct_values[1]],
+            middles,
+            [1.5 * distinct_values[-1] - 0.5 * distinct_values[-2]],
+        ]
+    )
 
 
 def round_numbers(low: float, high: float, steps: Sequence[int]) -> list[float]:
     """The numbers from low to high that are one of these, times a power of ten."""
     powers = range(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
-    found = (float(f"{step}e{power}") for power in powers for step in steps)
-    return [x for x in found if low <= x <= high]
+    candidates = (float(f"{step}e{power}") for power in powers for step in steps)
+    return [x for x in candidates if low <= x <= high]
 
 
 def _even(values: np.ndarray, share: float) -> bool:
@@ -162,8 +168,8 @@ def is_grid(x: np.ndarray, y: np.ndarray) -> bool:
 
 def cells_of(across: Levels, up: Levels) -> np.ndarray:
     """The cell of each case, counted row by row from the lowest; -1 where it has none."""
-    there = (across.places >= 0) & (up.places >= 0)
-    return np.where(there, up.places * len(across.texts) + across.places, -1)
+    inside = (across.places >= 0) & (up.places >= 0)
+    return np.where(inside, up.places * len(across.texts) + across.places, -1)
 
 
 def cell_cases(values: np.ndarray, cells: np.ndarray, count: int, worse: str) -> np.ndarray:
@@ -172,8 +178,8 @@ def cell_cases(values: np.ndarray, cells: np.ndarray, count: int, worse: str) ->
     worse  `<`: a limit is above, and the largest value is the worst; `>`: the smallest is; "": there is no limit, and
            the middle one stands for them
     """
-    there = np.flatnonzero((cells >= 0) & ~np.isnan(values))
-    order = there[np.lexsort((-values[there] if worse == ">" else values[there], cells[there]))]
+    with_value = np.flatnonzero((cells >= 0) & ~np.isnan(values))
+    order = with_value[np.lexsort((-values[with_value] if worse == ">" else values[with_value], cells[with_value]))]
     first = np.searchsorted(cells[order], np.arange(count))
     end = np.searchsorted(cells[order], np.arange(count), side="right")
     place = end - 1 if worse else (first + end - 1) // 2

@@ -10,10 +10,10 @@ from met.diagnostic import Problem, error
 
 def by_run(groups: Iterable[ArchiveGroup]) -> dict[str, list[ArchiveGroup]]:
     """The groups of each run or sweep, under its name."""
-    found: dict[str, list[ArchiveGroup]] = {}
+    groups_of_run: dict[str, list[ArchiveGroup]] = {}
     for group in groups:
-        found.setdefault(group.sweep or group.name, []).append(group)
-    return found
+        groups_of_run.setdefault(group.sweep or group.name, []).append(group)
+    return groups_of_run
 
 
 def groups_named(archive: ArchiveFile, names: Sequence[str]) -> tuple[ArchiveGroup, ...]:
@@ -22,8 +22,8 @@ def groups_named(archive: ArchiveFile, names: Sequence[str]) -> tuple[ArchiveGro
         if all(name not in (group.name, group.sweep) for group in archive.groups):
             helps = f"in it: {', '.join(by_run(archive.groups))}"
             raise Problem(error("E325", f"no run or sweep `{name}` in {archive.path}", help=helps))
-    found = [group for name in names for group in archive.groups if name in (group.name, group.sweep)]
-    return tuple(dict.fromkeys(found)) if names else archive.groups
+    named = [group for name in names for group in archive.groups if name in (group.name, group.sweep)]
+    return tuple(dict.fromkeys(named)) if names else archive.groups
 
 
 def cases_named(archive: ArchiveFile, names: Sequence[str], case: str | None) -> list[tuple[ArchiveGroup, int | None]]:
@@ -31,13 +31,13 @@ def cases_named(archive: ArchiveFile, names: Sequence[str], case: str | None) ->
     groups = groups_named(archive, names)
     if case is None:
         return [(group, None) for group in groups]
-    found: list[tuple[ArchiveGroup, int | None]] = []
+    cases: list[tuple[ArchiveGroup, int | None]] = []
     problems = []
     for group in groups:
         try:
-            found.append((group, group.find_case(case)))
+            cases.append((group, group.find_case(case)))
         except Problem as problem:
             problems.append(problem)
-    if not found:
+    if not cases:
         raise Problem([d for problem in problems for d in problem.diagnostics])
-    return found
+    return cases

@@ -22,7 +22,7 @@ def last_runs(deck: str) -> dict[str, LastRun]:
     What cannot be read is left out: an editor has no use for what is wrong with an archive.
     """
     path = Path(deck)
-    found: dict[str, LastRun] = {}
+    runs: dict[str, LastRun] = {}
     for archive in _newest(path):
         try:
             with ArchiveFile(archive) as opened:
@@ -30,16 +30,16 @@ def last_runs(deck: str) -> dict[str, LastRun]:
                     continue
                 seconds = _seconds(archive)
                 for group in opened.groups:
-                    found.setdefault(group.name, _last_run(archive, group, seconds.get(group.name)))
+                    runs.setdefault(group.name, _last_run(archive, group, seconds.get(group.name)))
         except (Problem, OSError):
             continue
-    return found
+    return runs
 
 
 def _newest(deck: Path) -> list[Path]:
     try:
-        archives = [each for each in deck.parent.iterdir() if each.suffix == ".h5" and each.name.startswith(deck.stem)]
-        return sorted(archives, key=lambda each: -each.stat().st_mtime)[:MOST_ARCHIVES]
+        archives = [path for path in deck.parent.iterdir() if path.suffix == ".h5" and path.name.startswith(deck.stem)]
+        return sorted(archives, key=lambda path: -path.stat().st_mtime)[:MOST_ARCHIVES]
     except OSError:
         return []
 
@@ -49,8 +49,12 @@ def _last_run(archive: Path, group: ArchiveGroup, seconds: float | None) -> Last
     if group.summary is None:
         met = outcomes(group)
         for number, text in enumerate(requirement_texts(group)[: met.shape[1]]):
-            one = met[:, number]
-            counts[text] = (int((one == 1).sum()), int((one == 0).sum()), int((one == -1).sum()))
+            met_of_requirement = met[:, number]
+            counts[text] = (
+                int((met_of_requirement == 1).sum()),
+                int((met_of_requirement == 0).sum()),
+                int((met_of_requirement == -1).sum()),
+            )
     return LastRun(str(archive), group.count, seconds, counts)
 
 
@@ -62,10 +66,10 @@ def _seconds(archive: Path) -> dict[str, float]:
         return {}
 
 
-def _numbers(told: Any) -> Iterator[tuple[str, float]]:
-    every = told.get("experiments") if isinstance(told, dict) else None
-    for each in every if isinstance(every, list) else ():
-        if isinstance(each, dict) and isinstance(each.get("experiment"), str):
-            seconds = each.get("seconds")
+def _numbers(timings: Any) -> Iterator[tuple[str, float]]:
+    every = timings.get("experiments") if isinstance(timings, dict) else None
+    for entry in every if isinstance(every, list) else ():
+        if isinstance(entry, dict) and isinstance(entry.get("experiment"), str):
+            seconds = entry.get("seconds")
             if isinstance(seconds, int | float) and seconds >= 0:
-                yield each["experiment"], float(seconds)
+                yield entry["experiment"], float(seconds)

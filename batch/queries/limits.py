@@ -69,18 +69,18 @@ def _servo(experiment: Experiment, channel: str, panel: Panel) -> Iterator[Limit
     if member in LIMITED and owner.rpartition(".")[2] in ("servo", "bed"):
         value = _number(experiment, f"{owner}.{LIMITED[member]}")
         if isinstance(value, float):
-            one = _mark(LIMITED[member], value / panel.scale, panel)
-            yield from (one, replace(one, value=-one.value))
+            limit_mark = _mark(LIMITED[member], value / panel.scale, panel)
+            yield from (limit_mark, replace(limit_mark, value=-limit_mark.value))
 
 
 def _number(experiment: Experiment, path: str) -> float | str | None:
     """The value of a parameter that no case varies; None for a varied one."""
-    found = experiment.parameters.get(path)
-    if found is None:
+    parameter = experiment.parameters.get(path)
+    if parameter is None:
         return None
-    if isinstance(found.value, str):
-        return found.value
-    return float(found.value) if isinstance(found.value, (int, float)) else None
+    if isinstance(parameter.value, str):
+        return parameter.value
+    return float(parameter.value) if isinstance(parameter.value, (int, float)) else None
 
 
 def _mark(name: str, value: float, panel: Panel) -> LimitMark:

@@ -56,9 +56,9 @@ def _idle(axes: dict[str, np.ndarray], metrics: list[np.ndarray]) -> list[str]:
     axis. Where no cases differ in one axis alone, as in a sample, all axes if no metric changes at all."""
     codes = {path: np.unique(values, return_inverse=True)[1] for path, values in axes.items()}
     together: dict[bytes, list[str]] = {}
-    for path, of in codes.items():
-        if of.any():
-            together.setdefault(of.tobytes(), []).append(path)
+    for path, code in codes.items():
+        if code.any():
+            together.setdefault(code.tobytes(), []).append(path)
     if not metrics or not together:
         return []
     idle, compared = list[str](), False
@@ -76,13 +76,13 @@ def _idle(axes: dict[str, np.ndarray], metrics: list[np.ndarray]) -> list[str]:
 
 def _numbered(codes: Iterable[np.ndarray], count: int) -> np.ndarray:
     """A number for each case, equal for cases that have all these codes equal."""
-    found = np.zeros(count, np.int64)
+    numbers = np.zeros(count, np.int64)
     for code in codes:
-        found = np.unique(found * (code.max() + 1) + code, return_inverse=True)[1]
-    return found
+        numbers = np.unique(numbers * (code.max() + 1) + code, return_inverse=True)[1]
+    return numbers
 
 
-def _same(of: np.ndarray, values: Iterable[np.ndarray]) -> bool:
+def _same(plants: np.ndarray, values: Iterable[np.ndarray]) -> bool:
     """True where cases with the same number `of` have the same values, but for rounding."""
-    _, first, number = np.unique(of, return_index=True, return_inverse=True)
+    _, first, number = np.unique(plants, return_index=True, return_inverse=True)
     return all(np.isclose(value[first[number]], value, rtol=ROUNDING, atol=0.0).all() for value in values)

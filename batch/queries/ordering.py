@@ -40,12 +40,16 @@ def by_names(names: Sequence[str], *, reverse: bool = False) -> CaseOrder | None
     """In the order of these names, each `NAME`, `NAME:largest` or `NAME:smallest`; None where there are none. reverse:
     largest first of all that do not say it themselves. Raises Problem E329."""
     keys: list[CaseOrder] = []
-    for each in names:
-        name, colon, way = (each, "", "") if "," in each else each.partition(":")  # `check` reports several in one
+    for name_text in names:
+        name, colon, way = (
+            (name_text, "", "") if "," in name_text else name_text.partition(":")
+        )  # `check` reports several in one
         if colon and way not in WAYS:
             helps = f"`--sort {name}:largest`, or `--sort {name}:smallest`"
             raise Problem(
-                error("E329", f"`{each}` is no order of cases: `{way}` is neither largest nor smallest", help=helps)
+                error(
+                    "E329", f"`{name_text}` is no order of cases: `{way}` is neither largest nor smallest", help=helps
+                )
             )
         if name in [key.name for key in keys]:
             raise Problem(error("E329", f"cases are to be listed by `{name}` twice", help="leave one out"))
@@ -100,7 +104,7 @@ def order_of(groups: Sequence[ArchiveGroup], by: CaseOrder | None) -> CaseOrder 
 def _names(groups: Sequence[ArchiveGroup]) -> dict[str, str]:
     """Names by which cases may be listed, in users' notation, with the variable of each."""
     variables = [variable for group in groups for variable in (*group.role("metric"), *group.role("coordinate"))]
-    found = {variable.path: variable.name for variable in variables}
+    by_path = {variable.path: variable.name for variable in variables}
     if any(REPEAT in group.variables and group.values(REPEAT).any() for group in groups):
-        found.setdefault(REPEAT, REPEAT)
-    return found
+        by_path.setdefault(REPEAT, REPEAT)
+    return by_path

@@ -80,8 +80,8 @@ class Pool:
         out = np.full(self.count, otherwise, np.float64)
         for number, group in enumerate(self.groups):
             if name in group.variables:
-                here = self.group_of == number
-                out[here] = group.values(name)[self.position_of[here]]
+                in_group = self.group_of == number
+                out[in_group] = group.values(name)[self.position_of[in_group]]
         return out
 
     def texts(self, name: str, places: Sequence[int] | np.ndarray) -> list[str]:
@@ -91,8 +91,8 @@ class Pool:
         for number, group in enumerate(self.groups):
             mine = np.flatnonzero(self.group_of[wanted] == number)
             if len(mine) and name in group.variables:
-                found = group.at(name, self.position_of[wanted[mine]])
-                for i, text in zip(mine.tolist(), found.tolist(), strict=True):
+                words = group.at(name, self.position_of[wanted[mine]])
+                for i, text in zip(mine.tolist(), words.tolist(), strict=True):
                     out[i] = str(text)
         return out
 
@@ -110,11 +110,11 @@ class Pool:
         """(case, requirement): 1 met, 0 missed, -1 unknown; 1 where a structure does not have the requirement."""
         out = np.ones((self.count, len(self.requirements)), np.int8)
         for number, group in enumerate(self.groups):
-            here = self.group_of == number
+            in_group = self.group_of == number
             if "met" in group.variables:
-                found = group.values("met")[self.position_of[here]]
+                met = group.values("met")[self.position_of[in_group]]
                 for column, text in enumerate(requirements.requirement_texts(group)):
-                    out[here, self.requirements.index(text)] = found[:, column]
+                    out[in_group, self.requirements.index(text)] = met[:, column]
         return out
 
     def missed(self, column: CaseColumn) -> np.ndarray:
@@ -131,7 +131,7 @@ class Pool:
         for status in distinct(self.status).tolist():
             if status != DONE:
                 word = STATUS.get(status, "failed")
-                out[self.status == status] = next(n for n, each in enumerate(ENDED) if each in (word, "lost"))
+                out[self.status == status] = next(n for n, outcome in enumerate(ENDED) if outcome in (word, "lost"))
         return out
 
     @cached_property
@@ -150,7 +150,7 @@ class Pool:
                 out.setdefault(group_requirement.metric, {})[group_requirement.text] = RequirementLimit(
                     group_requirement.text, group_requirement.limit, group_requirement.comparison[:1]
                 )
-        return {metric: tuple(found.values()) for metric, found in out.items()}
+        return {metric: tuple(limits.values()) for metric, limits in out.items()}
 
     @cached_property
     def ranking(self) -> Ranking:
@@ -213,7 +213,8 @@ class Pool:
     def _numbers(self, variable: Stored, role: Role) -> CaseColumn:
         scale, unit = deck_unit(variable)
         limits = tuple(
-            RequirementLimit(each.text, each.value / scale, each.sense) for each in self.limits.get(variable.name, ())
+            RequirementLimit(requirement.text, requirement.value / scale, requirement.sense)
+            for requirement in self.limits.get(variable.name, ())
         )
         values = self.gathered(variable.name) / scale
         return CaseColumn(

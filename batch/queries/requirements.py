@@ -37,21 +37,21 @@ def group_requirements(group: ArchiveGroup) -> list[GroupRequirement]:
     known = requirement_texts(group)
     if not known:
         return []
-    told = group.variables["requirement"].attributes
-    given = (told.get(name, []) for name in ("metric", "comparison", "limit", "share", "confidence"))
+    attributes = group.variables["requirement"].attributes
+    parts = (attributes.get(name, []) for name in ("metric", "comparison", "limit", "share", "confidence"))
     metrics, comparisons, limits, shares, confidences = (
-        value if isinstance(value, list) else [value] for value in given
+        value if isinstance(value, list) else [value] for value in parts
     )
     if not len(metrics) == len(comparisons) == len(limits) == len(known):
         return []
     shares, confidences = ([*map(_number, values or [math.nan] * len(known))] for values in (shares, confidences))
-    there = {variable.name for variable in group.role("metric")}
+    metric_names = {variable.name for variable in group.role("metric")}
     return [
         GroupRequirement(text, place, str(metric), str(comparison), limit, share, confidence)
         for place, (text, metric, comparison, limit, share, confidence) in enumerate(
             zip(known, metrics, comparisons, limits, shares, confidences, strict=True)
         )
-        if metric in there and isinstance(limit, float)
+        if metric in metric_names and isinstance(limit, float)
     ]
 
 
@@ -120,9 +120,9 @@ def ranking(
         first, end = np.searchsorted(tie, [number, number + 1])
         count = min(SPREAD, end) - first
         if end - first > count:
-            here = order[first:end]
-            chosen = _spread(varied(here), len(here), count)
-            order[first:end] = np.concatenate([here[chosen], np.delete(here, chosen)])
+            tied = order[first:end]
+            chosen = _spread(varied(tied), len(tied), count)
+            order[first:end] = np.concatenate([tied[chosen], np.delete(tied, chosen)])
     return Ranking(order, tie)
 
 

@@ -67,7 +67,10 @@ class SearchAnswer:
         columns = [group.values(variable.name) for variable in group.role("coordinate")]
         metrics = {variable.path: group.values(variable.name) for variable in group.role("metric")}
         by_name = {variable.name: variable.path for variable in group.role("metric")}
-        required = [_Required(each.text, by_name[each.metric], each.comparison, each.limit) for each in self.required]
+        required = [
+            _Required(requirement.text, by_name[requirement.metric], requirement.comparison, requirement.limit)
+            for requirement in self.required
+        ]
         return np.stack(columns, axis=1), group.values("status") == DONE, metrics, required
 
     def progress(self, most: int) -> list[tuple[int, int, Answer]]:
@@ -95,68 +98,76 @@ class SearchAnswer:
     def required(self) -> list[GroupRequirement]:
         """The requirements by which each case is judged: one over a share of cases applies to every case, and each
         occurs once."""
-        found: dict[tuple[str, str, float], GroupRequirement] = {}
+        by_condition: dict[tuple[str, str, float], GroupRequirement] = {}
         for group_requirement in group_requirements(self.group):
-            one = replace(
+            of_every_case = replace(
                 group_requirement, text=OVER_CASES.sub("", group_requirement.text), share=None, confidence=None
             )
-            found.setdefault((group_requirement.metric, group_requirement.comparison, group_requirement.limit), one)
-        return list(found.values())
+            by_condition.setdefault(
+                (group_requirement.metric, group_requirement.comparison, group_requirement.limit), of_every_case
+            )
+        return list(by_condition.values())
 
     @cached_property
     def ok(self) -> bool:
         """True if a tuning's result meets all requirements; for a search, if it found no case that fails or misses
         one."""
         if self.search.kind == "tune":
-            return self.found.serves and all(each.withstood for each in self.search.confirmation)
+            return self.found.serves and all(confirmation.withstood for confirmation in self.search.confirmation)
         return bool((self.group.values("status") == DONE).all() and (outcomes(self.group) == 1).all())
 
     def values(self, case: int | None = None) -> list[WrittenValue]:
         """The chosen values, for a deck's text or `--set`; those of another case, by its place, where one is given."""
-        found = []
-        for each, variable in zip(self.search.parameters, self.group.role("coordinate"), strict=False):
+        written = []
+        for parameter, variable in zip(self.search.parameters, self.group.role("coordinate"), strict=False):
             value = float(self.group.at(variable.name, [self.found.case if case is None else case])[0])
-            found.append(WrittenValue(each.path, value, str(variable.attributes.get("deck_unit", variable.unit))))
-        return found
+            written.append(
+                WrittenValue(parameter.path, value, str(variable.attributes.get("deck_unit", variable.unit)))
+            )
+        return written
 
     @property
     def draws(self) -> bool:
         """True if a tuning was judged against drawn cases, so that other draws may confirm it or not."""
         return any(variable.attributes.get("design") for variable in self.group.role("coordinate"))
 
-    def value(self, found: Answer | None = None) -> str:
+    def value(self, best: Answer | None = None) -> str:
         """The goal's value in the deck's unit, of the best, or of an earlier best."""
-        return self.goal((found or self.found).value)
+        return self.goal((best or self.found).value)
 
     def goal(self, value: float) -> str:
         """A value of the goal, SI, in the deck's unit."""
-        variable = next(each for each in self.group.role("metric") if each.path == self.search.metric)
+        variable = next(metric for metric in self.group.role("metric") if metric.path == self.search.metric)
         scale = float(variable.attributes.get("deck_scale", 1.0))
         unit = str(variable.attributes.get("deck_unit", variable.unit))
         return goal_text(value, unit, scale)
 
     def lines(self) -> list[str]:
         """The answer in lines, without the commands for further steps."""
-        found, search = self.found, self.search
-        sureness = self._sureness() if found.stands else []
+        best, search = self.found, self.search
+        sureness = self._sureness() if best.stands else []
         out = [*self._tuned(), *self._by_slopes(), *sureness] if search.kind == "tune" else self._worst()
-        if found.missed:
-            out.append(f"  misses {', '.join(found.missed)}")
-        elif found.rooms and not found.failed:
-            out.append(f"  nearest to its limit: {found.rooms[0].text}, {100.0 * found.rooms[0].share:.3g} % inside")
+        if best.missed:
+            out.append(f"  misses {', '.join(best.missed)}")
+        elif best.rooms and not best.failed:
+            out.append(f"  nearest to its limit: {best.rooms[0].text}, {100.0 * best.rooms[0].share:.3g} % inside")
         beyond = "worse" if search.kind == "search" else "better"
-        out += [f"  {path} is at the {end} end of its range: beyond it may be {beyond}" for path, end in found.ends]
-        out += [line for each in search.confirmation for line in self._confirmed(each)]
-        return out + (self._border() if found.serves and search.kind == "tune" else [])
+        out += [f"  {path} is at the {end} end of its range: beyond it may be {beyond}" for path, end in best.ends]
+        out += [line for confirmation in search.confirmation for line in self._confirmed(confirmation)]
+        return out + (self._border() if best.serves and search.kind == "tune" else [])
 
-    def _confirmed(self, found: Confirmation) -> list[str]:
+    def _confirmed(self, confirmation: Confirmation) -> list[str]:
         """Lines about the answer of a tuning in cases that did not choose it."""
-        worst = f"{self.search.metric} is {self.goal(found.worst)} in the worst"
-        of = f"{found.cases:,} cases of {found.against}"
-        if found.withstood:
-            return wrapped(f"confirmed by all {of}, which did not choose it: {worst}")
-        bad = [f"{n:,} {what}" for n, what in ((found.failed, "failed"), (found.missed, "missed a requirement")) if n]
-        return wrapped(f"not confirmed: of {of}, which did not choose it, {' and '.join(bad)}; {worst}")
+        worst = f"{self.search.metric} is {self.goal(confirmation.worst)} in the worst"
+        cases_text = f"{confirmation.cases:,} cases of {confirmation.against}"
+        if confirmation.withstood:
+            return wrapped(f"confirmed by all {cases_text}, which did not choose it: {worst}")
+        bad = [
+            f"{n:,} {what}"
+            for n, what in ((confirmation.failed, "failed"), (confirmation.missed, "missed a requirement"))
+            if n
+        ]
+        return wrapped(f"not confirmed: of {cases_text}, which did not choose it, {' and '.join(bad)}; {worst}")
 
     def _by_slopes(self) -> list[str]:
         """Lines about a tuning along exact slopes: its steps, and why there were no more."""
@@ -176,10 +187,10 @@ class SearchAnswer:
 
     def _sureness(self) -> list[str]:
         """Lines about how sure it is that a tuning's optimum is the best: the goals that its starts came to."""
-        found, reached = self.found, np.array(self.starts)
+        optimum, reached = self.found, np.array(self.starts)
         if not np.isfinite(reached).any():
             return []
-        if found.left is not None:
+        if optimum.left is not None:
             words = "the tuning asks for it only where its cases begin, and the best by the goal does not keep it"
             if not self.search.steers:
                 words = f"`least_margin = {self.search.least_margin:g};` in it makes it look for one that keeps it"
@@ -231,8 +242,8 @@ class SearchAnswer:
         goals, value = metrics[self.search.metric], self.found.value
         loss = value - goals if self.search.largest else goals - value
         worse = np.flatnonzero(done & (loss > SLIGHTLY * abs(value)))
-        here = abs(value) > self._rounding and len(worse)
-        return nearest(self.search, table, self.found.case, worse) if here else None
+        has_worse = abs(value) > self._rounding and len(worse)
+        return nearest(self.search, table, self.found.case, worse) if has_worse else None
 
     @property
     def _cases(self) -> str:
@@ -253,57 +264,57 @@ class SearchAnswer:
 
     @property
     def _chosen(self) -> str:
-        return ", ".join(f"{each.path} = {each.text}" for each in self.values())
+        return ", ".join(f"{chosen.path} = {chosen.text}" for chosen in self.values())
 
     def _tuned(self) -> list[str]:
-        found, search = self.found, self.search
+        best, search = self.found, self.search
         none = f"none of the {self._tried} is found to meet all that is required; nearest: {self._chosen}"
-        out = [f"use {self._chosen}" if self.ok else f"not advised: {self._chosen}" if found.stands else none]
-        if found.failed:
+        out = [f"use {self._chosen}" if self.ok else f"not advised: {self._chosen}" if best.stands else none]
+        if best.failed:
             out += [f"  case #{self.position} of it fails; {self._cases}", *self._cause]
         else:
-            among = f" in the worst of {found.tried} cases of {search.against}" if found.all > 1 else ""
+            among = f" in the worst of {best.tried} cases of {search.against}" if best.all > 1 else ""
             out.append(f"  {search.metric} is {self.value()}{among}; {self._cases}")
-        if found.confirmed and not found.stands and search.budget - self.group.count < SHORTEST * found.all:
+        if best.confirmed and not best.stands and search.budget - self.group.count < SHORTEST * best.all:
             out.append(f"  its cases are spent, of {search.at_most:,} at most; a larger `at_most` goes on")
-        if not found.stands and search.steers:
+        if not best.stands and search.steers:
             out.append(f"  `least_margin = {search.least_margin:g};` is required too: without it more may be found")
-        if not found.confirmed:
+        if not best.confirmed:
             out[0] = f"not tried with all that it must bear: {self._chosen}"
             out.append(
-                f"  {found.tried} of {found.all} cases of {search.against} were run of it; a larger `at_most` goes on"
+                f"  {best.tried} of {best.all} cases of {search.against} were run of it; a larger `at_most` goes on"
             )
-        return [*out, *(self._stability() if found.stands else [])]
+        return [*out, *(self._stability() if best.stands else [])]
 
     def _stability(self) -> list[str]:
         """Lines about the stability of the design, and of a better one that was left for it."""
-        found, search = self.found, self.search
+        best, search = self.found, self.search
         if "search_least_margin" not in self.group.attributes:
             return ["  stability not judged: this archive was made before MET judged it; run it again"]
-        out = wrapped(*stability_texts(found.stability, search.least_margin))
-        if not found.serves:
+        out = wrapped(*stability_texts(best.stability, search.least_margin))
+        if not best.serves:
             tried = f"none of the {len(search.judged)} designs that were judged" if search.judged[1:] else "it does not"
             out += wrapped(f"{tried} {'keeps' if search.judged[1:] else 'keep'} the least margin of "
                            f"{search.least_margin:g}" + ("" if search.steers else "; with `least_margin = "
                            f"{search.least_margin:g};` in the tuning it looks for one that does"))  # fmt: skip
-        left = found.left
+        left = best.left
         if left is not None and left.margins is not None:
             place = int(np.flatnonzero(self.group.values("case") == left.case)[0])
-            values = ", ".join(f"{each.path} = {each.text}".replace(" ", KEPT) for each in self.values(place))
-            value = self.goal(found.left_value)
+            values = ", ".join(f"{chosen.path} = {chosen.text}".replace(" ", KEPT) for chosen in self.values(place))
+            value = self.goal(best.left_value)
             out += wrapped(
                 f"{search.metric} is {value} with {values}, which is not advised: {margin_words(left.margins)}"
             )
         return out
 
     def _worst(self) -> list[str]:
-        found, search = self.found, self.search
+        best, search = self.found, self.search
         case, worst = f"case #{self.position} with {self._chosen}", f"the worst of search `{self.group.name}`"
-        if found.failed:
+        if best.failed:
             failed = int(np.count_nonzero(self.group.values("status") != DONE))
             words = f"{failed:,} of {self._cases} fail, which hurts more than any {search.metric}"
             return [f"{worst}: {case} fails", *self._cause, f"  {words}"]
-        if np.isnan(found.value):
+        if np.isnan(best.value):
             return [f"{worst}: {case}, in which {search.metric} has no value", f"  of {self._cases}"]
         which = "largest" if search.largest else "least"
         out = [f"{worst}: {search.metric} = {self.value()}, {case}", f"  the {which} {search.metric} of {self._cases}"]
@@ -323,31 +334,31 @@ class SearchAnswer:
 
     def as_data(self) -> dict[str, Any]:
         """The answer for programs, SI."""
-        found = self.found
+        best = self.found
         return {
             "kind": self.search.kind,
             "goal": self.search.goal,
             "case": self.position,
-            "value": found.value,
-            "failed": found.failed,
-            "chosen": {each.path: each.text for each in self.values()},
+            "value": best.value,
+            "failed": best.failed,
+            "chosen": {chosen.path: chosen.text for chosen in self.values()},
             "cases": self.group.count,
             "generations": self.generations,
-            "tried": found.tried,
-            "against": found.all,
-            "serves": found.serves,
-            "stability": stability_data(found.stability),
-            "stability_not_judged": found.stability.why_not or None if found.stability is not None else None,
+            "tried": best.tried,
+            "against": best.all,
+            "serves": best.serves,
+            "stability": stability_data(best.stability),
+            "stability_not_judged": best.stability.why_not or None if best.stability is not None else None,
             "least_margin": self.search.least_margin if self.search.kind == "tune" else None,
-            "missed": list(found.missed),
-            "nearest": [{"requirement": room.text, "inside": room.share} for room in found.rooms],
-            "at_ends": [{"path": path, "end": end} for path, end in found.ends],
-            "confirmation": [asdict(each) for each in self.search.confirmation],
+            "missed": list(best.missed),
+            "nearest": [{"requirement": room.text, "inside": room.share} for room in best.rooms],
+            "at_ends": [{"path": path, "end": end} for path, end in best.ends],
+            "confirmation": [asdict(confirmation) for confirmation in self.search.confirmation],
             "starts": self.starts if self.search.kind == "tune" else None,
             "along_slopes": self.search.along_slopes if self.search.gradients else None,
             "without_slopes": self.search.without_slopes or None,
             "nearest_miss": None
-            if (miss := found.miss) is None
+            if (miss := best.miss) is None
             else {
                 "case": int(self.group.values("case")[miss.case]),
                 "requirement": miss.text,
@@ -373,14 +384,14 @@ class _Required:
 
 def goal_text(value: float, unit: str, scale: float) -> str:
     """A goal's value, SI, in a unit of `scale` SI units."""
-    shown = "" if unit == "1" else f" {pretty_unit(unit)}"
-    return "no value" if np.isnan(value) else f"{number_text(value / scale)}{shown}"
+    unit_suffix = "" if unit == "1" else f" {pretty_unit(unit)}"
+    return "no value" if np.isnan(value) else f"{number_text(value / scale)}{unit_suffix}"
 
 
-def progress(found: Answer, experiment: Experiment) -> str:
+def progress(answer_so_far: Answer, experiment: Experiment) -> str:
     """The best so far in a few words, for the progress display: `best settle 4.81 s, over < 10 % binds`."""
-    search = found.search
-    if found.failed:
+    search = answer_so_far.search
+    if answer_so_far.failed:
         best = "a case fails" if search.kind == "search" else "every candidate fails so far"
         return best
     unit, scale = deck_unit(
@@ -389,11 +400,11 @@ def progress(found: Answer, experiment: Experiment) -> str:
         experiment.requirements,
     )
     word = "worst" if search.kind == "search" else "best"
-    return f"{word} {search.metric} {goal_text(found.value, unit, scale)}{_binding(found)}"
+    return f"{word} {search.metric} {goal_text(answer_so_far.value, unit, scale)}{_binding(answer_so_far)}"
 
 
-def _binding(found: Answer) -> str:
-    if found.missed:
-        return f", misses {found.missed[0]}"
-    near: Sequence[str] = [room.text for room in found.rooms[:NEAREST] if found.search.kind == "tune"]
+def _binding(best: Answer) -> str:
+    if best.missed:
+        return f", misses {best.missed[0]}"
+    near: Sequence[str] = [room.text for room in best.rooms[:NEAREST] if best.search.kind == "tune"]
     return f", {near[0]} is nearest" if near else ""

@@ -42,14 +42,17 @@ def search_result(archive: ArchiveFile, group: ArchiveGroup) -> SearchResult | N
         return None
     commands = _commands(archive, group, answer)
     tunes = answer.search.kind == "tune"
-    lines = (*answer.lines(), *(line for said, command in commands for line in _shown(said, command)))
+    lines = (
+        *answer.lines(),
+        *(line for purpose, command in commands for line in _purpose_and_command(purpose, command)),
+    )
     data = {**answer.as_data(), "commands": [command for _, command in commands]}
-    of = f"{len(group.values('case')):,} cases"
-    return SearchResult(group.name, lines, tuple(commands), data, answer.ok, tunes, tuple(answer.values()), of)
+    cases_text = f"{len(group.values('case')):,} cases"
+    return SearchResult(group.name, lines, tuple(commands), data, answer.ok, tunes, tuple(answer.values()), cases_text)
 
 
-def _shown(said: str, command: str) -> Sequence[str]:
-    return [f"{said} {command}"] if len(said) + len(command) < 100 else [said, f"  {command}"]
+def _purpose_and_command(purpose: str, command: str) -> Sequence[str]:
+    return [f"{purpose} {command}"] if len(purpose) + len(command) < 100 else [purpose, f"  {command}"]
 
 
 def _commands(archive: ArchiveFile, group: ArchiveGroup, answer: SearchAnswer) -> list[tuple[str, str]]:
@@ -59,18 +62,18 @@ def _commands(archive: ArchiveFile, group: ArchiveGroup, answer: SearchAnswer) -
         return [("run it again:", again)]
     how = context(archive, Pool(group.name, [group]))
     name = answer.search.against or answer.search.of
-    words = [f"-D {quoted(each)}" for each in how["defines"]]
-    chosen = [each.setting for each in answer.values()]
+    words = [f"-D {quoted(macro)}" for macro in how["defines"]]
+    chosen = [value.setting for value in answer.values()]
     replaced = {*map(setting_path, chosen), *(["seed"] if answer.draws else [])}
-    words += [setting_option(each) for each in how["given"] if setting_path(each) not in replaced]
-    words += [setting_option(each) for each in chosen]
+    words += [setting_option(setting) for setting in how["overrides"] if setting_path(setting) not in replaced]
+    words += [setting_option(setting) for setting in chosen]
     command = f"met run {quoted(how['deck'])} {quoted(name)} {' '.join(words)}"
-    found = [("its worst case again:", again), ("run it:", f"{command} -o chosen.h5")]
+    steps = [("its worst case again:", again), ("run it:", f"{command} -o chosen.h5")]
     if answer.draws:
         confirmed = len(answer.search.confirmation)
         seed = f"--set seed={answer.search.drawn_with + 1 + confirmed}"
-        said = "these cases chose it, so they flatter it: other draws confirm it or not:"
-        found[1] = ("with yet other draws:" if confirmed else said, f"{command} {seed} -o confirmed.h5")
+        purpose = "these cases chose it, so they flatter it: other draws confirm it or not:"
+        steps[1] = ("with yet other draws:" if confirmed else purpose, f"{command} {seed} -o confirmed.h5")
     elif answer.search.against:
-        found[1] = (f"nothing was drawn in {name}, so that no other draws confirm it; run it:", found[1][1])
-    return found
+        steps[1] = (f"nothing was drawn in {name}, so that no other draws confirm it; run it:", steps[1][1])
+    return steps

@@ -108,7 +108,7 @@ def sensitivities(
         raise Problem(error("E361", message, help=remedy))
     metrics = {variable.name: variable for variable in group.role("metric")}
     if before is not None:
-        metrics = {name: each for name, each in metrics.items() if name in before[0].variables}
+        metrics = {name: metric for name, metric in metrics.items() if name in before[0].variables}
     positions = np.arange(group.count) if before is None else before[2]
     failed = (group.values("status") != 0)[positions]
     known = [*metrics, *([FAILURE] if before is None and 0 < failed.sum() < len(failed) else [])]
@@ -153,16 +153,16 @@ def _inputs(group: ArchiveGroup, positions: np.ndarray) -> list[VariedInput]:
     cases."""
     variables = group.role("coordinate")
     values = [np.asarray(group.values(variable.name), float)[positions] for variable in variables]
-    found = [VariedInput(tuple(variables[i].path for i in part), values[part[0]]) for part in in_step(values)]
+    varied = [VariedInput(tuple(variables[i].path for i in part), values[part[0]]) for part in in_step(values)]
     if not len(positions):
         raise Problem(error("E361", f"no case of `{group.name}` is in both archives"))
-    if not found:
+    if not varied:
         helps = "a sweep varies some: `vary`, `sample`"
         raise Problem(error("E361", f"nothing varies in the cases of `{group.name}`", help=helps))
     if len(positions) < FEWEST:
         message = f"{len(positions):,} cases of `{group.name}` are not enough to tell what explains them"
         raise Problem(error("E361", message, help=f"{FEWEST} at least; some thousands for intervals that are narrow"))
-    return found
+    return varied
 
 
 def _explained(
@@ -174,48 +174,58 @@ def _explained(
     before: tuple[ArchiveGroup, np.ndarray, np.ndarray] | None,
     designed: tuple[list[np.ndarray], str],
 ) -> Sensitivity:
-    scale, unit, of = 1.0, "", ""
+    scale, unit, measure = 1.0, "", ""
     if metric is None:
-        output, name, of = failed.astype(float), FAILURE, FAILURE
+        output, name, measure = failed.astype(float), FAILURE, FAILURE
     else:
         (scale, unit), name = deck_unit(metric), metric.name
         output = np.asarray(group.values(name), float)[positions]
         if before is not None:
             with np.errstate(invalid="ignore"):
-                output, of = output - np.asarray(before[0].values(name), float)[before[1]], "change"
+                output, measure = output - np.asarray(before[0].values(name), float)[before[1]], "change"
     finite = np.isfinite(output)
-    made, why = designed
-    if made:
+    sampled, why = designed
+    if sampled:
         whole = np.full(group.count, np.nan)
         whole[positions] = output
-        rows = _whole_pairs(finite, positions, group.count, len(made) + 2).ravel()
-        names, values, output = [v.path for v in group.role("coordinate")], [each[rows] for each in made], whole[rows]
-        enough = len(rows) >= FEWEST_PAIRS * (len(made) + 2)
-        found = saltelli_shares(values, output) if enough else None
+        rows = _whole_pairs(finite, positions, group.count, len(sampled) + 2).ravel()
+        names, values, output = (
+            [v.path for v in group.role("coordinate")],
+            [column[rows] for column in sampled],
+            whole[rows],
+        )
+        enough = len(rows) >= FEWEST_PAIRS * (len(sampled) + 2)
+        estimate = saltelli_shares(values, output) if enough else None
     else:
         rows = np.flatnonzero(finite)
-        names, values, output = [each.name for each in inputs], [each.values[rows] for each in inputs], output[rows]
-        found = shares(values, output) if len(rows) >= FEWEST else None
-    together = () if found is None or made else tuple((names[i], names[j], size) for i, j, size in dependent(values))
-    overlapping = {name for one, other, _ in together for name in (one, other)}
+        names, values, output = (
+            [varied_input.name for varied_input in inputs],
+            [varied_input.values[rows] for varied_input in inputs],
+            output[rows],
+        )
+        estimate = shares(values, output) if len(rows) >= FEWEST else None
+    together = (
+        () if estimate is None or sampled else tuple((names[i], names[j], size) for i, j, size in dependent(values))
+    )
+    overlapping = {name for name_a, other, _ in together for name in (name_a, other)}
     return Sensitivity(
         name=name,
         unit=unit,
         scale=scale,
-        of=of,
+        of=measure,
         cases=len(rows),
         left=len(positions) - len(rows),
         inputs=tuple(names),
         shares=tuple(
             share.without_intervals() if name in overlapping else share
-            for name, share in zip(names, found.inputs, strict=True)
+            for name, share in zip(names, estimate.inputs, strict=True)
         )
-        if found is not None
+        if estimate is not None
         else (),
-        rest=None if found is None else found.rest,
+        rest=None if estimate is None else estimate.rest,
         together=together,
         mean=float(output.mean()) if len(rows) else float("nan"),
-        design="saltelli" if made else "",
+        design="saltelli" if sampled else "",
         why=why,
         drawn=any(variable.attributes.get("design") for variable in group.role("coordinate")),
     )
@@ -233,27 +243,30 @@ def total_text(share: InputShare) -> str:
     return f"{math.floor(share.total_low * 100) / 100:.2f} .. {math.ceil(share.total_high * 100) / 100:.2f}"
 
 
-def notes_of(found: Sensitivity) -> list[str]:
+def notes_of(sensitivity: Sensitivity) -> list[str]:
     """Sentences on the estimation of the shares, with its caveats."""
     notes = []
-    if found.design:
+    if sensitivity.design:
         notes.append("by the estimators of `saltelli`; with others: with any number of them, and with noise")
-    if found.why:
-        notes.append(f"{found.why}: estimated as from any cases")
-    if found.rest is not None and found.rest > UNCLEAR:
-        many = "three inputs or more together, of " if len(found.inputs) > 2 else ""
+    if sensitivity.why:
+        notes.append(f"{sensitivity.why}: estimated as from any cases")
+    if sensitivity.rest is not None and sensitivity.rest > UNCLEAR:
+        many = "three inputs or more together, of " if len(sensitivity.inputs) > 2 else ""
         notes.append(
-            f"{found.rest:.2f} of the variance is of {many}noise, or of too few cases: any input may have part in it"
+            f"{sensitivity.rest:.2f} of the variance is of {many}noise, or of too few cases: "
+            "any input may have part in it"
         )
-    widest = max((share.first_by for share in found.shares if math.isfinite(share.first_by)), default=0.0)
+    widest = max((share.first_by for share in sensitivity.shares if math.isfinite(share.first_by)), default=0.0)
     if widest > WIDE:
         notes.append("these intervals say next to nothing: of few cases, or some make up most of the variance")
-    elif widest > UNCLEAR and found.design:
+    elif widest > UNCLEAR and sensitivity.design:
         notes.append("not enough cases for narrow intervals: four times as many halve them")
     elif widest > UNCLEAR:
-        cases = float(f"{found.cases * (widest / UNCLEAR) ** 2:.1g}")
+        cases = float(f"{sensitivity.cases * (widest / UNCLEAR) ** 2:.1g}")
         notes.append(f"few cases: it takes about {cases:,.0f} for shares alone within ± {UNCLEAR}")
-    for one, other, size in found.together:
+    for name_a, other, size in sensitivity.together:
         how = f"rank correlation {size:+.2f}" if abs(size) > UNCLEAR else "some values of one go with some of the other"
-        notes.append(f"{one} and {other} do not vary independently ({how}): their shares overlap, and have no interval")
+        notes.append(
+            f"{name_a} and {other} do not vary independently ({how}): their shares overlap, and have no interval"
+        )
     return notes

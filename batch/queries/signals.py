@@ -83,7 +83,7 @@ class SignalSelection:
 
 def _choices(group: ArchiveGroup, signals: dict[str, Stored]) -> dict[str, tuple[SignalSelection, ...]]:
     """The selections of each name: whole signals, one joint's, one component's, a family's."""
-    found: dict[str, tuple[SignalSelection, ...]] = {}
+    selections: dict[str, tuple[SignalSelection, ...]] = {}
     for variable in signals.values():
         joints, components = group.joints(variable), group.components(variable)
         parts: dict[str, list[int]] = {}
@@ -98,13 +98,13 @@ def _choices(group: ArchiveGroup, signals: dict[str, Stored]) -> dict[str, tuple
                 parts.setdefault(name, []).append(column)
         parts[variable.name] = list(range(len(scalars)))
         for name, columns in parts.items():
-            if name == variable.name or (name not in found and name not in signals):
-                found[name] = (SignalSelection(name, variable, tuple(columns)),)
-    for name, choice in list(found.items()):
+            if name == variable.name or (name not in selections and name not in signals):
+                selections[name] = (SignalSelection(name, variable, tuple(columns)),)
+    for name, choice in list(selections.items()):
         family, _, member = name.rpartition(".")
         if member in FAMILIES.get(family.rpartition(".")[2], ()):
-            found[family] = (*found.get(family, ()), *choice)
-    return found
+            selections[family] = (*selections.get(family, ()), *choice)
+    return selections
 
 
 def _panels(group: ArchiveGroup, choice: SignalSelection) -> list[Panel]:
@@ -171,13 +171,13 @@ def number_texts(values: Iterable[float]) -> list[str]:
     values = [float(value) for value in values]
     texts = {value: number_text(value) for value in values}
     alike: dict[str, list[float]] = {}
-    for each, text in texts.items():
-        alike.setdefault(text, []).append(each)
+    for number, text in texts.items():
+        alike.setdefault(text, []).append(number)
     for those in alike.values():
         digits = 4
-        while len({texts[each] for each in those}) < len(those) and digits < 17:
+        while len({texts[value] for value in those}) < len(those) and digits < 17:
             digits += 1
-            texts.update((each, f"{each:.{digits}g}") for each in those)
+            texts.update((value, f"{value:.{digits}g}") for value in those)
     return [texts[value] if value in texts else number_text(value) for value in values]
 
 

@@ -27,9 +27,9 @@ def _all_of(sweep: str, summaries: Sequence[Summary]) -> list[str]:
     texts = list(dict.fromkeys(r.text for summary in summaries for r in summary.requirements))
     wide = max(map(len, texts), default=0)
     for text in texts:
-        found = [(summary.cases, r.met) for summary in summaries for r in summary.requirements if r.text == text]
-        of, met = map(sum, zip(*found, strict=True))
-        out.append(f"  require {text:<{wide}}  met by {met:,} of {of:,} ({100 * met / of:.3g} %)")
+        met_counts = [(summary.cases, r.met) for summary in summaries for r in summary.requirements if r.text == text]
+        all_cases, met = map(sum, zip(*met_counts, strict=True))
+        out.append(f"  require {text:<{wide}}  met by {met:,} of {all_cases:,} ({100 * met / all_cases:.3g} %)")
     return out
 
 

@@ -182,13 +182,13 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
     """The outcome of one experiment, or of its case at this position."""
     if position is None and (summed := summed_up(group)) is not None:
         return _of_summary(group, summed)
-    here = slice(None) if position is None else slice(position, position + 1)
-    status = group.values("status")[here]
+    cases = slice(None) if position is None else slice(position, position + 1)
+    status = group.values("status")[cases]
     failed = np.flatnonzero(status != 0)
-    found: tuple[FailureGroup, ...] = ()
+    failure_groups: tuple[FailureGroup, ...] = ()
     if len(failed):
         rows, ids, causes = (group.at(name, (position or 0) + failed) for name in ("case", "case_id", "cause"))
-        found = failures(status[failed], causes, rows, ids)
+        failure_groups = failures(status[failed], causes, rows, ids)
     requirements: tuple[RequirementSummary, ...] = ()
     searched = SearchAnswer.of(group) if position is None else None
     answer = None if searched is None else answer_outcome(searched)
@@ -198,7 +198,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
             for r in answer.requirements
         )
     elif "met" in group.variables:
-        met, done = group.values("met")[here], group.values("status")[here] == 0
+        met, done = group.values("met")[cases], group.values("status")[cases] == 0
         shares = evidence(group) if position is None else []
         requirements = tuple(
             RequirementSummary(
@@ -217,23 +217,23 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
         cases=group.count if position is None else 1,
         failed=len(failed),
         recorded=group.recorded if position is None else int(position in group.recorded_positions),
-        failures=found,
-        metrics=tuple(_metric(v, group.values(v.name)[here]) for v in group.role("metric")),
+        failures=failure_groups,
+        metrics=tuple(_metric(v, group.values(v.name)[cases]) for v in group.role("metric")),
         requirements=requirements,
         sweep=str(group.attributes.get("sweep", "")),
         verified=verified,
         step_errors=verdicts(group, verified) if position is None else (),
         warnings=tuple(warnings(group)) if position is None else (),
         doubts=_doubts(group, position),
-        limits=limit_summaries(group, here),
+        limits=limit_summaries(group, cases),
         answer=answer,
-        limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
+        limited=int((group.values("bed_limited")[cases] > 0).sum()) if "bed_limited" in group.variables else 0,
     )
 
 
-def _of_summary(group: ArchiveGroup, kept: CaseSummary) -> Summary:
+def _of_summary(group: ArchiveGroup, case_summary: CaseSummary) -> Summary:
     """The outcome of an experiment whose archive keeps a summary."""
-    values = kept.values
+    values = case_summary.values
     causes: dict[bool, list[FailureGroup]] = {True: [], False: []}
     for cause, status, cases, first in zip(
         *(values[f"cause{name}"].tolist() for name in ("", "_status", "_cases", "_first")), strict=True
@@ -243,16 +243,17 @@ def _of_summary(group: ArchiveGroup, kept: CaseSummary) -> Summary:
         causes[status == DOUBTFUL].append(FailureGroup(word, str(cause), name, (first,), cases))
     shares = evidence(group)
     texts = requirement_texts(group)
-    whole = {place: kept.judged(place, whole=True)[0] for place in range(len(texts))}
+    whole = {place: case_summary.judged(place, whole=True)[0] for place in range(len(texts))}
     verified = figures.figures(group)
     return Summary(
         name=group.name,
-        cases=kept.cases,
-        failed=sum(each.count for each in causes[False]),
+        cases=case_summary.cases,
+        failed=sum(failure_group.count for failure_group in causes[False]),
         recorded=group.recorded,
         failures=tuple(causes[False]),
         metrics=tuple(
-            _summed(group.variables[str(name)], kept, place) for place, name in enumerate(values["summed_metric"])
+            _summed(group.variables[str(name)], case_summary, place)
+            for place, name in enumerate(values["summed_metric"])
         ),
         requirements=tuple(
             RequirementSummary(
@@ -271,27 +272,27 @@ def _of_summary(group: ArchiveGroup, kept: CaseSummary) -> Summary:
         warnings=tuple(warnings(group)),
         doubts=tuple(causes[True]),
         limits=limit_summaries(group) if group.summary is None else (),
-        limited=kept.limited,
+        limited=case_summary.limited,
     )
 
 
-def _summed(variable: Stored, kept: CaseSummary, place: int) -> SummedMetric:
-    told = {name: kept.values[name][place].item() for name in SUMMED}
+def _summed(variable: Stored, case_summary: CaseSummary, place: int) -> SummedMetric:
+    sums = {name: case_summary.values[name][place].item() for name in SUMMED}
     return SummedMetric(
-        minimum=told["least"],
-        median=told["least"] if told["finite"] == 1 else np.nan,
-        maximum=told["most"],
-        infinite=told["infinite"],
-        unknown=told["unknown"],
+        minimum=sums["least"],
+        median=sums["least"] if sums["finite"] == 1 else np.nan,
+        maximum=sums["most"],
+        infinite=sums["infinite"],
+        unknown=sums["unknown"],
         name=variable.name,
         unit=variable.unit,
         about=variable.long_name,
         deck_unit=str(variable.attributes.get("deck_unit", variable.unit)),
         deck_scale=float(variable.attributes.get("deck_scale", 1.0)),
-        mean=told["mean"],
-        deviation=float(np.sqrt(told["variance"])),
-        least_case=told["least_case"],
-        most_case=told["most_case"],
+        mean=sums["mean"],
+        deviation=float(np.sqrt(sums["variance"])),
+        least_case=sums["least_case"],
+        most_case=sums["most_case"],
     )
 
 
@@ -314,19 +315,19 @@ def _doubts(group: ArchiveGroup, position: int | None) -> tuple[FailureGroup, ..
     if not len(those):
         return ()
     rows, ids = (group.at(name, those) for name in ("case", "case_id"))
-    found = failures(np.zeros(len(those)), np.concatenate(causes), rows, ids)
-    return tuple(replace(each, status="warning") for each in found)
+    doubts = failures(np.zeros(len(those)), np.concatenate(causes), rows, ids)
+    return tuple(replace(doubt, status="warning") for doubt in doubts)
 
 
 def _metric(variable: Stored, values: np.ndarray) -> MetricSummary:
-    found, told = spread(values), variable.attributes
+    moments, attributes = spread(values), variable.attributes
     return MetricSummary(
-        **asdict(found),
+        **asdict(moments),
         name=variable.name,
         unit=variable.unit,
         about=variable.long_name,
-        deck_unit=str(told.get("deck_unit", variable.unit)),
-        deck_scale=float(told.get("deck_scale", 1.0)),
+        deck_unit=str(attributes.get("deck_unit", variable.unit)),
+        deck_scale=float(attributes.get("deck_scale", 1.0)),
     )
 
 
@@ -343,10 +344,10 @@ def spread(values: np.ndarray) -> MetricSpread:
 
 def median_text(values: np.ndarray, *, infinite: str = "inf", none: str = "-") -> str:
     """The median in a table, with the number of infinite values: `2.44, 2 inf`."""
-    found = spread(values)
-    if np.isnan(found.median):
-        return infinite if found.infinite else none
-    return number_text(found.median) + (f", {found.infinite:,} {infinite}" if found.infinite else "")
+    moments = spread(values)
+    if np.isnan(moments.median):
+        return infinite if moments.infinite else none
+    return number_text(moments.median) + (f", {moments.infinite:,} {infinite}" if moments.infinite else "")
 
 
 def as_json(summary: Summary) -> dict[str, Any]:
@@ -357,8 +358,8 @@ def as_json(summary: Summary) -> dict[str, Any]:
     limits = [
         {"text": step_error.text, "met": step_error.met, "said": step_error.said} for step_error in summary.step_errors
     ]
-    told = {"verified": figures.as_json(summary.verified), "step_errors": limits, "warnings": warned}
-    data: dict[str, Any] = finite({**plain, "metrics": [_named_first(asdict(m)) for m in summary.metrics], **told})
+    judged = {"verified": figures.as_json(summary.verified), "step_errors": limits, "warnings": warned}
+    data: dict[str, Any] = finite({**plain, "metrics": [_named_first(asdict(m)) for m in summary.metrics], **judged})
     return {**data, "ok": summary.ok}
 
 

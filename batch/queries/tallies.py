@@ -47,7 +47,7 @@ class PointNumbers:
         point. Raises TooManyPoints."""
         if not chosen:
             return np.full(cases, self._number(()))
-        table = np.stack([np.asarray(each, float) for each in chosen], axis=1)
+        table = np.stack([np.asarray(column, float) for column in chosen], axis=1)
         _, first, index = np.unique(table, axis=0, return_index=True, return_inverse=True)
         numbers = np.empty(len(first), np.int64)
         for place in np.argsort(first).tolist():
@@ -162,9 +162,9 @@ class CaseTallies:
         self.metrics = {name: MetricTally() for name in metrics}
         self._everywhere = [Judged(requirement, 0) for requirement in requirements]
         self._at_points = {
-            number: [Judged(each, _most(each, int(size))) for size in sizes]
-            for number, each in enumerate(requirements)
-            if each.share is not None
+            number: [Judged(requirement, _most(requirement, int(size))) for size in sizes]
+            for number, requirement in enumerate(requirements)
+            if requirement.share is not None
         }
         self._causes: dict[tuple[int, str], list[Any]] = {}
         self.limited = 0
@@ -177,12 +177,12 @@ class CaseTallies:
             tally.add(block.places, block.metrics[name])
         order = np.argsort(block.points, kind="stable") if self._at_points else np.zeros(0, np.int64)
         parts = np.split(order, np.flatnonzero(np.diff(block.points[order])) + 1) if len(order) else []
-        for number, each in enumerate(self._requirements):
-            values, met = block.metrics[each.metric], block.outcomes[:, number]
+        for number, requirement in enumerate(self._requirements):
+            values, met = block.metrics[requirement.metric], block.outcomes[:, number]
             self._everywhere[number].add(block.places, values, met, done)
             for part in parts if number in self._at_points else ():
-                here = self._at_points[number][int(block.points[part[0]])]
-                here.add(block.places[part], values[part], met[part], done[part])
+                tally_at_point = self._at_points[number][int(block.points[part[0]])]
+                tally_at_point.add(block.places[part], values[part], met[part], done[part])
         for place in np.flatnonzero(~done | np.array([word != "" for word in block.warning])).tolist():
             status = DOUBTFUL if done[place] else int(block.status[place])
             text = str(block.warning[place] if done[place] else block.cause[place])
@@ -193,14 +193,14 @@ class CaseTallies:
 
     def named(self) -> list[int]:
         """Places of the cases that stand out: extremes of metrics, worst by requirements, first of causes."""
-        found = [place for tally in self.metrics.values() for place, _ in tally.ends.values()]
-        found += [row["worst_case"] for row in self._rows()]
-        return found + [place for _, place, _ in self._causes.values()]
+        places = [place for tally in self.metrics.values() for place, _ in tally.ends.values()]
+        places += [row["worst_case"] for row in self._rows()]
+        return places + [place for _, place, _ in self._causes.values()]
 
     def _rows(self) -> list[dict[str, Any]]:
-        rows = [each.row(number, -1) for number, each in enumerate(self._everywhere)]
+        rows = [tally.row(number, -1) for number, tally in enumerate(self._everywhere)]
         for number, some in self._at_points.items():
-            rows += [each.row(number, point) for point, each in enumerate(some)]
+            rows += [tally.row(number, point) for point, tally in enumerate(some)]
         return rows
 
     def values(
@@ -221,8 +221,11 @@ class CaseTallies:
             "unknown": [tally.counts["unknown"] for tally in tallies],
             "mean": [tally.moments.mean for tally in tallies],
             "variance": [tally.moments.variance for tally in tallies],
-            **{name: [value for _, value in found] for name, found in ends.items()},
-            **{f"{name}_case": [case(at) if at >= 0 else -1 for at, _ in found] for name, found in ends.items()},
+            **{name: [value for _, value in extremes] for name, extremes in ends.items()},
+            **{
+                f"{name}_case": [case(place) if place >= 0 else -1 for place, _ in extremes]
+                for name, extremes in ends.items()
+            },
             "point": list(range(len(points.values))),
             "chosen": list(chosen),
             "chosen_value": np.array(points.values, float).reshape(len(points.values), len(chosen)),

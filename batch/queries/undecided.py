@@ -22,23 +22,23 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
 
     experiment  of the plan, for places
     """
-    duration, found, none = float(group.attributes["duration_s"]), [], []
-    for each in () if group.allows("D341") else group_requirements(group):
-        times = group.values(each.metric)
-        if not _is_time(str(group.variables[each.metric].attributes.get("model"))):
+    duration, undecided, none = float(group.attributes["duration_s"]), [], []
+    for requirement in () if group.allows("D341") else group_requirements(group):
+        times = group.values(requirement.metric)
+        if not _is_time(str(group.variables[requirement.metric].attributes.get("model"))):
             continue
         unseen = int(np.isposinf(times).sum())
-        if duration < each.limit < math.inf and unseen:
-            found.append((each, unseen))
-        elif len(times) and not times.any() and each.comparison.startswith("<"):
-            none.append(each)
-    return [*_unseen(group, experiment, duration, found), *_nothing(experiment, none)]
+        if duration < requirement.limit < math.inf and unseen:
+            undecided.append((requirement, unseen))
+        elif len(times) and not times.any() and requirement.comparison.startswith("<"):
+            none.append(requirement)
+    return [*_unseen(group, experiment, duration, undecided), *_nothing(experiment, none)]
 
 
-def _nothing(experiment: Experiment | None, found: list[GroupRequirement]) -> list[Diagnostic]:
-    if not found:
+def _nothing(experiment: Experiment | None, requirements: list[GroupRequirement]) -> list[Diagnostic]:
+    if not requirements:
         return []
-    first, *others = found
+    first, *others = requirements
     name = first.metric.rpartition(".")[2]
     message = (
         f"`require {first.text}` is met from the start: `{name}` is 0 s, since its signal left the band at no time"
@@ -47,15 +47,15 @@ def _nothing(experiment: Experiment | None, found: list[GroupRequirement]) -> li
         "is it the signal that the command moves, and the band less than the motion? where it is to stay there, "
         "`peak` or `always(...)` says so"
     ]
-    return _told(experiment, first, others, message, helps)
+    return _diagnostics(experiment, first, others, message, helps)
 
 
 def _unseen(
-    group: ArchiveGroup, experiment: Experiment | None, duration: float, found: list[tuple[GroupRequirement, int]]
+    group: ArchiveGroup, experiment: Experiment | None, duration: float, undecided: list[tuple[GroupRequirement, int]]
 ) -> list[Diagnostic]:
-    if not found:
+    if not undecided:
         return []
-    (first, unseen), *others = found
+    (first, unseen), *others = undecided
     many = f" in {unseen:,} of {group.count:,} cases" if group.count > 1 else ""
     name = first.metric.rpartition(".")[2]
     message = (
@@ -63,10 +63,10 @@ def _unseen(
         f"then{many}, and it may yet come"
     )
     helps = ["let the run last longer, or write an earlier limit"]
-    return _told(experiment, first, [each for each, _ in others], message, helps)
+    return _diagnostics(experiment, first, [requirement for requirement, _ in others], message, helps)
 
 
-def _told(
+def _diagnostics(
     experiment: Experiment | None,
     first: GroupRequirement,
     others: list[GroupRequirement],

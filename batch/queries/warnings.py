@@ -28,11 +28,16 @@ def campaign_warnings(groups: Iterable[ArchiveGroup], experiments: Mapping[str, 
             key = (warning.code, warning.at if warning.at is not None else warning.message)
             more[key] = more.get(key, -1) + 1
             first.setdefault(key, warning)
-    said = (
-        (each, f"the same of {counted(more[key], 'other structure')}, which `met show` lists" if more[key] else "")
-        for key, each in first.items()
+    with_notes = (
+        (
+            diagnostic,
+            f"the same of {counted(more[key], 'other structure')}, which `met show` lists" if more[key] else "",
+        )
+        for key, diagnostic in first.items()
     )
-    return [replace(each, help=(*each.help, note)) if note else each for each, note in said]
+    return [
+        replace(diagnostic, help=(*diagnostic.help, note)) if note else diagnostic for diagnostic, note in with_notes
+    ]
 
 
 def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
@@ -42,4 +47,4 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
     """
     # found from counts; rows beside a summary are few, and say nothing about all cases
     about = (step_errors,) if summed_up(group) is not None else (step_errors, at_limits, grapples, undecided, no_effect)
-    return [warning for each in about for warning in each.warnings(group, experiment)]
+    return [warning for module in about for warning in module.warnings(group, experiment)]

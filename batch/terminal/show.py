@@ -17,7 +17,7 @@ from batch.queries.deck_units import DeckUnits
 from batch.queries.evidence_table import RequirementEvidence, requirement_evidence
 from batch.queries.evidence_table import as_data as evidence_data
 from batch.queries.failures import failure_lines
-from batch.queries.given import given
+from batch.queries.given import settings_lines
 from batch.queries.groups import by_run, cases_named, groups_named
 from batch.queries.ordering import CaseOrder
 from batch.queries.pool import Pool, pools
@@ -80,7 +80,7 @@ def show(
     there are none unless `signals` are asked for.
     """
     out = [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
-    out += [f"  {line(each)}" for each in given(archive)]
+    out += [f"  {line(each)}" for each in settings_lines(archive)]
     shown = cases_named(archive, experiments, case)
     check_asked(archive, by, some)
     ordering.check([group for group, _ in shown], by)

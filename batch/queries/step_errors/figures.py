@@ -67,42 +67,42 @@ class Verification:
 def figures(group: ArchiveGroup, position: int | None = None) -> Verification | None:
     """The accuracy of the numbers of an archive's experiment, or of its case at this position; None where it was not
     verified."""
-    found = group.verified
-    if found is None:
+    verified = group.verified
+    if verified is None:
         return None
-    places = np.array([group.position_of(int(case)) for case in found.cases])
+    places = np.array([group.position_of(int(case)) for case in verified.cases])
     rows = range(len(places)) if position is None else np.flatnonzero(places == position).tolist()
     if not rows:
         return None
-    own = {name: group.at(name, places) for name in found.metrics}
+    own = {name: group.at(name, places) for name in verified.metrics}
     return Verification(
         len(rows),
-        found.order,
-        found.step,
-        {name: _of_metric(found, column, own[name], list(rows)) for column, name in enumerate(found.metrics)},
+        verified.order,
+        verified.step,
+        {name: _of_metric(verified, column, own[name], list(rows)) for column, name in enumerate(verified.metrics)},
     )
 
 
-def _of_metric(found: Verified, column: int, own: np.ndarray, rows: list[int]) -> MetricError:
-    half, quarter, missed = found.half[:, column], found.quarter[:, column], found.missed[:, column]
-    instant = float(found.instant[column])
-    each = tuple(
+def _of_metric(verified: Verified, column: int, own: np.ndarray, rows: list[int]) -> MetricError:
+    half, quarter, missed = verified.half[:, column], verified.quarter[:, column], verified.missed[:, column]
+    instant = float(verified.instant[column])
+    errors = tuple(
         case_error(
-            int(found.cases[n]),
+            int(verified.cases[n]),
             (float(own[n]), float(half[n]), float(quarter[n])),
-            found.order,
+            verified.order,
             instant,
             float(missed[n]),
         )
         for n in rows
     )
-    known = [(one.error, one.case) for one in each if one.error is not None]
-    lost = [one for one in each if one.error is None]
+    known = [(case_error_.error, case_error_.case) for case_error_ in errors if case_error_.error is not None]
+    lost = [case_error_ for case_error_ in errors if case_error_.error is None]
     if not known:
-        return MetricError(math.nan, -1, math.nan, True, len(lost), lost[0].why, each)
+        return MetricError(math.nan, -1, math.nan, True, len(lost), lost[0].why, errors)
     worst, case = max(known, key=lambda pair: pair[0].error)
     clear = all(error.clear for error, _ in known)
-    return MetricError(worst.error, case, worst.order, clear, len(lost), lost[0].why if lost else "", each)
+    return MetricError(worst.error, case, worst.order, clear, len(lost), lost[0].why if lost else "", errors)
 
 
 def case_error(
@@ -129,53 +129,53 @@ def case_error(
     return CaseError(case, own, half, quarter, step_error(first, second, abs(own), order, missed), missed=missed)
 
 
-def together(found: Iterable[Verification | None]) -> Verification | None:
+def together(verifications: Iterable[Verification | None]) -> Verification | None:
     """The figures of several structures as those of one experiment: for each metric that of its worst case."""
-    those = [each for each in found if each is not None]
+    those = [verification for verification in verifications if verification is not None]
     if len(those) < 2:
         return those[0] if those else None
     metrics: dict[str, MetricError] = {}
-    for one in those:
-        for name, each in one.metrics.items():
-            metrics[name] = _worse(metrics[name], each) if name in metrics else each
+    for verification in those:
+        for name, metric_error in verification.metrics.items():
+            metrics[name] = _worse(metrics[name], metric_error) if name in metrics else metric_error
     first = those[0]
-    return Verification(sum(one.cases for one in those), first.order, first.step, metrics)
+    return Verification(sum(verification.cases for verification in those), first.order, first.step, metrics)
 
 
-def _worse(one: MetricError, other: MetricError) -> MetricError:
-    worst = other if math.isnan(one.error) or other.error > one.error else one
+def _worse(metric_error: MetricError, other: MetricError) -> MetricError:
+    worst = other if math.isnan(metric_error.error) or other.error > metric_error.error else metric_error
     return replace(
         worst,
-        clear=one.clear and other.clear,
-        unknown=one.unknown + other.unknown,
-        why=one.why or other.why,
-        cases=one.cases + other.cases,
+        clear=metric_error.clear and other.clear,
+        unknown=metric_error.unknown + other.unknown,
+        why=metric_error.why or other.why,
+        cases=metric_error.cases + other.cases,
     )
 
 
 def of_difference(a: Verification | None, b: Verification | None) -> dict[str, float]:
     """The errors due to the step of differences between two archives' metrics, SI: the sums of those that are known."""
     known: dict[str, float] = {}
-    for found in (a, b):
-        for name, each in found.metrics.items() if found is not None else ():
-            if math.isfinite(each.error):
-                known[name] = known.get(name, 0.0) + each.error
+    for verification in (a, b):
+        for name, metric_error in verification.metrics.items() if verification is not None else ():
+            if math.isfinite(metric_error.error):
+                known[name] = known.get(name, 0.0) + metric_error.error
     return known
 
 
-def as_json(found: Verification | None) -> dict[str, Any] | None:
+def as_json(verification: Verification | None) -> dict[str, Any] | None:
     """Plain data of a verification; missing numbers are not-a-number."""
-    if found is None:
+    if verification is None:
         return None
     metrics = {
         name: {
-            "error": each.error,
-            "case": None if each.case < 0 else each.case,
-            "order": each.order,
-            "clear": each.clear,
-            "unknown": each.unknown,
-            "why": each.why,
+            "error": metric_error.error,
+            "case": None if metric_error.case < 0 else metric_error.case,
+            "order": metric_error.order,
+            "clear": metric_error.clear,
+            "unknown": metric_error.unknown,
+            "why": metric_error.why,
         }
-        for name, each in found.metrics.items()
+        for name, metric_error in verification.metrics.items()
     }
-    return {"cases": found.cases, "order": found.order, "step": found.step, "metrics": metrics}
+    return {"cases": verification.cases, "order": verification.order, "step": verification.step, "metrics": metrics}

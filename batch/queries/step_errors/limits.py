@@ -41,31 +41,31 @@ class StepErrorVerdict:
         return {True: "met", False: "missed", None: "not known"}[self.met]
 
 
-def verdicts(group: ArchiveGroup, found: Verification | None) -> tuple[StepErrorVerdict, ...]:
+def verdicts(group: ArchiveGroup, verification: Verification | None) -> tuple[StepErrorVerdict, ...]:
     """The verdicts on an experiment's requirements on errors due to the step."""
-    return tuple(_verdict(group, step_error, found) for step_error in group.step_errors)
+    return tuple(_verdict(group, step_error, verification) for step_error in group.step_errors)
 
 
-def _verdict(group: ArchiveGroup, limit: StepErrorLimit, found: Verification | None) -> StepErrorVerdict:
-    if found is None:
+def _verdict(group: ArchiveGroup, limit: StepErrorLimit, verification: Verification | None) -> StepErrorVerdict:
+    if verification is None:
         return StepErrorVerdict(limit.text, None, "nothing is verified: `met run --verify some`", limit)
-    metric = found.metrics.get(limit.metric)
+    metric = verification.metrics.get(limit.metric)
     cases = [case for case in metric.cases if not _has_none(case)] if metric is not None else []
     if not cases:
         return StepErrorVerdict(limit.text, None, "no verified case has a finite value", limit)
-    worst = max(cases, key=lambda each: _size(each, limit.share))
+    worst = max(cases, key=lambda case_error: _size(case_error, limit.share))
     size = _size(worst, limit.share)
     missed = sum(not _is_within(_size(case, limit.share), limit) for case in cases)
     if worst.error is None:
-        said = worst.why
+        text = worst.why
     elif limit.share:
-        said = f"{rounded(100 * size)} %" if size < math.inf else "an error, and a value of 0"
+        text = f"{rounded(100 * size)} %" if size < math.inf else "an error, and a value of 0"
     else:
         scale, unit = deck_unit(group.variables[limit.metric])
-        said = f"{rounded(size / abs(scale))} {unit}".removesuffix(" 1")
-    of = f", the worst of {len(cases):,} verified cases" if len(cases) > 1 else ""
-    said = f"{said} in case #{worst.case}{of}"
-    return StepErrorVerdict(limit.text, not missed, said, limit, len(cases), missed, worst.case, size)
+        text = f"{rounded(size / abs(scale))} {unit}".removesuffix(" 1")
+    among = f", the worst of {len(cases):,} verified cases" if len(cases) > 1 else ""
+    text = f"{text} in case #{worst.case}{among}"
+    return StepErrorVerdict(limit.text, not missed, text, limit, len(cases), missed, worst.case, size)
 
 
 def _is_within(size: float, limit: StepErrorLimit) -> bool:

@@ -35,23 +35,27 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
 
     experiment  of the plan, for places
     """
-    found = figures(group)
-    if found is None:
+    verification = figures(group)
+    if verification is None:
         return []
     required = group_requirements(group)
-    out = [_undecided(group, found, each, experiment) for each in required if each.metric in found.metrics]
-    of_none = [name for name in found.metrics if all(each.metric != name for each in required)]
-    out += [_unclear(group, found, name, experiment) for name in of_none]
-    out = [*_lost(found, experiment), *out]
-    return [each for each in out if each is not None and not group.allows(each.code)]
+    out = [
+        _undecided(group, verification, requirement, experiment)
+        for requirement in required
+        if requirement.metric in verification.metrics
+    ]
+    of_none = [name for name in verification.metrics if all(requirement.metric != name for requirement in required)]
+    out += [_unclear(group, verification, name, experiment) for name in of_none]
+    out = [*_lost(verification, experiment), *out]
+    return [diagnostic for diagnostic in out if diagnostic is not None and not group.allows(diagnostic.code)]
 
 
 def _undecided(
-    group: ArchiveGroup, found: Verification, required: GroupRequirement, experiment: Experiment | None
+    group: ArchiveGroup, verification: Verification, required: GroupRequirement, experiment: Experiment | None
 ) -> Diagnostic | None:
     """The warning about a requirement whose outcome another step may change."""
-    metric = found.metrics[required.metric]
-    those = [(each, turned) for each in metric.cases if (turned := _turned(each, required))]
+    metric = verification.metrics[required.metric]
+    those = [(case_error, turned) for case_error in metric.cases if (turned := _turned(case_error, required))]
     if not those:
         return None
     case, turned = max(those, key=lambda pair: _excess(pair[0], required))
@@ -59,15 +63,19 @@ def _undecided(
     unit = "" if unit == "1" else f" {unit}"
     value = f"{number_text(case.value / scale)}{unit}"
     if case.error is not None and math.isfinite(case.error.error):
-        said = f"{value} ± {rounded(case.error.error / abs(scale))}{unit} by the step"
+        text = f"{value} ± {rounded(case.error.error / abs(scale))}{unit} by the step"
     else:
-        said = f"{value} at the step, {turned}"
+        text = f"{value} at the step, {turned}"
     margin = abs(case.value - required.limit)
-    helps = [_remedy(found, case, margin, f"an error below the {number_text(margin / abs(scale))}{unit} that are left")]
+    helps = [
+        _remedy(
+            verification, case, margin, f"an error below the {number_text(margin / abs(scale))}{unit} that are left"
+        )
+    ]
     if len(those) > 1:
-        helps.append(f"so it is in {len(those):,} of the {found.cases:,} verified cases")
+        helps.append(f"so it is in {len(those):,} of the {verification.cases:,} verified cases")
     place = None if experiment is None else experiment.requirements[required.place].place
-    where = f"`{required.metric}` of case #{case.case} is {said}"
+    where = f"`{required.metric}` of case #{case.case} is {text}"
     return _warning("D310", f"the step decides whether `{required.text}` is met: {where}", place, helps)
 
 
@@ -92,28 +100,32 @@ def _excess(case: CaseError, required: GroupRequirement) -> float:
     return math.inf if case.error is None or not margin else case.error.error / margin
 
 
-def _unclear(group: ArchiveGroup, found: Verification, name: str, experiment: Experiment | None) -> Diagnostic | None:
+def _unclear(
+    group: ArchiveGroup, verification: Verification, name: str, experiment: Experiment | None
+) -> Diagnostic | None:
     """The warning about a metric that changes much with the step, or not in the integrator's order."""
     values = group.values(name)
     size = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
     those = [
-        each
-        for each in found.metrics[name].cases
-        if each.error is not None
-        and (LARGE if each.error.clear else MATTERS) * size < each.error.error - each.missed < math.inf
+        case_error
+        for case_error in verification.metrics[name].cases
+        if case_error.error is not None
+        and (LARGE if case_error.error.clear else MATTERS) * size
+        < case_error.error.error - case_error.missed
+        < math.inf
     ]
     if not those:
         return None
-    case = max(those, key=lambda each: each.error.error if each.error is not None else 0.0)
+    case = max(those, key=lambda case_error: case_error.error.error if case_error.error is not None else 0.0)
     assert case.error is not None
     scale, unit = deck_unit(group.variables[name])
     unit = "" if unit == "1" else f" {unit}"
-    value, half, quarter = (f"{number_text(each / scale)}{unit}" for each in (case.value, case.half, case.quarter))
+    value, half, quarter = (f"{number_text(number / scale)}{unit}" for number in (case.value, case.half, case.quarter))
     message = (
         f"`{name}` of case #{case.case} depends on the step: it is {value}, {half} at half of the step, and "
         f"{quarter} at a quarter"
     )
-    helps = [_remedy(found, case, MATTERS * size, f"an error below {100 * MATTERS:g} %")]
+    helps = [_remedy(verification, case, MATTERS * size, f"an error below {100 * MATTERS:g} %")]
     place = None
     if experiment is not None:
         path = group.variables[name].path
@@ -121,35 +133,37 @@ def _unclear(group: ArchiveGroup, found: Verification, name: str, experiment: Ex
     return _warning("D311", message, place, helps)
 
 
-def _lost(found: Verification, experiment: Experiment | None) -> list[Diagnostic]:
+def _lost(verification: Verification, experiment: Experiment | None) -> list[Diagnostic]:
     """The warning about cases that have metrics at the step, and none with a shorter one."""
-    metrics = list(found.metrics.values())
+    metrics = list(verification.metrics.values())
     those = []
     for row, case in enumerate(metrics[0].cases):
         of_case = [metric.cases[row] for metric in metrics]
-        if not all(math.isnan(each.value) for each in of_case):
-            halves, quarters = ([getattr(each, share) for each in of_case] for share in ("half", "quarter"))
+        if not all(math.isnan(case_error.value) for case_error in of_case):
+            halves, quarters = ([getattr(case_error, share) for case_error in of_case] for share in ("half", "quarter"))
             shares = [share for share, values in ((2, halves), (4, quarters)) if all(map(math.isnan, values))]
             those += [(case.case, shares[0])] if shares else []
     if not those:
         return []
     position, factor = those[0]
-    helps = [f"`rates {{ dynamics = {_rate(found, factor)}; }}` shows why it fails"]
+    helps = [f"`rates {{ dynamics = {_rate(verification, factor)}; }}` shows why it fails"]
     if len(those) > 1:
-        helps.append(f"so it is in {len(those):,} of the {found.cases:,} verified cases")
+        helps.append(f"so it is in {len(those):,} of the {verification.cases:,} verified cases")
     share = "half" if factor == 2 else "a quarter"
-    message = f"case #{position} reaches its end at the step of {1e3 * found.step:g} ms, and does not at {share} of it"
+    message = (
+        f"case #{position} reaches its end at the step of {1e3 * verification.step:g} ms, and does not at {share} of it"
+    )
     return [_warning("D312", message, None if experiment is None else experiment.place, helps)]
 
 
-def _remedy(found: Verification, case: CaseError, tolerance: float, wanted: str) -> str:
+def _remedy(verification: Verification, case: CaseError, tolerance: float, wanted: str) -> str:
     """The remedy: the rate of the dynamics at which the error would be so small."""
     if case.error is not None and math.isfinite(case.error.error) and tolerance > 0.0 and _falls(case.error):
-        step = case.error.step_for(found.step, tolerance)
-        halvings = max(1, math.ceil(math.log2(found.step / step))) if step > 0.0 else MOST_HALVINGS + 1
+        step = case.error.step_for(verification.step, tolerance)
+        halvings = max(1, math.ceil(math.log2(verification.step / step))) if step > 0.0 else MOST_HALVINGS + 1
         if halvings <= MOST_HALVINGS:
-            return f"`rates {{ dynamics = {_rate(found, 2**halvings)}; }}` would do, for {wanted}"
-    return f"it is not known which step would do; `rates {{ dynamics = {_rate(found, 4)}; }}` shows more of it"
+            return f"`rates {{ dynamics = {_rate(verification, 2**halvings)}; }}` would do, for {wanted}"
+    return f"it is not known which step would do; `rates {{ dynamics = {_rate(verification, 4)}; }}` shows more of it"
 
 
 def _falls(error: StepError) -> bool:
@@ -157,9 +171,9 @@ def _falls(error: StepError) -> bool:
     return error.clear or math.isnan(error.order) or error.order > NEAR
 
 
-def _rate(found: Verification, factor: int) -> str:
+def _rate(verification: Verification, factor: int) -> str:
     """A multiple of the rate of the dynamics."""
-    return f"{float(f'{factor / found.step:.12g}'):.12g} Hz"
+    return f"{float(f'{factor / verification.step:.12g}'):.12g} Hz"
 
 
 def _warning(code: str, message: str, place: Place | None, helps: list[str]) -> Diagnostic:

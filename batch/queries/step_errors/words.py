@@ -14,11 +14,11 @@ NONE = "-"
 """Text in place of an unknown error."""
 
 
-def error_text(found: MetricError | None, scale: float = 1.0) -> str:
+def error_text(metric_error: MetricError | None, scale: float = 1.0) -> str:
     """An error in two digits, in the unit of size `scale`; NONE where it is not known."""
-    if found is None or not math.isfinite(found.error):
+    if metric_error is None or not math.isfinite(metric_error.error):
         return NONE
-    return rounded(found.error / abs(scale))
+    return rounded(metric_error.error / abs(scale))
 
 
 def rounded(error: float) -> str:
@@ -26,25 +26,34 @@ def rounded(error: float) -> str:
     return number_text(float(f"{error:.2g}"))
 
 
-def about(found: Verification) -> str:
+def about(verification: Verification) -> str:
     """A line about the verification, `± by the step: 5 cases at half and a quarter of the step, order 2.0`, with
     remarks."""
-    cases = "1 case" if found.cases == 1 else f"{found.cases:,} cases"
-    said = f"± by the step: {cases} at half and a quarter of the step"
+    cases = "1 case" if verification.cases == 1 else f"{verification.cases:,} cases"
+    text = f"± by the step: {cases} at half and a quarter of the step"
     orders = sorted(
-        {f"{metric.order:.1f}" for metric in found.metrics.values() if metric.clear and math.isfinite(metric.order)}
+        {
+            f"{metric.order:.1f}"
+            for metric in verification.metrics.values()
+            if metric.clear and math.isfinite(metric.order)
+        }
     )
     if orders:
-        said += f", order {_between(orders)}"
-    if unclear := [name for name, each in found.metrics.items() if not each.clear]:
-        known = [one.error for metric in found.metrics.values() for one in metric.cases if one.error is not None]
-        of = f"{sum(not error.clear for error in known):,} of {len(known):,} numbers"
-        said += f"; order unclear in {of}, where it is a rough bound: {', '.join(unclear)}"
-    for name, each in found.metrics.items():
-        if each.unknown:
-            where = "" if found.cases == 1 else f" in {each.unknown:,}"
-            said += f"; of {name} not known{where}: {each.why}"
-    return said
+        text += f", order {_between(orders)}"
+    if unclear := [name for name, metric_error in verification.metrics.items() if not metric_error.clear]:
+        known = [
+            case_error.error
+            for metric in verification.metrics.values()
+            for case_error in metric.cases
+            if case_error.error is not None
+        ]
+        unclear_text = f"{sum(not error.clear for error in known):,} of {len(known):,} numbers"
+        text += f"; order unclear in {unclear_text}, where it is a rough bound: {', '.join(unclear)}"
+    for name, metric in verification.metrics.items():
+        if metric.unknown:
+            where = "" if verification.cases == 1 else f" in {metric.unknown:,}"
+            text += f"; of {name} not known{where}: {metric.why}"
+    return text
 
 
 def _between(orders: Sequence[str]) -> str:

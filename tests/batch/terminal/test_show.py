@@ -13,7 +13,7 @@ import pytest
 
 import batch
 from batch.archive.read import ArchiveFile
-from batch.queries.given import given
+from batch.queries.given import settings_lines
 from batch.queries.signals import number_text, number_texts, panels, pretty_unit
 from batch.terminal.show import _range_texts, as_json, show
 from met.diagnostic import Problem
@@ -204,4 +204,4 @@ def test_units_are_typeset(unit: str, text: str) -> None:
 def test_what_the_command_line_gave_is_told(written: str, defines: str, lines: list[str]) -> None:
     sources = {"deck.ic": "", "<command line>": written} if written else {"deck.ic": ""}
     archive: Any = SimpleNamespace(provenance={"defines": defines}, sources=lambda: sources)
-    assert given(archive) == lines
+    assert settings_lines(archive) == lines
