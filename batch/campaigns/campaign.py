@@ -170,7 +170,7 @@ def prepare(
     histories: str | int | Sequence[str | int] = "default",
     float32: bool = False,
     selected: Sequence[tuple[Experiment, CaseValues]] | None = None,
-    kept: Mapping[str, np.ndarray] | None = None,
+    history_rows: Mapping[str, np.ndarray] | None = None,
     wires: Wires | None = None,
     verify: Verify = "auto",
     decided: Collection[str] = (),
@@ -184,7 +184,7 @@ def prepare(
     histories    what to keep (batch/campaigns/keep.py), one word or several
     float32      keep histories as numbers of four bytes
     selected     experiments with rows of their case tables, in place of `experiments` and `cases`
-    kept         rows whose histories are kept, by the experiment's name, in place of `histories`
+    history_rows  rows whose histories are kept, by the experiment's name, in place of `histories`
     wires        where it is run on real beds: then nothing is verified
     verify       which cases are run again with shorter steps: "none", "some", "all", or "auto": some where it is cheap
     decided      experiments, by name, whose rows in `selected` are those after which it was decided what is required
@@ -195,9 +195,9 @@ def prepare(
         raise ValueError(f"verify is one of {', '.join(VERIFY_WORDS)}, and not {verify!r}")
     all_of = None
     if selected is None:
-        asked = choosing.experiments_named(plan, experiments)
-        all_of = sum(experiment.cases.count for experiment in asked)
-        selected = choosing.select_rows(asked, cases)
+        chosen = choosing.experiments_named(plan, experiments)
+        all_of = sum(experiment.cases.count for experiment in chosen)
+        selected = choosing.select_rows(chosen, cases)
     selected = [(experiment, rows) for experiment, rows in selected if len(rows)]
     if not selected:
         raise Problem(error("E311", "there is no case to run", help="`met cases DECK` lists them"))
@@ -211,8 +211,8 @@ def prepare(
     parts = _parts(selected, wanted, float32, decided)
     if not chosen_rows.all:
         parts = tuple(_summarised(part, chosen_rows) for part in parts)
-    if kept is not None:
-        parts = tuple(replace(part, kept=places_among(part.rows, kept[part.experiment.name])) for part in parts)
+    if history_rows is not None:
+        parts = tuple(replace(part, kept=places_among(part.rows, history_rows[part.experiment.name])) for part in parts)
     notes: list[str] = []
     whole = sum(part.bytes for part in parts)
     if wanted.default and whole > KEPT_BYTES:
@@ -286,8 +286,8 @@ def _parts(
     for experiment, rows in selected:
         if experiment.structure.history_bytes:
             own = np.asarray(named.get(experiment.name, np.empty(0, np.int64)))
-            kept = kept_before(wanted, experiment, rows, own)
-            part = CampaignPart(experiment, rows, kept, wanted.at_most(len(rows)), single)
+            history_places = kept_before(wanted, experiment, rows, own)
+            part = CampaignPart(experiment, rows, history_places, wanted.at_most(len(rows)), single)
         else:
             part = CampaignPart(experiment, rows, np.empty(0, np.int64))
         # cases that a user chooses are all run, whatever they show
@@ -318,13 +318,17 @@ def histories_section(
     part = campaign.parts[values.experiment]
     if values.recorded or not part.experiment.structure.history_bytes:
         return None
-    kept = part.kept
+    history_places = part.kept
     if campaign.keep.later:
-        kept = distinct(np.concatenate([kept, kept_by_outcome(campaign.keep, part.experiment, results())]))
-    if not len(kept):
+        history_places = distinct(
+            np.concatenate([history_places, kept_by_outcome(campaign.keep, part.experiment, results())])
+        )
+    if not len(history_places):
         return None
     number = len(campaign.parts) + values.experiment
-    return CampaignSection(number, values.experiment, values.prepared, part.rows[kept], True, part.single, values.begun)
+    return CampaignSection(
+        number, values.experiment, values.prepared, part.rows[history_places], True, part.single, values.begun
+    )
 
 
 def with_known_rows(
@@ -341,8 +345,8 @@ def with_known_rows(
         wanted = section.rows if part.searches and part.all_recorded else part.rows[part.kept]
         if part.keeps_best:
             wanted = np.concatenate([wanted, best[section.number]])
-        kept = np.flatnonzero(np.isin(section.rows, wanted))
-        parts.append(replace(part, experiment=experiment, rows=section.rows, kept=kept))
+        known_places = np.flatnonzero(np.isin(section.rows, wanted))
+        parts.append(replace(part, experiment=experiment, rows=section.rows, kept=known_places))
         for _, named in choosing.select_rows([experiment], campaign.keep.cases) if part.stops_early else ():
             for case in experiment.cases.table[named[~np.isin(named, section.rows)]].tolist():
                 notes.append(f"no history of case #{case} is kept: what is required was decided without it")

@@ -48,8 +48,8 @@ def changes(before: Plan, now: Plan, *, ordered: bool = True) -> list[str]:
     for name in old:
         if name in new:
             head = f"{name}: " if len(new) > 1 else ""
-            found = between(old[name], new[name], ordered=ordered)
-            out += [head + each.text for each in sorted(found, key=lambda each: each.follows)]
+            differences = between(old[name], new[name], ordered=ordered)
+            out += [head + change.text for change in sorted(differences, key=lambda change: change.follows)]
     return out
 
 
@@ -75,18 +75,18 @@ def between(before: Experiment, now: Experiment, *, ordered: bool) -> list[Chang
 
 def _linear(before: Experiment, now: Experiment) -> Iterator[str]:
     """Changes of linear answers, and of metrics of them."""
-    for word, of in (("linear", _answers), ("metric", _figures)):
-        old, new = of(before), of(now)
+    for word, texts_of in (("linear", _answers), ("metric", _figures)):
+        old, new = texts_of(before), texts_of(now)
         for name in dict.fromkeys((*old, *new)):
             if old.get(name) != new.get(name):
                 yield f"{word} {name}: {old.get(name, 'none')} -> {new.get(name, 'none')}"
 
 
 def _answers(experiment: Experiment) -> dict[str, str]:
-    return {use.name: ", ".join(_asked(use)) for use in experiment.linear}
+    return {use.name: ", ".join(_answer_parts(use)) for use in experiment.linear}
 
 
-def _asked(use: LinearUse) -> Iterator[str]:
+def _answer_parts(use: LinearUse) -> Iterator[str]:
     yield use.where
     yield from (f"{number:.9g}" for number in use.pose or ())
     yield from (*use.inputs, *use.outputs, *(f"open {path}" for path in use.opened))
@@ -112,7 +112,7 @@ def _parameters(before: Experiment, now: Experiment, new: set[str]) -> Iterator[
             first, *_ = quantities = [mine.parameters[member] for member in members]
             follows = first.origin.kind == "derived" or any(name.startswith(entity) for entity in new)
             places = (None, first.origin.place) if mine is now else (first.origin.place, None)
-            yield Change(f"{name} is {word}: {_shown_all(quantities)}{_at(first)}", follows, *places)
+            yield Change(f"{name} is {word}: {_shown_all(quantities)}{_place_text(first)}", follows, *places)
 
 
 def _unlike(old: Quantity, new: Quantity) -> bool:
@@ -123,7 +123,9 @@ def _changed(path: str, old: Quantity, new: Quantity) -> Change:
     """The change of a parameter that both have. One that is computed, or newly varied by a sweep, follows from other
     changes."""
     follows = new.origin.kind == "derived" or isinstance(old.value, Formula) or isinstance(new.value, Formula)
-    return Change(f"{path}: {' -> '.join(_apart(old, new))}{_at(new)}", follows, old.origin.place, new.origin.place)
+    return Change(
+        f"{path}: {' -> '.join(_apart(old, new))}{_place_text(new)}", follows, old.origin.place, new.origin.place
+    )
 
 
 MOST_CASES = 10_000
@@ -146,42 +148,44 @@ class _Computed:
         if not self.values[0] or not isinstance(old.value, Formula) or not isinstance(new.value, Formula):
             return
         pair = ((self.values[0], old.value), (self.values[1], new.value))
-        one, two = (np.atleast_1d(np.asarray(values[formula.output], dtype=float)) for values, formula in pair)
-        if ((one == two) | (np.isnan(one) & np.isnan(two))).all():
+        first, two = (np.atleast_1d(np.asarray(values[formula.output], dtype=float)) for values, formula in pair)
+        if ((first == two) | (np.isnan(first) & np.isnan(two))).all():
             return
-        sides = ((replace(old, unit="1"), one), (replace(new, unit="1"), two))
+        sides = ((replace(old, unit="1"), first), (replace(new, unit="1"), two))
         ends = [
-            _apart(*(replace(each, value=float(end(column))) for each, column in sides)) for end in (np.min, np.max)
+            _apart(*(replace(side, value=float(end(column))) for side, column in sides)) for end in (np.min, np.max)
         ]
         unit = "" if new.unit == "1" else f" {new.unit}"
         texts = [f"{low if low == high else f'{low} to {high}'}{unit}" for low, high in zip(*ends, strict=True)]
         text = " -> ".join(texts) if texts[0] != texts[1] else f"other values of {texts[0]}"
         follows = new.origin.kind == "derived"
-        yield Change(f"{path}: {text}, varied{_at(new)}", follows, old.origin.place, new.origin.place)
+        yield Change(f"{path}: {text}, varied{_place_text(new)}", follows, old.origin.place, new.origin.place)
 
 
 def _some_cases(before: Cases, now: Cases) -> dict[str, np.ndarray]:
     """Values of all varied parameters in cases of `now`; those that it does not vary have their former values."""
     rows = np.unique(np.linspace(0, max(0, now.count - 1), MOST_CASES, dtype=np.int64)) if now.count else np.arange(0)
-    found = {coordinate.path: np.resize(coordinate.values[: len(rows)], len(rows)) for coordinate in before.coordinates}
-    return found | {coordinate.path: coordinate.values[rows] for coordinate in now.coordinates}
+    values = {
+        coordinate.path: np.resize(coordinate.values[: len(rows)], len(rows)) for coordinate in before.coordinates
+    }
+    return values | {coordinate.path: coordinate.values[rows] for coordinate in now.coordinates}
 
 
-def _at(quantity: Quantity) -> str:
+def _place_text(quantity: Quantity) -> str:
     place = quantity.origin.place
     return f" ({place.file}:{place.line})" if place else ""
 
 
 def _vectors(paths: Iterable[str]) -> dict[str, list[str]]:
     """The paths by name; three components of a vector come under its name."""
-    found: dict[str, list[str]] = {}
+    names: dict[str, list[str]] = {}
     known = dict.fromkeys(paths)
     for path in known:
         vector, _, axis = path.rpartition(".")
-        members = [f"{vector}.{each}" for each in AXES]
+        members = [f"{vector}.{component}" for component in AXES]
         whole = axis in AXES and all(member in known for member in members)
-        found[vector if whole else path] = members if whole else [path]
-    return found
+        names[vector if whole else path] = members if whole else [path]
+    return names
 
 
 def _value(quantity: Quantity) -> Any:
@@ -191,23 +195,23 @@ def _value(quantity: Quantity) -> Any:
 def _apart(before: Quantity, now: Quantity) -> tuple[str, str]:
     """The values of two parameters in the fewest digits, but at least six, that distinguish them."""
     for digits in range(6, 18):
-        texts = _shown(before, digits), _shown(now, digits)
+        texts = _value_text(before, digits), _value_text(now, digits)
         if texts[0] != texts[1]:
             break
     return texts
 
 
-def _shown(quantity: Quantity, digits: int = 6) -> str:
+def _value_text(quantity: Quantity, digits: int = 6) -> str:
     value = _value(quantity)
-    shown = f"{value:.{digits}g}" if isinstance(value, float) else str(value)
-    return f"{shown} {quantity.unit}" if isinstance(value, float) and quantity.unit != "1" else shown
+    number_text_ = f"{value:.{digits}g}" if isinstance(value, float) else str(value)
+    return f"{number_text_} {quantity.unit}" if isinstance(value, float) and quantity.unit != "1" else number_text_
 
 
 def _shown_all(quantities: Sequence[Quantity]) -> str:
     if len(quantities) == 1:
-        return _shown(quantities[0])
+        return _value_text(quantities[0])
     unit = quantities[0].unit
-    numbers = ", ".join(_shown(dataclasses.replace(quantity, unit="1")) for quantity in quantities)
+    numbers = ", ".join(_value_text(dataclasses.replace(quantity, unit="1")) for quantity in quantities)
     return f"[{numbers}]" + (f" {unit}" if unit != "1" else "")
 
 
@@ -224,19 +228,19 @@ def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
         elif path not in new:
             yield f"{path} is not varied any more"
         elif not _same(old[path].values, new[path].values, ordered):
-            spans = [_span(each[path]) for each in (old, new)]
+            spans = [_span(coordinates[path]) for coordinates in (old, new)]
             yield f"{path}: {' -> '.join(spans)}" if spans[0] != spans[1] else f"{path}: other values ({spans[1]})"
     for name in ("seed", "seeds"):
         if getattr(before, name) != getattr(now, name):
             yield f"{name}: {_word(getattr(before, name))} -> {_word(getattr(now, name))}"
-    if not _alike(*(_array(each.repeats) for each in (before, now))):
-        repeats = [len(different(_array(each.repeats))) for each in (before, now)]
+    if not _alike(*(_array(cases.repeats) for cases in (before, now))):
+        repeats = [len(different(_array(cases.repeats))) for cases in (before, now)]
         yield f"repeats: {repeats[0]} -> {repeats[1]}" if repeats[0] != repeats[1] else "repeats: in other cases"
 
 
 def _stops(before: Experiment, now: Experiment) -> Iterator[str]:
     """Changes that affect how many cases of a design point are run, where results decide that."""
-    early = [bool(each.cases.until_shown) for each in (before, now)]
+    early = [bool(experiment.cases.until_shown) for experiment in (before, now)]
     if early[0] != early[1]:
         yield "cases are run until it is shown what is required" if early[1] else "all cases are run"
     elif early[1]:
@@ -282,7 +286,7 @@ def _tuned_limits(before: Experiment, now: Experiment) -> Iterator[str]:
     """Changes of the requirements of a tuning, which decide the worth of its cases, and so its later cases."""
     old, new = ([requirement.text for requirement in run.requirements] for run in (before, now))
     if old != new and now.search is not None and now.search.kind == "tune":
-        gone, come = ([text for text in one if text not in other] for one, other in ((old, new), (new, old)))
+        gone, come = ([text for text in some if text not in other] for some, other in ((old, new), (new, old)))
         yield f"requirements: {', '.join(gone) or 'none'} -> {', '.join(come) or 'none'}"
 
 
@@ -296,10 +300,10 @@ def _same(before: CaseValues, now: CaseValues, ordered: bool) -> bool:
     return _alike(before, now) if ordered else _alike(different(before), different(now))
 
 
-def _alike(one: CaseValues, two: CaseValues) -> bool:
+def _alike(first: CaseValues, two: CaseValues) -> bool:
     """True if two columns have the same numbers."""
-    return len(one) == len(two) and all(
-        np.array_equal(one[rows], two[rows], equal_nan=True) for rows in blocks(len(one))
+    return len(first) == len(two) and all(
+        np.array_equal(first[rows], two[rows], equal_nan=True) for rows in blocks(len(first))
     )
 
 
@@ -380,7 +384,7 @@ def _schedule(before: Schedule, now: Schedule) -> Iterator[str]:
 
 
 def _base(before: Base | None, now: Base | None) -> Iterator[tuple[str, str]]:
-    kinds = ["fixed" if each is None else each.kind for each in (before, now)]
+    kinds = ["fixed" if base is None else base.kind for base in (before, now)]
     if kinds[0] != kinds[1]:
         yield f"initial.{BASE}.", f"base: {kinds[0]} -> {kinds[1]}"
         yield from ((path, "") for path in (f"{BASE}.", f"links.{BASE}."))
@@ -391,7 +395,7 @@ def _base(before: Base | None, now: Base | None) -> Iterator[tuple[str, str]]:
 def _courses(what: str, path: str, before: Sequence[Course], now: Sequence[Course]) -> Iterator[tuple[str, str]]:
     old, new = ({course.component: course.model for course in courses} for courses in (before, now))
     for component in dict.fromkeys([*old, *new]):
-        models = [each.get(component, "none") for each in (old, new)]
+        models = [models_of.get(component, "none") for models_of in (old, new)]
         if models[0] != models[1]:
             yield f"{path}{component}.", f"{what}: {component} {models[0]} -> {models[1]}"
 
@@ -399,7 +403,7 @@ def _courses(what: str, path: str, before: Sequence[Course], now: Sequence[Cours
 def _entities(field: str, before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
     """Changes of the things in one field: new and missing ones, and differences in the others."""
     what, begins = ENTITIES[field]
-    old, new = ({_name(each): each for each in getattr(structure, field)} for structure in (before, now))
+    old, new = ({_name(entity): entity for entity in getattr(structure, field)} for structure in (before, now))
     if list(old) != list(new) and sorted(old) == sorted(new) and field != "servos":
         yield "", f"{field}: in another order"
     for name in dict.fromkeys([*old, *new]):
@@ -411,54 +415,54 @@ def _entities(field: str, before: Structure, now: Structure) -> Iterator[tuple[s
             yield from zip(heads or [""], [text, ""], strict=False)
             continue
         for key, text in _thing(field, old[name], new[name], before, now):
-            told = f"{what} {name} {text}" if what.endswith(":") else f"{what} {name}: {text}"
-            yield from zip(heads if key in WHOLE.get(field, ()) else [""], [told, ""], strict=False)
+            line = f"{what} {name} {text}" if what.endswith(":") else f"{what} {name}: {text}"
+            yield from zip(heads if key in WHOLE.get(field, ()) else [""], [line, ""], strict=False)
 
 
 def _thing(field: str, old: Any, new: Any, before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
     """Changes of one thing: the names of its fields, in words."""
-    for each in dataclasses.fields(new):
-        one, two = getattr(old, each.name), getattr(new, each.name)
-        if each.name == "divisor":
-            rates = [_rate(divisor, structure.schedule) for divisor, structure in ((one, before), (two, now))]
-            if rates[0] != rates[1] and not _with_dynamics(one, two, before, now):
-                yield each.name, f"rate {rates[0]} -> {rates[1]}"
-        elif one == two or in_key(each) == "never" or each.name in NOT_TOLD:
+    for field_ in dataclasses.fields(new):
+        old_value, two = getattr(old, field_.name), getattr(new, field_.name)
+        if field_.name == "divisor":
+            rates = [_rate(divisor, structure.schedule) for divisor, structure in ((old_value, before), (two, now))]
+            if rates[0] != rates[1] and not _with_dynamics(old_value, two, before, now):
+                yield field_.name, f"rate {rates[0]} -> {rates[1]}"
+        elif old_value == two or in_key(field_) == "never" or field_.name in NOT_TOLD:
             continue
-        elif isinstance(one, Formulas):
-            yield each.name, f"{old.text} -> {new.text}" if old.text != new.text else "computed otherwise"
-        elif each.name == "courses":
-            yield from (("courses", text.removeprefix(": ")) for _, text in _courses("", "", one, two))
-        elif field == "servos" and each.name == "sensors":
-            yield from (("sensors", text) for text in _sensors(one, two))
-        elif field == "record" and each.name == "joints":
+        elif isinstance(old_value, Formulas):
+            yield field_.name, f"{old.text} -> {new.text}" if old.text != new.text else "computed otherwise"
+        elif field_.name == "courses":
+            yield from (("courses", text.removeprefix(": ")) for _, text in _courses("", "", old_value, two))
+        elif field == "servos" and field_.name == "sensors":
+            yield from (("sensors", text) for text in _sensors(old_value, two))
+        elif field == "record" and field_.name == "joints":
             if {joint.name for joint in before.moving} == {joint.name for joint in now.moving}:
-                yield each.name, f"of {_word(one)} -> of {_word(two)}"
+                yield field_.name, f"of {_word(old_value)} -> of {_word(two)}"
         else:
-            yield each.name, f"{each.name} {_word(one)} -> {_word(two)}"
+            yield field_.name, f"{field_.name} {_word(old_value)} -> {_word(two)}"
 
 
-def _with_dynamics(one: int | None, two: int | None, before: Structure, now: Structure) -> bool:
+def _with_dynamics(divisor: int | None, two: int | None, before: Structure, now: Structure) -> bool:
     """True if a part ticked once a step of the dynamics and still does: the dynamics' own change then covers its
     rate."""
-    return one == before.schedule.dynamics and two == now.schedule.dynamics
+    return divisor == before.schedule.dynamics and two == now.schedule.dynamics
 
 
 def _sensors(before: Sequence[Any], now: Sequence[Any]) -> Iterator[str]:
     old, new = ({sensor.of: sensor.model for sensor in sensors} for sensors in (before, now))
-    for of in dict.fromkeys([*old, *new]):
-        models = [each.get(of, "none") for each in (old, new)]
+    for source in dict.fromkeys([*old, *new]):
+        models = [models_of.get(source, "none") for models_of in (old, new)]
         if models[0] != models[1]:
-            yield f"sensor of {of} {models[0]} -> {models[1]}"
+            yield f"sensor of {source} {models[0]} -> {models[1]}"
 
 
 def _rate(divisor: int | None, schedule: Schedule) -> str:
     return "at every stage" if divisor is None else f"{schedule.base_hz / divisor:g} Hz"
 
 
-def _name(each: Any) -> str:
+def _name(entity: Any) -> str:
     """The name of one of several things: for a servo its joint, for a link its own."""
-    return str(getattr(each, "joint", None) or each.name)
+    return str(getattr(entity, "joint", None) or entity.name)
 
 
 def _word(value: Any) -> str:

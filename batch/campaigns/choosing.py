@@ -37,8 +37,8 @@ def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experime
             problems.append(error("E310", f"no run or sweep `{name}` in {plan.deck}", help=helps))
     if problems:
         raise Problem(problems)
-    found = {experiment.name: experiment for name in names for experiment in by_name[name]}
-    return tuple(found.values())
+    by_experiment = {experiment.name: experiment for name in names for experiment in by_name[name]}
+    return tuple(by_experiment.values())
 
 
 def select_rows(
@@ -48,7 +48,7 @@ def select_rows(
     case_id; all for None. An experiment without any of them is left out. Raises Problem E311, E312."""
     if cases is None:
         return [(experiment, all_rows(experiment.cases.count)) for experiment in experiments]
-    found: dict[str, set[int]] = {experiment.name: set() for experiment in experiments}
+    rows_of: dict[str, set[int]] = {experiment.name: set() for experiment in experiments}
     for case in cases:
         matches = [(e, row) for e in experiments for row in _rows(e, case)]
         if not matches:
@@ -69,8 +69,8 @@ def select_rows(
             remedy = "" if alike else "give more of its id, or "  # cases that differ only in structure share their ids
             raise Problem(error("E312", message, help=f"{remedy or 'give '}its position: `--case '#{position}'`"))
         for experiment, row in matches:
-            found[experiment.name].add(row)
-    return [(e, np.array(sorted(found[e.name]), dtype=np.int64)) for e in experiments if found[e.name]]
+            rows_of[experiment.name].add(row)
+    return [(e, np.array(sorted(rows_of[e.name]), dtype=np.int64)) for e in experiments if rows_of[e.name]]
 
 
 def _of_search(name: str, case: int | str) -> str:
@@ -99,5 +99,5 @@ def _rows(experiment: Experiment, case: int | str) -> list[int]:
     if not case:
         return []
     pieces = (np.arange(piece.start, piece.stop) for piece in blocks(experiment.cases.count))
-    ids = (each for rows in pieces for each in keys.case_ids(experiment, rows))
+    ids = (case_id for rows in pieces for case_id in keys.case_ids(experiment, rows))
     return [row for row, case_id in enumerate(ids) if case_id.startswith(str(case))]

@@ -77,11 +77,11 @@ class Driver:
 
     def find(self, section: CampaignSection) -> list[tuple[int, int]]:
         """Count the finished cases of a section; returns the missing stretches."""
-        kept, told = self.folder.sound_tasks(section)
-        self.told += told
-        missing = uncovered(kept, len(section.rows))
+        sound, messages = self.folder.sound_tasks(section)
+        self.told += messages
+        missing = uncovered(sound, len(section.rows))
         count = self.counts[section.number] = Count(len(section.rows) - sum(last - first for first, last in missing))
-        for done in kept.values():
+        for done in sound.values():
             count.failed += done.failed
             count.seconds += done.seconds
         return missing

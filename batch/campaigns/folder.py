@@ -169,14 +169,14 @@ class Folder:
         for path in (self.path / "plan.json", *self.path.glob("plan.*.npy")):
             path.unlink(missing_ok=True)
         plan_file.write(plan, self.path / "plan.json", computed=True)
-        told = []
+        descriptions = []
         for section in sections:
             rows = None
             if section.number not in searches and len(section.rows) < section.prepared.experiment.cases.count:
                 rows = f"rows.{section.number}.npy"
                 with new_file(self.path / rows) as file:
                     np.save(file, np.asarray(section.rows))
-            told.append(
+            descriptions.append(
                 {
                     "number": section.number,
                     "name": section.name,
@@ -191,7 +191,14 @@ class Folder:
                     "searches": section.number in searches,
                 }
             )
-        data = {"schema": SCHEMA, "version": FORMAT, "met": VERSION, "deck": plan.deck, "sections": told, **about}
+        data = {
+            "schema": SCHEMA,
+            "version": FORMAT,
+            "met": VERSION,
+            "deck": plan.deck,
+            "sections": descriptions,
+            **about,
+        }
         write_json(self.path / "campaign.json", data)
 
     def described(self) -> dict[str, Any]:
@@ -214,20 +221,27 @@ class Folder:
         experiments = [engine.prepare(experiment) for experiment in plan.experiments]
         out = {}
         described = self.described()
-        searched = {told["experiment"] for told in described["sections"] if told.get("searches")}
+        searched = {description["experiment"] for description in described["sections"] if description.get("searches")}
         experiments = [
-            self._grown(each, number) if number in searched else each for number, each in enumerate(experiments)
+            self._grown(experiment, number) if number in searched else experiment
+            for number, experiment in enumerate(experiments)
         ]
-        for told in described["sections"]:
-            number, of = told["number"], told["experiment"]
-            if of >= len(experiments):
+        for description in described["sections"]:
+            number, position = description["number"], description["experiment"]
+            if position >= len(experiments):
                 raise self._damaged(self.path / "campaign.json")
-            if not experiments[of].is_work(told["code"]):
-                raise Problem(_other_code(experiments[of].experiment.name, self.path, described))
-            count = experiments[of].experiment.cases.count
-            rows = all_rows(count) if told.get("searches") else self._rows(told, count)
+            if not experiments[position].is_work(description["code"]):
+                raise Problem(_other_code(experiments[position].experiment.name, self.path, described))
+            count = experiments[position].experiment.cases.count
+            rows = all_rows(count) if description.get("searches") else self._rows(description, count)
             out[number] = CampaignSection(
-                number, of, experiments[of], rows, told["recorded"], told["single"], told["code"]
+                number,
+                position,
+                experiments[position],
+                rows,
+                description["recorded"],
+                description["single"],
+                description["code"],
             )
         return out
 
@@ -249,13 +263,13 @@ class Folder:
         except (OSError, ValueError) as reason:
             raise self._damaged(path) from reason
 
-    def _rows(self, told: dict[str, Any], count: int) -> CaseValues:
+    def _rows(self, description: dict[str, Any], count: int) -> CaseValues:
         """The rows of a section of an experiment with `count` cases. Raises Problem."""
         rows: CaseValues
-        if told["rows"] is None:
+        if description["rows"] is None:
             rows = all_rows(count)
         else:
-            path = self.path / told["rows"]
+            path = self.path / description["rows"]
             try:
                 data = io.BytesIO(read_regular(path, count * np.dtype(np.int64).itemsize + NPY_HEAD_BYTES))
                 rows = np.lib.format.read_array(data, allow_pickle=False)
@@ -263,7 +277,7 @@ class Folder:
                 raise self._damaged(path) from reason
             if rows.dtype != np.int64 or rows.ndim != 1 or not _rise(rows, count):
                 raise self._damaged(path)
-        if len(rows) != told["cases"]:
+        if len(rows) != description["cases"]:
             raise self._damaged(self.path / "campaign.json")
         return rows
 
@@ -276,25 +290,25 @@ class Folder:
     def named_tasks(self, number: int, stretch: tuple[int, int] | None = None) -> list[Task]:
         """The tasks of a section that have a file, sound or not, by their first cases; only those within a stretch of
         cases where one is given."""
-        found, (first, last) = [], stretch or (0, MOST_SWEPT)
+        tasks, (first, last) = [], stretch or (0, MOST_SWEPT)
         for path in self._shard_files():
             parts = SHARD.fullmatch(path.name)
             task = Task(*map(int, parts.groups())) if parts else None
             if task is None or task.section != number or (stretch and not first <= task.first < task.last <= last):
                 continue
             if path.name == task.name and path == self._path(task):
-                found.append(task)
-        return sorted(found, key=lambda task: (task.first, -task.last))
+                tasks.append(task)
+        return sorted(tasks, key=lambda task: (task.first, -task.last))
 
     def _shard_files(self) -> Iterator[Path]:
         """Everything in the folder of shards, and in the folders in it."""
         with contextlib.suppress(OSError):
-            for each in sorted(os.scandir(self.shards), key=lambda each: each.name):
-                if each.name.isdecimal() and each.is_dir(follow_symlinks=False):
+            for entry in sorted(os.scandir(self.shards), key=lambda entry: entry.name):
+                if entry.name.isdecimal() and entry.is_dir(follow_symlinks=False):
                     with contextlib.suppress(OSError):
-                        yield from (self.shards / each.name / name for name in os.listdir(each.path))
+                        yield from (self.shards / entry.name / name for name in os.listdir(entry.path))
                 else:
-                    yield self.shards / each.name
+                    yield self.shards / entry.name
 
     def _path(self, task: Task) -> Path:
         """The file of a task's shard: in its own folder, or beside all others, where an older MET wrote it."""
@@ -304,32 +318,34 @@ class Folder:
 
     def read(self, section: CampaignSection, task: Task) -> shard.Shard:
         """A task's shard. Raises shard.UnsoundShard where it is not one of this section's, OSError."""
-        found = shard.read(self._path(task), task.cases * _bytes_of_case(section))
-        if not 0 <= task.first < task.last <= len(section.rows) or len(found.outputs) != task.cases:
+        read_shard = shard.read(self._path(task), task.cases * _bytes_of_case(section))
+        if not 0 <= task.first < task.last <= len(section.rows) or len(read_shard.outputs) != task.cases:
             raise shard.UnsoundShard("holds other cases than its name says")
-        if found.key != section.key(task.first, task.last):
+        if read_shard.key != section.key(task.first, task.last):
             raise shard.UnsoundShard("is of another plan, or of another version of MET's code")
-        if not _fits(section, found):
+        if not _fits(section, read_shard):
             raise shard.UnsoundShard("holds other outputs than the program has")
-        return found
+        return read_shard
 
     def sound_tasks(self, section: CampaignSection) -> tuple[dict[Task, Done], list[str]]:
         """The tasks of a section whose shards count, and messages about those that do not, which are removed: their
         cases are run again."""
-        kept: dict[Task, Done] = {}
-        told = []
-        at = 0
+        tasks: dict[Task, Done] = {}
+        messages = []
+        end = 0
         for task in self.named_tasks(section.number):
             try:
-                found = self.read(section, task)
+                read_shard = self.read(section, task)
             except (shard.UnsoundShard, OSError) as reason:
                 why = str(reason) if isinstance(reason, shard.UnsoundShard) else f"cannot be read: {reason.strerror}"
-                told.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
+                messages.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
                 _remove(self._path(task))
             else:
-                kept[task] = Done(found.seconds, found.failed_from(at - task.first))  # each case counts once
-                at = max(at, task.last)
-        return kept, told
+                tasks[task] = Done(
+                    read_shard.seconds, read_shard.failed_from(end - task.first)
+                )  # each case counts once
+                end = max(end, task.last)
+        return tasks, messages
 
     def remove_shard(self, task: Task) -> None:
         """Remove a task's shard, sound or not: its cases are run again."""
@@ -407,18 +423,18 @@ def _checked(data: Any) -> dict[str, Any]:
         and data.get("verify", "auto") in VERIFY_WORDS
         and isinstance(data.get("rows", "all"), str)
         and all(is_count(section["number"]) for section in sections)
-        and all(one["number"] < other["number"] for one, other in pairwise(sections))
+        and all(section["number"] < other["number"] for section, other in pairwise(sections))
     )
-    for each in sections if good else ():
+    for section in sections if good else ():
         good = good and (
-            is_count(each["experiment"])
-            and is_count(each["cases"])
-            and isinstance(each["name"], str)
-            and isinstance(each["code"], str)
-            and each["rows"] in (None, f"rows.{each['number']}.npy")
-            and all(isinstance(each[name], bool) for name in ("again", "recorded", "single"))
-            and isinstance(each.get("stops_early", False), bool)
-            and isinstance(each.get("searches", False), bool)
+            is_count(section["experiment"])
+            and is_count(section["cases"])
+            and isinstance(section["name"], str)
+            and isinstance(section["code"], str)
+            and section["rows"] in (None, f"rows.{section['number']}.npy")
+            and all(isinstance(section[name], bool) for name in ("again", "recorded", "single"))
+            and isinstance(section.get("stops_early", False), bool)
+            and isinstance(section.get("searches", False), bool)
         )
     if not good:
         raise ValueError("it is no description of a campaign")
@@ -436,16 +452,16 @@ def _bytes_of_case(section: CampaignSection) -> int:
     return np.dtype(float).itemsize * (len(section.prepared.outputs) + rows * section.prepared.program.columns)
 
 
-def _fits(section: CampaignSection, found: shard.Shard) -> bool:
+def _fits(section: CampaignSection, read_shard: shard.Shard) -> bool:
     """True if the arrays of a shard have the program's sizes, and its failures are possible."""
     program, structure = section.prepared.program, section.prepared.experiment.structure
-    if found.outputs.shape[1] != len(section.prepared.outputs):
+    if read_shard.outputs.shape[1] != len(section.prepared.outputs):
         return False
-    shape = (len(found.outputs), structure.schedule.rows, program.columns)
+    shape = (len(read_shard.outputs), structure.schedule.rows, program.columns)
     wanted = shape if section.recorded and program.columns else None
-    if wanted != (None if found.history is None else found.history.shape):
+    if wanted != (None if read_shard.history is None else read_shard.history.shape):
         return False
-    failed = found.outputs[found.outputs[:, 0] != 0.0, :3]
+    failed = read_shard.outputs[read_shard.outputs[:, 0] != 0.0, :3]
     parts = len(structure.moving) + bool(structure.free) + len(structure.payloads) + len(structure.sensors)
     most = np.array([TOO_FAST, parts, structure.schedule.ticks + 1])
     return bool(((failed >= 0.0) & (failed <= most)).all())
@@ -458,12 +474,12 @@ def beside(archive: Path) -> Path:
 
 def uncovered(tasks: Iterable[Task], cases: int) -> list[tuple[int, int]]:
     """Stretches of cases that no task covers; tasks by their first cases."""
-    out, at = [], 0
+    out, end = [], 0
     for task in tasks:
-        if task.first > at:
-            out.append((at, task.first))
-        at = max(at, task.last)
-    return [*out, (at, cases)] if at < cases else out
+        if task.first > end:
+            out.append((end, task.first))
+        end = max(end, task.last)
+    return [*out, (end, cases)] if end < cases else out
 
 
 def write_json(path: Path, data: Any) -> None:

@@ -17,22 +17,22 @@ out."""
 
 
 def not_followed(
-    experiment: Experiment, memories: Memories, cells: Sequence[str], said: Sequence[Diagnostic]
+    experiment: Experiment, memories: Memories, cells: Sequence[str], others_warnings: Sequence[Diagnostic]
 ) -> list[Diagnostic]:
     """The warning about joints and points that do not follow their commands, if there are any: the worst, with the
     others by name.
 
-    said  what else is told of the same instants
+    others_warnings  what else is told of the same instants
     """
-    if experiment.allows("D348") or any(each.code in LOOPS for each in said):
+    if experiment.allows("D348") or any(diagnostic.code in LOOPS for diagnostic in others_warnings):
         return []
-    found = unfollowed(experiment, memories.ticks, memories.by_case, cells)
-    if not found:
+    unfollowed_commands = unfollowed(experiment, memories.ticks, memories.by_case, cells)
+    if not unfollowed_commands:
         return []
     begun = step_size(experiment, chosen_cases(experiment))
     if begun.loops or any(fault.kind == "grows" for fault in begun.faults):
         return []
-    worst, *others = found
+    worst, *others = unfollowed_commands
     place, what = _place(experiment, worst), "path of guide" if worst.kind == "path" else "joint"
     does = "is not followed" if worst.kind == "path" else "does not follow its command"
     at_limit = f", and `{worst.limit}` was reached for most of that time" if worst.limit else ""
@@ -45,39 +45,43 @@ def not_followed(
     return [Diagnostic("D348", message, None if place is None else Label(place), (), tuple(helps), "warning")]
 
 
-def _off(experiment: Experiment, found: Unfollowed) -> str:
+def _off(experiment: Experiment, unfollowed_: Unfollowed) -> str:
     """The error in words: `1.047 rad off, of 1.047 rad that it is told to move`."""
-    straight = found.kind == "path" or any(
-        joint.name == found.of and joint.kind == "prismatic" for joint in experiment.structure.joints
+    straight = unfollowed_.kind == "path" or any(
+        joint.name == unfollowed_.of and joint.kind == "prismatic" for joint in experiment.structure.joints
     )
-    unit = ("m" if straight else "rad") + ("/s" if found.kind == "rate" else "")
-    off = f"{number_text(found.off)} {unit} off"
-    if not found.asked:
+    unit = ("m" if straight else "rad") + ("/s" if unfollowed_.kind == "rate" else "")
+    off = f"{number_text(unfollowed_.off)} {unit} off"
+    if not unfollowed_.asked:
         return f"{off}, and is told to stay"
-    does = {"position": "it is told to move", "rate": "it is told", "path": "it leads"}[found.kind]
-    return f"{off}, of {number_text(found.asked)} {unit} that {does}"
+    does = {"position": "it is told to move", "rate": "it is told", "path": "it leads"}[unfollowed_.kind]
+    return f"{off}, of {number_text(unfollowed_.asked)} {unit} that {does}"
 
 
-def _remedy(experiment: Experiment, found: Unfollowed) -> str:
+def _remedy(experiment: Experiment, unfollowed_: Unfollowed) -> str:
     """The remedies, in words, with which it may follow."""
-    if found.kind == "path":
+    if unfollowed_.kind == "path":
         return "let the path stay where the arm reaches, and within what rates and damping leave"
     structure, beside = experiment.structure, []
     for use in structure.environment:
         about = experiment.parameters.get(f"environment.{use.name}.joint")
-        if about is not None and about.value == found.of:
+        if about is not None and about.value == unfollowed_.of:
             beside.append(f"`{use.name}`")
     other = f", or take away what holds it: {', '.join(beside)}" if beside else ""
-    if found.limit:
-        return f"raise `{found.limit}`, give it less to move{other}"
+    if unfollowed_.limit:
+        return f"raise `{unfollowed_.limit}`, give it less to move{other}"
     return f"look at its servo's gains, ratio and friction, and at what it has to move{other}"
 
 
-def _place(experiment: Experiment, found: Unfollowed) -> Place | None:
+def _place(experiment: Experiment, unfollowed_: Unfollowed) -> Place | None:
     """The place where the command, or the guide, is written."""
-    if found.kind == "path":
-        return next(use.place for use in experiment.structure.guides if use.name == found.of)
-    asked = (one for path, one in experiment.parameters.items() if path.startswith(f"{found.of}.servo.command."))
-    places = [one.origin.place for one in asked if one.origin.place is not None]
-    servos = [use.place for use in experiment.structure.servos if use.joint == found.of]
+    if unfollowed_.kind == "path":
+        return next(use.place for use in experiment.structure.guides if use.name == unfollowed_.of)
+    commands = (
+        parameter
+        for path, parameter in experiment.parameters.items()
+        if path.startswith(f"{unfollowed_.of}.servo.command.")
+    )
+    places = [command.origin.place for command in commands if command.origin.place is not None]
+    servos = [use.place for use in experiment.structure.servos if use.joint == unfollowed_.of]
     return (places or servos)[0]

@@ -46,7 +46,10 @@ MOST_EXPERIMENTS = 8
 def with_memories(sections: Sequence[CampaignSection]) -> list[CampaignSection]:
     """The sections of a campaign; small ones that are examined keep the memory of their cases."""
     wanted = set(np.linspace(0, len(sections) - 1, MOST_EXPERIMENTS).astype(int).tolist())
-    return [replace(each, memories=_memories(each)) if at in wanted else each for at, each in enumerate(sections)]
+    return [
+        replace(section, memories=_memories(section)) if number in wanted else section
+        for number, section in enumerate(sections)
+    ]
 
 
 def _memories(section: CampaignSection) -> Memories | None:
@@ -82,18 +85,20 @@ def step_warnings(section: CampaignSection, outcomes: CaseOutcomes, threads: int
         again = replace(memories, cases=frozenset(missing.tolist()))
         engine.compute(section.prepared, missing, record=False, threads=threads, memories=again)
     try:
-        at = _passed(section, memories, cases)
-        if not len(at.case):
+        instants = _passed(section, memories, cases)
+        if not len(instants.case):
             return []
-        said = [_warning(experiment, one) for one in passed.lasting(experiment, at)]
-        said += [
+        diagnostics = [_warning(experiment, lasting) for lasting in passed.lasting(experiment, instants)]
+        diagnostics += [
             bed_warning(
-                experiment, each, f"reckoned with the arm as it stands {from_instants(experiment, each.case, since)}"
+                experiment,
+                reading,
+                f"reckoned with the arm as it stands {from_instants(experiment, reading.case, since)}",
             )
-            for each, since in passed.lasting_beds(experiment, at)
+            for reading, since in passed.lasting_beds(experiment, instants)
         ]
-        said += not_followed(experiment, memories, section.prepared.recording.cells, said)
-        return [each for each in said if not experiment.allows(each.code)]
+        diagnostics += not_followed(experiment, memories, section.prepared.recording.cells, diagnostics)
+        return [diagnostic for diagnostic in diagnostics if not experiment.allows(diagnostic.code)]
     except Problem:  # a program that needs a kernel
         return []
 
@@ -112,18 +117,18 @@ def _cases(section: CampaignSection, outcomes: CaseOutcomes, memories: Memories)
 def standing_out(outcomes: CaseOutcomes) -> list[int]:
     """Places of the cases with a metric far from all others', the furthest first: single rows that went another way.
     None for few cases or very many, nor where metrics are spread evenly."""
-    found: dict[int, float] = {}
+    ratios: dict[int, float] = {}
     for values in outcomes.few_values():
         fine = np.flatnonzero(np.isfinite(values))
         if len(fine) < LEAST_CASES:
             continue
         quarter, middle, three_quarters = np.percentile(values[fine], (25.0, 50.0, 75.0))
         away = np.abs(values[fine] - middle)
-        at, spread = int(away.argmax()), STANDS_OUT * (three_quarters - quarter)
-        if away[at] > max(spread, ROUNDING * abs(middle)):
-            ratio = float(away[at] / spread) if spread > 0.0 else np.inf
-            found[int(fine[at])] = max(ratio, found.get(int(fine[at]), 0.0))
-    return sorted(found, key=lambda place: (-found[place], place))[:MOST_OUT]
+        furthest, spread = int(away.argmax()), STANDS_OUT * (three_quarters - quarter)
+        if away[furthest] > max(spread, ROUNDING * abs(middle)):
+            ratio = float(away[furthest] / spread) if spread > 0.0 else np.inf
+            ratios[int(fine[furthest])] = max(ratio, ratios.get(int(fine[furthest]), 0.0))
+    return sorted(ratios, key=lambda place: (-ratios[place], place))[:MOST_OUT]
 
 
 def _passed(section: CampaignSection, memories: Memories, cases: Sequence[int]) -> passed.Passed:
@@ -131,19 +136,19 @@ def _passed(section: CampaignSection, memories: Memories, cases: Sequence[int]) 
     experiment, cells = section.prepared.experiment, section.prepared.recording.cells
     count = max(passed.LEAST_INSTANTS, passed.instants(experiment) // len(cases))
     places = [passed.telling(experiment, memories.by_case[case], cells, count) for case in cases]
-    every = np.concatenate([memories.by_case[case][at] for case, at in zip(cases, places, strict=True)])
+    every = np.concatenate([memories.by_case[case][ticks] for case, ticks in zip(cases, places, strict=True)])
     return passed.Passed(
-        np.repeat(cases, [len(at) for at in places]),
+        np.repeat(cases, [len(ticks) for ticks in places]),
         np.array(memories.ticks)[np.concatenate(places)],
         {name: every[:, slot] for slot, name in enumerate(cells)},
     )
 
 
-def _warning(experiment: Experiment, found: passed.Lasting) -> Diagnostic:
+def _warning(experiment: Experiment, lasting: passed.Lasting) -> Diagnostic:
     """A warning about a lasting finding, in words."""
     hz = experiment.structure.schedule.base_hz
-    where = from_instants(experiment, found.case, float(found.at.tick[0]) / hz, found.until)
-    if not isinstance(found.fault, StepFault):
-        return loop_warning(experiment, found.fault, experiment.place, f"as it stands {where}")
-    better = passed.remedy_of(experiment, found)
-    return fault_warning(experiment, found.fault, better, experiment.place, f"reckoned {where}")
+    where = from_instants(experiment, lasting.case, float(lasting.at.tick[0]) / hz, lasting.until)
+    if not isinstance(lasting.fault, StepFault):
+        return loop_warning(experiment, lasting.fault, experiment.place, f"as it stands {where}")
+    better = passed.remedy_of(experiment, lasting)
+    return fault_warning(experiment, lasting.fault, better, experiment.place, f"reckoned {where}")

@@ -48,20 +48,20 @@ def judged_until_kept(count: int, judge: Callable[[int], JudgedDesign], least_ma
     Where many do not, the distance to the next that is judged doubles, since neighbours in the order are much alike;
     when one keeps it, those in between are judged by halving.
     """
-    found: dict[int, JudgedDesign] = {}
+    judged: dict[int, JudgedDesign] = {}
 
     def keeps(number: int) -> bool:
-        if number not in found:
-            found[number] = judge(number)
-        return found[number].keeps(least_margin)
+        if number not in judged:
+            judged[number] = judge(number)
+        return judged[number].keeps(least_margin)
 
     last, number, stride = -1, 0, 1
-    while number < count and len(found) < MOST_DESIGNS and not keeps(number):
+    while number < count and len(judged) < MOST_DESIGNS and not keeps(number):
         last, number, stride = number, min(number + stride, max(number + 1, count - 1)), 2 * stride
-    while number in found and found[number].keeps(least_margin) and number - last > 1 and len(found) < MOST_DESIGNS:
+    while number in judged and judged[number].keeps(least_margin) and number - last > 1 and len(judged) < MOST_DESIGNS:
         middle = (last + number) // 2
         last, number = (last, middle) if keeps(middle) else (middle, number)
-    return dict(sorted(found.items()))
+    return dict(sorted(judged.items()))
 
 
 def judged_design(prepared: engine.Prepared, cases: np.ndarray) -> JudgedDesign:

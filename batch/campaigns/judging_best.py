@@ -31,15 +31,15 @@ def judged_best(file: ArchiveFile, designs: Designs, order: np.ndarray, least_ma
         return engine.prepare(experiments[name])
 
     def judge(place: int) -> JudgedDesign:
-        pool, found = designs.pool, list[JudgedDesign]()
+        pool, judgements = designs.pool, list[JudgedDesign]()
         cases = np.flatnonzero(designs.of_case == order[place])
         for number in np.unique(pool.group_of[cases]).tolist():
             group = pool.groups[number]
             own = pool.position_of[cases[pool.group_of[cases] == number]]
             rows = np.searchsorted(experiments[group.name].cases.table, group.values("case")[own])
-            found.append(judged_design(prepared(group.name), rows))
-        known = [each for each in found if each.margins is not None]
-        return min(known, key=lambda each: each.margins.disk) if known else found[0]  # type: ignore[union-attr]
+            judgements.append(judged_design(prepared(group.name), rows))
+        known = [judgement for judgement in judgements if judgement.margins is not None]
+        return min(known, key=lambda judgement: judgement.margins.disk) if known else judgements[0]  # type: ignore[union-attr]
 
     judged = judged_until_kept(len(order), judge, least_margin)
     return {int(order[place]): design for place, design in judged.items()}

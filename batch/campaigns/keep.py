@@ -84,7 +84,7 @@ def kept_rows(word: str, experiments: Sequence[Experiment]) -> KeptRows:
         first = experiments[0].metrics
         return KeptRows(word, int(rest[0]), metric or (first[0].name if first else ""))
     near = difflib.get_close_matches(name, ROW_WORDS, n=1)
-    helps = [*(f"did you mean `{each}`?" for each in near if each != name), ROWS_HELP]
+    helps = [*(f"did you mean `{text}`?" for text in near if text != name), ROWS_HELP]
     raise Problem(error("E351", f"rows `{word}` is none of the words that say whose rows are kept", help=helps))
 
 
@@ -96,41 +96,41 @@ def as_list(words: str | int | Sequence[str | int]) -> list[str | int]:
 
 def keep(words: str | int | Sequence[str | int], experiments: Sequence[Experiment]) -> Keep:
     """Read one or several words of `--histories` (`WORDS`). Raises Problem E351."""
-    given = as_list(words)
-    found = Keep()
-    for word in given:
-        found = _with(found, word, experiments)
-    alone = [word for word in given if word in ("default", "all", "none")]
-    if alone and len(given) > 1:
-        raise Problem(error("E351", f"histories `{alone[0]}` stands alone, and not with {len(given) - 1} more"))
-    return found
+    word_list = as_list(words)
+    keep_rules = Keep()
+    for word in word_list:
+        keep_rules = _with(keep_rules, word, experiments)
+    alone = [word for word in word_list if word in ("default", "all", "none")]
+    if alone and len(word_list) > 1:
+        raise Problem(error("E351", f"histories `{alone[0]}` stands alone, and not with {len(word_list) - 1} more"))
+    return keep_rules
 
 
-def _with(found: Keep, word: str | int, experiments: Sequence[Experiment]) -> Keep:
+def _with(rules: Keep, word: str | int, experiments: Sequence[Experiment]) -> Keep:
     from dataclasses import replace
 
     if not isinstance(word, str):
-        return replace(found, cases=(*found.cases, word))
+        return replace(rules, cases=(*rules.cases, word))
     name, *rest = word.split(":")
     if word in ("default", "all", "none"):
-        return replace(found, default=word == "default", everything=word != "none")
+        return replace(rules, default=word == "default", everything=word != "none")
     if word == "failed":
-        return replace(found, failed=True)
+        return replace(rules, failed=True)
     if name == "every" and len(rest) == 1 and rest[0].isdecimal() and int(rest[0]) > 0:
-        return replace(found, every=(*found.every, min(int(rest[0]), 2**62)))
+        return replace(rules, every=(*rules.every, min(int(rest[0]), 2**62)))
     if name == "worst" and 1 <= len(rest) <= 2 and rest[0].isdecimal() and int(rest[0]) > 0:
         metric = rest[1] if len(rest) == 2 else ""
         _check_metric(metric, experiments)
-        return replace(found, worst=(*found.worst, (int(rest[0]), metric)))
+        return replace(rules, worst=(*rules.worst, (int(rest[0]), metric)))
     if word.startswith("#") or (word and all(c in "0123456789abcdef" for c in word)):
-        return replace(found, cases=(*found.cases, word))
+        return replace(rules, cases=(*rules.cases, word))
     near = [match for match in difflib.get_close_matches(name, SINGLE, n=1) if match != name]
-    helps = [*(f"did you mean `{each}`?" for each in near), f"what may be kept: {WORDS}"]
+    helps = [*(f"did you mean `{text}`?" for text in near), f"what may be kept: {WORDS}"]
     if "," in word:
         helps.insert(
             0,
             "several words are given one by one: `"
-            + " ".join(f"--histories {each.strip()}" for each in word.split(","))
+            + " ".join(f"--histories {part.strip()}" for part in word.split(","))
             + "`",
         )
     raise Problem(error("E351", f"histories `{word}` is none of the words that say what to keep", help=helps))
@@ -143,33 +143,33 @@ def _check_metric(metric: str, experiments: Sequence[Experiment]) -> None:
         raise Problem(error("E351", "there is no metric by which cases could be the worst", help=remedy))
     if metric and metric not in known:
         near = difflib.get_close_matches(metric, known, n=1)
-        helps = [*(f"did you mean `{each}`?" for each in near), f"metrics here: {', '.join(known)}"]
+        helps = [*(f"did you mean `{text}`?" for text in near), f"metrics here: {', '.join(known)}"]
         raise Problem(error("E351", f"no metric `{metric}` by which cases could be the worst", help=helps))
 
 
-def kept_before(found: Keep, experiment: Experiment, rows: CaseValues, named: np.ndarray) -> np.ndarray:
+def kept_before(rules: Keep, experiment: Experiment, rows: CaseValues, named: np.ndarray) -> np.ndarray:
     """Places in `rows` of the cases whose histories are kept whatever their results. named: rows of `found.cases`"""
-    if found.everything:
+    if rules.everything:
         return np.arange(len(rows))
-    kept = [places_among(rows, named[are_among(rows, named)])]
-    for piece in blocks(len(rows)) if found.every else ():
+    places = [places_among(rows, named[are_among(rows, named)])]
+    for piece in blocks(len(rows)) if rules.every else ():
         positions = np.asarray(experiment.cases.table[rows[piece]])
-        kept += [piece.start + np.flatnonzero(positions % every == 0) for every in found.every]
-    return distinct(np.concatenate(kept).astype(np.int64))
+        places += [piece.start + np.flatnonzero(positions % every == 0) for every in rules.every]
+    return distinct(np.concatenate(places).astype(np.int64))
 
 
-def worst_wanted(found: Keep, experiment: Experiment) -> dict[str, int]:
+def worst_wanted(rules: Keep, experiment: Experiment) -> dict[str, int]:
     """The number of worst cases by each metric whose histories are kept; the largest where several are asked for."""
     wanted: dict[str, int] = {}
-    for count, by in found.worst:
+    for count, by in rules.worst:
         metric = by or (experiment.metrics[0].name if experiment.metrics else "")
         wanted[metric] = max(count, wanted.get(metric, 0))
     return {use.name: wanted[use.name] for use in experiment.metrics if use.name in wanted}
 
 
-def kept_by_outcome(found: Keep, experiment: Experiment, results: CaseOutcomes) -> np.ndarray:
+def kept_by_outcome(rules: Keep, experiment: Experiment, results: CaseOutcomes) -> np.ndarray:
     """Places of the cases whose histories are kept because of their results. results: of all cases"""
-    kept = [results.worst(metric) for metric in worst_wanted(found, experiment)]
-    if found.failed:
-        kept.append(results.failed.select(np.arange(results.failed.set)))
-    return distinct(np.concatenate([np.zeros(0, np.int64), *kept]))
+    places = [results.worst(metric) for metric in worst_wanted(rules, experiment)]
+    if rules.failed:
+        places.append(results.failed.select(np.arange(results.failed.set)))
+    return distinct(np.concatenate([np.zeros(0, np.int64), *places]))

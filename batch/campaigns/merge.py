@@ -60,30 +60,32 @@ def merge(
     progress   told how many cases are written
     threads    that read shards and make what is written; None: one a processor
     """
-    kept = histories.rows if histories is not None else np.empty(0, np.int64)
-    places = places_among(values.rows, np.asarray(kept))
+    history_rows = histories.rows if histories is not None else np.empty(0, np.int64)
+    places = places_among(values.rows, np.asarray(history_rows))
     outcomes = CaseOutcomes(values.prepared.experiment)
     before: list[np.ndarray] = []
     ended: dict[int, tuple[int, str]] = {}
 
-    def made(first: int, outputs: np.ndarray, fates: dict[int, tuple[int, str]]) -> tuple[int, Run, Mapping[str, Any]]:
+    def block_results(
+        first: int, outputs: np.ndarray, fates: dict[int, tuple[int, str]]
+    ) -> tuple[int, Run, Mapping[str, Any]]:
         run = _results(values, first, outputs, None, fates)
         return first, run, writer.case_values(number, run)
 
     def shards(pool: ThreadPoolExecutor) -> Iterator[tuple[int, shard.Shard]]:
-        for at, found in shards_in_order(folder, values, pool):
-            if found.history is not None:
-                run = _results(values, at, found.outputs.copy(), found.history, dict(found.fates))
-                writer.put_signals(number, at, run)
-            yield at, found
+        for start, read_shard in shards_in_order(folder, values, pool):
+            if read_shard.history is not None:
+                run = _results(values, start, read_shard.outputs.copy(), read_shard.history, dict(read_shard.fates))
+                writer.put_signals(number, start, run)
+            yield start, read_shard
 
     def calls(pool: ThreadPoolExecutor) -> Iterator[Callable[[], tuple[int, Run, Mapping[str, Any]]]]:
         for first, outputs, fates in in_blocks(shards(pool)):
             again = np.flatnonzero((places >= first) & (places < first + len(outputs)))
-            here = places[again] - first
-            before.append(outputs[here])
-            ended.update({int(k): fates[int(c)] for k, c in zip(again, here, strict=True) if int(c) in fates})
-            yield partial(made, first, outputs, fates)
+            cases = places[again] - first
+            before.append(outputs[cases])
+            ended.update({int(k): fates[int(c)] for k, c in zip(again, cases, strict=True) if int(c) in fates})
+            yield partial(block_results, first, outputs, fates)
 
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         for first, run, found_values in ahead(pool, calls(pool), AHEAD):
@@ -93,16 +95,18 @@ def merge(
     if histories is not None:
         again = np.concatenate(before)
         first_kept = 0
-        for at, found in shards_in_order(folder, histories):
+        for start, read_shard in shards_in_order(folder, histories):
             # a case that gave nothing then has no history either: it is what was found of it first that counts
-            lost = {case - at: fate for case, fate in ended.items() if 0 <= case - at < len(found.outputs)}
-            known = {**found.fates, **lost}
-            _check_bits(histories, at, found.outputs, again[at : at + len(found.outputs)], known)
-            kept = np.array([case in lost or case not in found.fates for case in range(len(found.outputs))])
-            if kept.any():
-                run = _results(histories, at, found.outputs, found.history, known)
-                writer.put_signals(number, first_kept, run, kept)
-            first_kept += int(kept.sum())
+            lost = {case - start: fate for case, fate in ended.items() if 0 <= case - start < len(read_shard.outputs)}
+            known = {**read_shard.fates, **lost}
+            _check_bits(histories, start, read_shard.outputs, again[start : start + len(read_shard.outputs)], known)
+            history_rows = np.array(
+                [case in lost or case not in read_shard.fates for case in range(len(read_shard.outputs))]
+            )
+            if history_rows.any():
+                run = _results(histories, start, read_shard.outputs, read_shard.history, known)
+                writer.put_signals(number, first_kept, run, history_rows)
+            first_kept += int(history_rows.sum())
     return outcomes
 
 
@@ -116,20 +120,20 @@ def without_history(folder: Folder, values: CampaignSection, histories: Campaign
 def _alone(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, str]]:
     """Rows that could not be run, with the reasons; each has a shard of its own. If an earlier shard has the row too,
     that counts, as in `shards_in_order`: a worker that was thought dead may have finished."""
-    at = 0
+    end = 0
     for task in folder.named_tasks(section.number):
-        if task.cases == 1 and task.first >= at:
+        if task.cases == 1 and task.first >= end:
             with contextlib.suppress(shard.UnsoundShard, OSError):  # `pieces` meets it, too
                 for _, why in folder.read(section, task).fates.values():
                     yield int(section.rows[task.first]), why
-        at = max(at, task.last)
+        end = max(end, task.last)
 
 
 def results(folder: Folder, section: CampaignSection, most: Mapping[str, int] | None = None) -> CaseOutcomes:
     """The outcomes of all cases of a section, by which histories are chosen. most: as for `CaseOutcomes`"""
     outcomes = CaseOutcomes(section.prepared.experiment, most)
-    for at, found in shards_in_order(folder, section):
-        outcomes.add_run(_results(section, at, found.outputs, None, dict(found.fates)))
+    for start, read_shard in shards_in_order(folder, section):
+        outcomes.add_run(_results(section, start, read_shard.outputs, None, dict(read_shard.fates)))
     return outcomes
 
 
@@ -139,20 +143,20 @@ def shards_in_order(
     """The shards of a section in order, without cases of earlier ones, each with the place of its first case. pool:
     reads some in advance, unless they have histories, which would take much memory. Raises Missing."""
 
-    def read(task: Task, at: int) -> tuple[int, shard.Shard]:
+    def read(task: Task, end: int) -> tuple[int, shard.Shard]:
         try:
-            return at, _without(folder.read(section, task), at - task.first)
+            return end, _without(folder.read(section, task), end - task.first)
         except (shard.UnsoundShard, OSError) as reason:
             raise Missing(f"shard {task.name} {reason}") from reason
 
-    tasks, at = [], 0
+    tasks, end = [], 0
     for task in folder.named_tasks(section.number):
-        if task.last > at >= task.first:
-            tasks.append(partial(read, task, at))
-            at = task.last
+        if task.last > end >= task.first:
+            tasks.append(partial(read, task, end))
+            end = task.last
     yield from ahead(None if section.recorded else pool, tasks, AHEAD)
-    if at < len(section.rows):
-        raise Missing(f"no shard holds case {at:,} of {section.name}")
+    if end < len(section.rows):
+        raise Missing(f"no shard holds case {end:,} of {section.name}")
 
 
 def in_blocks(
@@ -162,10 +166,12 @@ def in_blocks(
     waiting: list[np.ndarray] = []
     fates: dict[int, tuple[int, str]] = {}
     first = held = 0
-    for at, found in shards:
-        fates |= {at - first + case: fate for case, fate in found.fates.items()}
-        waiting.append(found.outputs.copy() if found.history is not None else found.outputs)  # not the shard with it
-        held += len(found.outputs)
+    for start, read_shard in shards:
+        fates |= {start - first + case: fate for case, fate in read_shard.fates.items()}
+        waiting.append(
+            read_shard.outputs.copy() if read_shard.history is not None else read_shard.outputs
+        )  # not the shard with it
+        held += len(read_shard.outputs)
         while held >= BLOCK:
             outputs = np.concatenate(waiting)
             yield first, outputs[:BLOCK], {case: fate for case, fate in fates.items() if case < BLOCK}
@@ -179,11 +185,11 @@ def runs_in_blocks(folder: Folder, section: CampaignSection, threads: int | None
     """The results of all cases of a section in order, in blocks of `BLOCK`, each with the place of its first case.
     Raises Missing."""
 
-    def made(first: int, outputs: np.ndarray, fates: dict[int, tuple[int, str]]) -> tuple[int, Run]:
+    def block_results(first: int, outputs: np.ndarray, fates: dict[int, tuple[int, str]]) -> tuple[int, Run]:
         return first, _results(section, first, outputs, None, fates)
 
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        blocks = (partial(made, *block) for block in in_blocks(shards_in_order(folder, section, pool)))
+        blocks = (partial(block_results, *block) for block in in_blocks(shards_in_order(folder, section, pool)))
         yield from ahead(pool, blocks, AHEAD)
 
 
@@ -202,50 +208,50 @@ def ahead(pool: ThreadPoolExecutor | None, calls: Iterable[Callable[[], T]], mos
         while waiting:
             yield waiting.popleft().result()
     finally:
-        for each in waiting:
-            each.cancel()
+        for future in waiting:
+            future.cancel()
 
 
 def with_rows(folder: Folder, section: CampaignSection, places: np.ndarray, number: int) -> CampaignSection:
     """A section of some of another's cases, with shards of its own under this number. places: rising. Raises
     Missing."""
-    kept = replace(section, number=number, rows=np.asarray(section.rows[places]), memories=None)
+    new_section = replace(section, number=number, rows=np.asarray(section.rows[places]), memories=None)
     for task in folder.named_tasks(number):
         (folder.shards / task.name).unlink(missing_ok=True)
-    done = at = 0
+    done = end = 0
     for task in folder.named_tasks(section.number):
-        first, last = np.searchsorted(places, [max(task.first, at), task.last]).tolist()
-        at = max(at, task.last)  # each case counts once
+        first, last = np.searchsorted(places, [max(task.first, end), task.last]).tolist()
+        end = max(end, task.last)  # each case counts once
         if last <= first:
             continue
         try:
-            found = folder.read(section, task)
+            read_shard = folder.read(section, task)
         except (shard.UnsoundShard, OSError) as reason:
             raise Missing(f"shard {task.name} {reason}") from reason
         own = Task(number, first, last)
-        part = _part(found, places[first:last] - task.first, kept.key(first, last))
+        part = _part(read_shard, places[first:last] - task.first, new_section.key(first, last))
         shard.write(folder.shards / own.name, part)
         done += last - first
     if done < len(places):
         raise Missing(f"{len(places) - done:,} cases of {section.name} have no shard any more")
-    return kept
+    return new_section
 
 
-def _part(found: shard.Shard, cases: np.ndarray, key: str) -> shard.Shard:
+def _part(original: shard.Shard, cases: np.ndarray, key: str) -> shard.Shard:
     """Some cases of a shard as a new shard, without computing time, which stays with the original."""
-    history = None if found.history is None else found.history[cases]
+    history = None if original.history is None else original.history[cases]
     to = {case: place for place, case in enumerate(cases.tolist())}
-    fates = {to[case]: fate for case, fate in found.fates.items() if case in to}
-    return shard.Shard(key, found.outputs[cases], history, 0.0, fates)
+    fates = {to[case]: fate for case, fate in original.fates.items() if case in to}
+    return shard.Shard(key, original.outputs[cases], history, 0.0, fates)
 
 
-def _without(found: shard.Shard, first: int) -> shard.Shard:
+def _without(original: shard.Shard, first: int) -> shard.Shard:
     """A shard without its first cases."""
     if not first:
-        return found
-    history = None if found.history is None else found.history[first:]
-    fates = {case - first: fate for case, fate in found.fates.items() if case >= first}
-    return shard.Shard(found.key, found.outputs[first:], history, found.seconds, fates)
+        return original
+    history = None if original.history is None else original.history[first:]
+    fates = {case - first: fate for case, fate in original.fates.items() if case >= first}
+    return shard.Shard(original.key, original.outputs[first:], history, original.seconds, fates)
 
 
 def _results(
@@ -259,13 +265,15 @@ def _results(
     return engine.results(section.prepared, rows, history, outputs, fates)
 
 
-def _check_bits(section: CampaignSection, at: int, now: np.ndarray, before: np.ndarray, fates: Iterable[int]) -> None:
+def _check_bits(
+    section: CampaignSection, start: int, now: np.ndarray, before: np.ndarray, fates: Iterable[int]
+) -> None:
     """Check that a case run again for its history gave the same numbers; cases in `fates` gave none."""
     own = len(section.prepared.program.outputs)  # the last bits of linear answers depend on the processor
     now, before = np.ascontiguousarray(now[:, :own]), np.ascontiguousarray(before[:, :own])
     alike = ((now.view(np.int64) == before.view(np.int64)) | (np.isnan(now) & np.isnan(before))).all(axis=1)
     alike[list(fates)] = True
     if not alike.all():
-        case = section.prepared.experiment.cases.table[section.rows[at + int(np.argmin(alike))]]
+        case = section.prepared.experiment.cases.table[section.rows[start + int(np.argmin(alike))]]
         message = f"case #{case} of `{section.name}` gave other numbers when it was run again for its history"
         raise Problem(error("E352", message, help="a defect of MET, or of this machine's memory: please report it"))

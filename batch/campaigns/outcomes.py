@@ -113,7 +113,7 @@ class CaseOutcomes:
 
     def worst_finite(self) -> list[int]:
         """Places of the worst by each metric among those with a finite value."""
-        return [int(place) for found in self._finite.values() for place in found.places]
+        return [int(place) for worst in self._finite.values() for place in worst.places]
 
 
 class _Worst:

@@ -38,14 +38,18 @@ def default_output(
     So a case that is run again does not take its sweep's place. A deck of the standard library is called `<name>`.
     whole: how many cases there are of all that was asked for; None: of what is selected.
     """
-    asked = plan.selected
+    names_asked = plan.selected
     if experiments and not any(map(varies, plan.settings)):
         chosen = experiments_named(plan, experiments)
-        asked = tuple(experiments) if len(chosen) < len(plan.experiments) else plan.selected
-    names = [Path(plan.deck.strip("<>")).stem, *asked]
+        names_asked = tuple(experiments) if len(chosen) < len(plan.experiments) else plan.selected
+    names = [Path(plan.deck.strip("<>")).stem, *names_asked]
     count = sum(len(rows) for _, rows in selected)
     if count < (sum(experiment.cases.count for experiment, _ in selected) if whole is None else whole):
-        few = [int(position) for each, rows in selected for position in each.cases.table[rows]] if count <= 4 else []
+        few = (
+            [int(position) for experiment, rows in selected for position in experiment.cases.table[rows]]
+            if count <= 4
+            else []
+        )
         names.append("case" + "-".join(map(str, few)) if few else "cases")
     return Path(".".join([*names, "h5"]))
 
@@ -136,18 +140,18 @@ def check_room(output: Path, needed: int) -> None:
         raise Problem(error("E306", message, help=helps))
 
 
-def cannot_write(output: Path, reason: OSError, kept: str = "") -> Any:
-    """The error that a file cannot be written. kept: the part of the work that is kept, and its place; "" where none
-    is"""
+def cannot_write(output: Path, reason: OSError, kept_work: str = "") -> Any:
+    """The error that a file cannot be written. kept_work: the part of the work that is kept, and its place; "" where
+    none is"""
     why = outputs.refusal_text(reason)
     if reason.errno in (errno.EMFILE, errno.ENFILE):  # the name of the unopened file does not matter
-        return error("E305", f"cannot write {output}: {why}", help=f"{kept or 'nothing was kept'}; {more_files()}")
+        return error("E305", f"cannot write {output}: {why}", help=f"{kept_work or 'nothing was kept'}; {more_files()}")
     where = str(reason.filename) if isinstance(reason.filename, str | os.PathLike) else ""
     if where and Path(where).is_relative_to(beside(output)):  # the archive itself is not the obstacle
         why = f"{where}: {why}"
-    helps = kept or "nothing was kept; `-o FILE` names another place"
+    helps = kept_work or "nothing was kept; `-o FILE` names another place"
     if reason.errno in (errno.EEXIST, errno.EISDIR, errno.ENOTDIR):
-        helps = f"{kept or 'nothing was kept'}; move away what is in the way, or give another name with `-o`"
+        helps = f"{kept_work or 'nothing was kept'}; move away what is in the way, or give another name with `-o`"
     return error("E305", f"cannot write {output}: {why}", help=helps)
 
 

@@ -94,16 +94,16 @@ def perform(
     """
     values, key = resuming.as_begun(Folder(beside(campaign.output)), campaign, values_sections(campaign))
     campaign = resuming.settled(campaign, values)
-    there = resuming.finished_state(campaign, key)
-    if there == resuming.WHOLE and not fresh:
+    finished = resuming.finished_state(campaign, key)
+    if finished == resuming.WHOLE and not fresh:
         resuming.remove_leftovers(Folder(beside(campaign.output)), key)
         return Performed({}, whole=True)
-    if not there and not fresh and not together and not resuming.is_begun(Folder(beside(campaign.output)), key):
+    if not finished and not fresh and not together and not resuming.is_begun(Folder(beside(campaign.output)), key):
         resuming.guard(campaign)
     check_room(campaign.output, campaign.bytes_missing)
     values = [
-        each if part.open_ended else now
-        for part, each, now in zip(campaign.parts, values, instants.with_memories(values), strict=True)
+        section if part.open_ended else now
+        for part, section, now in zip(campaign.parts, values, instants.with_memories(values), strict=True)
     ]
     for value in values:
         linear_metrics.check(value.prepared)
@@ -115,10 +115,10 @@ def perform(
         raise Problem(busy(campaign.output)) from None
     except OSError as reason:
         raise Problem(cannot_write(campaign.output, reason)) from reason
-    if not fresh and there != resuming.WHOLE and resuming.finished_state(campaign, key) == resuming.WHOLE:
+    if not fresh and finished != resuming.WHOLE and resuming.finished_state(campaign, key) == resuming.WHOLE:
         folder.remove()  # another run has ended meanwhile
         return Performed({}, whole=True)
-    if there == resuming.DAMAGED and not fresh:
+    if finished == resuming.DAMAGED and not fresh:
         say(f"{campaign.output} is not as it was written: it is made again")
     work = _CampaignWork(campaign, folder, values, key, max_failures, progress, say, more)
     try:
@@ -138,8 +138,8 @@ def perform(
         work.leave("stopped")
         raise Problem(busy(campaign.output)) from None
     except OSError as reason:
-        kept = work.leave("stopped")
-        raise Problem(cannot_write(campaign.output, reason, kept)) from reason
+        kept_work = work.leave("stopped")
+        raise Problem(cannot_write(campaign.output, reason, kept_work)) from reason
     except BaseException:
         work.leave("stopped")
         raise
@@ -205,7 +205,7 @@ class _CampaignWork:
                 if together and left:
                     raise Stopped(f"{left:,} of {self.campaign.cases:,} cases are missing")
                 early = [value for value in self.values if self.campaign.parts[value.experiment].stops_early]
-                stops = {each.number: StoppingPoints(each) for each in early}
+                stops = {section.number: StoppingPoints(section) for section in early}
                 for number, points in stops.items():
                     points.read(self.folder)
                     driver.counts[number].failed = points.failed
@@ -275,8 +275,8 @@ class _CampaignWork:
             for value in self.values
         ]
         self.kept = [
-            now if each.number in stops or each.number in searches else each
-            for each, now in zip(self.kept, instants.with_memories(self.kept), strict=True)
+            now if section.number in stops or section.number in searches else section
+            for section, now in zip(self.kept, instants.with_memories(self.kept), strict=True)
         ]
         best = {number: [search.answer.case] for number, search in searches.items()}
         self.whole, notes = with_known_rows(self.campaign, self.kept, best)
@@ -287,10 +287,10 @@ class _CampaignWork:
         """Go on with the few cases whose rows are kept, and a summary of all, if a summary is asked for."""
         if self.campaign.kept_rows.all:
             return
-        kept, parts = [], []
+        sections, parts = [], []
         for part, section in zip(self.whole.parts, self.values, strict=True):
             self.reporter.begin(f"{section.name}, summing up", len(section.rows), 0, 0, "")
-            found = summarise(
+            summarised = summarise(
                 section,
                 merge.runs_in_blocks(self.folder, section, self._threads),
                 self.campaign.kept_rows,
@@ -298,28 +298,30 @@ class _CampaignWork:
                 progress=lambda cases: self.reporter.advance(cases, 0),
             )
             self.reporter.end()
-            self.summaries[section.experiment] = found
+            self.summaries[section.experiment] = summarised
             number = 2 * len(self.values) + section.number
-            kept.append(merge.with_rows(self.folder, section, found.places, number))
-            parts.append(replace(part, rows=kept[-1].rows))
-        self.kept, self.whole = kept, replace(self.campaign, parts=tuple(parts))
+            sections.append(merge.with_rows(self.folder, section, summarised.places, number))
+            parts.append(replace(part, rows=sections[-1].rows))
+        self.kept, self.whole = sections, replace(self.campaign, parts=tuple(parts))
 
     def _histories(self, driver: Driver) -> dict[int, CampaignSection]:
         """Run the second pass; its sections by experiment."""
-        found = {}
+        sections_again = {}
         for section in self.kept:
             histories = histories_section(self.whole, section, partial(self._results, section))
             if histories is not None:
-                self.sections[histories.number] = found[section.experiment] = histories
-        if found:
-            parts = [(self.campaign.parts[section.experiment], len(section.rows)) for section in found.values()]
+                self.sections[histories.number] = sections_again[section.experiment] = histories
+        if sections_again:
+            parts = [
+                (self.campaign.parts[section.experiment], len(section.rows)) for section in sections_again.values()
+            ]
             check_room(self.campaign.output, self.campaign.bytes_of(parts))
             resuming.describe(self.folder, self.campaign, self.sections.values(), self.key)
-            missing = [(section, driver.find(section)) for section in found.values()]
+            missing = [(section, driver.find(section)) for section in sections_again.values()]
             self._tell_found(first=False)
             for section, stretches in missing:
                 driver.run(section, stretches)
-        return found
+        return sections_again
 
     def _results(self, section: CampaignSection) -> CaseOutcomes:
         wanted = worst_wanted(self.campaign.keep, section.prepared.experiment)
@@ -331,7 +333,7 @@ class _CampaignWork:
 
         parts = []
         for part, values in zip(self.whole.parts, self.kept, strict=True):
-            kept = part.kept
+            history_places = part.kept
             if values.experiment in histories:
                 rows = np.asarray(histories[values.experiment].rows)
                 lost = merge.without_history(self.folder, values, histories[values.experiment])
@@ -339,13 +341,13 @@ class _CampaignWork:
                     case = part.experiment.cases.table[row]
                     again = f"`met run {quoted(self.campaign.output)} --case '#{case}'` tries again"
                     self._note(f"no history of case #{case} of `{values.name}` is kept: {why}; {again}")
-                kept = places_among(part.rows, rows[~np.isin(rows, list(lost))])
+                history_places = places_among(part.rows, rows[~np.isin(rows, list(lost))])
             program = values.prepared
             parts.append(
                 ArchivePart(
                     part.experiment,
                     part.rows,
-                    kept,
+                    history_places,
                     part.single,
                     program.code_key,
                     program.result_keys,
@@ -416,12 +418,12 @@ class _CampaignWork:
         if len(places):
             own = {use.name for use in experiment.structure.metrics}
             named = writer.groups[number].layout.role("metric")
-            names = {each.key: each.name for each in named if each.key in own}
+            names = {variable.key: variable.name for variable in named if variable.key in own}
             self.reporter.begin(f"{section.name}, with shorter steps", len(FACTORS) * len(places), 0, 0, "")
-            found = verify(
+            verified = verify(
                 experiment, section.rows[places], names, self._threads, lambda runs: self.reporter.advance(runs, 0)
             )
-            writer.put_verified(number, found)
+            writer.put_verified(number, verified)
 
     def _timings(self) -> list[dict[str, Any]]:
         counts = self.driver.counts if self.driver else {}
@@ -457,6 +459,10 @@ class _CampaignWork:
 
 
 def _stopped(code: str, message: str, work: _CampaignWork, how: str = "") -> Diagnostic:
-    kept = work.folder.path.exists()
-    helps = f"what is done is kept in {work.folder.path}: the same command goes on{how}" if kept else "nothing was kept"
+    has_folder = work.folder.path.exists()
+    helps = (
+        f"what is done is kept in {work.folder.path}: the same command goes on{how}"
+        if has_folder
+        else "nothing was kept"
+    )
     return error(code, message, help=helps)

@@ -53,8 +53,8 @@ def read_points(path: Path, experiment: Experiment) -> np.ndarray:
 def with_cases(experiment: Experiment, table: np.ndarray) -> Experiment:
     """The experiment with these cases, [case, coordinate], SI."""
     coordinates = tuple(
-        replace(each, values=np.ascontiguousarray(column))
-        for each, column in zip(experiment.cases.coordinates, table.T, strict=True)
+        replace(coordinate, values=np.ascontiguousarray(column))
+        for coordinate, column in zip(experiment.cases.coordinates, table.T, strict=True)
     )
     return replace(experiment, cases=replace(experiment.cases, count=len(table), coordinates=coordinates))
 

@@ -41,20 +41,20 @@ DONE = "done"
 FRAME = re.compile(r'^  File "(?P<file>.+)", line (?P<line>\d+) in (?P<name>.+)$', re.MULTILINE)
 
 
-def rehearse(timeout: float | None, **asked: Any) -> None:
+def rehearse(timeout: float | None, **question: Any) -> None:
     """Have all models of a deck or plan recorded in another process. Raises Problem E217 where that does not end well.
 
     timeout  s of a case without any progress; None: it may take for ever
-    asked    as `batch.campaigns.plans.read_plan` takes it
+    question as `batch.campaigns.plans.read_plan` takes it
     """
     if all(point.package == PACKAGE for group in models.GROUPS.values() for point in offered(group.entry_points)):
         return
     limit = None if timeout is None else max(timeout, LEAST_SECONDS)
-    with tempfile.TemporaryFile() as words, tempfile.TemporaryFile() as told:
+    with tempfile.TemporaryFile() as words, tempfile.TemporaryFile() as progress_file:
         process = subprocess.Popen(
             interpreter.command("batch.campaigns.rehearsal"),
             stdin=subprocess.PIPE,
-            stdout=told,
+            stdout=progress_file,
             stderr=words,
             env=interpreter.environment(),
             start_new_session=True,
@@ -62,15 +62,15 @@ def rehearse(timeout: float | None, **asked: Any) -> None:
         try:
             with suppress(BrokenPipeError):
                 assert process.stdin is not None
-                process.stdin.write(json.dumps(asked).encode())
+                process.stdin.write(json.dumps(question).encode())
                 process.stdin.close()
             how = _ended(process, limit)
         finally:
             process.kill()
             process.wait()
-        at, said = (_all_of(file).splitlines() for file in (told, words))
-        if at[-1:] != [DONE]:
-            raise _taken_along(at[-1] if at else "", how, "\n".join(said))
+        progress_lines, error_lines = (_all_of(file).splitlines() for file in (progress_file, words))
+        if progress_lines[-1:] != [DONE]:
+            raise _taken_along(progress_lines[-1] if progress_lines else "", how, "\n".join(error_lines))
 
 
 def _ended(process: subprocess.Popen[bytes], limit: float | None) -> str:
@@ -93,20 +93,20 @@ def _all_of(file: Any) -> str:
     return str(file.read().decode("utf-8", "replace"))
 
 
-def _taken_along(at: str, how: str, said: str) -> Problem:
-    """The error about models that end the process. at: the recorded experiment, empty while the deck was read; said: a
-    traceback of `faulthandler`, if any"""
-    what = f"of `{at}`" if at else "of the deck"
-    found = next((frame for frame in FRAME.finditer(said) if _is_a_models(frame["file"])), None)
+def _taken_along(experiment: str, how: str, error_text: str) -> Problem:
+    """The error about models that end the process. experiment: the recorded one, empty while the deck was read;
+    error_text: a traceback of `faulthandler`, if any"""
+    what = f"of `{experiment}`" if experiment else "of the deck"
+    frame_match = next((frame for frame in FRAME.finditer(error_text) if _is_a_models(frame["file"])), None)
     helps = ("mend the model, or tell its author", "without `--processes` or `--timeout` it would take `met` along")
-    if found is None:
+    if frame_match is None:
         message = f"the models {what} cannot be recorded: a process that tried it {how}, and nothing says where"
         return Problem(error("E217", message, help=helps))
-    file, line = found["file"], int(found["line"])
+    file, line = frame_match["file"], int(frame_match["line"])
     text = linecache.getline(file, line).rstrip()
     indent = len(text) - len(text.lstrip())
     place = Place(file, line, indent + 1, max(len(text) - indent, 1))
-    message = f"a model {what} cannot be recorded: in `{found['name']}`, a process that tried it {how}"
+    message = f"a model {what} cannot be recorded: in `{frame_match['name']}`, a process that tried it {how}"
     sources = {file: "".join(linecache.getlines(file))}
     return Problem(error("E217", message, Label(place, "it was here"), help=helps), sources)
 
@@ -150,12 +150,12 @@ def main(lines: Sequence[str]) -> None:
         os.write(out, f"{word}\n".encode())
 
     with suppress(Exception):
-        asked = json.loads("".join(lines))
-        if names_archive(asked["source"]):
-            with ArchiveFile(asked["source"]) as file:
+        question = json.loads("".join(lines))
+        if names_archive(question["source"]):
+            with ArchiveFile(question["source"]) as file:
                 plan = file.plan()
         else:
-            plan = read_plan(**asked, quiet=True)
+            plan = read_plan(**question, quiet=True)
         for experiment in plan.experiments:
             say(experiment.name)
             prepare(experiment).recording  # noqa: B018 - what a model does is done while it is recorded

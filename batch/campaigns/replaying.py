@@ -78,20 +78,20 @@ def replay(
             raise Problem(error("E357", f"no case of {file.path} failed: there is nothing to run again"))
         plan = file.plan()
         picked_rows = []
-        kept: dict[str, np.ndarray] = {}
+        history_rows: dict[str, np.ndarray] = {}
         for experiment in plan.experiments:
             if experiment.name in rows:
                 table = experiment.cases.table
                 wanted = np.searchsorted(table, sorted(rows[experiment.name]))
                 picked_rows.append((experiment, np.asarray(wanted, dtype=np.int64)))
                 if everything:
-                    kept[experiment.name] = np.searchsorted(table, positions[experiment.name])
+                    history_rows[experiment.name] = np.searchsorted(table, positions[experiment.name])
     few = sorted({position for positions in rows.values() for position in positions})
     if everything:
         word = "again"
     else:
         word = "failed" if failed else "case" + "-".join(map(str, few)) if len(few) <= MOST_IN_NAME else "cases"
-    return Replay(Path(archive), plan, tuple(picked_rows), word, kept if everything else None, tuple(decided))
+    return Replay(Path(archive), plan, tuple(picked_rows), word, history_rows if everything else None, tuple(decided))
 
 
 def _of_summary(file: ArchiveFile, names: Sequence[str], cases: Sequence[str]) -> Replay:
@@ -99,9 +99,9 @@ def _of_summary(file: ArchiveFile, names: Sequence[str], cases: Sequence[str]) -
     plan, wanted = file.plan(), {group.name for group in groups_named(file, names)}
     if not cases:
         raise Problem(error("E357", f"which cases of {file.path} are to be run again?", help="`--case '#7'` says it"))
-    asked = [experiment for experiment in plan.experiments if experiment.name in wanted]
-    picked = tuple((each, np.asarray(rows)) for each, rows in choosing.select_rows(asked, cases))
-    few = sorted({int(each.cases.table[row]) for each, rows in picked for row in rows.tolist()})
+    experiments = [experiment for experiment in plan.experiments if experiment.name in wanted]
+    picked = tuple((experiment, np.asarray(rows)) for experiment, rows in choosing.select_rows(experiments, cases))
+    few = sorted({int(experiment.cases.table[row]) for experiment, rows in picked for row in rows.tolist()})
     word = "case" + "-".join(map(str, few)) if len(few) <= MOST_IN_NAME else "cases"
     return Replay(file.path, plan, picked, word)
 
@@ -120,9 +120,9 @@ def differences(before: str | Path, after: str | Path) -> list[str]:
         for new in new_file.groups:
             old = groups[new.name]
             places = np.searchsorted(old.values("case"), new.values("case"))
-            there = are_among(old.values("case"), new.values("case"))  # a summary has few rows
-            places = np.where(there, places, 0)
-            ran = (old.at("status", places) < 2) & there
+            in_old = are_among(old.values("case"), new.values("case"))  # a summary has few rows
+            places = np.where(in_old, places, 0)
+            ran = (old.at("status", places) < 2) & in_old
             out += _signals(old, new, places, ran)
             names = ["case_id", "status", "n_valid", *(variable.name for variable in new.role("metric"))]
             for name in names:
@@ -141,8 +141,8 @@ def in_both(before: str | Path, after: str | Path) -> tuple[int, int]:
     """The number of the second archive's cases that have a row in the first, and of all of its cases."""
     with ArchiveFile(before) as old_file, ArchiveFile(after) as new_file:
         known = {group.name: group.values("case") for group in old_file.groups}
-        found = [are_among(known[group.name], group.values("case")) for group in new_file.groups]
-    return sum(int(each.sum()) for each in found), sum(map(len, found))
+        in_old = [are_among(known[group.name], group.values("case")) for group in new_file.groups]
+    return sum(int(mask.sum()) for mask in in_old), sum(map(len, in_old))
 
 
 def _signals(old: ArchiveGroup, new: ArchiveGroup, places: np.ndarray, ran: np.ndarray) -> list[str]:

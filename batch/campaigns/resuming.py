@@ -42,8 +42,8 @@ MOST_CHANGES = 8
 def campaign_key(values: Sequence[CampaignSection]) -> str:
     """A digest of everything that decides the numbers of a campaign: code and inputs. The choice of cases that are run
     again for their histories may change meanwhile."""
-    told = [[section.name, section.key(), *_search_of(section)] for section in values]
-    return hashlib.sha256(json.dumps(told).encode()).hexdigest()
+    keys = [[section.name, section.key(), *_search_of(section)] for section in values]
+    return hashlib.sha256(json.dumps(keys).encode()).hexdigest()
 
 
 def _search_of(section: CampaignSection) -> list[Any]:
@@ -99,11 +99,11 @@ def finished_state(campaign: Campaign, key: str) -> str:
     DAMAGED where it has changed; else ""."""
     output = campaign.output
     try:
-        told = read_json(sidecar_path(output))
-        asked = {"campaign": key, "asked_sha256": _asked_sum(campaign)}
-        if not isinstance(told, dict) or any(told.get(name) != value for name, value in asked.items()):
+        sidecar = read_json(sidecar_path(output))
+        wanted = {"campaign": key, "asked_sha256": _asked_sum(campaign)}
+        if not isinstance(sidecar, dict) or any(sidecar.get(name) != value for name, value in wanted.items()):
             return ""
-        return WHOLE if told.get("archive_sha256") == _file_sum(output) else DAMAGED
+        return WHOLE if sidecar.get("archive_sha256") == _file_sum(output) else DAMAGED
     except (OSError, ValueError):
         return ""
 
@@ -112,29 +112,34 @@ def guard(campaign: Campaign) -> None:
     """Refuse to replace a finished archive of another campaign that took long, or was measured on motor beds. Raises
     Problem E353."""
     try:
-        told = read_json(sidecar_path(campaign.output))
-        seconds = min(MOST_SECONDS, sum(float(each["seconds"]) for each in told["experiments"]))
-        measured = bool(told.get("beds"))
+        sidecar = read_json(sidecar_path(campaign.output))
+        seconds = min(MOST_SECONDS, sum(float(record["seconds"]) for record in sidecar["experiments"]))
+        measured = bool(sidecar.get("beds"))
     except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return
     if (seconds < GUARDED_SECONDS and not measured) or not campaign.output.exists():
         return
     try:
         with ArchiveFile(campaign.output) as file:
-            found = changes(file.plan(as_written=True), campaign.plan)
+            differences = changes(file.plan(as_written=True), campaign.plan)
     except Problem:
-        found = ["it cannot be read any more"]
+        differences = ["it cannot be read any more"]
     what = "driven on motor beds" if measured else f"{duration(seconds)} of computing"
     message = f"{campaign.output} holds another campaign, {what}, and is left as it is"
-    raise Problem(error("E353", message, help=changed_since(found or ["what is asked for (`--case`, `--histories`)"])))
+    raise Problem(
+        error("E353", message, help=changed_since(differences or ["what is asked for (`--case`, `--histories`)"]))
+    )
 
 
-def changed_since(found: Sequence[str]) -> list[str]:
+def changed_since(differences: Sequence[str]) -> list[str]:
     """Help for an error: the changes, and the remedies."""
-    most = [*found[:MOST_CHANGES], *([f"and {len(found) - MOST_CHANGES} more"] if len(found) > MOST_CHANGES else [])]
+    most = [
+        *differences[:MOST_CHANGES],
+        *([f"and {len(differences) - MOST_CHANGES} more"] if len(differences) > MOST_CHANGES else []),
+    ]
     return [
         "changed since: " + most[0],
-        *(f"               {each}" for each in most[1:]),
+        *(f"               {text}" for text in most[1:]),
         "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it",
     ]
 
@@ -176,9 +181,9 @@ def take_up(
     if not held and not folder.submitted and not folder.recorded:  # the earlier run had done nothing
         folder.empty()
         return
-    told = folder.described()
-    if told["key"] != key:
-        raise Problem(_of_another(folder, campaign, values, told))
+    description = folder.described()
+    if description["key"] != key:
+        raise Problem(_of_another(folder, campaign, values, description))
 
 
 def describe(folder: Folder, campaign: Campaign, sections: Iterable[CampaignSection], key: str) -> None:
@@ -199,45 +204,47 @@ def describe(folder: Folder, campaign: Campaign, sections: Iterable[CampaignSect
 
 def described(folder: Folder) -> Campaign:
     """The campaign of a folder, as it was written down. Raises Problem."""
-    told = folder.described()
-    if beside(folder.path.with_name(told["archive"])).name != folder.path.name:
-        message = f"{folder.path} says that it fills {told['archive']}, which has another folder"
+    description = folder.described()
+    if beside(folder.path.with_name(description["archive"])).name != folder.path.name:
+        message = f"{folder.path} says that it fills {description['archive']}, which has another folder"
         raise Problem(error("E350", message, help="give the folder the name back that it had"))
     plan = folder.plan()
     first = sorted((section for section in folder.sections().values()), key=lambda section: section.number)
-    selected = [(each.prepared.experiment, each.rows) for each in first[: len(plan.experiments)]]
+    selected = [(section.prepared.experiment, section.rows) for section in first[: len(plan.experiments)]]
     return prepare(
         plan,
-        output=folder.path.with_name(told["archive"]),
+        output=folder.path.with_name(description["archive"]),
         selected=selected,
-        histories=told["histories"],
-        float32=told["float32"],
-        verify=told.get("verify", "auto"),
-        rows=told.get("rows", "all"),
+        histories=description["histories"],
+        float32=description["float32"],
+        verify=description.get("verify", "auto"),
+        rows=description.get("rows", "all"),
     )
 
 
-def _of_another(folder: Folder, campaign: Campaign, values: Sequence[CampaignSection], told: dict[str, Any]) -> Any:
-    done = sum(task.cases for number in range(len(told["sections"])) for task in folder.named_tasks(number))
+def _of_another(
+    folder: Folder, campaign: Campaign, values: Sequence[CampaignSection], description: dict[str, Any]
+) -> Any:
+    done = sum(task.cases for number in range(len(description["sections"])) for task in folder.named_tasks(number))
     try:
-        found = changes(folder.plan(), campaign.plan)
+        differences = changes(folder.plan(), campaign.plan)
     except Problem:
-        found = ["its plan cannot be read any more"]
-    if not found:
-        found = _other_work(campaign, values, told)
+        differences = ["its plan cannot be read any more"]
+    if not differences:
+        differences = _other_work(campaign, values, description)
     message = f"{folder.path} holds {done:,} cases of another campaign, and is left as it is"
-    return error("E353", message, help=changed_since(found))
+    return error("E353", message, help=changed_since(differences))
 
 
-def _other_work(campaign: Campaign, values: Sequence[CampaignSection], told: dict[str, Any]) -> list[str]:
+def _other_work(campaign: Campaign, values: Sequence[CampaignSection], description: dict[str, Any]) -> list[str]:
     """Differences besides the plan between a campaign and the one in its folder."""
-    before = told["sections"][: len(values)]
-    if [len(section.rows) for section in values] != [each.get("cases") for each in before]:
+    before = description["sections"][: len(values)]
+    if [len(section.rows) for section in values] != [section.get("cases") for section in before]:
         return ["other cases were asked for"]
-    if [section.code for section in values] != [each.get("code") for each in before]:
-        return [f"MET's own models or code (it was begun by version {told.get('met')})"]
+    if [section.code for section in values] != [section.get("code") for section in before]:
+        return [f"MET's own models or code (it was begun by version {description.get('met')})"]
     if [(section.recorded, section.single) for section in values] != [
-        (each.get("recorded"), each.get("single")) for each in before
+        (section.get("recorded"), section.get("single")) for section in before
     ]:
         return ["what is kept of histories (`--histories`, `--float32`)"]
     return ["which cases were asked for, or whose histories are kept (`--case`, `--histories`)"]

@@ -37,9 +37,9 @@ READS = 2
 def check_first_generation(experiment: Experiment) -> None:
     """Refuse a plan of a search whose cases are not the search's first generation. Raises Problem E302."""
     assert experiment.search is not None
-    asked = search_method(experiment.search).ask()
+    first_generation = search_method(experiment.search).ask()
     table = np.stack([np.asarray(coordinate.values) for coordinate in experiment.cases.coordinates], axis=1)
-    if asked.shape != table.shape or not (asked == table).all():
+    if first_generation.shape != table.shape or not (first_generation == table).all():
         message = f"the cases of `{experiment.name}` in this plan are not those that it begins with"
         helps = "they were changed, or are of another version of MET: make the plan again from its deck"
         raise Problem(error("E302", message, help=helps))
@@ -98,12 +98,12 @@ class CampaignSearch:
     def grow(self) -> tuple[int, int] | None:
         """Ask for the next generation: the stretch of its cases; None when the search has ended, and the section is
         whole."""
-        asked, first = self._method.ask(), len(self._table)
-        if not len(asked):
+        generation, first = self._method.ask(), len(self._table)
+        if not len(generation):
             self._complete()
             return None
-        self._table = np.concatenate([self._table, asked])
-        self._generations.append(len(asked))
+        self._table = np.concatenate([self._table, generation])
+        self._generations.append(len(generation))
         self.section = grown(self.section, self._table)
         return first, len(self._table)
 
@@ -135,9 +135,9 @@ class CampaignSearch:
         where it is not wanted."""
         disks = np.full(len(run.case), np.inf)
         rows, least = run.case[wanted].tolist(), aimed_at(self.search.least_margin)
-        found = margins_at_start(self.section.prepared.experiment, rows, least)
-        if found is not None:
-            disks[wanted] = found
+        margins = margins_at_start(self.section.prepared.experiment, rows, least)
+        if margins is not None:
+            disks[wanted] = margins
         return disks
 
     @property
@@ -213,33 +213,33 @@ def _held(
 
     tell  whether what is found counts as done before, and what is no shard is told of
     """
-    count, found = driver.counts[section.number], list[tuple[Task, shard.Shard]]()
+    count, shards = driver.counts[section.number], list[tuple[Task, shard.Shard]]()
     for task in driver.folder.named_tasks(section.number, (first, last)):
         try:
-            found.append((task, driver.folder.read(section, task)))
+            shards.append((task, driver.folder.read(section, task)))
         except (shard.UnsoundShard, OSError) as reason:
             why = str(reason) if isinstance(reason, shard.UnsoundShard) else f"cannot be read: {reason.strerror}"
             driver.told.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
             driver.folder.remove_shard(task)
-    at, kept = first, list[tuple[Task, shard.Shard]]()
-    for task, each in found:
-        if task.last > at:
-            kept.append((task, each))
+    end, new_shards = first, list[tuple[Task, shard.Shard]]()
+    for task, held_shard in shards:
+        if task.last > end:
+            new_shards.append((task, held_shard))
             if tell:
-                count.done += task.last - max(at, task.first)
-                count.failed += each.failed_from(max(0, at - task.first))
-                count.seconds += each.seconds
-            at = task.last
-    inside = [Task(task.section, task.first - first, task.last - first) for task, _ in kept]
-    return kept, [(first + a, first + b) for a, b in uncovered(inside, last - first)]
+                count.done += task.last - max(end, task.first)
+                count.failed += held_shard.failed_from(max(0, end - task.first))
+                count.seconds += held_shard.seconds
+            end = task.last
+    inside = [Task(task.section, task.first - first, task.last - first) for task, _ in new_shards]
+    return new_shards, [(first + a, first + b) for a, b in uncovered(inside, last - first)]
 
 
 def _results(section: CampaignSection, first: int, last: int, shards: Held) -> Run:
     """The results of a stretch of cases from its shards; a case counts once, as it is merged."""
-    outputs, fates, at = list[np.ndarray](), dict[int, tuple[int, str]](), first
-    for task, each in shards:
-        skipped = max(0, at - task.first)
-        outputs.append(each.outputs[skipped:])
-        fates |= {task.first + case - first: fate for case, fate in each.fates.items() if case >= skipped}
-        at = task.last
+    outputs, fates, end = list[np.ndarray](), dict[int, tuple[int, str]](), first
+    for task, held_shard in shards:
+        skipped = max(0, end - task.first)
+        outputs.append(held_shard.outputs[skipped:])
+        fates |= {task.first + case - first: fate for case, fate in held_shard.fates.items() if case >= skipped}
+        end = task.last
     return engine.results(section.prepared, np.arange(first, last), None, np.concatenate(outputs), fates)

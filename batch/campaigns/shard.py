@@ -104,15 +104,15 @@ def read(path: Path, most: int | None = None) -> Shard:
     body = memoryview(data)[:-SUM_BYTES]
     if SUM(body).digest() != data[-SUM_BYTES:]:
         raise UnsoundShard("is not what was written: its checksum differs")
-    at = len(MAGIC) + 8
-    end = at + int.from_bytes(data[len(MAGIC) : at], "little")
+    head_start = len(MAGIC) + 8
+    end = head_start + int.from_bytes(data[len(MAGIC) : head_start], "little")
     try:
-        return _made(parse_json(bytes(body[at:end])), data, end)
+        return _shard_of(parse_json(bytes(body[head_start:end])), data, end)
     except (ValueError, LookupError, TypeError, AttributeError) as reason:
         raise UnsoundShard("has a head that does not go with what follows it") from reason
 
 
-def _made(head: Any, data: bytearray, at: int) -> Shard:
+def _shard_of(head: Any, data: bytearray, start: int) -> Shard:
     """The shard with this head, whose arrays begin at a place of its file. Raises ValueError and the like for an
     invalid head, whose checksum may be right if it was forged."""
     arrays = {}
@@ -120,12 +120,12 @@ def _made(head: Any, data: bytearray, at: int) -> Shard:
         if not all(map(is_count, shape)):
             raise ValueError(shape)
         size = math.prod(shape)
-        if at + size * TYPES[kind].itemsize > len(data) - SUM_BYTES:
+        if start + size * TYPES[kind].itemsize > len(data) - SUM_BYTES:
             raise ValueError(shape)
-        arrays[name] = np.frombuffer(data, TYPES[kind], size, at).reshape(shape)
-        at += size * TYPES[kind].itemsize
+        arrays[name] = np.frombuffer(data, TYPES[kind], size, start).reshape(shape)
+        start += size * TYPES[kind].itemsize
     outputs, history, seconds = arrays.pop("outputs"), arrays.pop("history", None), float(head["seconds"])
-    if arrays or at != len(data) - SUM_BYTES or outputs.ndim != 2 or outputs.dtype != TYPES["f8"] or seconds < 0.0:
+    if arrays or start != len(data) - SUM_BYTES or outputs.ndim != 2 or outputs.dtype != TYPES["f8"] or seconds < 0.0:
         raise ValueError(head)
     if history is not None and (history.ndim != 3 or len(history) != len(outputs)):
         raise ValueError(head)

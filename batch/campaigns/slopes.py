@@ -40,14 +40,14 @@ class TuningSlopes:
         """The slopes of these cases, or the reason why there are none (`SlopeSource.slopes`)."""
         experiment = with_cases(self._experiment, cases)
         try:
-            found = self._program.of(range(len(cases)), self._metrics, experiment=experiment, edges=False)
+            case_slopes = self._program.of(range(len(cases)), self._metrics, experiment=experiment, edges=False)
         except Problem as refused:
             return refused.diagnostics[0].message
         done, why_not = np.ones(len(cases), dtype=bool), dict[str, str]()
-        for (case, metric, _), why in found.why_not.items():
-            name = found.metrics[metric]
+        for (case, metric, _), why in case_slopes.why_not.items():
+            name = case_slopes.metrics[metric]
             done[case] &= why != FAILED
             why_not.setdefault(name, f"`{name}`: {why}")
-        values = dict(zip(found.metrics, found.value.T, strict=True))
-        slopes = {name: found.slope[:, number] for number, name in enumerate(found.metrics)}
+        values = dict(zip(case_slopes.metrics, case_slopes.value.T, strict=True))
+        slopes = {name: case_slopes.slope[:, number] for number, name in enumerate(case_slopes.metrics)}
         return CaseSlopes(done, values, slopes, why_not)

@@ -105,24 +105,24 @@ class Reporter:
 
 def status_records(folder: Folder) -> list[dict[str, Any]]:
     """The last status of each process that works or worked in a folder, the latest first."""
-    found = []
+    records = []
     for path in folder.path.glob("status*.json"):
         try:
             data = read_json(path)
         except (OSError, ValueError):
             continue
         if isinstance(data, dict) and all(isinstance(data.get(name), kind) for name, kind in TYPES.items()):
-            found.append({**data, "name": path.name.removeprefix("status").removesuffix(".json").strip(".")})
-    return sorted(found, key=lambda each: -each["updated"])
+            records.append({**data, "name": path.name.removeprefix("status").removesuffix(".json").strip(".")})
+    return sorted(records, key=lambda record: -record["updated"])
 
 
 def find_folder(name: str) -> Folder | None:
     """The folder that a user means: by its own name, or its archive's; None where there is none. Raises Problem for an
     unsound archive."""
     path = Path(name)
-    for each in (path, beside(path) if path.name else path):
-        if Folder(each).exists():
-            return Folder(each)
+    for folder in (path, beside(path) if path.name else path):
+        if Folder(folder).exists():
+            return Folder(folder)
     return None
 
 
@@ -131,15 +131,15 @@ def report(folder: Folder, now: float) -> dict[str, Any]:
     work."""
     sections = []
     told_here = folder.described()
-    for each in told_here["sections"]:
-        left = sum(last - first for first, last in uncovered(folder.named_tasks(each["number"]), each["cases"]))
+    for section in told_here["sections"]:
+        left = sum(last - first for first, last in uncovered(folder.named_tasks(section["number"]), section["cases"]))
         sections.append(
             {
-                "name": each["name"],
-                "cases": each["cases"],
-                "done": each["cases"] - left,
-                "again": each["again"],
-                "stops_early": each.get("stops_early", False),
+                "name": section["name"],
+                "cases": section["cases"],
+                "done": section["cases"] - left,
+                "again": section["again"],
+                "stops_early": section.get("stops_early", False),
             }
         )
     workers = []
@@ -179,31 +179,31 @@ def lines(data: dict[str, Any]) -> list[str]:
     """The progress of a campaign in lines, for people."""
     from ic.printing.columns import columns
 
-    first = [each for each in data["sections"] if not each["again"]]
-    cases, done = (sum(each[name] for each in first) for name in ("cases", "done"))
-    early = any(each["stops_early"] for each in first)
+    first = [section for section in data["sections"] if not section["again"]]
+    cases, done = (sum(section[name] for section in first) for name in ("cases", "done"))
+    early = any(section["stops_early"] for section in first)
     out = [f"{data['folder']}: {done:,} of {'at most ' * early}{cases:,} cases are done"]
     rows = [
         [
-            each["name"] + (", again for histories" if each["again"] else ""),
-            f"{each['done']:,}",
-            f"of {'at most ' * each['stops_early']}{each['cases']:,}",
+            section["name"] + (", again for histories" if section["again"] else ""),
+            f"{section['done']:,}",
+            f"of {'at most ' * section['stops_early']}{section['cases']:,}",
         ]
-        for each in data["sections"]
+        for section in data["sections"]
     ]
     out += columns(rows, right=(1, 2)) if len(rows) > 1 else []
-    working = [each for each in data["workers"] if each["state"] in AT_WORK]
-    rates = [each["cases_per_s"] for each in working if each["cases_per_s"]]
+    working = [worker for worker in data["workers"] if worker["state"] in AT_WORK]
+    rates = [worker["cases_per_s"] for worker in working if worker["cases_per_s"]]
     if rates and cases > done:
         rate = sum(rates)
-        shown = f"{rate:,.3g}" if rate < 1000 else f"{rate:,.0f}"
-        out.append(f"  {shown} cases/s, {'at most ' * early}{duration((cases - done) / rate)} left")
+        rate_text = f"{rate:,.3g}" if rate < 1000 else f"{rate:,.0f}"
+        out.append(f"  {rate_text} cases/s, {'at most ' * early}{duration((cases - done) / rate)} left")
     rows = []
-    for each in data["workers"]:
-        failed = f"{each['failed']:,} failed" if each["failed"] else ""
-        job, ago = f"job {each['job']}" if each["job"] else "", f"{duration(each['seconds_ago'])} ago"
-        where, process = f"on {each['host']}", f"process {each['pid']}"
-        rows.append([job, each["state"], where, process, each["workers"], failed, each["more"], ago])
+    for worker in data["workers"]:
+        failed = f"{worker['failed']:,} failed" if worker["failed"] else ""
+        job, ago = f"job {worker['job']}" if worker["job"] else "", f"{duration(worker['seconds_ago'])} ago"
+        where, process = f"on {worker['host']}", f"process {worker['pid']}"
+        rows.append([job, worker["state"], where, process, worker["workers"], failed, worker["more"], ago])
     out += columns(rows, right=())
     if not working and done < cases:
         out.append("  nobody is at work: the command that began it goes on")
@@ -214,9 +214,9 @@ def finished_archive(archive: Path) -> dict[str, Any] | None:
     """Data about a finished archive from its sidecar: its cases, and when it was begun; None where there is none.
     Raises Problem for an unsound archive."""
     try:
-        told = read_json(sidecar_path(archive))
-        cases = sum(each["cases"] for each in told["experiments"] if is_count(each["cases"]))
-        return {"archive": str(archive), "cases": cases, "began": str(told["began"])} if archive.is_file() else None
+        sidecar = read_json(sidecar_path(archive))
+        cases = sum(record["cases"] for record in sidecar["experiments"] if is_count(record["cases"]))
+        return {"archive": str(archive), "cases": cases, "began": str(sidecar["began"])} if archive.is_file() else None
     except (OSError, ValueError, LookupError, TypeError):
         pass
     if not archive.exists():
@@ -243,13 +243,13 @@ def died_lines(folder: Folder) -> Iterator[str]:
             yield f"the run before this one was killed ({process}){remedy}"
 
 
-def alive(told: dict[str, Any], now: float) -> bool:
+def alive(record: dict[str, Any], now: float) -> bool:
     """True if the process that wrote this status is still at work, as far as is known."""
-    if told["state"] not in AT_WORK:
+    if record["state"] not in AT_WORK:
         return False
-    if told["host"] == socket.gethostname():
-        return Path(f"/proc/{told['pid']}").exists()
-    return bool(now - told["updated"] < STALE_SECONDS)
+    if record["host"] == socket.gethostname():
+        return Path(f"/proc/{record['pid']}").exists()
+    return bool(now - record["updated"] < STALE_SECONDS)
 
 
 def duration(seconds: float) -> str:

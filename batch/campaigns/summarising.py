@@ -41,8 +41,8 @@ def point_sizes(experiment: Experiment, rows: CaseValues) -> list[int]:
     points, sizes = PointNumbers(), np.zeros(MOST_POINTS, np.int64)
     try:
         for piece in blocks(len(rows)):
-            here = np.asarray(rows[piece])
-            numbers = points.of([np.asarray(each.values[here]) for each in chosen], len(here))
+            positions = np.asarray(rows[piece])
+            numbers = points.of([np.asarray(coordinate.values[positions]) for coordinate in chosen], len(positions))
             sizes += np.bincount(numbers, minlength=len(sizes))
     except TooManyPoints:
         message = f"a summary has {MOST_POINTS:,} design points at most, and this sweep has more"
@@ -79,7 +79,7 @@ def summarise(
     of its first case; verified: whether some are run with shorter steps, and need their rows. Raises Problem E351."""
     experiment = section.prepared.experiment
     layout = archive_layout.layout(experiment, 1, 0)
-    named = {each.key: each.name for role in ("coordinate", "metric") for each in layout.role(role)}
+    named = {variable.key: variable.name for role in ("coordinate", "metric") for variable in layout.role(role)}
     chosen, points = _chosen(experiment), PointNumbers()
     tallies = CaseTallies(
         [use.name for use in experiment.metrics],
@@ -91,9 +91,9 @@ def summarise(
         outcomes.add_run(run)
         rows = np.asarray(run.case)
         met = np.empty((len(rows), len(experiment.requirements)), np.int8)
-        for number, each in enumerate(experiment.requirements):
-            unknown = (run.status != DONE) | np.isnan(run.metrics[each.metric])
-            met[:, number] = np.where(unknown, -1, run.met[each.text])
+        for number, requirement in enumerate(experiment.requirements):
+            unknown = (run.status != DONE) | np.isnan(run.metrics[requirement.metric])
+            met[:, number] = np.where(unknown, -1, run.met[requirement.text])
         tallies.add(
             CaseBlock(
                 first + np.arange(len(rows)),
@@ -102,20 +102,20 @@ def summarise(
                 run.warning,
                 run.metrics,
                 met,
-                points.of([np.asarray(each.values[rows]) for each in chosen], len(rows)),
+                points.of([np.asarray(coordinate.values[rows]) for coordinate in chosen], len(rows)),
                 int(np.count_nonzero(run.limited)),
             )
         )
         progress(first + len(rows))
-    kept = tallies.named()
-    kept += outcomes.worst(wanted.metric).tolist() if wanted.worst else []
-    kept += choosing.chosen(experiment, outcomes).tolist() if verified else []
-    places = distinct(np.array(kept or [0], np.int64))  # an archive has a case
+    kept_places = tallies.named()
+    kept_places += outcomes.worst(wanted.metric).tolist() if wanted.worst else []
+    kept_places += choosing.chosen(experiment, outcomes).tolist() if verified else []
+    places = distinct(np.array(kept_places or [0], np.int64))  # an archive has a case
     values = tallies.values(
         lambda place: int(experiment.cases.table[section.rows[place]]),
         named,
-        [named[each.path] for each in chosen],
+        [named[coordinate.path] for coordinate in chosen],
         points,
     )
-    found = CaseSummary(len(section.rows), tallies.limited, wanted.word, _drawn(experiment), values)
-    return Summarised(found, places, outcomes)
+    summary = CaseSummary(len(section.rows), tallies.limited, wanted.word, _drawn(experiment), values)
+    return Summarised(summary, places, outcomes)

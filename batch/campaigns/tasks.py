@@ -79,12 +79,12 @@ class CampaignSection:
         kept."""
         experiment = self.prepared.experiment
         last = len(self.rows) if last is None else last
-        kept = ("recorded" if self.recorded else "outputs", "f4" if self.single else "f8")
+        record_kind = ("recorded" if self.recorded else "outputs", "f4" if self.single else "f8")
         shape = (last - first, len(experiment.cases.coordinates) + len(experiment.cases.noise))
-        told = (self.code, experiment.structure.schedule.ticks, *kept, shape)
-        summed = hashlib.sha256(f"{told}\n".encode())
-        for at in range(first, last, BLOCK):
-            summed.update(engine.inputs(experiment, self.rows[at : min(at + BLOCK, last)]).tobytes())
+        key_parts = (self.code, experiment.structure.schedule.ticks, *record_kind, shape)
+        summed = hashlib.sha256(f"{key_parts}\n".encode())
+        for start in range(first, last, BLOCK):
+            summed.update(engine.inputs(experiment, self.rows[start : min(start + BLOCK, last)]).tobytes())
         return summed.hexdigest()
 
 
@@ -130,18 +130,18 @@ def carry_out(
     computed: Callable[[], None] = lambda: None,
 ) -> Done:
     """Run a task's cases and write its shard into the folder. computed: called in between."""
-    found = compute(section, task, threads=threads, progress=progress)
+    new_shard = compute(section, task, threads=threads, progress=progress)
     computed()
-    keep(folder, task, found)
-    return Done(found.seconds, found.failed)
+    keep(folder, task, new_shard)
+    return Done(new_shard.seconds, new_shard.failed)
 
 
-def keep(folder: Path, task: Task, found: shard.Shard) -> None:
+def keep(folder: Path, task: Task, new_shard: shard.Shard) -> None:
     """Write a task's shard into its place in the folder of shards. Raises OSError."""
     path = folder / task.path
     if path.parent != folder:
         path.parent.mkdir(exist_ok=True)
-    shard.write(path, found)
+    shard.write(path, new_shard)
 
 
 def compute(

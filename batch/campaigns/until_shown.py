@@ -41,7 +41,9 @@ class StoppingPoints:
         self._places = np.split(ordered, np.cumsum(np.bincount(points))[:-1])
         self._wanted = [requirement for requirement in experiment.requirements if requirement.confidence is not None]
         most = max(map(len, self._places))
-        self._limits = [limits(each.share or 0.0, each.confidence or 0.0, most) for each in self._wanted]
+        self._limits = [
+            limits(requirement.share or 0.0, requirement.confidence or 0.0, most) for requirement in self._wanted
+        ]
         self._read: dict[Task, np.ndarray] = {}
         self._known = np.zeros(len(section.rows), bool)
         self._missed = np.zeros((len(section.rows), len(self._wanted)), bool)
@@ -61,10 +63,10 @@ class StoppingPoints:
     @property
     def failed(self) -> int:
         """The number of failed cases among those known and not dropped."""
-        kept = [
+        known_places = [
             p[: self._prefix(p) if stop is None else stop] for p, stop in zip(self._places, self._stops, strict=True)
         ]
-        return sum(int(self._failed[places].sum()) for places in kept)
+        return sum(int(self._failed[places].sum()) for places in known_places)
 
     def read(self, folder: Folder) -> None:
         """Read the shards so far; an unsound one counts as empty. A case counts once, as in merging."""
@@ -93,9 +95,9 @@ class StoppingPoints:
         stretches: list[tuple[int, int]] = []
         for places in undecided:
             known = self._prefix(places)
-            there = places[known : known + self._batch(places, known, busy)]
-            there = np.sort(there[~self._known[there]])
-            parts = np.split(there, np.flatnonzero(np.diff(there) > 1) + 1)
+            next_places = places[known : known + self._batch(places, known, busy)]
+            next_places = np.sort(next_places[~self._known[next_places]])
+            parts = np.split(next_places, np.flatnonzero(np.diff(next_places) > 1) + 1)
             stretches += [(int(part[0]), int(part[-1]) + 1) for part in parts]
         return sorted(stretches)
 
@@ -107,12 +109,15 @@ class StoppingPoints:
         batch = max(busy, min(self._needed(places, known), max(FIRST_CASES, known // GROWTH)))
         return -(-batch // GRANULE) * GRANULE
 
-    def _outcomes(self, task: Task, found: shard.Shard) -> np.ndarray:
+    def _outcomes(self, task: Task, task_shard: shard.Shard) -> np.ndarray:
         """For each case of a shard, whether it misses each of the requirements, by the archive's rule, and whether it
         failed: [case, requirement], the last for failed."""
         rows = self._section.rows[task.first : task.last]
-        run = engine.results(self._section.prepared, rows, None, found.outputs, dict(found.fates))
-        met = [run.met[each.text] & ~np.isnan(run.metrics[each.metric]) & (run.status == DONE) for each in self._wanted]
+        run = engine.results(self._section.prepared, rows, None, task_shard.outputs, dict(task_shard.fates))
+        met = [
+            run.met[requirement.text] & ~np.isnan(run.metrics[requirement.metric]) & (run.status == DONE)
+            for requirement in self._wanted
+        ]
         return ~np.stack([*met, run.status == DONE], axis=1)
 
     def _prefix(self, places: np.ndarray) -> int:
@@ -124,9 +129,9 @@ class StoppingPoints:
         """The number of cases at which a design point stops; None where its known cases do not decide it."""
         known = self._prefix(places)
         cases, stop = np.arange(1, known + 1), 0
-        for found, missed in zip(self._limits, self._missed[places[:known]].T, strict=True):
-            said = found.verdicts(cases, np.cumsum(missed)) != 0
-            stop = max(stop, int(said.argmax()) + 1 if said.any() else known + 1)
+        for limit, missed in zip(self._limits, self._missed[places[:known]].T, strict=True):
+            decided = limit.verdicts(cases, np.cumsum(missed)) != 0
+            stop = max(stop, int(decided.argmax()) + 1 if decided.any() else known + 1)
         if stop <= known:
             return stop
         return known if known == len(places) else None
@@ -134,10 +139,10 @@ class StoppingPoints:
     def _needed(self, places: np.ndarray, known: int) -> int:
         """The fewest further cases that may decide all requirements of a design point."""
         most = 1
-        for found, missed in zip(self._limits, self._missed[places[:known]].T, strict=True):
-            if not found.verdicts(np.arange(1, known + 1), np.cumsum(missed)).any():
-                misses = min(int(missed.sum()), len(found.demonstrates) - 1)
-                most = max(most, int(found.demonstrates[misses]) - known)
+        for limit, missed in zip(self._limits, self._missed[places[:known]].T, strict=True):
+            if not limit.verdicts(np.arange(1, known + 1), np.cumsum(missed)).any():
+                misses = min(int(missed.sum()), len(limit.demonstrates) - 1)
+                most = max(most, int(limit.demonstrates[misses]) - known)
         return most
 
 

@@ -146,7 +146,7 @@ def _of_archive(
         output=archive,
         selected=again.selected,
         histories=histories or ("all" if again.kept is None and rows == "all" else "none"),
-        kept=again.kept if not histories else None,
+        history_rows=again.kept if not histories else None,
         decided=again.decided,
         float32=float32,
         verify=verify,

@@ -37,9 +37,9 @@ def verify(
     structure = experiment.structure
     metrics = {}
     for number, factor in enumerate(FACTORS):
-        told = progress and partial(_add, progress, number * len(rows))
+        progress_of_run = progress and partial(_add, progress, number * len(rows))
         refined = refine(experiment, factor)
-        metrics[factor] = _metrics(refined, rows, threads, told, furthest=factor == FACTORS[-1])
+        metrics[factor] = _metrics(refined, rows, threads, progress_of_run, furthest=factor == FACTORS[-1])
     half, quarter = (np.stack([metrics[factor][name] for name in names], axis=1) for factor in FACTORS)
     last = metrics[FACTORS[-1]]
     furthest = np.stack([last.get(name + FURTHEST, last[name]) for name in names], axis=1)
@@ -85,8 +85,8 @@ def _instant(experiment: Experiment, name: str) -> float:
 def _is_seen_at_steps(experiment: Experiment, name: str) -> bool:
     """True where a metric sees its channel at each step. One of a servo's memory sees it at the servo's ticks, which do
     not change."""
-    structure, of = experiment.structure, _use(experiment, name).of
-    return channels(structure, [of])[of].divisor == structure.schedule.dynamics
+    structure, path = experiment.structure, _use(experiment, name).of
+    return channels(structure, [path])[path].divisor == structure.schedule.dynamics
 
 
 def _use(experiment: Experiment, name: str) -> MetricUse:
