@@ -180,7 +180,7 @@ def compiled_with_reply(
         unsaved=request.unsaved,
         memo=memo,
     )
-    keep(FoundAnswers(pickle.dumps(memo.asked, pickle.HIGHEST_PROTOCOL)))
+    keep(FoundAnswers(pickle.dumps(memo.answers, pickle.HIGHEST_PROTOCOL)))
     return compiled, _reply(compiled.diagnostics, compiled.sources)
 
 

@@ -52,7 +52,7 @@ class Assumption:
 
 def assumptions(experiment: Experiment, case: int = 0) -> tuple[Assumption, ...]:
     """The assumptions of a run in this row of its case table. Raises Problem where the program cannot be built."""
-    return tuple(_Along(experiment, case).found())
+    return tuple(_Along(experiment, case).assumptions())
 
 
 class _Along:
@@ -71,7 +71,9 @@ class _Along:
         self.system, self.parameters, self.read = builder.system, experiment.parameters, tape.read
         self.tree = self.system.tree(tape.read).each(lambda _, value: float(value))
         self.t = np.linspace(0.0, experiment.structure.schedule.duration, INSTANTS)
-        motions = [self._course(each, joint) for each, joint in zip(self.system.actuators, self.names, strict=True)]
+        motions = [
+            self._course(actuator, joint) for actuator, joint in zip(self.system.actuators, self.names, strict=True)
+        ]
         self.q, self.qd, self.qdd = ([motion[k] for motion in motions] for k in range(3))
         moving, turning = (
             self.system.followed(tape.read, Motion(tuple(self.q), tuple(rates)))  # type: ignore[arg-type]
@@ -92,12 +94,12 @@ class _Along:
             return q, still, still
         value = partial(self.system.value, read=self.read)
         p = parameters(actuator.owner, f"{actuator.path}.command", profile.parameters, value)
-        asked, slope = (np.broadcast_to(np.asarray(x, float), self.t.shape) for x in profile.course(p, self.t))  # type: ignore[arg-type]
+        commanded, slope = (np.broadcast_to(np.asarray(x, float), self.t.shape) for x in profile.course(p, self.t))  # type: ignore[arg-type]
         if actuator.command_kind == "position":
             smooth = profile.jump(p) == "none"
-            return asked, slope, np.gradient(slope, self.t) if smooth else still
-        turned = np.concatenate([[0.0], np.cumsum(0.5 * (asked[1:] + asked[:-1]) * np.diff(self.t))])
-        return q + turned, asked, still if profile.jump(p) == "value" else slope
+            return commanded, slope, np.gradient(slope, self.t) if smooth else still
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * (commanded[1:] + commanded[:-1]) * np.diff(self.t))])
+        return q + turned, commanded, still if profile.jump(p) == "value" else slope
 
     def solved(self, *, gravity: Vector = ZERO, rates: bool = False, accelerations: bool = False) -> Solved:
         """Inverse dynamics with these of its parts, at all instants."""
@@ -126,12 +128,14 @@ class _Along:
         """An assumption with the largest of these torques by joint, over all instants; one with forces besides."""
         sizes = [float(np.max(np.abs(torque))) for torque in torques]
         for unit in ("N*m", "N"):
-            of = [i for i, joint in enumerate(self.system.joints) if _unit(joint) == unit]
-            if of:
-                at = max(of, key=sizes.__getitem__)
-                yield Assumption(subject, assumed, sizes[at], unit, self.names[at] if sizes[at] else "", meaning)
+            indices = [i for i, joint in enumerate(self.system.joints) if _unit(joint) == unit]
+            if indices:
+                worst = max(indices, key=sizes.__getitem__)
+                yield Assumption(
+                    subject, assumed, sizes[worst], unit, self.names[worst] if sizes[worst] else "", meaning
+                )
 
-    def found(self) -> Iterator[Assumption]:
+    def assumptions(self) -> Iterator[Assumption]:
         structure = self.system.structure
         if self.names and not structure.free:
             yield from self._gravity()
@@ -168,7 +172,7 @@ class _Along:
             yield from self.largest("gravity", assumed, "its largest load", loads)
             return
         axes = [self.solved(gravity=tuple(EARTH * x for x in axis)).tau for axis in np.eye(3).tolist()]  # type: ignore[arg-type]
-        worst = [np.sqrt(sum(np.square(x) for x in each)) for each in zip(*axes, strict=True)]
+        worst = [np.sqrt(sum(np.square(x) for x in components)) for components in zip(*axes, strict=True)]
         yield from self.largest("gravity", "none", "the Earth's largest load, in its worst direction", worst)
 
     def _products(self) -> Iterator[Assumption]:
@@ -185,8 +189,8 @@ class _Along:
                 for i, joint in enumerate(self.tree.joints)
                 if joint.parent < 0
             }
-            at = max(sizes, key=sizes.__getitem__)
-            yield Assumption("base", "held", sizes[at], unit, at, meaning)
+            joint = max(sizes, key=sizes.__getitem__)
+            yield Assumption("base", "held", sizes[joint], unit, joint, meaning)
 
     def _drive(self, i: int, joint: Joint, actuator: Actuator | None) -> Iterator[Assumption]:
         """A joint that nothing drives, and one that goes with its command whatever that takes."""
@@ -208,9 +212,9 @@ class _Along:
             zeros = [name for name, x in known.items() if x and x.origin.kind == "default" and x.value == 0.0]
             if zeros and actuator.use.joint not in self.system.structure.springs:
                 joints.setdefault(", ".join(zeros), []).append(f"`{actuator.use.joint}`")
-        for names, of in joints.items():
-            shown = of[0] if len(of) == 1 else f"{of[0]} and {len(of) - 1} more"
-            yield Assumption(f"servo of {shown}", f"0, as not written: {names}")
+        for names, alike in joints.items():
+            subject = alike[0] if len(alike) == 1 else f"{alike[0]} and {len(alike) - 1} more"
+            yield Assumption(f"servo of {subject}", f"0, as not written: {names}")
 
 
 def _unit(joint: Joint) -> str:

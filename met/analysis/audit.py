@@ -45,38 +45,38 @@ def _idle_inputs(experiment: Experiment) -> tuple[str, ...]:
 def _idle_inputs_of_chain(chain: Experiment) -> tuple[str, ...]:
     """The idle inputs of one chain; the rest of a step is recorded only where an effect does not show without it."""
     program = build(chain)
-    made = SectionRecorder(program)
-    made.steps(program.start, "start")
-    made.steps(program.end, "end")
+    recorder = SectionRecorder(program)
+    recorder.steps(program.start, "start")
+    recorder.steps(program.end, "end")
     if chain.structure.integrator in models.find_own("integrator"):  # another package's is recorded in any case
-        made.steps(tuple(Unless0(()) if isinstance(each, Unless0) else each for each in program.tick), "tick")
-        if not _unread(program, made.sections):
+        recorder.steps(tuple(Unless0(()) if isinstance(step, Unless0) else step for step in program.tick), "tick")
+        if not _unread(program, recorder.sections):
             return ()
-    made.steps(program.tick, "tick")
-    return _unread(program, made.sections)
+    recorder.steps(program.tick, "tick")
+    return _unread(program, recorder.sections)
 
 
 def _unread(program: Program, sections: Iterable[CodeSection]) -> tuple[str, ...]:
     """Inputs from which these sections compute nothing that the program records, gives or decides by."""
     control = walk((*program.start, *program.tick, *program.end))
     needed = {node.cell for node in control if isinstance(node, WhileAny)}
-    given = {n for n, name in enumerate(program.outputs) if not name.startswith(COORDINATE)}
+    outputs = {n for n, name in enumerate(program.outputs) if not name.startswith(COORDINATE)}
     read: set[str] = set()
     while True:
-        found: set[str] = set()
+        cells_read: set[str] = set()
         for section in sections:
-            inputs, cells = _reads(section, needed, given)
+            inputs, cells = _reads(section, needed, outputs)
             read |= inputs
-            found |= cells
-        if found <= needed or len(read) == len(program.inputs):
+            cells_read |= cells
+        if cells_read <= needed or len(read) == len(program.inputs):
             return tuple(name for name in program.inputs if name not in read)
-        needed |= found
+        needed |= cells_read
 
 
-def _reads(section: CodeSection, needed: set[str], given: set[int]) -> tuple[set[str], set[str]]:
+def _reads(section: CodeSection, needed: set[str], outputs: set[int]) -> tuple[set[str], set[str]]:
     """Inputs and cells from which the section computes the needed cells, the given outputs and its recorded values."""
     roots = [ref for cell, ref in section.stores if cell in needed]
     roots += [ref for _, ref in section.records]
-    roots += [ref for number, ref in section.outputs if number in given]
+    roots += [ref for number, ref in section.outputs if number in outputs]
     used = [section.nodes[position] for position in live(section.nodes, roots)]
     return {node[1] for node in used if node[0] == "input"}, {node[1] for node in used if node[0] == "cell"}

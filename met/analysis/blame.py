@@ -74,25 +74,25 @@ class Unstable:
 
 
 def closed(
-    linearizer: Linearizer, found: SampledLoops, lanes: Iterable[tuple[int, float, bool]]
+    linearizer: Linearizer, loops: SampledLoops, lanes: Iterable[tuple[int, float, bool]]
 ) -> tuple[Unstable, ...]:
     """The loops that make lanes grow, the one that needs the largest change first; lanes: as from
     `met.analysis.loops.growing`."""
-    several, seen, opened = dict[tuple[str, ...], Unstable](), set[str](), Opened(linearizer, found)
+    several, seen, opened = dict[tuple[str, ...], Unstable](), set[str](), Opened(linearizer, loops)
     for lane, limit, ticks in lanes:
         case = opened.lane(lane, limit, ticks)
         concerned = case.concerned()
         if seen and concerned <= seen:
             continue
         seen |= concerned
-        for each in opened.blamed(case):
-            several.setdefault(each.joints, each)
+        for unstable in opened.blamed(case):
+            several.setdefault(unstable.joints, unstable)
     return tuple(sorted(several.values(), key=needs))
 
 
-def needs(each: Unstable) -> tuple[float, float]:
+def needs(unstable: Unstable) -> tuple[float, float]:
     """Sort key of a finding: the smaller, the larger the change that is needed."""
-    return _change(each.gain), each.every
+    return _change(unstable.gain), unstable.every
 
 
 def _change(share: float | None) -> float:
@@ -118,7 +118,7 @@ class _Growing:
         """The largest growth rate that does not occur without a loop."""
         left = list(self.rates)
         for rate in without.rates[: max(0, len(left) - 1)]:
-            left.remove(min(left, key=lambda one: abs(one - rate)))
+            left.remove(min(left, key=lambda candidate: abs(candidate - rate)))
         return max(left)
 
 
@@ -175,7 +175,7 @@ class Lane:
         most = TRIED if self.size <= WHOLE else TRIED_OF_MANY
         if len(joints) <= most:
             return tuple(joints)
-        found: dict[str, float] = {}
+        largest_shares: dict[str, float] = {}
         mixed = self.ticks and any(law.continuous for law in self.loops.laws)
         for ticks in (True, False) if mixed else (self.ticks,):
             modes = [
@@ -188,14 +188,14 @@ class Lane:
                 shares = parts_in(part, self.lane, gains, value, ticks=ticks)
                 whole = sum(shares.values()) or 1.0
                 for joint, share in shares.items():
-                    found[joint] = max(found.get(joint, 0.0), share / whole)
-        chosen = heapq.nlargest(most, found, key=lambda joint: round(found[joint], 6))
+                    largest_shares[joint] = max(largest_shares.get(joint, 0.0), share / whole)
+        chosen = heapq.nlargest(most, largest_shares, key=lambda joint: round(largest_shares[joint], 6))
         return tuple(joint for joint in joints if joint in chosen)
 
     def without(self, own: _Growing, joints: Sequence[str], gains: Gains | None = None) -> _Growing | None:
         """The growth without the loops of these joints, where it is less than with them; None where it is not."""
-        found = self.growing({**(gains or {}), **dict.fromkeys(joints, 0.0)}, above=0.5)
-        return found if own.adds_to(found, self.limit) else None
+        growth = self.growing({**(gains or {}), **dict.fromkeys(joints, 0.0)}, above=0.5)
+        return growth if own.adds_to(growth, self.limit) else None
 
     def concerned(self) -> frozenset[str]:
         """The joints whose loops are each to blame without the others."""
@@ -213,23 +213,23 @@ class Lane:
             return []
         together = tuple(law.joint for law in self.loops.laws)
         gains: dict[str, float] = {}
-        told: list[Unstable] = []
+        findings: list[Unstable] = []
         while len(gains) < len(together):
             now = self.growing(gains)
             groups: list[tuple[str, ...]] = [(joint,) for joint in self.telling(gains) if joint not in gains]
             at_fault = {which: base for which in groups if (base := self.without(now, which, gains)) is not None}
-            if not at_fault and not told and len(together) > 1:
+            if not at_fault and not findings and len(together) > 1:
                 base = self.without(now, together)
                 at_fault = {} if base is None else {together: base}
             if not at_fault:
                 break
             fits = {which: self._gain(now, base, which, gains) for which, base in at_fault.items()}
             which = max(fits, key=lambda which: _change(fits[which]))
-            told.append(self._unstable(own, which, fits[which], now.beyond(at_fault[which])))
+            findings.append(self._unstable(own, which, fits[which], now.beyond(at_fault[which])))
             if self.size > WHOLE:
                 break  # the next check tells the next
             gains |= dict.fromkeys(which, fits[which] or 0.0)
-        return told or self._too_weak(own)
+        return findings or self._too_weak(own)
 
     def _gain(self, own: _Growing, without: _Growing, joints: Sequence[str], gains: Gains) -> float | None:
         """The share of the gains of these joints at which no more modes grow than without their loops; None where there
@@ -256,7 +256,7 @@ class Lane:
 
     def _too_weak(self, own: _Growing) -> list[Unstable]:
         """The position loops that do not hold a load which falls without them, and would hold it with more gain."""
-        told, tried = [], self.telling()
+        findings, tried = [], self.telling()
         for law in self.loops.laws:
             if law.joint not in tried or self.size > LARGEST_FITTED:
                 continue
@@ -267,18 +267,18 @@ class Lane:
             gain = self._fitting(count, own.count - 1) if law.command == "position" else None
             if gain is not None and gain > 1.0:
                 every = 1.0 / max(own.rates)
-                told.append(
+                findings.append(
                     Unstable(int(self.loops.case[self.lane]), (law.joint,), gain, every, ticks=False, weak=True)
                 )
-        return told
+        return findings
 
 
 class Opened:
     """The loops of an experiment's cases, opened so that every gain can be scaled, those of continuous laws too."""
 
-    def __init__(self, linearizer: Linearizer, found: SampledLoops) -> None:
-        self._linearizer, self._found = linearizer, found
-        self._rubs = frozenset(each.name.partition(".")[0] for each in linearizer.builder.step.sticking)
+    def __init__(self, linearizer: Linearizer, loops: SampledLoops) -> None:
+        self._linearizer, self._loops = linearizer, loops
+        self._rubs = frozenset(sticking.name.partition(".")[0] for sticking in linearizer.builder.step.sticking)
 
     @cached_property
     def _opened(self) -> Linearizer:
@@ -287,26 +287,29 @@ class Opened:
 
     @cached_property
     def loops(self) -> SampledLoops:
-        return self._found if not self._linearizer.continuous else self._with({})
+        return self._loops if not self._linearizer.continuous else self._with({})
 
     def _with(self, scaled: Mapping[str, Mapping[str, float]]) -> SampledLoops:
-        found = self._opened.sampled(scaled=scaled)
-        assert found is not None
-        return found
+        loops = self._opened.sampled(scaled=scaled)
+        assert loops is not None
+        return loops
 
     def lane(self, lane: int, limit: float, ticks: bool) -> Lane:
         return Lane(self.loops, lane, limit, ticks)
 
     def blamed(self, lane: Lane) -> list[Unstable]:
         """The loops that make a lane grow, with what helps."""
-        several = (replace(each, rubs=not self._rubs.isdisjoint(each.joints)) for each in lane.blamed())
-        return [each if each.ticks and (each.gain or 0.0) > POOR else self._remedied(lane, each) for each in several]
+        several = (replace(unstable, rubs=not self._rubs.isdisjoint(unstable.joints)) for unstable in lane.blamed())
+        return [
+            unstable if unstable.ticks and (unstable.gain or 0.0) > POOR else self._remedied(lane, unstable)
+            for unstable in several
+        ]
 
-    def _remedied(self, lane: Lane, found: Unstable) -> Unstable:
+    def _remedied(self, lane: Lane, unstable: Unstable) -> Unstable:
         """The findings with the parameters that help, each tried alone."""
-        if len(found.joints) > 1 or lane.size > WHOLE:
-            return found
-        (joint,), own = found.joints, lane.growing()
+        if len(unstable.joints) > 1 or lane.size > WHOLE:
+            return unstable
+        (joint,), own = unstable.joints, lane.growing()
         aim = min(own.count - 1, lane.growing({joint: 0.0}).count)
         several = {}
         for gain in self._opened.gains(joint):
@@ -318,16 +321,16 @@ class Opened:
             share = fitting(count, aim)
             if share is not None:
                 several[gain.name] = share
-        return replace(found, parameters=several)
+        return replace(unstable, parameters=several)
 
 
 def fitting(count: Callable[[float], float], aim: float, stride: float = STRIDE, exact: float = 1.001) -> float | None:
     """The largest share below 1 at which at most `count` modes grow, to the factor `exact`; else the smallest above 1;
     None where there is none."""
-    for each in (stride, 1.0 / stride):
-        bad, good = 1.0, each
+    for factor in (stride, 1.0 / stride):
+        bad, good = 1.0, factor
         while count(good) > aim:
-            bad, good = good, good * each
+            bad, good = good, good * factor
             if not SMALLEST <= good <= LARGEST:
                 break
         else:

@@ -29,11 +29,11 @@ def chains(experiment: Experiment) -> tuple[Experiment, ...]:
     structure = experiment.structure
     if len(structure.moving) < MANY_JOINTS or not _are_apart(structure):
         return ()
-    found = tuple(_of(experiment, joints) for joints in _branches(structure))
+    by_branch = tuple(_of(experiment, joints) for joints in _branches(structure))
     divisors = {use.divisor for use in structure.servos}  # with others a frame of computers would be shorter
-    if len(found) < 2 or any({use.divisor for use in each.structure.servos} != divisors for each in found):
+    if len(by_branch) < 2 or any({use.divisor for use in chain.structure.servos} != divisors for chain in by_branch):
         return ()
-    return found
+    return by_branch
 
 
 def ticks_and_steps(structure: Structure) -> int:
@@ -46,8 +46,8 @@ def numbered(chain: Experiment) -> tuple[Experiment, Mapping[str, str]]:
     """The chain with its joints and links renamed to numbers, so that equal chains give equal experiments; and the
     joints' names by these numbers."""
     structure = chain.structure
-    joints = {each.name: str(number) for number, each in enumerate(structure.joints)}
-    links = {each.name: str(number) for number, each in enumerate(structure.links)} | {BASE: BASE}
+    joints = {joint.name: str(number) for number, joint in enumerate(structure.joints)}
+    links = {link.name: str(number) for number, link in enumerate(structure.links)} | {BASE: BASE}
 
     def path_of(path: str) -> str:
         head, *rest = path.split(".")
@@ -62,7 +62,7 @@ def numbered(chain: Experiment) -> tuple[Experiment, Mapping[str, str]]:
             outputs.append(chain.formulas.outputs[quantity.value.output])
             quantity = replace(quantity, value=Formula(len(outputs) - 1))
         parameters[path] = quantity
-    made = replace(
+    renumbered = replace(
         structure,
         links=tuple(replace(link, name=links[link.name]) for link in structure.links),
         joints=tuple(
@@ -72,8 +72,8 @@ def numbered(chain: Experiment) -> tuple[Experiment, Mapping[str, str]]:
         servos=tuple(replace(servo, joint=joints[servo.joint]) for servo in structure.servos),
     )
     formulas = Formulas(chain.formulas.inputs, chain.formulas.nodes, tuple(outputs))
-    found = replace(chain, structure=made, parameters=parameters, formulas=formulas)
-    return found, {number: name for name, number in joints.items()}
+    renamed_chain = replace(chain, structure=renumbered, parameters=parameters, formulas=formulas)
+    return renamed_chain, {number: name for name, number in joints.items()}
 
 
 def _are_apart(structure: Structure) -> bool:
@@ -95,13 +95,13 @@ def _branches(structure: Structure) -> Iterator[frozenset[str]]:
         outward.setdefault(joint.parent, []).append(joint.name)
     moving = {joint.name for joint in structure.moving}
     for first in outward.get(BASE, ()):
-        found, waiting = set[str](), [first]
+        reached, waiting = set[str](), [first]
         while waiting:
             name = waiting.pop()
-            found.add(name)
+            reached.add(name)
             waiting += outward.get(children[name], ())
-        if found & moving:
-            yield frozenset(found)
+        if reached & moving:
+            yield frozenset(reached)
 
 
 def _of(experiment: Experiment, joints: frozenset[str]) -> Experiment:

@@ -57,7 +57,7 @@ def contacts(experiment: Experiment, case: int = 0) -> tuple[Contact, ...]:
     program = builder.program()
     values = inputs(experiment, np.array([case]))[0]
     tape = PlainTape(program, dict(zip(program.inputs, values, strict=True)), 1)
-    found = []
+    all_contacts = []
     step = experiment.structure.schedule.step
     with np.errstate(all="ignore"):
         follow(tape, program.start)
@@ -73,9 +73,9 @@ def contacts(experiment: Experiment, case: int = 0) -> tuple[Contact, ...]:
                 inertia, rate = _meeting(builder, tape, name, model, p)
                 if 0.0 < inertia < math.inf:
                     steps = model.lasts(p, inertia, rate if rate > 0.0 else USUAL_RATE) / step
-                    found.append(Contact(name, f"`{moved}`", inertia, "kg", steps))
+                    all_contacts.append(Contact(name, f"`{moved}`", inertia, "kg", steps))
                 continue
-            number = next(i for i, each in enumerate(system.joints) if each.name == moved)
+            number = next(i for i, joint in enumerate(system.joints) if joint.name == moved)
             actuator = system.actuators[number]
             if (actuator is not None and actuator.gives) or system.joints[number].follows:
                 continue
@@ -85,8 +85,8 @@ def contacts(experiment: Experiment, case: int = 0) -> tuple[Contact, ...]:
             stiffness = system.value(f"environment.{name}.{model.springs[1]}", tape.read)
             lasts = math.pi * math.sqrt(inertia / stiffness) if stiffness > 0.0 else math.inf
             unit = "kg" if system.joints[number].kind == "prismatic" else "kg m^2"
-            found.append(Contact(name, f"joint `{moved}`", inertia, unit, lasts / step))
-    return tuple(found)
+            all_contacts.append(Contact(name, f"joint `{moved}`", inertia, unit, lasts / step))
+    return tuple(all_contacts)
 
 
 def _meeting(builder: Builder, tape: PlainTape, name: str, model: Environment, p: Any) -> tuple[float, float]:
@@ -103,13 +103,13 @@ def _meeting(builder: Builder, tape: PlainTape, name: str, model: Environment, p
         return model.touch(p, ArmWorld(system, tape.read, tree, moving, base, 0.0, 0.0))  # type: ignore[misc]
 
     def approach(push: float) -> float:
-        found = touch(y.qd)
-        force = found.forces(p, scale(push, found.normal))
+        touching = touch(y.qd)
+        force = touching.forces(p, scale(push, touching.normal))
         vars(system)["environment"] = ((name, replace(model, loads=lambda p, world: Loads(forces=force))),)
         return float(touch(builder.step.observed(tape).derivative.slope.qdd).rate)
 
-    for each in builder.step.sticking:
-        tape.write(cell_names.FRICTION_MODE(each.name), 1.0)
+    for sticking in builder.step.sticking:
+        tape.write(cell_names.FRICTION_MODE(sticking.name), 1.0)
     every = system.environment
     parts = approach(0.0) - approach(1.0)
     vars(system)["environment"] = every

@@ -69,39 +69,45 @@ def unfollowed(
 
     ticks     of the base rate, rising;  memories: row of the case table -> [tick, cell], as `cells` names these
     """
-    system, whole = System(experiment), [case for case, at in memories.items() if np.isfinite(at).all()]
-    judged = [each for each in system.working if each.command_kind in ("position", "rate")]
-    judged = [each for each in judged if each.use.joint not in system.failing and _is_own(experiment, each.use.command)]
-    judged = [each for each in judged if not _is_required(experiment, each.use.joint, each.command_kind)]
+    system, whole = System(experiment), [case for case, memory in memories.items() if np.isfinite(memory).all()]
+    judged = [actuator for actuator in system.working if actuator.command_kind in ("position", "rate")]
+    judged = [
+        actuator
+        for actuator in judged
+        if actuator.use.joint not in system.failing and _is_own(experiment, actuator.use.command)
+    ]
+    judged = [
+        actuator for actuator in judged if not _is_required(experiment, actuator.use.joint, actuator.command_kind)
+    ]
     guides = [use for use in guiding.ticking(system) if models.find("guide", use.model, use.place).error]
     if not whole or not (judged or guides):
         return []
     tape = _lanes(system, ticks, memories, whole, cells)
     times = np.asarray(ticks) / tape.base_hz
-    found: list[Unfollowed] = []
+    findings: list[Unfollowed] = []
 
     def by_case(value: object) -> np.ndarray:
         return np.broadcast_to(np.asarray(value, dtype=float), (tape.lanes,)).reshape(len(whole), len(ticks))
 
     with np.errstate(all="ignore"):
-        for each in judged:
-            joint, kind = each.use.joint, each.command_kind
-            asked = by_case(setpoints.setpoint(system, each, tape.read, tape.time).value)
+        for actuator in judged:
+            joint, kind = actuator.use.joint, actuator.command_kind
+            setpoint = by_case(setpoints.setpoint(system, actuator, tape.read, tape.time).value)
             begun = by_case(tape.lane(f"{joint}.q"))[:, :1] if kind == "position" else 0.0
             is_at = by_case(tape.lane(f"{joint}.{'q' if kind == 'position' else 'qd'}"))
-            for one in _told(joint, kind, whole, times, asked - begun, np.abs(asked - is_at)):
-                first = int(np.searchsorted(times, one.since))
+            for finding in _not_followed(joint, kind, whole, times, setpoint - begun, np.abs(setpoint - is_at)):
+                first = int(np.searchsorted(times, finding.since))
                 steps = (ticks[-1] - ticks[first]) // experiment.structure.schedule.dynamics
-                counted = dict(zip(cells, memories[one.case][-1] - memories[one.case][first], strict=True))
-                found.append(replace(one, limit=_limit(experiment, joint, counted, steps)))
+                counted = dict(zip(cells, memories[finding.case][-1] - memories[finding.case][first], strict=True))
+                findings.append(replace(finding, limit=_limit(experiment, joint, counted, steps)))
         for use in guides:
             guiding.tick(system, tape, use)
             way = by_case(guiding.way_along(system, tape, use))
             off = by_case(tape.lane(f"guides.{use.name}.{models.find('guide', use.model, use.place).error}"))
-            found += _told(use.name, "path", whole, times, way, off)
+            findings += _not_followed(use.name, "path", whole, times, way, off)
     worst: dict[tuple[str, bool], Unfollowed] = {}
-    for one in sorted(found, key=lambda one: (-one.weight, one.case)):
-        worst.setdefault((one.of, one.kind == "path"), one)
+    for finding in sorted(findings, key=lambda finding: (-finding.weight, finding.case)):
+        worst.setdefault((finding.of, finding.kind == "path"), finding)
     return list(worst.values())
 
 
@@ -130,10 +136,10 @@ def _lanes(
     """A lane for each instant of each case, with the case's memory and its own parameters."""
     experiment = system.experiment
     rows = np.repeat(cases, len(ticks))
-    given = {coordinate.path: coordinate.values[rows] for coordinate in experiment.cases.coordinates}
-    tape = LaneTape(experiment.structure.schedule.base_hz, given, len(rows))
+    swept = {coordinate.path: coordinate.values[rows] for coordinate in experiment.cases.coordinates}
+    tape = LaneTape(experiment.structure.schedule.base_hz, swept, len(rows))
     tape.k = np.tile(np.asarray(ticks), len(cases))
-    values = experiment.formulas.replay(given)
+    values = experiment.formulas.replay(swept)
     for path in system.varying:
         tape.write(PARAMETER + path, values[experiment.parameters[path].value.output])  # type: ignore[union-attr]
     system.keep_tree(tape.read, tape.write)
@@ -142,28 +148,28 @@ def _lanes(
     return tape
 
 
-def _told(
-    of: str, kind: str, cases: Sequence[int], times: np.ndarray, way: np.ndarray, off: np.ndarray
+def _not_followed(
+    subject: str, kind: str, cases: Sequence[int], times: np.ndarray, way: np.ndarray, off: np.ndarray
 ) -> Iterator[Unfollowed]:
     """The cases in which a setpoint is not followed.
 
     way  what is commanded, from where it begins;  off: distance from the setpoint: [case, instant]
     """
     end = float(times[-1])
-    for case, told, away in zip(cases, way, off, strict=True):
-        most = float(np.max(np.abs(told)))
-        asked = most if most > STAYS else 0.0
-        unsettled = np.flatnonzero(np.abs(told - told[-1]) > SETTLED * max(most, 0.1))
+    for case, setpoint, away in zip(cases, way, off, strict=True):
+        most = float(np.max(np.abs(setpoint)))
+        commanded = most if most > STAYS else 0.0
+        unsettled = np.flatnonzero(np.abs(setpoint - setpoint[-1]) > SETTLED * max(most, 0.1))
         first = max(int(unsettled[-1]) + 1 if len(unsettled) else 0, int(np.searchsorted(times, FIRST * end)))
         if first >= len(times) or end - times[first] < LEAST * end:
             continue
         late, half = away[first:], (first + len(times)) // 2
         mean = float(np.sqrt(np.mean(late * late)))
-        bound = SHARE * asked if asked else STRAYS
-        one, other = first + int(np.argmax(away[first:half])), half + int(np.argmax(away[half:]))
-        falls = (away[one] - away[other]) * end > FALLS * away[other] * (times[other] - times[one])
+        bound = SHARE * commanded if commanded else STRAYS
+        worst, other = first + int(np.argmax(away[first:half])), half + int(np.argmax(away[half:]))
+        falls = (away[worst] - away[other]) * end > FALLS * away[other] * (times[other] - times[worst])
         if mean > bound and not falls:
-            yield Unfollowed(of, kind, mean, asked, mean / bound, float(times[first]), end, case)
+            yield Unfollowed(subject, kind, mean, commanded, mean / bound, float(times[first]), end, case)
 
 
 def _limit(experiment: Experiment, joint: str, counted: Mapping[str, float], steps: int) -> str:

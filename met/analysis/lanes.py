@@ -39,23 +39,23 @@ class LaneTape:
         return np.float64(self.k) / np.float64(self.base_hz)
 
     def read(self, name: str) -> Real:
-        found: Real = self.cells.get(name, ZERO)
-        return found
+        value: Real = self.cells.get(name, ZERO)
+        return value
 
     def write(self, name: str, value: Any) -> None:
         self.cells[name] = value if value.__class__ is np.ndarray else np.float64(value)
 
     def read_mask(self, name: str) -> Truth:
-        found: Any = self.cells.get(name, ZERO) != 0.0
-        truth: Truth = found if isinstance(found, np.ndarray) else bool(found)  # type: ignore[assignment]
+        is_set: Any = self.cells.get(name, ZERO) != 0.0
+        truth: Truth = is_set if isinstance(is_set, np.ndarray) else bool(is_set)  # type: ignore[assignment]
         return truth
 
     def write_mask(self, name: str, value: Any) -> None:
         self.cells[name] = np.where(value, 1.0, 0.0) if isinstance(value, np.ndarray) else np.float64(bool(value))
 
     def input(self, name: str) -> Real:
-        found: Any = self.inputs[name]
-        return found
+        value: Any = self.inputs[name]
+        return value
 
     def record(self, column: int, value: Real) -> None:
         """Drop the recorded value: no rows are kept."""
@@ -72,25 +72,25 @@ class LaneTape:
 
     def spread(self, times: int) -> LaneTape:
         """A tape with every lane repeated that many times, side by side."""
-        made = LaneTape(self.base_hz, {}, self.lanes * times)
-        made.k = self.k
-        made.inputs = {name: np.repeat(value, times) for name, value in self.inputs.items()}
-        made.cells = {
+        tape = LaneTape(self.base_hz, {}, self.lanes * times)
+        tape.k = self.k
+        tape.inputs = {name: np.repeat(value, times) for name, value in self.inputs.items()}
+        tape.cells = {
             name: np.repeat(value, times) if isinstance(value, np.ndarray) else value
             for name, value in self.cells.items()
         }
-        return made
+        return tape
 
     def only(self, lanes: np.ndarray) -> LaneTape:
         """The tape of some lanes only; lanes: a truth for each."""
-        made = LaneTape(self.base_hz, {}, int(np.count_nonzero(lanes)))
-        made.k = self.k
-        made.inputs = {name: value[lanes] for name, value in self.inputs.items()}
-        made.cells = {
+        tape = LaneTape(self.base_hz, {}, int(np.count_nonzero(lanes)))
+        tape.k = self.k
+        tape.inputs = {name: value[lanes] for name, value in self.inputs.items()}
+        tape.cells = {
             name: value[lanes] if isinstance(value, np.ndarray) and value.ndim else value
             for name, value in self.cells.items()
         }
-        return made
+        return tape
 
     def follow(self, body: Iterable[Control]) -> None:
         """Run the body once, at the tape's tick. Loops in which payloads change hands run once; loops that repeat until
@@ -120,13 +120,13 @@ def to_both_sides(start: np.ndarray, size: np.ndarray, moved: slice = slice(None
     start, size  [value, lane];  moved: of these values those that are moved
     """
     n, lanes = start.shape
-    each, size = np.arange(n)[moved], np.broadcast_to(size, start.shape)
-    made = np.empty((n, lanes, len(each), 2))
-    made[:] = start[:, :, None, None]
-    at = np.arange(len(each))
-    made[each, :, at, 0] += size[each]
-    made[each, :, at, 1] -= size[each]
-    return made.reshape(n, -1), (made[each, :, at, 0] - made[each, :, at, 1]).T
+    indices, size = np.arange(n)[moved], np.broadcast_to(size, start.shape)
+    points = np.empty((n, lanes, len(indices), 2))
+    points[:] = start[:, :, None, None]
+    columns = np.arange(len(indices))
+    points[indices, :, columns, 0] += size[indices]
+    points[indices, :, columns, 1] -= size[indices]
+    return points.reshape(n, -1), (points[indices, :, columns, 0] - points[indices, :, columns, 1]).T
 
 
 def spread_over(read: Callable[[str], Any], times: int) -> Callable[[str], Any]:
@@ -142,6 +142,6 @@ def spread_over(read: Callable[[str], Any], times: int) -> Callable[[str], Any]:
 def differences(values: Mapping[str, Any], cells: Sequence[str], sizes: np.ndarray) -> np.ndarray:
     """[lane, of, by] of values in lanes that were moved to both sides; sizes: [lane, by]."""
     lanes, n = sizes.shape
-    found = np.array([np.broadcast_to(values[name], (lanes * 2 * n,)) for name in cells])
-    pairs = found.reshape(len(cells), lanes, n, 2)
+    rows = np.array([np.broadcast_to(values[name], (lanes * 2 * n,)) for name in cells])
+    pairs = rows.reshape(len(cells), lanes, n, 2)
     return np.moveaxis((pairs[..., 0] - pairs[..., 1]) / sizes, 0, 1)

@@ -71,13 +71,13 @@ def linearised(
     cells   the state, then all servos' memory
     scaled  what parameters of the servo are multiplied by, by name
     """
-    found, parts, joint = _Linearised(builder, actuator, tape, cells), actuator.parts, actuator.use.joint
-    true = found.quantities()
-    seen, of_sensors = found.through_sensors(true)
-    of_law = found.law(scaled or {})
+    linear_law, parts, joint = _Linearised(builder, actuator, tape, cells), actuator.parts, actuator.use.joint
+    true = linear_law.quantities()
+    seen, of_sensors = linear_law.through_sensors(true)
+    of_law = linear_law.law(scaled or {})
     own = np.zeros((tape.lanes, len(parts.outputs) + len(parts.integrals), len(cells)))
-    for at, name in enumerate(_held(parts), len(true)):
-        own[:, :, found.place(f"{actuator.path}.{name}")] += of_law[:, :, at]
+    for place, name in enumerate(_held(parts), len(true)):
+        own[:, :, linear_law.place(f"{actuator.path}.{name}")] += of_law[:, :, place]
     by_quantity = of_law[:, :, : len(true)]
     none = np.zeros((tape.lanes, 0, len(cells)))
     return SampledLaw(
@@ -97,15 +97,15 @@ def linearised(
 
 def gains(builder: Builder, actuator: Actuator, tape: LaneTape) -> tuple[Parameter, ...]:
     """The parameters of a servo on which its law's slopes depend, but the physics under its outputs does not."""
-    found = _Linearised(builder, actuator, tape, ())
-    law_now, drive_now = found.law({}), found.drive({})
-    told = []
+    linear_law = _Linearised(builder, actuator, tape, ())
+    law_now, drive_now = linear_law.law({}), linear_law.drive({})
+    acting = []
     for parameter in actuator.parts.parameters:
         if parameter.shape == "number" and parameter.at_least == 0.0:
             scaled = {parameter.name: 0.5}
-            if not np.array_equal(found.law(scaled), law_now) and found.drive(scaled) == drive_now:
-                told.append(parameter)
-    return tuple(told)
+            if not np.array_equal(linear_law.law(scaled), law_now) and linear_law.drive(scaled) == drive_now:
+                acting.append(parameter)
+    return tuple(acting)
 
 
 class _Linearised:
@@ -113,7 +113,7 @@ class _Linearised:
 
     def __init__(self, builder: Builder, actuator: Actuator, tape: LaneTape, cells: Sequence[str]) -> None:
         self.builder, self.system, self.actuator, self.tape = builder, builder.system, actuator, tape
-        self.cells, self._places = cells, {name: at for at, name in enumerate(cells)}
+        self.cells, self._places = cells, {name: place for place, name in enumerate(cells)}
 
     def place(self, cell: str) -> int:
         return self._places[cell]
@@ -121,11 +121,11 @@ class _Linearised:
     def quantities(self) -> dict[str, np.ndarray]:
         """The slopes of the law's true inputs: `q`, `qd` and states of the servo, by name."""
         joint, path, tape = self.actuator.use.joint, self.actuator.path, self.tape
-        natural = [each.name for each in self.actuator.parts.natural]
+        natural = [state.name for state in self.actuator.parts.natural]
         cells = [f"{joint}.q", f"{joint}.qd", *(f"{path}.{name}" for name in natural)]
-        found = {name: np.zeros((tape.lanes, len(self.cells))) for name in ("q", "qd", *natural)}
-        for name, cell in zip(found, cells, strict=True):
-            found[name][:, self.place(cell)] = 1.0
+        by_quantity = {name: np.zeros((tape.lanes, len(self.cells))) for name in ("q", "qd", *natural)}
+        for name, cell in zip(by_quantity, cells, strict=True):
+            by_quantity[name][:, self.place(cell)] = 1.0
         if self.actuator.servo.measured is not None:
             start = np.array([tape.lane(cell) for cell in cells])
             moved, sizes = to_both_sides(start, _sizes(start, 2))
@@ -133,23 +133,23 @@ class _Linearised:
             p, (q, qd) = self._values(2 * len(cells), {}), moved[:2]
             of_joint = sensing.measured(self.actuator, p, q, qd, states)
             slopes = differences(dict(zip(("q", "qd"), of_joint, strict=True)), ("q", "qd"), sizes)
-            for at, name in enumerate(("q", "qd")):
-                found[name][:] = 0.0
-                found[name][:, [self.place(cell) for cell in cells]] = slopes[:, at]
-        return found
+            for column, name in enumerate(("q", "qd")):
+                by_quantity[name][:] = 0.0
+                by_quantity[name][:, [self.place(cell) for cell in cells]] = slopes[:, column]
+        return by_quantity
 
     def through_sensors(self, true: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """The slopes of the law's inputs as its sensors give them, and of the sensors' memory after a tick, [lane,
         memory, cell]."""
         seen, held = dict(true), [np.zeros((self.tape.lanes, 0, len(self.cells)))]
         for fitted in self.actuator.sensors:
-            of = sensing.quantity(fitted)
+            quantity = sensing.quantity(fitted)
             slopes = self._reading(fitted)
             names = [*(state.name for state in fitted.states), *(memory.name for memory in fitted.memory)]
             inner = [self.place(f"{fitted.path}.{name}") for name in names]
-            rows = slopes[:, :, :1] * true[of][:, None, :]
+            rows = slopes[:, :, :1] * true[quantity][:, None, :]
             rows[:, :, inner] += slopes[:, :, 1:]
-            seen[of] = rows[:, 0]
+            seen[quantity] = rows[:, 0]
             held.append(rows[:, 1:])
         return seen, np.concatenate(held, axis=1)
 
@@ -157,7 +157,7 @@ class _Linearised:
         """The slopes of outputs and integrals after a tick by the law's inputs and by its memory: [lane, of, by]."""
         actuator, parts, tape = self.actuator, self.actuator.parts, self.tape
         joint, own = actuator.use.joint, _held(parts)
-        natural = [each.name for each in parts.natural]
+        natural = [state.name for state in parts.natural]
         start = np.array([*self._seen(), *(tape.lane(f"{actuator.path}.{name}") for name in own)])
         moved, sizes = to_both_sides(start, _sizes(start, 2))
         values: list[Any] = list(moved)
@@ -166,9 +166,9 @@ class _Linearised:
         times = 2 * len(start)
         still: Any = np.repeat(tape.lane(f"{joint}.q"), times) if actuator.command_kind == "position" else ZERO
         seen: Seen = self.builder.seen(actuator, q, qd, Setpoint(actuator.command_kind, still, ZERO), ZERO, states)
-        found = law(actuator, self._values(times, scaled), NamedValues(actuator.owner, held), seen)
-        after: dict[str, Any] = dict(found.outputs)
-        after |= {name: held[name] + seen.period * x for name, x in found.slopes.items()}
+        control = law(actuator, self._values(times, scaled), NamedValues(actuator.owner, held), seen)
+        after: dict[str, Any] = dict(control.outputs)
+        after |= {name: held[name] + seen.period * x for name, x in control.slopes.items()}
         return differences(after, own, sizes)
 
     def drive(self, scaled: Mapping[str, float]) -> tuple[Any, ...]:
@@ -178,18 +178,25 @@ class _Linearised:
         states = NamedValues(actuator.owner, {part.name: 0.2 for part in parts.natural})
         motion = JointMotion(0.1, 0.1, 0.0, 0.0, actuator.command_kind)
         p = self._values(1, scaled)
-        found = answer(actuator.owner, actuator.servo.drive, p, NamedValues(actuator.owner, held), states, motion)
-        numbers = (found.torque, found.rotor, found.dry, found.qdd, *found.slopes.values(), *found.friction.values())
+        driven = answer(actuator.owner, actuator.servo.drive, p, NamedValues(actuator.owner, held), states, motion)
+        numbers = (
+            driven.torque,
+            driven.rotor,
+            driven.dry,
+            driven.qdd,
+            *driven.slopes.values(),
+            *driven.friction.values(),
+        )
         return tuple(tuple(np.atleast_1d(np.asarray(number, dtype=float)).tolist()) for number in numbers)
 
     def _seen(self) -> list[np.ndarray]:
         """The law's inputs without its sensors: the joint's motion as measured, then states of the servo."""
         actuator, tape = self.actuator, self.tape
-        states: Any = {each.name: tape.lane(f"{actuator.path}.{each.name}") for each in actuator.parts.natural}
+        states: Any = {state.name: tape.lane(f"{actuator.path}.{state.name}") for state in actuator.parts.natural}
         q, qd = (tape.lane(f"{actuator.use.joint}.{part}") for part in ("q", "qd"))
         own: tuple[Any, Any] = q, qd
         of_joint = sensing.measured(actuator, self._values(1, {}), *own, NamedValues(actuator.owner, states))
-        return [*(np.broadcast_to(np.asarray(each), tape.lanes) for each in of_joint), *states.values()]
+        return [*(np.broadcast_to(np.asarray(quantity), tape.lanes) for quantity in of_joint), *states.values()]
 
     def _values(self, times: int, scaled: Mapping[str, float]) -> NamedValues:
         """The servo's parameters over lanes, some of them scaled."""
@@ -206,8 +213,8 @@ class _Linearised:
         by], without noise. The slope is taken over several changes; the one that agrees best with its neighbour is
         kept."""
         tape, states, held = self.tape, [part.name for part in fitted.states], [part.name for part in fitted.memory]
-        (at,) = (k for k, name in enumerate(self.quantity_names()) if name == sensing.quantity(fitted))
-        start = np.array([self._seen()[at], *(tape.lane(f"{fitted.path}.{name}") for name in (*states, *held))])
+        (column,) = (k for k, name in enumerate(self.quantity_names()) if name == sensing.quantity(fitted))
+        start = np.array([self._seen()[column], *(tape.lane(f"{fitted.path}.{name}") for name in (*states, *held))])
         count, sizes = len(start), len(READINGS)
         moved, changes = to_both_sides(np.repeat(start, sizes, axis=1), np.tile(READINGS, tape.lanes))
         values: list[Any] = list(moved)
@@ -216,13 +223,13 @@ class _Linearised:
         inner = NamedValues(fitted.owner, dict(zip(states, values[1 : 1 + len(states)], strict=True)))
         memory = NamedValues(fitted.owner, dict(zip(held, values[1 + len(states) :], strict=True)))
         sensed = Sensed(lambda: values[0], self.actuator.use.divisor / self.builder.schedule.base_hz, lambda: 0.0)
-        found: Reading = answer(fitted.owner, fitted.sensor.read, p, memory, inner, sensed)
-        slopes = differences({"": found.value, **found.held}, ("", *held), changes)
+        reading: Reading = answer(fitted.owner, fitted.sensor.read, p, memory, inner, sensed)
+        slopes = differences({"": reading.value, **reading.held}, ("", *held), changes)
         return _agreed(slopes.reshape(tape.lanes, sizes, 1 + len(held), count))
 
     def quantity_names(self) -> tuple[str, ...]:
         """Names of the law's inputs."""
-        return ("q", "qd", *(each.name for each in self.actuator.parts.natural))
+        return ("q", "qd", *(state.name for state in self.actuator.parts.natural))
 
 
 def _held(parts: Parts) -> list[str]:
@@ -240,9 +247,9 @@ def _sizes(start: np.ndarray, plain: int) -> np.ndarray:
 def _agreed(slopes: np.ndarray) -> np.ndarray:
     """The slopes, among those over changes of several sizes, [lane, size, of, by], that differ least from those of the
     next size; 0 where all are 0."""
-    one, other = slopes[:, :-1], slopes[:, 1:]
-    larger = np.maximum(np.abs(one), np.abs(other))
+    own, other = slopes[:, :-1], slopes[:, 1:]
+    larger = np.maximum(np.abs(own), np.abs(other))
     with np.errstate(all="ignore"):
-        apart = np.where(larger > 0.0, np.abs(one - other) / larger, np.inf)
+        apart = np.where(larger > 0.0, np.abs(own - other) / larger, np.inf)
     best = np.argmin(np.round(np.where(np.isnan(apart), np.inf, apart), 6), axis=1)
-    return np.take_along_axis(one, best[:, None], axis=1)[:, 0]
+    return np.take_along_axis(own, best[:, None], axis=1)[:, 0]

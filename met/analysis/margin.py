@@ -72,13 +72,13 @@ class Margin:
     @property
     def factor(self) -> float | None:
         """The smaller of `heavier` and `lighter`; below 1 where the loop is unstable."""
-        return min((each for each in (self.heavier, self.lighter) if each is not None), default=None)
+        return min((factor for factor in (self.heavier, self.lighter) if factor is not None), default=None)
 
     @property
     def room(self) -> float:
         """The smaller factor, as far as was searched; below any other where the arm's r is no number."""
-        found = self.searched / self.together if self.factor is None else self.factor
-        return found if found == found else 0.0
+        room = self.searched / self.together if self.factor is None else self.factor
+        return room if room == room else 0.0
 
     @property
     def too_light(self) -> bool:
@@ -95,11 +95,11 @@ class Margin:
         return self.lower < self.least and self.together < (self.searched if self.limit is None else self.limit)
 
 
-def remedy(one: Margin) -> str:
+def remedy(margin: Margin) -> str:
     """Help text with a change that may make an unstable joint stable."""
-    if one.too_light:
+    if margin.too_light:
         return "a lower gain of the servo's rate loop, a faster servo or a heavier arm"
-    changed = "lower gains" if one.limit == 0.0 else "a lighter arm"
+    changed = "lower gains" if margin.limit == 0.0 else "a lighter arm"
     return f"{changed}, a faster servo or another law"
 
 
@@ -123,13 +123,13 @@ def margins(
     reach     the search goes on to arms so many times heavier, and lighter, than those, and twice that
     """
     on_beds = BedExperiment(experiment)
-    found = []
+    by_case = []
     for done, case in enumerate(range(experiment.cases.count) if cases is None else cases, start=1):
         with np.errstate(all="ignore"):  # a bed with no inertia has no finite loop
-            found.append(tuple(_margins(on_beds, case, span, reach)))
+            by_case.append(tuple(_margins(on_beds, case, span, reach)))
         if progress is not None:
             progress(done)
-    return tuple(found)
+    return tuple(by_case)
 
 
 def rotor_inertias(experiment: Experiment, case: int) -> np.ndarray:
@@ -203,7 +203,7 @@ class BedExperiment:
 
     def motors(self, tape: PlainTape) -> list[Motor]:
         """The motors of the joints on beds."""
-        return [self.beds.motor(tape, each) for each in self.beds.mounted]
+        return [self.beds.motor(tape, mounted) for mounted in self.beds.mounted]
 
 
 def _rotor(motor: Motor) -> float:
@@ -213,27 +213,38 @@ def _rotor(motor: Motor) -> float:
 def _margins(on_beds: BedExperiment, case: int, span: tuple[float, float] | None, reach: float) -> Iterator[Margin]:
     experiment, builder, beds, known = on_beds.experiment, on_beds.builder, on_beds.beds, on_beds.known
     tape = on_beds.begun(case)
-    names = [each.joint for each in beds.mounted]
+    names = [mounted.joint for mounted in beds.mounted]
     Lambda = np.array([[float(tape.read(cell_names.ARM_INERTIA(a, b))) for b in names] for a in names])
     motors = on_beds.motors(tape)
-    rotors = np.array([_rotor(each) for each in motors])
+    rotors = np.array([_rotor(motor) for motor in motors])
     least, together = ends_of_motion(Lambda, rotors) if span is None else span
-    for each, motor, r in zip(beds.mounted, motors, (Lambda.diagonal() / rotors).tolist(), strict=True):
-        heads = (f"{each.joint}.servo.", f"{each.joint}.bed.", f"{each.joint}.law.")
+    for mounted, motor, r in zip(beds.mounted, motors, (Lambda.diagonal() / rotors).tolist(), strict=True):
+        heads = (f"{mounted.joint}.servo.", f"{mounted.joint}.bed.", f"{mounted.joint}.law.")
         own = [path for path in experiment.parameters if path.startswith(heads) and ".command." not in path]
         # Its own r is always among those searched. Whether a loop grows beyond them is not known.
         lightest, heaviest = LIGHTEST, HEAVIEST
         if least > 0.0 and together < np.inf:
             lightest, heaviest = min(lightest, 0.5 * least / reach), max(heaviest, 2.0 * reach * together)
-        key = (each.joint, lightest, heaviest, *(builder.system.value(path, tape.read) for path in own))
+        key = (mounted.joint, lightest, heaviest, *(builder.system.value(path, tape.read) for path in own))
         if key not in known:
-            loop = on_beds.loop(each.joint, case, motor)
+            loop = on_beds.loop(mounted.joint, case, motor)
             known[key] = _Known.of(loop, lightest, heaviest, _finite(least, together))
         lower, limit = _around(known[key], (least, together), (lightest, heaviest))
-        delay = float(builder.system.value(f"{each.joint}.bed.delay", tape.read))
+        delay = float(builder.system.value(f"{mounted.joint}.bed.delay", tape.read))
         rate_hz = builder.schedule.base_hz / beds.divisor
         yield Margin(
-            case, each.joint, each.law.name, each.bed.name, rate_hz, delay, r, together, least, lower, limit, heaviest
+            case,
+            mounted.joint,
+            mounted.law.name,
+            mounted.bed.name,
+            rate_hz,
+            delay,
+            r,
+            together,
+            least,
+            lower,
+            limit,
+            heaviest,
         )
 
 
@@ -242,14 +253,14 @@ def _around(known: _Known, own: tuple[float, float], searched: tuple[float, floa
 
     At its own r it is as the loop is there, also where the search has gone past a narrow stretch.
     """
-    found = known.stretches
+    ranges = known.stretches
     numbers, loop = _finite(*own), known.loop
     unknown = [r for r in numbers if r not in known.grows]
     if unknown:
         known.grows.update(zip(unknown, grow(loop, unknown), strict=True))
-    if any(known.grows[r] == any(_holds(each, r) for each in found) for r in numbers):
+    if any(known.grows[r] == any(_holds(stretch, r) for stretch in ranges) for r in numbers):
         looked_at = sorted({*np.geomspace(*searched, STEPS).tolist(), *numbers})
-        found = stretches(loop, looked_at, grow(loop, looked_at))
+        ranges = stretches(loop, looked_at, grow(loop, looked_at))
 
     def near(stretch: tuple[float, float | None]) -> float:
         lower, limit = stretch
@@ -257,7 +268,7 @@ def _around(known: _Known, own: tuple[float, float], searched: tuple[float, floa
             return own[1] / lower if lower > 0.0 else 1.0
         return 1.0 if limit is None else min(1.0, limit / own[1])
 
-    return max(found, key=near, default=(0.0, 0.0))
+    return max(ranges, key=near, default=(0.0, 0.0))
 
 
 def _finite(*own: float) -> list[float]:
@@ -281,7 +292,7 @@ def stretches(loop: CaseLoop, looked_at: Sequence[float], growing: Sequence[bool
     A range begins at 0 where the loop does not grow at the smallest r that was looked at, and ends at None where it
     does not at the largest. looked_at: rising; growing: of each of them
     """
-    found: list[tuple[float, float | None]] = []
+    ranges: list[tuple[float, float | None]] = []
     lower = 0.0
     for (low, high), (before, after) in zip(pairwise(looked_at), pairwise(growing), strict=True):
         if before == after:
@@ -292,10 +303,10 @@ def stretches(loop: CaseLoop, looked_at: Sequence[float], growing: Sequence[bool
             low, high = between[first], between[first + 1]
         end = (low * high) ** 0.5
         if after:
-            found.append((lower, end))
+            ranges.append((lower, end))
         else:
             lower = end
-    return (*found, (lower, None)) if not growing[-1] else tuple(found)
+    return (*ranges, (lower, None)) if not growing[-1] else tuple(ranges)
 
 
 def _faultless(experiment: Experiment) -> Experiment:

@@ -73,17 +73,17 @@ def definiteness(experiment: Experiment, cases: Sequence[int]) -> Definiteness:
     builder = Builder(System(experiment))
     program = builder.program()
     arms = [_posed(builder, program, values) for values in inputs(experiment, np.array(cases))]
-    matrices = np.concatenate([found for _, found, _ in arms])
+    matrices = np.concatenate([case_matrices for _, case_matrices, _ in arms])
     size = np.abs(np.diagonal(matrices, axis1=1, axis2=2))
     root = np.sqrt(np.where(size > 0.0, size, 1.0))
     scaled = np.nan_to_num(matrices / (root[:, :, None] * root[:, None, :]), posinf=0.0, neginf=0.0)
     least = np.linalg.eigvalsh(scaled)[:, 0]
-    at = int(np.argmin(least))
-    poses = [(case, tuple(q)) for case, (each, _, _) in zip(cases, arms, strict=True) for q in each.tolist()]
-    if least[at] > LEAST:
-        return Definiteness(len(poses), float(least[at]), *poses[at])
+    worst = int(np.argmin(least))
+    poses = [(case, tuple(q)) for case, (arm_poses, _, _) in zip(cases, arms, strict=True) for q in arm_poses.tolist()]
+    if least[worst] > LEAST:
+        return Definiteness(len(poses), float(least[worst]), *poses[worst])
     turns = {link: np.concatenate([turn[link] for _, _, turn in arms]) / root[..., None] for link in arms[0][2]}
-    return Definiteness(len(poses), float(least[at]), *poses[at], _remedy(scaled, turns))
+    return Definiteness(len(poses), float(least[worst]), *poses[worst], _remedy(scaled, turns))
 
 
 def _remedy(matrices: np.ndarray, turns: Mapping[str, np.ndarray]) -> tuple[float, str, str] | None:
@@ -91,14 +91,14 @@ def _remedy(matrices: np.ndarray, turns: Mapping[str, np.ndarray]) -> tuple[floa
 
     turns  of each link, [pose, n, axis]: its angular velocity for each unit velocity, scaled as the matrices
     """
-    found = []
+    remedies = []
     for (link, turn), (axis, moment) in product(turns.items(), enumerate(("xx", "yy", "zz"))):
         outer = turn[:, :, None, axis] * turn[:, None, :, axis]
         # adding more never makes an eigenvalue smaller
-        at = bisect_right(LARGER, CURED, key=lambda x, outer=outer: np.linalg.eigvalsh(matrices + x * outer).min())  # type: ignore[misc]
-        if at < len(LARGER):
-            found.append((LARGER[at], link, moment))
-    return min(found, default=None)
+        place = bisect_right(LARGER, CURED, key=lambda x, outer=outer: np.linalg.eigvalsh(matrices + x * outer).min())  # type: ignore[misc]
+        if place < len(LARGER):
+            remedies.append((LARGER[place], link, moment))
+    return min(remedies, default=None)
 
 
 def _posed(
@@ -120,13 +120,17 @@ def _posed(
             low[i], high[i], end[i] = start[i] - math.pi, start[i] + math.pi, start[i] - math.pi
     poses = np.vstack([start, low, end, low + (high - low) * _spread(len(start))])
     placed: Any = system.followed(tape.read, Motion(tuple(poses.T), tuple(poses.T))).q
-    q = np.array(list(dict.fromkeys(zip(*(each.tolist() for each in placed), strict=True)))) if placed else poses[:1]
+    q = (
+        np.array(list(dict.fromkeys(zip(*(column.tolist() for column in placed), strict=True))))
+        if placed
+        else poses[:1]
+    )
     tree = system.tree(tape.read).each(lambda _, value: float(value))
     columns, qd, base = _unit_velocities(tree, q)
     motions = link_motions(tree, columns, qd, base_velocity=base)
     lumped = [link.name for link in system.structure.links if link.lumped]
     turns = {link: _stacked(motions[link].w, (len(q), _size(tree))) for link in lumped}
-    matrices = mass_matrices(tree, q, *(list(map(float, each)) for each in (solved.rotor, solved.spin)))
+    matrices = mass_matrices(tree, q, *(list(map(float, inertias)) for inertias in (solved.rotor, solved.spin)))
     free = _independent(system.ratios(tape.read), _size(tree))
     return q, free.T @ matrices @ free, {link: free.T @ turn for link, turn in turns.items()}
 
@@ -160,22 +164,24 @@ def mass_matrices(tree: Tree, q: np.ndarray, rotor: Sequence[float], spin: Seque
     """
     columns, qd, base = _unit_velocities(tree, q)
     shape = (len(q), _size(tree))
-    rates = list(joint_rates(tree, [joint.at(at) for joint, at in zip(tree.joints, columns, strict=True)], qd, base))
+    rates = list(
+        joint_rates(tree, [joint.at(position) for joint, position in zip(tree.joints, columns, strict=True)], qd, base)
+    )
     bodies = [joint.body for joint in tree.joints]
-    found = np.zeros((*shape, shape[1]))
+    matrices = np.zeros((*shape, shape[1]))
     for i, joint in enumerate(tree.joints):
         k = i - len(bodies)
-        found[:, k, k] += rotor[i]
+        matrices[:, k, k] += rotor[i]
         of_link = _stacked(rates[i][0], shape)[:, :, 2] - (qd[i] if joint.kind == "revolute" else 0.0)
-        found[:, k, :] += spin[i] * of_link
-        found[:, :, k] += spin[i] * of_link
+        matrices[:, k, :] += spin[i] * of_link
+        matrices[:, :, k] += spin[i] * of_link
     if tree.floating is not None:
         bodies.append(tree.floating.body)
         rates.append(fixed_motion(base, tree.base))
     for (m, h, I), (w, v) in zip(bodies, rates, strict=True):  # noqa: E741
         for rate, momentum in ((w, add(apply_symmetric(I, w), cross(h, v))), (v, sub(scale(m, v), cross(h, w)))):
-            found += np.einsum("pax,pbx->pab", _stacked(rate, shape), _stacked(momentum, shape))
-    return found
+            matrices += np.einsum("pax,pbx->pab", _stacked(rate, shape), _stacked(momentum, shape))
+    return matrices
 
 
 def _size(tree: Tree) -> int:

@@ -31,16 +31,16 @@ class KeptAnswer:
 class AnalysisMemo:
     """The answers of this process, and those loaded from an earlier one.
 
-    asked  by their digests: what is to be brought along next time
+    answers  by their digests: what is to be brought along next time
     """
 
     def __init__(
-        self, known: Mapping[bytes, KeptAnswer] | None = None, found: Callable[[], object] | None = None
+        self, known: Mapping[bytes, KeptAnswer] | None = None, on_new: Callable[[], object] | None = None
     ) -> None:
-        """found: called when an answer was found that was not brought along."""
+        """on_new: called when an answer was found that was not brought along."""
         self._known: Mapping[bytes, KeptAnswer] = known or {}
-        self._found = found
-        self.asked: dict[bytes, KeptAnswer] = {}
+        self._on_new = on_new
+        self.answers: dict[bytes, KeptAnswer] = {}
         self._of_now: dict[bytes, Any] = {}
         self._open: list[list[bytes]] = []  # digests of the questions asked within each one being answered
 
@@ -51,25 +51,25 @@ class AnalysisMemo:
         if self._open:
             self._open[-1].append(key)
         self._bring(key)
-        if key not in self.asked:
+        if key not in self.answers:
             within = list[bytes]()
             self._open.append(within)
             try:
-                found = find()
+                new = find()
             finally:
                 self._open.pop()
-            self.asked[key] = KeptAnswer(found, tuple(within))
-            if self._found is not None:
-                self._found()
-        answer: T = self.asked[key].answer
+            self.answers[key] = KeptAnswer(new, tuple(within))
+            if self._on_new is not None:
+                self._on_new()
+        answer: T = self.answers[key].answer
         return answer
 
     def _bring(self, key: bytes) -> None:
         """Take a loaded answer among those that were asked for, with all that it depends on."""
-        if key in self._known and key not in self.asked:
-            self.asked[key] = self._known[key]
-            for each in self._known[key].within:
-                self._bring(each)
+        if key in self._known and key not in self.answers:
+            self.answers[key] = self._known[key]
+            for inner_key in self._known[key].within:
+                self._bring(inner_key)
 
     def answer_of_now(
         self, question: str, experiment: Experiment, find: Callable[[], T], rows: Sequence[int] = ()
@@ -85,5 +85,5 @@ class AnalysisMemo:
     def so_far(self) -> dict[bytes, KeptAnswer]:
         """The answers that were asked for, after the loaded ones that may be asked for yet: at most `MOST`, the oldest
         dropped first."""
-        found = {**{key: each for key, each in self._known.items() if key not in self.asked}, **self.asked}
-        return dict(list(found.items())[-MOST:])
+        answers = {**{key: answer for key, answer in self._known.items() if key not in self.answers}, **self.answers}
+        return dict(list(answers.items())[-MOST:])

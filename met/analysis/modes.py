@@ -104,18 +104,18 @@ class Mode:
         return math.exp(-k * b), math.exp(-k * a), k
 
 
-def modes(found: StepMap, integrator: Integrator) -> Iterator[Mode]:
+def modes(step_map: StepMap, integrator: Integrator) -> Iterator[Mode]:
     """All modes that are not slow, of all lanes; of a pair, the one with positive frequency."""
-    h = found.h
-    lanes = np.flatnonzero(np.isfinite(found.slope).all((1, 2)))
-    truths = np.linalg.eigvals(found.slope[lanes])
+    h = step_map.h
+    lanes = np.flatnonzero(np.isfinite(step_map.slope).all((1, 2)))
+    truths = np.linalg.eigvals(step_map.slope[lanes])
     wanted = np.any(np.abs(truths) * h > SLOW, axis=1)
     lanes, truths = lanes[wanted], truths[wanted]
-    A = found.slope[lanes]
+    A = step_map.slope[lanes]
     with np.errstate(all="ignore"):
-        M = found.step[lanes] if found.step is not None else linear_step(integrator, A, found.positions, h)
+        M = step_map.step[lanes] if step_map.step is not None else linear_step(integrator, A, step_map.positions, h)
     numbers = np.isfinite(M).all((1, 2))
-    lanes, truths, A, M = (each[numbers] for each in (lanes, truths, A, M))
+    lanes, truths, A, M = (array[numbers] for array in (lanes, truths, A, M))
     if not lanes.size:
         return
     factors, right = np.linalg.eig(M)
@@ -127,22 +127,22 @@ def modes(found: StepMap, integrator: Integrator) -> Iterator[Mode]:
         apart = np.abs(weights).sum(2) < TOGETHER * np.abs(sums)
     forward = factors.imag >= 0.0
     together = np.flatnonzero((forward & ~apart).any(1))
-    made = {}
-    for at, found_roots, found_factors in zip(together.tolist(), *_answers(A[together], integrator, h), strict=True):
-        made[at] = found_roots, found_factors
-    for at, lane in enumerate(lanes.tolist()):
-        for i in np.flatnonzero(forward[at]).tolist():
-            root, factor = complex(roots[at, i]), complex(factors[at, i])
-            if not apart[at, i]:
-                root = complex(made[at][0][np.argmin(np.abs(made[at][1] - factor))])
-            nearest = complex(truths[at][np.argmin(np.abs(truths[at] - root))])
+    answers = {}
+    for place, found_roots, found_factors in zip(together.tolist(), *_answers(A[together], integrator, h), strict=True):
+        answers[place] = found_roots, found_factors
+    for place, lane in enumerate(lanes.tolist()):
+        for i in np.flatnonzero(forward[place]).tolist():
+            root, factor = complex(roots[place, i]), complex(factors[place, i])
+            if not apart[place, i]:
+                root = complex(answers[place][0][np.argmin(np.abs(answers[place][1] - factor))])
+            nearest = complex(truths[place][np.argmin(np.abs(truths[place] - root))])
             if abs(nearest - root) > NEAR * abs(root):
                 root = nearest
             if not max(abs(root) * h, abs(factor - 1.0)) > SLOW:
                 continue
-            turns = bool(found.rate[lane] > TURNS * abs(root))
-            case, loose = int(found.case[lane]), bool(found.loose[lane])
-            yield Mode(lane, case, loose, root, factor, turns, found.names, weights[at, i])
+            turns = bool(step_map.rate[lane] > TURNS * abs(root))
+            case, loose = int(step_map.case[lane]), bool(step_map.loose[lane])
+            yield Mode(lane, case, loose, root, factor, turns, step_map.names, weights[place, i])
 
 
 def _inverse(right: np.ndarray) -> np.ndarray:
@@ -150,9 +150,9 @@ def _inverse(right: np.ndarray) -> np.ndarray:
     where they allow it."""
     if right.shape[-1] > MANY:
         with contextlib.suppress(np.linalg.LinAlgError):
-            found = np.linalg.inv(right)
-            if np.isfinite(found).all():
-                return found
+            left = np.linalg.inv(right)
+            if np.isfinite(left).all():
+                return left
     return np.linalg.pinv(right)
 
 
@@ -164,23 +164,23 @@ def _answers(A: np.ndarray, integrator: Integrator, h: float) -> tuple[np.ndarra
     swings = np.zeros((*roots.shape, 2, 2))
     swings[..., 0, 1] = 1.0
     swings[..., 1, 0], swings[..., 1, 1] = -(np.abs(roots) ** 2), 2.0 * roots.real
-    made = np.linalg.eigvals(linear_step(integrator, swings, 1, h))
+    factors = np.linalg.eigvals(linear_step(integrator, swings, 1, h))
     lone = linear_step(integrator, roots.real[..., None, None], 0, h)[..., 0]
-    every = np.concatenate([made, np.where(roots.imag[..., None] == 0.0, lone, np.inf)], axis=-1)
+    every = np.concatenate([factors, np.where(roots.imag[..., None] == 0.0, lone, np.inf)], axis=-1)
     every[roots.imag < 0.0] = np.inf
     return np.repeat(roots, 3, axis=1), every.reshape(len(A), -1)
 
 
-def of_lane(found: StepMap, lane: int, h: float) -> StepMap:
+def of_lane(step_map: StepMap, lane: int, h: float) -> StepMap:
     """One lane alone, whose step is of h s."""
-    one = slice(lane, lane + 1)
+    own = slice(lane, lane + 1)
     return replace(
-        found,
-        case=found.case[one],
-        loose=found.loose[one],
-        slope=found.slope[one],
+        step_map,
+        case=step_map.case[own],
+        loose=step_map.loose[own],
+        slope=step_map.slope[own],
         step=None,
-        rate=found.rate[one],
+        rate=step_map.rate[own],
         h=h,
     )
 
@@ -188,11 +188,13 @@ def of_lane(found: StepMap, lane: int, h: float) -> StepMap:
 def finer(schedule: Schedule) -> list[tuple[float, int]]:
     """Rates of the dynamics that fit the run, from the next faster one on, Hz, and the steps of the run."""
     divisors = (n for n in range(schedule.dynamics - 1, 0, -1) if schedule.ticks % n == 0)
-    found = [(schedule.base_hz / n, schedule.ticks // n) for n in divisors]
-    return found + [(schedule.base_hz * times, schedule.ticks * times) for times in range(2, FINEST + 1)]
+    rates = [(schedule.base_hz / n, schedule.ticks // n) for n in divisors]
+    return rates + [(schedule.base_hz * times, schedule.ticks * times) for times in range(2, FINEST + 1)]
 
 
-def slowest(found: StepMap, mode: Mode, integrator: Integrator, schedule: Schedule, *, follows: bool) -> float | None:
+def slowest(
+    step_map: StepMap, mode: Mode, integrator: Integrator, schedule: Schedule, *, follows: bool
+) -> float | None:
     """The slowest faster rate of the dynamics at which no mode of the lane grows, Hz; None: none that is sensible.
 
     follows  whether it is to follow all that swings over the run, and to have no mode that is fast
@@ -203,8 +205,8 @@ def slowest(found: StepMap, mode: Mode, integrator: Integrator, schedule: Schedu
         middle = (low + high) // 2
         hz, steps = rates[middle]
         h = 1.0 / hz
-        at = of_lane(found, mode.lane, h)
-        if all(_fits(each, h, steps, follows) for each in modes(at, integrator)):
+        at_rate = of_lane(step_map, mode.lane, h)
+        if all(_fits(other, h, steps, follows) for other in modes(at_rate, integrator)):
             high = middle
         else:
             low = middle + 1

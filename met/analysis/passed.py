@@ -95,7 +95,7 @@ def telling(experiment: Experiment, memory: np.ndarray, cells: Sequence[str], co
         q, qd = (memory[fine, places[f"{joint.name}.{part}"]] for part in ("q", "qd"))
         wanted += [int(np.argmax(np.abs(qd))), int(np.argmin(q)), int(np.argmax(q))]
     last = len(fine) // 2 - 1
-    pairs = list(dict.fromkeys(min(each // 2, last) for each in wanted))[: count // 4]
+    pairs = list(dict.fromkeys(min(place // 2, last) for place in wanted))[: count // 4]
     even = np.linspace(0, last, max(1, count // 2 - len(pairs))).astype(int).tolist()
     return fine[sorted({place for pair in {*pairs, *even} for place in (2 * pair, 2 * pair + 1)})]
 
@@ -116,19 +116,20 @@ def lasting(experiment: Experiment, passed: Passed) -> tuple[Lasting, ...]:
     if not any(every):
         every.append(seen.fast())
     in_truth = [
-        isinstance(each.fault, StepFault) and each.fault.mode.grows_in_truth(schedule.step) for each in every[0]
+        isinstance(candidate.fault, StepFault) and candidate.fault.mode.grows_in_truth(schedule.step)
+        for candidate in every[0]
     ]
     if sampled is not None and all(in_truth):
         every.append(_loops(Opened(linearizer, sampled), times, seen.stretches, schedule.duration))
         every[0] = [] if every[-1] else every[0]
-    found = []
+    findings = []
     for several in every:
         if several:
-            worst = max(several, key=lambda each: each.weight)
-            at = passed.only(np.array([worst.lane]))
+            worst = max(several, key=lambda candidate: candidate.weight)
+            instant = passed.only(np.array([worst.lane]))
             since, until = float(times[worst.first]), float(times[worst.last])
-            found.append(Lasting(worst.fault, int(passed.case[worst.lane]), since, until, at))
-    return _news(experiment, found)
+            findings.append(Lasting(worst.fault, int(passed.case[worst.lane]), since, until, instant))
+    return _news(experiment, findings)
 
 
 @frozen
@@ -154,61 +155,61 @@ class _Seen:
 
     def growing(self, quiet: np.ndarray) -> list[_Candidate]:
         """Modes that the step makes grow by e and more, where no law holds them."""
-        shown = self._of(lambda mode, lane: mode.grown(self.h, 1) > 0.0 and not quiet[lane])
-        found = []
-        for owner, first, last in _lasting_ones(shown, self.stretches):
-            of_each = [max(shown[lane][owner], key=lambda mode: mode.growth) for lane in range(first, last + 1)]
+        by_lane = self._of(lambda mode, lane: mode.grown(self.h, 1) > 0.0 and not quiet[lane])
+        candidates = []
+        for owner, first, last in _lasting_ones(by_lane, self.stretches):
+            of_each = [max(by_lane[lane][owner], key=lambda mode: mode.growth) for lane in range(first, last + 1)]
             grown = _over([mode.grown(self.h, 1) for mode in of_each], self.times[first : last + 1], self.h)
             if grown > GROWS:
                 worst = max(of_each, key=lambda mode: mode.growth)
                 fault = StepFault("grows", worst, *owner, worst.growth, 0.0, 0.0)
-                found.append(_Candidate(grown, fault, worst.lane, first, last))
-        return found
+                candidates.append(_Candidate(grown, fault, worst.lane, first, last))
+        return candidates
 
     def missed(self, held: frozenset[str]) -> list[_Candidate]:
         """The mode that swings and is damped, or not, unlike in truth over the whole time, judged at its best
         instant."""
-        shown = self._of(lambda mode, _: abs(mode.root.imag) > abs(mode.root.real))
-        found = []
-        for owner, first, last in _lasting_ones(shown, self.stretches):
+        by_lane = self._of(lambda mode, _: abs(mode.root.imag) > abs(mode.root.real))
+        candidates = []
+        for owner, first, last in _lasting_ones(by_lane, self.stretches):
             steps = round((self.times[last] - self.times[first]) / self.h)
 
             def lost(mode: Mode, steps: int = steps) -> float:
                 run, truth, _ = mode.missed(self.h, steps)
                 return abs(run - truth)
 
-            best = min((max(shown[lane][owner], key=lost) for lane in range(first, last + 1)), key=lost)
+            best = min((max(by_lane[lane][owner], key=lost) for lane in range(first, last + 1)), key=lost)
             if lost(best) > TELLING and owner[1] not in held and steps > BESIDE:
                 run, truth, k = best.missed(self.h, steps)
                 fault = StepFault("misses", best, *owner, run, truth, k * self.h)
-                found.append(_Candidate(lost(best), fault, best.lane, first, last))
-        return found
+                candidates.append(_Candidate(lost(best), fault, best.lane, first, last))
+        return candidates
 
     def fast(self) -> list[_Candidate]:
         """Modes for which the step is long."""
-        shown = self._of(lambda mode, _: abs(mode.root) * self.h > FAST * (1.0 + 1e-6))
-        found = []
-        for owner, first, last in _lasting_ones(shown, self.stretches):
-            every = [mode for lane in range(first, last + 1) for mode in shown[lane][owner]]
+        by_lane = self._of(lambda mode, _: abs(mode.root) * self.h > FAST * (1.0 + 1e-6))
+        candidates = []
+        for owner, first, last in _lasting_ones(by_lane, self.stretches):
+            every = [mode for lane in range(first, last + 1) for mode in by_lane[lane][owner]]
             worst = max(every, key=lambda mode: round(abs(mode.root) * self.h, 6))
             figure = abs(worst.root) * self.h
             fault = StepFault("fast", worst, *owner, figure, 0.0, 0.0)
             if round((self.times[last] - self.times[first]) / self.h) > BESIDE:
-                found.append(_Candidate(figure, fault, worst.lane, first, last))
-        return found
+                candidates.append(_Candidate(figure, fault, worst.lane, first, last))
+        return candidates
 
     def _of(self, telling: Callable[[Mode, int], bool]) -> list[dict[Owner, list[Mode]]]:
         """The modes of each lane and owner that pass a test."""
         return [
-            {owner: those for owner, each in of_lane.items() if (those := [m for m in each if telling(m, lane)])}
+            {owner: those for owner, owned in of_lane.items() if (those := [m for m in owned if telling(m, lane)])}
             for lane, of_lane in enumerate(self.modes)
         ]
 
 
-def _by_owner(found: StepMap, integrator: Integrator, lanes: int) -> list[dict[Owner, list[Mode]]]:
+def _by_owner(step_map: StepMap, integrator: Integrator, lanes: int) -> list[dict[Owner, list[Mode]]]:
     """The modes of each lane by owner, without those that the arm turns away from before they have swung."""
     out: list[dict[Owner, list[Mode]]] = [{} for _ in range(lanes)]
-    for mode in modes(found, integrator):
+    for mode in modes(step_map, integrator):
         if not mode.turns:
             out[mode.lane].setdefault(owner_of(mode), []).append(mode)
     return out
@@ -226,40 +227,42 @@ def lasting_beds(experiment: Experiment, passed: Passed) -> list[tuple[Margin, f
     if not experiment.structure.substitutions:
         return []
     Lambda = Linearizer(experiment, passed.case.tolist(), passed.memory).loads()
-    found: dict[str, tuple[Margin, float]] = {}
+    unstable: dict[str, tuple[Margin, float]] = {}
     for first, last in _stretches(passed):
         case = int(passed.case[first])
         rotors = rotor_inertias(experiment, case)
-        motions = np.array([ends_of_motion(each, rotors) for each in Lambda[first : last + 1]])
+        motions = np.array([ends_of_motion(matrix, rotors) for matrix in Lambda[first : last + 1]])
         if last == first or not np.isfinite(motions).all():
             continue
         least, most = np.maximum(*_pairs(motions[:, 0])), np.minimum(*_pairs(motions[:, 1]))
         (begun,) = margins(experiment, [case])
-        for one in begun:
-            for at in (int(np.argmax(most)), int(np.argmin(least))):
-                then = replace(one, least=float(least[at]), together=float(most[at]))
-                if one.stable and not then.stable and one.joint not in found:
-                    time = float(passed.tick[first + at]) / experiment.structure.schedule.base_hz
-                    found[one.joint] = then, time
-    return list(found.values())
+        for margin in begun:
+            for place in (int(np.argmax(most)), int(np.argmin(least))):
+                then = replace(margin, least=float(least[place]), together=float(most[place]))
+                if margin.stable and not then.stable and margin.joint not in unstable:
+                    time = float(passed.tick[first + place]) / experiment.structure.schedule.base_hz
+                    unstable[margin.joint] = then, time
+    return list(unstable.values())
 
 
 def _pairs(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return values[1:], values[:-1]
 
 
-def remedy_of(experiment: Experiment, found: Lasting) -> Remedy:
+def remedy_of(experiment: Experiment, finding: Lasting) -> Remedy:
     """The remedy for a mode that lasts, as it is at its worst instant."""
-    assert isinstance(found.fault, StepFault)
-    here = as_run(Linearizer(experiment, found.at.case.tolist(), found.at.memory).map())
-    fault = replace(found.fault, mode=replace(found.fault.mode, lane=0))
-    return remedy(experiment, here, fault, found.at.memory)
+    assert isinstance(finding.fault, StepFault)
+    step_map = as_run(Linearizer(experiment, finding.at.case.tolist(), finding.at.memory).map())
+    fault = replace(finding.fault, mode=replace(finding.fault.mode, lane=0))
+    return remedy(experiment, step_map, fault, finding.at.memory)
 
 
-def as_run(found: StepMap) -> StepMap:
+def as_run(step_map: StepMap) -> StepMap:
     """The lanes with the run's own state, numbered by instant."""
-    own = ~found.loose
-    return replace(found, case=found.case[own], loose=found.loose[own], slope=found.slope[own], rate=found.rate[own])
+    own = ~step_map.loose
+    return replace(
+        step_map, case=step_map.case[own], loose=step_map.loose[own], slope=step_map.slope[own], rate=step_map.rate[own]
+    )
 
 
 def _stretches(passed: Passed) -> list[tuple[int, int]]:
@@ -269,14 +272,14 @@ def _stretches(passed: Passed) -> list[tuple[int, int]]:
 
 
 def _lasting_ones(
-    shown: Sequence[Mapping[Found, object]], stretches: Sequence[tuple[int, int]]
+    by_lane: Sequence[Mapping[Found, object]], stretches: Sequence[tuple[int, int]]
 ) -> Iterator[tuple[Found, int, int]]:
     """Each owner with the first and last of two or more neighbouring lanes of a case that all have it."""
     for first, last in stretches:
-        for owner in dict.fromkeys(each for lane in range(first, last + 1) for each in shown[lane]):
+        for owner in dict.fromkeys(lane_owner for lane in range(first, last + 1) for lane_owner in by_lane[lane]):
             since = None
             for lane in range(first, last + 2):
-                if lane <= last and owner in shown[lane]:
+                if lane <= last and owner in by_lane[lane]:
                     since = lane if since is None else since
                 elif since is not None:
                     if lane - 1 > since:
@@ -288,15 +291,15 @@ def _loops(
     opened: Opened, times: np.ndarray, stretches: Sequence[tuple[int, int]], duration: float
 ) -> list[_Candidate]:
     """The loops that are unstable for longest, with laws that have no stored integrals, as in all loose lanes."""
-    found = opened.loops
+    loops = opened.loops
     rates, ticks = np.full(len(times), -math.inf), np.zeros(len(times), bool)
-    for lane, limit, by_ticks in growing(found, fastest(found), duration):
+    for lane, limit, by_ticks in growing(loops, fastest(loops), duration):
         if opened.lane(lane, limit, by_ticks).concerned():
-            ticks[lane], rates[lane] = by_ticks, growths(found, np.array([lane]), ticks=by_ticks).max()
-    shown = [{"": None} if rate > 0.0 else {} for rate in rates.tolist()]
+            ticks[lane], rates[lane] = by_ticks, growths(loops, np.array([lane]), ticks=by_ticks).max()
+    by_lane = [{"": None} if rate > 0.0 else {} for rate in rates.tolist()]
     several = [
         (_over(rates[first : last + 1].tolist(), times[first : last + 1], 1.0), first, last)
-        for _, first, last in _lasting_ones(shown, stretches)
+        for _, first, last in _lasting_ones(by_lane, stretches)
     ]
     for grown, first, last in sorted(several, reverse=True):
         lane = first + int(np.argmax(np.round(rates[first : last + 1] / rates[first : last + 1].max(), 4)))
@@ -307,15 +310,17 @@ def _loops(
     return []
 
 
-def _news(experiment: Experiment, found: Sequence[Lasting]) -> tuple[Lasting, ...]:
+def _news(experiment: Experiment, findings: Sequence[Lasting]) -> tuple[Lasting, ...]:
     """The findings of kinds that the starting poses do not show: the check has reported those."""
-    if not found:
+    if not findings:
         return ()
     begun = step_size(experiment, chosen_cases(experiment))
-    told = {fault.kind for fault in begun.faults}
-    if "grows" in told or "misses" in told:
-        told.add("fast")
-    loops = bool(begun.loops) or "grows" in told
+    kinds = {fault.kind for fault in begun.faults}
+    if "grows" in kinds or "misses" in kinds:
+        kinds.add("fast")
+    loops = bool(begun.loops) or "grows" in kinds
     return tuple(
-        each for each in found if (not loops if isinstance(each.fault, Unstable) else each.fault.kind not in told)
+        finding
+        for finding in findings
+        if (not loops if isinstance(finding.fault, Unstable) else finding.fault.kind not in kinds)
     )

@@ -37,10 +37,10 @@ def reads(use: ServoUse, values: Mapping[str, Any]) -> frozenset[str] | None:
         graph.input(":time"),
         SimpleNamespace(**{state.name: graph.input(state.name) for state in parts.natural}),
     )
-    found = _tried(servo.control, _parameters(graph, parts.parameters, values), _named(graph, of_law), seen)
-    if found is None:
+    tried = _tried(servo.control, _parameters(graph, parts.parameters, values), _named(graph, of_law), seen)
+    if tried is None:
         return None
-    roots = [x.ref for x in (*found.outputs.values(), *found.slopes.values()) if isinstance(x, Scalar)]
+    roots = [x.ref for x in (*tried.outputs.values(), *tried.slopes.values()) if isinstance(x, Scalar)]
     inputs = {graph.nodes[position][1] for position in graph.live(roots) if graph.nodes[position][0] == "input"}
     return frozenset(inputs & set(quantities(use)))
 
@@ -68,16 +68,16 @@ def accelerates(use: ServoUse, values: Mapping[str, Any]) -> bool | None:
 
 def _parameters(graph: Graph, declared: Iterable[Any], values: Mapping[str, Any]) -> SimpleNamespace:
     """Placeholders for numbers; words, lists and numbers that shape the program keep their values."""
-    made: dict[str, Any] = {}
-    for each in declared:
-        path = f":{each.name}"
-        if not _is_input(each):
-            made[each.name] = values[each.name]
-        elif each.shape == "vector":
-            made[each.name] = tuple(graph.input(f"{path}.{axis}") for axis in "xyz")
+    placeholders: dict[str, Any] = {}
+    for parameter in declared:
+        path = f":{parameter.name}"
+        if not _is_input(parameter):
+            placeholders[parameter.name] = values[parameter.name]
+        elif parameter.shape == "vector":
+            placeholders[parameter.name] = tuple(graph.input(f"{path}.{axis}") for axis in "xyz")
         else:
-            made[each.name] = graph.input(path)
-    return SimpleNamespace(**made)
+            placeholders[parameter.name] = graph.input(path)
+    return SimpleNamespace(**placeholders)
 
 
 def _is_input(parameter: Parameter) -> bool:

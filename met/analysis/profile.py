@@ -157,33 +157,36 @@ def profile(experiment: Experiment) -> RunProfile:
     begun = time.perf_counter()
     recording = record(build(experiment))
     recorded = time.perf_counter()
-    made = backends.load(recording)
+    kernel = backends.load(recording)
     compiled = time.perf_counter()
 
     schedule = experiment.structure.schedule
-    cases = _cases(experiment, made.lanes, max(1, schedule.ticks // schedule.dynamics))
-    blocks = len(cases) // made.lanes
+    cases = _cases(experiment, kernel.lanes, max(1, schedule.ticks // schedule.dynamics))
+    blocks = len(cases) // kernel.lanes
     ticks = min(schedule.ticks, max(1, _STEPS // blocks) * schedule.dynamics)
     steps = max(1, ticks // schedule.dynamics)
-    calls = _calls(made, cases, ticks)
-    halfway = made.block(cases[: made.lanes])
+    calls = _calls(kernel, cases, ticks)
+    halfway = kernel.block(cases[: kernel.lanes])
     halfway.step(0, ticks // 2)
     numbers = sorted({number for number, _ in calls})
     chains, fused = _chains()
     seconds, fastest, *alone = _best(
-        [lambda: made.run(cases, ticks, threads=1), chains, *(_alone(made, number, halfway) for number in numbers)]
+        [lambda: kernel.run(cases, ticks, threads=1), chains, *(_alone(kernel, number, halfway) for number in numbers)]
     )
-    ns = {number: each * 1e9 / (_CALLS * _STARTS * made.lanes) for number, each in zip(numbers, alone, strict=True)}
+    ns = {
+        number: section_seconds * 1e9 / (_CALLS * _STARTS * kernel.lanes)
+        for number, section_seconds in zip(numbers, alone, strict=True)
+    }
     return RunProfile(
         experiment=experiment.name,
         cases=experiment.cases.count,
         joints=len(experiment.structure.moving),
-        lanes=made.lanes,
-        vector=made.vector,
-        cpu=made.processor,
-        code_bytes=made.code_bytes,
-        pieces=made.functions,
-        cached=made.cached,
+        lanes=kernel.lanes,
+        vector=kernel.vector,
+        cpu=kernel.processor,
+        code_bytes=kernel.code_bytes,
+        pieces=kernel.functions,
+        cached=kernel.cached,
         recording_s=recorded - begun,
         compiling_s=compiled - recorded,
         blocks=blocks,
@@ -225,9 +228,9 @@ def _chains() -> tuple[Work, int]:
         0,
         names,
     )
-    made = backends.load(record(program))
-    cases = np.ones((blocks * made.lanes, 1))
-    work = partial(made.run, cases, ticks - 1, record=False, threads=1)
+    kernel = backends.load(record(program))
+    cases = np.ones((blocks * kernel.lanes, 1))
+    work = partial(kernel.run, cases, ticks - 1, record=False, threads=1)
     return work, chains * length * ticks * len(cases)
 
 
@@ -236,7 +239,7 @@ def hoisted(experiment: Experiment, recording: Recording) -> Iterator[Input]:
     sections = {step.section for step in _all(recording.start) if isinstance(step, RunSection)}
     ticking = {step.section for step in _all(recording.tick) if isinstance(step, (RunSection, RecordSection))}
     for coordinate in experiment.cases.coordinates:
-        count, kept = 0, set()
+        count, stored = 0, set()
         for section in (recording.sections[i] for i in sections):
             needs: set[int] = set()
             for i in section.order:
@@ -245,32 +248,32 @@ def hoisted(experiment: Experiment, recording: Recording) -> Iterator[Input]:
                 if node == ("input", coordinate.path) or any(ref >> 1 in needs for ref in refs):
                     needs.add(i)
                     count += node[0] not in LEAVES
-            kept |= {name for name, ref in section.stores if ref >> 1 in needs and name.startswith((PARAMETER, TREE))}
-        readers = sum(_reads(recording.sections[i], kept) for i in ticking)
-        yield Input(coordinate.path, len(coordinate.sets), count, len(kept), readers)
+            stored |= {name for name, ref in section.stores if ref >> 1 in needs and name.startswith((PARAMETER, TREE))}
+        readers = sum(_reads(recording.sections[i], stored) for i in ticking)
+        yield Input(coordinate.path, len(coordinate.sets), count, len(stored), readers)
 
 
 def _reads(section: CodeSection, cells: set[str]) -> int:
     """Live operations that take one of these cells."""
-    found = 0
+    count = 0
     for i in operations(section):
         node = section.nodes[i]
         operands = (section.nodes[ref >> 1] for ref in node[1 : 1 + OPERANDS[node[0]]])
-        found += any(operand[0] == "cell" and operand[1] in cells for operand in operands)
-    return found
+        count += any(operand[0] == "cell" and operand[1] in cells for operand in operands)
+    return count
 
 
 def by_part(section: CodeSection) -> dict[str, tuple[int, int]]:
     """Live operations and flops of a section by part, in order of first appearance."""
-    found: dict[str, tuple[int, int]] = {}
+    costs: dict[str, tuple[int, int]] = {}
     parts = iter((*section.parts, (len(section.nodes), "")))
     name, (until, following) = "", next(parts)
     for i in operations(section):
         while i >= until:
             name, (until, following) = following, next(parts)
-        count, flops = found.get(name, (0, 0))
-        found[name] = (count + 1, flops + FLOPS.get(section.nodes[i][0], 0))
-    return found
+        count, flops = costs.get(name, (0, 0))
+        costs[name] = (count + 1, flops + FLOPS.get(section.nodes[i][0], 0))
+    return costs
 
 
 # Times
@@ -283,7 +286,7 @@ def _parts(
 
     calls  of a section a step, by its number and whether within a loop;  alone: ns of a call of it and case
     """
-    found: dict[tuple[str, str, bool], WorkCost] = {}
+    costs: dict[tuple[str, str, bool], WorkCost] = {}
     for (number, event), rate in calls.items():
         section = recording.sections[number]
         shares = by_part(section) or {section.parts[0][1]: (0, 0)}  # without any operation
@@ -291,12 +294,12 @@ def _parts(
         for path, (ops, flops) in shares.items():
             phase, _, part = path.partition("/")
             key = (_work(phase), part, event)
-            old = found.get(key, WorkCost(*key, 0.0, 0.0, 0.0, 0.0))
+            old = costs.get(key, WorkCost(*key, 0.0, 0.0, 0.0, 0.0))
             ns = alone[number] * rate * (ops / whole if ops else 1.0)
-            found[key] = WorkCost(
+            costs[key] = WorkCost(
                 *key, max(old.calls, rate), old.operations + ops * rate, old.flops + flops * rate, old.ns + ns
             )
-    return tuple(sorted(found.values(), key=_place))
+    return tuple(sorted(costs.values(), key=_place))
 
 
 def _work(phase: str) -> str:
@@ -314,13 +317,13 @@ def _place(part: WorkCost) -> tuple[bool, int, int]:
     )
 
 
-def _calls(made: Kernel, cases: np.ndarray, ticks: int) -> dict[tuple[int, bool], float]:
+def _calls(kernel: Kernel, cases: np.ndarray, ticks: int) -> dict[tuple[int, bool], float]:
     """Mean number of calls of each section in a run, over the blocks, by (section, whether within a loop)."""
-    program, loops = counting(made.program)
-    counter = backends.load(record(program), made.lanes)
+    program, loops = counting(kernel.program)
+    counter = backends.load(record(program), kernel.lanes)
     _, outputs = counter.run(cases, ticks, record=False, threads=1)
-    turns = iter([float(outputs[:: made.lanes, program.outputs.index(loop.turns)].mean()) for loop in loops])
-    found: dict[tuple[int, bool], float] = {}
+    turns = iter([float(outputs[:: kernel.lanes, program.outputs.index(loop.turns)].mean()) for loop in loops])
+    calls: dict[tuple[int, bool], float] = {}
 
     def ticks_of(first: int, divisor: int) -> int:
         """The number of multiples of the divisor from the first tick to the last."""
@@ -332,9 +335,9 @@ def _calls(made: Kernel, cases: np.ndarray, ticks: int) -> dict[tuple[int, bool]
             match node:
                 case RunSection(section):
                     key = (section, event is not None)
-                    found[key] = found.get(key, 0.0) + (ticks_of(first, divisor) if event is None else event)
+                    calls[key] = calls.get(key, 0.0) + (ticks_of(first, divisor) if event is None else event)
                 case RecordSection(section, own):
-                    found[section, False] = ticks_of(0, own)
+                    calls[section, False] = ticks_of(0, own)
                 case Branch(Every(own), inner):
                     note(inner, first, math.lcm(divisor, own), event)
                 case Branch(Unless0(), inner):
@@ -342,15 +345,15 @@ def _calls(made: Kernel, cases: np.ndarray, ticks: int) -> dict[tuple[int, bool]
                 case Branch(WhileAny(), inner):
                     note(inner, first, divisor, next(turns))
 
-    note(made.recording.start, 0, 1, None)
-    found.clear()  # of the start only the loops' counters matter: they come first
-    note(made.recording.tick, 0, 1, None)
-    return found
+    note(kernel.recording.start, 0, 1, None)
+    calls.clear()  # of the start only the loops' counters matter: they come first
+    note(kernel.recording.tick, 0, 1, None)
+    return calls
 
 
-def _alone(made: Kernel, number: int, state: Block) -> Work:
+def _alone(kernel: Kernel, number: int, state: Block) -> Work:
     """Work that calls a section many times in a row, from copies of this state."""
-    recording = made.recording
+    recording = kernel.recording
     section = recording.sections[number]
     program, step = recording.program, RunSection(0)
     if section.records:
@@ -360,7 +363,7 @@ def _alone(made: Kernel, number: int, state: Block) -> Work:
         program = replace(program, tick=())
     single = Recording(program, (section,), (), (step,), (), recording.cells)
     # Not inlined: in a loop of its own a compiler would find that nothing changes, and skip much of the work.
-    alone = backends.find().load(single, lanes=made.lanes, inline=False).block(state.inputs.T)
+    alone = backends.find().load(single, lanes=kernel.lanes, inline=False).block(state.inputs.T)
 
     def work() -> None:
         for _ in range(_STARTS):
@@ -406,6 +409,6 @@ def _all(body: tuple[RecordedControl, ...]) -> Iterator[RecordedControl]:
             yield from _all(node.body)
 
 
-def as_data(found: RunProfile) -> Mapping[str, Any]:
+def as_data(run_profile: RunProfile) -> Mapping[str, Any]:
     """The profile as JSON can hold it."""
-    return {**asdict(found), "flops": found.flops, "share_of_peak": found.share_of_peak}
+    return {**asdict(run_profile), "flops": run_profile.flops, "share_of_peak": run_profile.share_of_peak}

@@ -112,9 +112,9 @@ def not_for_a_bed(experiment: Experiment, use: ServoUse) -> tuple[str, str] | No
     first = next(iter(experiment.structure.substitutions), None)
     other = None if first is None else servo_of(experiment, first.joint)
     if other is not None and other.divisor != use.divisor:
-        one, two = (experiment.structure.schedule.base_hz / each.divisor for each in (use, other))
+        own_hz, two = (experiment.structure.schedule.base_hz / servo.divisor for servo in (use, other))
         same = "give both the same rate, or size a bed in a run of its own"
-        return f"ticks at {one:g} Hz, and that of `{other.joint}`, which is on a bed, at {two:g} Hz", same
+        return f"ticks at {own_hz:g} Hz, and that of `{other.joint}`, which is on a bed, at {two:g} Hz", same
     for model_use in experiment.structure.environment:
         named = models.find("environment", model_use.model, model_use.place).friction_joint
         path = f"environment.{model_use.name}.{named}"
@@ -137,13 +137,13 @@ def shaft_work(
     rows  of the case table, rising; all of them by default.  progress: called with the number of cases done so far
     """
     prepared = prepare(_recording(experiment, joint, _names(experiment, joint)))
-    each = max(1, prepared.experiment.structure.history_bytes)
-    size = max(1, BLOCK_BYTES // each)
+    case_bytes = max(1, prepared.experiment.structure.history_bytes)
+    size = max(1, BLOCK_BYTES // case_bytes)
     wanted = np.arange(experiment.cases.count) if rows is None else rows
     for first in range(0, len(wanted), size):
         block = wanted[first : first + size]
-        told = None if progress is None else lambda done, before=first: progress(before + done)
-        yield _block(experiment, joint, run(prepared, block, progress=told), block)
+        report = None if progress is None else lambda done, before=first: progress(before + done)
+        yield _block(experiment, joint, run(prepared, block, progress=report), block)
 
 
 def _recording(experiment: Experiment, joint: str, names: Sequence[str]) -> Experiment:
@@ -161,8 +161,8 @@ def _recording(experiment: Experiment, joint: str, names: Sequence[str]) -> Expe
 
 def drive_of(use: Substitution) -> DriveCommand:
     """The quantity that the drive of a joint's bed is commanded."""
-    told: DriveCommand = models.find("bed", use.bed, use.place).drive
-    return told
+    drive: DriveCommand = models.find("bed", use.bed, use.place).drive
+    return drive
 
 
 def _names(experiment: Experiment, joint: str) -> tuple[str, ...]:
@@ -170,12 +170,12 @@ def _names(experiment: Experiment, joint: str) -> tuple[str, ...]:
     use = substitution_of(experiment, joint)
     if use is None:
         return OF_JOINT
-    told = drive_of(use)
-    return (*OF_BED, "bed.motor_torque" if told == "rate" else f"bed.drive_{told}")
+    drive = drive_of(use)
+    return (*OF_BED, "bed.motor_torque" if drive == "rate" else f"bed.drive_{drive}")
 
 
-def _block(experiment: Experiment, joint: str, found: Any, rows: np.ndarray) -> ShaftWork:
-    of = {name: found.signals[f"{joint}.{name}"] for name in _names(experiment, joint)}
+def _block(experiment: Experiment, joint: str, results: Any, rows: np.ndarray) -> ShaftWork:
+    signals = {name: results.signals[f"{joint}.{name}"] for name in _names(experiment, joint)}
     use = substitution_of(experiment, joint)
     motor = motor_of(experiment, joint, rows)
     ratio = motor["ratio"][:, None]
@@ -187,34 +187,38 @@ def _block(experiment: Experiment, joint: str, found: Any, rows: np.ndarray) -> 
             for name in ("inertia", "kt_load", "kt", "resistance", "tau_max")
             if (path := f"{joint}.bed.{name}") in experiment.parameters
         }
-        rate, load = of["bed.shaft_rate"], of["law.torque"] / scale.torque
+        rate, load = signals["bed.shaft_rate"], signals["law.torque"] / scale.torque
         kt, resistance, most = (bed[name][:, None] for name in ("kt", "resistance", "tau_max"))
         if drive_of(use) == "voltage":
-            voltage = of["bed.drive_voltage"]
+            voltage = signals["bed.drive_voltage"]
             drive = np.clip(kt / resistance * (voltage - kt * rate), -most, most)
         else:
-            drive = of["bed.motor_torque"] if drive_of(use) == "rate" else np.clip(of["bed.drive_torque"], -most, most)
+            drive = (
+                signals["bed.motor_torque"]
+                if drive_of(use) == "rate"
+                else np.clip(signals["bed.drive_torque"], -most, most)
+            )
             voltage = resistance / kt * drive + kt * rate
     else:
         bed = motor
-        rate, voltage, drive = of["servo.motor_rate"], of["servo.voltage"], of["servo.motor_torque"]
-        load = -of["tau_load"] / ratio
+        rate, voltage, drive = signals["servo.motor_rate"], signals["servo.voltage"], signals["servo.motor_torque"]
+        load = -signals["tau_load"] / ratio
     return ShaftWork(
         case=np.asarray(experiment.cases.table[rows]),
-        time=found.time,
+        time=results.time,
         rate=rate,
-        acceleration=ratio * of["qdd"] / scale.rate,
+        acceleration=ratio * signals["qdd"] / scale.rate,
         drive=drive,
         voltage=voltage,
         load=load,
-        arm=of["J_eff"] / ratio**2 / scale.inertia,
+        arm=signals["J_eff"] / ratio**2 / scale.inertia,
         rotor=motor["inertia"] / of_cases(scale.inertia),
         shaft=bed["inertia"],
         kt=bed["kt"],
         kt_load=bed.get("kt_load"),
         strongest=bed["tau_max"],
-        failed=found.status != 0,
-        limited=found.limited,
+        failed=results.status != 0,
+        limited=results.limited,
     )
 
 
@@ -223,7 +227,7 @@ def scale_of(experiment: Experiment, joint: str, rows: np.ndarray) -> BedScale:
     use = substitution_of(experiment, joint)
     if use is None or not use.scaled:
         return BedScale()
-    names = (each.name for each in bed_scale.PARAMETERS)
+    names = (declared.name for declared in bed_scale.PARAMETERS)
     return BedScale(*(parameter(experiment, f"{joint}.bed.scale.{name}", rows)[:, None] for name in names))  # type: ignore[arg-type]
 
 
@@ -239,8 +243,8 @@ def motor_of(experiment: Experiment, joint: str, rows: np.ndarray) -> dict[str, 
     head = f"{joint}.servo."
     numbers = {
         path.removeprefix(head): parameter(experiment, path, rows)
-        for path, each in experiment.parameters.items()
-        if path.startswith(head) and isinstance(each.value, float | int | Formula)
+        for path, quantity in experiment.parameters.items()
+        if path.startswith(head) and isinstance(quantity.value, float | int | Formula)
     }
     motor: Motor = models.find("servo", use.model, use.place).motor(SimpleNamespace(**numbers))
     return {field.name: np.asarray(getattr(motor, field.name)) for field in fields(motor)}
@@ -267,15 +271,15 @@ def on_bed(experiment: Experiment, joint: str, *, delay: int) -> Experiment:
     law = models.find("law", others[0].law) if others else LAWS[0]
     parameters = dict(experiment.parameters)
     for owner, model in (("bed", bed), ("law", law)):
-        for each in model.parameters:
-            path, own = f"{joint}.{owner}.{each.name}", f"{joint}.servo.{each.of_servo}"
-            if each.shape == "text":
+        for declared in model.parameters:
+            path, own = f"{joint}.{owner}.{declared.name}", f"{joint}.servo.{declared.of_servo}"
+            if declared.shape == "text":
                 continue
-            if each.of_servo and own in experiment.parameters:
+            if declared.of_servo and own in experiment.parameters:
                 parameters[path] = experiment.parameters[own]
-            elif each.default is not None:
-                value = float(delay) if path.endswith(".bed.delay") else each.default
-                parameters[path] = Quantity(value, each.unit, Origin("default"))
+            elif declared.default is not None:
+                value = float(delay) if path.endswith(".bed.delay") else declared.default
+                parameters[path] = Quantity(value, declared.unit, Origin("default"))
     use = Substitution(joint, bed.name, law.name)
     structure = replace(experiment.structure, substitutions=(*others, use))
     return replace(experiment, structure=structure, parameters=parameters)

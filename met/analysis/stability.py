@@ -48,41 +48,41 @@ def least_margins(experiment: Experiment, passed: Passed) -> LeastMargins | str:
     if structure.substitutions:
         return "a motor is on a bed: `met margin` judges its loop"
     linearizer = Linearizer(experiment, passed.case.tolist(), passed.memory)
-    found = linearizer.sampled()
-    if found is None:
+    sampled = linearizer.sampled()
+    if sampled is None:
         return "no law closes a loop over the arm"
     if linearizer.continuous:
         return f"the law of joint `{min(linearizer.continuous)}` is continuous"
-    if _events(found) > MOST_EVENTS:
+    if _events(sampled) > MOST_EVENTS:
         return "the rates of dynamics and servos have no common period that is short enough"
-    if not np.isfinite(found.slope).all():
+    if not np.isfinite(sampled.slope).all():
         return "the arm has no finite slopes at an instant"
-    closed = _largest(found, np.arange(len(found.case)))
+    closed = _largest(sampled, np.arange(len(sampled.case)))
     several = list[_Least]()
-    for law in found.laws:
+    for law in sampled.laws:
         if law.outputs != 1:
             return f"the law of joint `{law.joint}` has {law.outputs} outputs"
-        loops = _open_loops(found, law, closed)
+        loops = _open_loops(sampled, law, closed)
         if loops is not None:
             several.append(_least(loops, law.joint))
     if not several:
         return "nothing comes back where a loop is opened: the arm is held"
-    worst = min(several, key=lambda each: each.disk)
-    together, joints = math.inf, tuple(each.joints[0] for each in several)
+    worst = min(several, key=lambda loop: loop.disk)
+    together, joints = math.inf, tuple(loop.joints[0] for loop in several)
     if worst.disk and several[1:]:
-        every = _together(found, worst, joints)
+        every = _together(sampled, worst, joints)
         together = every.gain
         worst = every if every.disk * (1.0 + TOGETHER) < worst.disk else worst
     return LeastMargins(
         disk=_rounded(worst.disk),
-        gain=_rounded(min(together, *(each.gain for each in several))),
-        delay=_rounded(float(np.min([each.delay for each in several]))),
+        gain=_rounded(min(together, *(loop.gain for loop in several))),
+        delay=_rounded(float(np.min([loop.delay for loop in several]))),
         joints=worst.joints if worst.disk else joints,
         case=int(experiment.cases.table[passed.case[worst.lane]]),
         time=float(passed.tick[worst.lane]) / structure.schedule.base_hz,
         loops=len(several),
         cases=len(np.unique(passed.case)),
-        poses=len(found.case),
+        poses=len(sampled.case),
     )
 
 
@@ -98,31 +98,31 @@ def margins_at_start(experiment: Experiment, rows: Sequence[int], least: float) 
     if experiment.structure.substitutions:
         return None
     linearizer = Linearizer(experiment, rows)
-    found = linearizer.sampled()
-    if found is None or linearizer.continuous or _events(found) > MOST_EVENTS:
+    sampled = linearizer.sampled()
+    if sampled is None or linearizer.continuous or _events(sampled) > MOST_EVENTS:
         return None
-    disks, lanes = np.full(len(found.case), math.inf), np.arange(len(found.case))
-    fine = np.isfinite(found.slope).all((1, 2))
+    disks, lanes = np.full(len(sampled.case), math.inf), np.arange(len(sampled.case))
+    fine = np.isfinite(sampled.slope).all((1, 2))
     if not fine.all():
         return np.where(fine, disks, math.nan)
 
-    closed, allowed = _largest(found, lanes), allowed_gain(least)
-    for law in found.laws:
-        loops = _open_loops(found, law, closed) if law.outputs == 1 else None
+    closed, allowed = _largest(sampled, lanes), allowed_gain(least)
+    for law in sampled.laws:
+        loops = _open_loops(sampled, law, closed) if law.outputs == 1 else None
         if loops is not None:
             disks = np.minimum(disks, np.where(loops.stable, 1.0 / _sensitivities(loops).max(axis=0), 0.0))
     raised, lowered = (
-        _largest(found, lanes, dict.fromkeys((law.joint for law in found.laws), gain))
+        _largest(sampled, lanes, dict.fromkeys((law.joint for law in sampled.laws), gain))
         for gain in (allowed, 1.0 / allowed)
     )
     together = np.maximum(raised, lowered) <= 1.0 + LEAST
     return np.where(together, disks, np.minimum(disks, SHORT * least))
 
 
-def _events(found: SampledLoops) -> int:
+def _events(sampled: SampledLoops) -> int:
     """Ticks and steps in a frame."""
-    length = round(seconds(found) * found.base_hz)
-    return length // found.divisor + sum(length // law.divisor for law in found.laws)
+    length = round(seconds(sampled) * sampled.base_hz)
+    return length // sampled.divisor + sum(length // law.divisor for law in sampled.laws)
 
 
 @frozen
@@ -144,27 +144,27 @@ class _OpenLoops:
     def sensitivities(self, frequencies: np.ndarray) -> np.ndarray:
         """The largest singular value of S - 1/2 at angular frequencies, rad/s, where S is the loop's sensitivity:
         [frequency, lane]."""
-        z, one = np.exp(1j * frequencies * self.period)[:, None, None, None], np.eye(self.D.shape[-1])
+        z, identity = np.exp(1j * frequencies * self.period)[:, None, None, None], np.eye(self.D.shape[-1])
         P = self.C @ np.linalg.solve(z * np.eye(self.A.shape[-1]) - self.A, self.B.astype(complex)) + self.D
-        if one.size == 1:
+        if identity.size == 1:
             return np.asarray(np.abs(1.0 / (1.0 - P[..., 0, 0]) - 0.5))
-        return np.asarray(np.linalg.svd(np.linalg.inv(one - P) - 0.5 * one, compute_uv=False)[..., 0])
+        return np.asarray(np.linalg.svd(np.linalg.inv(identity - P) - 0.5 * identity, compute_uv=False)[..., 0])
 
     def only(self, lane: int) -> _OpenLoops:
         """The loop in one lane."""
-        one = slice(lane, lane + 1)
-        return _OpenLoops(self.A[one], self.B[one], self.C[one], self.D[one], self.largest[one], self.period)
+        own = slice(lane, lane + 1)
+        return _OpenLoops(self.A[own], self.B[own], self.C[own], self.D[own], self.largest[own], self.period)
 
 
-def _open_loops(found: SampledLoops, law: SampledLaw, closed: np.ndarray) -> _OpenLoops | None:
+def _open_loops(sampled: SampledLoops, law: SampledLaw, closed: np.ndarray) -> _OpenLoops | None:
     """A law's open loop; None where nothing comes back. closed: the closed loop's largest eigenvalue, [lane]"""
-    parts = opened(found, np.arange(len(found.case)), law.joint)
+    parts = opened(sampled, np.arange(len(sampled.case)), law.joint)
     A, B, C, D = parts
     moved, comes_back = B, bool(D.any())
     for _ in range(2 if not comes_back else 0):  # a voltage moves the arm within two steps, if at all
         moved = A @ moved
         comes_back |= bool((np.abs(C @ moved) > 0.0).any())
-    return _OpenLoops(*parts, closed, seconds(found)) if comes_back or (C @ B).any() else None
+    return _OpenLoops(*parts, closed, seconds(sampled)) if comes_back or (C @ B).any() else None
 
 
 @frozen
@@ -186,8 +186,8 @@ def _least(loops: _OpenLoops, joint: str) -> _Least:
         return _Least(0.0, 1.0, 0.0, (joint,), int(unstable[np.argmax(loops.largest[unstable])]))
     sizes = _sensitivities(loops)
     lane = int(sizes.max(axis=0).argmax())
-    found = [_of_lane(loops.only(each), sizes[:, each]) for each in sorted({0, lane})]
-    disk, gain, delay = (float(np.min([each[place] for each in found])) for place in range(3))
+    by_lane = [_of_lane(loops.only(number), sizes[:, number]) for number in sorted({0, lane})]
+    disk, gain, delay = (float(np.min([lane_margins[place] for lane_margins in by_lane])) for place in range(3))
     return _Least(disk, gain, delay, (joint,), lane)
 
 
@@ -203,8 +203,8 @@ def _of_lane(loops: _OpenLoops, sizes: np.ndarray) -> tuple[float, float, float]
         return margins_of.disk, min(factors, default=math.inf), delay
     from scipy.optimize import minimize_scalar
 
-    grid, at = np.log(_frequencies(loops)), int(sizes.argmax())
-    ends = (grid[max(0, at - 1)], grid[min(len(grid) - 1, at + 1)])
+    grid, peak = np.log(_frequencies(loops)), int(sizes.argmax())
+    ends = (grid[max(0, peak - 1)], grid[min(len(grid) - 1, peak + 1)])
     least = minimize_scalar(lambda w: -float(loops.sensitivities(np.exp([w]))[0, 0]), bounds=ends, method="bounded")
     gain = min(_factors(*gain_limits(A, B, C, D, LEAST)), default=math.inf)
     return 1.0 / max(-float(least.fun), float(sizes.max())), gain, math.nan
@@ -221,17 +221,17 @@ def _sensitivities(loops: _OpenLoops) -> np.ndarray:
     return np.concatenate([loops.sensitivities(some) for some in np.array_split(_frequencies(loops), pieces)])
 
 
-def _together(found: SampledLoops, least: _Least, joints: tuple[str, ...]) -> _Least:
+def _together(sampled: SampledLoops, least: _Least, joints: tuple[str, ...]) -> _Least:
     """The factor by which the gains of all these loops at once may rise or fall, to `TOGETHER`, with the disk that
     allows it: of the lanes that do not bear what the least margin of single loops allows, or of that margin's lane
     where all bear it. Infinite where no factor up to `FARTHEST` is too much."""
     lanes = np.array([least.lane])
 
     def largest(gain: float) -> np.ndarray:
-        return _largest(found, lanes, dict.fromkeys(joints, gain))
+        return _largest(sampled, lanes, dict.fromkeys(joints, gain))
 
     if (allowed := allowed_gain(least.disk)) < FARTHEST:
-        lanes = np.arange(len(found.case))
+        lanes = np.arange(len(sampled.case))
         grown = np.maximum(largest(allowed), largest(1.0 / allowed)) > 1.0 + LEAST
         lanes = np.flatnonzero(grown) if grown.any() else np.array([least.lane])
     factor, lane = math.inf, least.lane
@@ -254,9 +254,9 @@ def _together(found: SampledLoops, least: _Least, joints: tuple[str, ...]) -> _L
     return _Least(disk, factor, math.nan, joints, lane)
 
 
-def _largest(found: SampledLoops, lanes: np.ndarray, gains: dict[str, float] | None = None) -> np.ndarray:
+def _largest(sampled: SampledLoops, lanes: np.ndarray, gains: dict[str, float] | None = None) -> np.ndarray:
     """The largest eigenvalue of a frame with all loops closed, in size, [lane]."""
-    return np.asarray(np.abs(np.linalg.eigvals(frame(found, lanes, gains))).max(axis=1))
+    return np.asarray(np.abs(np.linalg.eigvals(frame(sampled, lanes, gains))).max(axis=1))
 
 
 def _factors(down: float | None, up: float | None) -> Iterator[float]:

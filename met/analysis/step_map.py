@@ -102,7 +102,7 @@ class Linearizer:
         """memory: cells of these cases at instants that they pass, [lane]; a case may be there several times. None:
         where they begin. opened: continuous laws are kept apart from the slopes, as laws that tick are. most: number of
         states beyond which TooLarge is raised"""
-        structure, self._given = experiment.structure, (experiment, cases, memory)
+        structure, self._arguments = experiment.structure, (experiment, cases, memory)
         self.continuous = frozenset(use.joint for use in structure.servos if use.continuous)
         if opened:
             structure = replace(structure, servos=tuple(replace(use, continuous=False) for use in structure.servos))
@@ -112,35 +112,39 @@ class Linearizer:
         table = {coordinate.path: coordinate.values[self.cases] for coordinate in experiment.cases.coordinates}
         lanes = len(self.cases)
         # any value serves as the noise seed: none of it is changed
-        given = table | dict.fromkeys(experiment.cases.noise, np.zeros(lanes))
-        begun, step = LaneTape(self.builder.schedule.base_hz, given, lanes), self.builder.step
+        inputs = table | dict.fromkeys(experiment.cases.noise, np.zeros(lanes))
+        begun, step = LaneTape(self.builder.schedule.base_hz, inputs, lanes), self.builder.step
         with np.errstate(all="ignore"):
             self.builder.start(begun)
             begun.follow((*step.grapple.events(), *self.builder.computers()))
             step.modes(begun)
         if memory is not None:
             begun.cells.update(
-                {name: at for name, at in memory.items() if name in begun.cells or name.startswith(bodies.PAYLOAD)}
+                {
+                    name: values
+                    for name, values in memory.items()
+                    if name in begun.cells or name.startswith(bodies.PAYLOAD)
+                }
             )
         held = self._braked(begun) if memory is None else {}
         self.tape, self.loose = begun.spread(2), np.tile([False, True], lanes)
         self._loosen(held)
         self.cells = tuple(f"{name}.{part}" for part in ("q", "qd") for name in step.coordinates) + step.states
         driven = [
-            each
-            for each in self.system.working
-            if each.servo.control is not None and each.command_kind not in ("torque", "none")
+            actuator
+            for actuator in self.system.working
+            if actuator.servo.control is not None and actuator.command_kind not in ("torque", "none")
         ]
         if self.system.structure.substitutions:
             driven = []
         self.has_laws = bool(driven)
-        self.laws = tuple(each for each in driven if each.ticks)
+        self.laws = tuple(actuator for actuator in driven if actuator.ticks)
         self.held = tuple(name for law in self.laws for name in laws.memory(law))
         if len(self.cells) > most:
             raise TooLarge(f"{len(self.cells):,} states, and {most:,} is the most")
         own = tuple(f"{law.path}.{part.name}" for law in self.laws for part in law.parts.memory)
         self.slope = np.zeros((2 * lanes, len(self.cells), len(self.cells) + len(self.held)))
-        numbers = {name: at for at, name in enumerate((*self.cells, *self.held))}
+        numbers = {name: place for place, name in enumerate((*self.cells, *self.held))}
         places = np.array([numbers[name] for name in (*self.cells, *own)], dtype=int)
         for block in _blocks(len(places), max(1, AT_ONCE // (4 * lanes))):
             wide, moved, sizes = self._moved((*self.cells, *own), block)
@@ -163,7 +167,7 @@ class Linearizer:
 
     def opened(self) -> Linearizer:
         """The slopes with continuous laws kept apart."""
-        return Linearizer(*self._given, opened=True)
+        return Linearizer(*self._arguments, opened=True)
 
     def sampled(
         self, *, loose: bool = True, scaled: Mapping[str, Mapping[str, float]] | None = None
@@ -175,10 +179,10 @@ class Linearizer:
         """
         if not self.has_laws:
             return None
-        step, schedule, here = self.builder.step, self.builder.step.schedule, self.loose == loose
-        tape = self.tape.only(here)
+        step, schedule, wanted = self.builder.step, self.builder.step.schedule, self.loose == loose
+        tape = self.tape.only(wanted)
         with np.errstate(all="ignore"):
-            found = tuple(
+            wanted_laws = tuple(
                 laws.linearised(
                     self.builder,
                     law,
@@ -190,7 +194,7 @@ class Linearizer:
                 for law in self.laws
             )
         return SampledLoops(
-            self.cases, len(self.cells), len(step.coordinates), self.held, self.slope[here], found,
+            self.cases, len(self.cells), len(step.coordinates), self.held, self.slope[wanted], wanted_laws,
             self.system.integrator, schedule.step, schedule.dynamics, schedule.base_hz,
         )  # fmt: skip
 
@@ -259,16 +263,16 @@ class Linearizer:
         """Release the loose lanes: rates and computers' outputs are 0, and all dry friction is sliding, except at
         joints held by brakes."""
         tape, step, loose = self.tape, self.builder.step, self.loose
-        memory = [f"{each.path}.{part.name}" for each in self.system.working for part in each.parts.memory]
+        memory = [f"{actuator.path}.{part.name}" for actuator in self.system.working for part in actuator.parts.memory]
         first = [cell_names.FIRST(name) for name in memory]
         for name in (*(f"{coordinate}.qd" for coordinate in step.coordinates), *memory, *first):
             if name in tape.cells:
                 tape.cells[name] = np.where(loose, 0.0, tape.lane(name))
-        for each in step.sticking:
-            name = cell_names.FRICTION_MODE(each.name)
+        for sticking in step.sticking:
+            name = cell_names.FRICTION_MODE(sticking.name)
             lets_go = loose & (tape.lane(name) == 0.0)
-            if each.name in held:
-                lets_go &= ~np.repeat(held[each.name], 2)
+            if sticking.name in held:
+                lets_go &= ~np.repeat(held[sticking.name], 2)
             tape.cells[name] = np.where(lets_go, 1.0, tape.lane(name))
 
     def _of_stages(self) -> np.ndarray:

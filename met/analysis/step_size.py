@@ -100,11 +100,11 @@ def chosen_cases(experiment: Experiment, also: Iterable[int] = ()) -> tuple[int,
         wanted += ends(coordinate.values)
     joints, states = len(experiment.structure.moving), 6 * len(experiment.structure.servos)
     most = max(2, LANES // (2 * joints + states + 12))
-    found = list(dict.fromkeys(case for case in wanted if case < experiment.cases.count))[:most]
-    if len(found) < most:
+    chosen = list(dict.fromkeys(case for case in wanted if case < experiment.cases.count))[:most]
+    if len(chosen) < most:
         even = np.linspace(0, experiment.cases.count - 1, min(experiment.cases.count, most)).astype(int).tolist()
-        found += [case for case in even if case not in found][: most - len(found)]
-    return tuple(found)
+        chosen += [case for case in even if case not in chosen][: most - len(chosen)]
+    return tuple(chosen)
 
 
 def step_size(
@@ -134,14 +134,14 @@ def _of_chain(chain: Experiment, cases: Sequence[int], memo: AnalysisMemo, most:
     looked = _look(chain, cases, memo, most)
     if looked.may_grow(chain):
         return None
-    found = looked.judged(chain)
-    if found.faults or not found.finite:
+    findings = looked.judged(chain)
+    if findings.faults or not findings.finite:
         return None
-    mode = found.mode
+    mode = findings.mode
     if mode is not None:  # of the mode's participants only the owner is needed
-        owner = next(name for name in mode.names if _owner(name) == (found.owner, found.joint))
+        owner = next(name for name in mode.names if _owner(name) == (findings.owner, findings.joint))
         mode = replace(mode, names=(owner,), weights=np.ones(1))
-    return replace(found.without_matrices(), mode=mode)
+    return replace(findings.without_matrices(), mode=mode)
 
 
 def _look(part: Experiment, cases: Sequence[int], memo: AnalysisMemo, most: float) -> _Look:
@@ -151,34 +151,34 @@ def _look(part: Experiment, cases: Sequence[int], memo: AnalysisMemo, most: floa
     return memo.answer_of_now("look", endless, lambda: _Look(endless, cases, most), cases)
 
 
-def _named(found: StepSize, names: Mapping[str, str]) -> StepSize:
+def _named(findings: StepSize, names: Mapping[str, str]) -> StepSize:
     """The findings on a chain with the arm's own names for its joints. names: the arm's names by the chain's"""
-    if found.mode is None:
-        return found
-    ways = (name.partition(".") for name in found.mode.names)
-    mode = replace(found.mode, names=tuple(f"{names[head]}.{rest}" for head, _, rest in ways))
+    if findings.mode is None:
+        return findings
+    ways = (name.partition(".") for name in findings.mode.names)
+    mode = replace(findings.mode, names=tuple(f"{names[head]}.{rest}" for head, _, rest in ways))
     owner, joint = owner_of(mode)
-    return replace(found, mode=mode, owner=owner, joint=joint)
+    return replace(findings, mode=mode, owner=owner, joint=joint)
 
 
 def _together(parts: Sequence[StepSize]) -> StepSize:
     """The findings on an arm without faults, from those on its chains."""
     first = parts[0].without_matrices()
-    shown = max((part for part in parts if part.mode is not None), key=_shown, default=first)
+    quickest = max((part for part in parts if part.mode is not None), key=_speed_key, default=first)
     return replace(
         first,
-        mode=shown.mode,
-        owner=shown.owner,
-        joint=shown.joint,
+        mode=quickest.mode,
+        owner=quickest.owner,
+        joint=quickest.joint,
         fastest=max(part.fastest for part in parts),
         grown=max(part.grown for part in parts),
     )
 
 
-def _shown(found: StepSize) -> tuple[float, bool]:
+def _speed_key(findings: StepSize) -> tuple[float, bool]:
     """The sort key of findings by the fastest mode of the first case."""
-    assert found.mode is not None
-    return _speed(found.mode, found.map.h)
+    assert findings.mode is not None
+    return _speed(findings.mode, findings.map.h)
 
 
 def _speed(mode: Mode, h: float) -> tuple[float, bool]:
@@ -205,8 +205,8 @@ class _Look:
 
     def judged(self, experiment: Experiment) -> StepSize:
         """The findings for a run of this length."""
-        schedule, found, every, sampled = experiment.structure.schedule, self.map, self.modes, self.sampled
-        steps, h = schedule.ticks // schedule.dynamics, found.h
+        schedule, step_map, every, sampled = experiment.structure.schedule, self.map, self.modes, self.sampled
+        steps, h = schedule.ticks // schedule.dynamics, step_map.h
         held = ticking(sampled) if sampled is not None else frozenset()
         quiet = np.zeros(len(self.cases), bool)
         loops: tuple[Unstable, ...] = ()
@@ -218,19 +218,19 @@ class _Look:
 
                 loops = closed(self.linearizer, sampled, lanes)
         faults = list(_faults(every, quiet, held, h, steps))
-        fast = max(every, key=lambda each: _speed(each, h), default=None)
-        first = [each for each in every if each.case == self.cases[0]]
-        shown = max(first, key=lambda each: _speed(each, h), default=None)
+        fast = max(every, key=lambda mode: _speed(mode, h), default=None)
+        first = [mode for mode in every if mode.case == self.cases[0]]
+        quickest = max(first, key=lambda mode: _speed(mode, h), default=None)
         return StepSize(
             tuple(self.cases),
-            shown,
-            *(owner_of(shown) if shown is not None else ("", "")),
+            quickest,
+            *(owner_of(quickest) if quickest is not None else ("", "")),
             abs(fast.root) * h if fast is not None else 0.0,
-            max((each.grown(h, steps) for each in every), default=0.0),
+            max((mode.grown(h, steps) for mode in every), default=0.0),
             tuple(faults),
-            bool(np.isfinite(found.slope).all()),
+            bool(np.isfinite(step_map.slope).all()),
             loops,
-            found,
+            step_map,
         )
 
 
@@ -244,22 +244,26 @@ def _faults(
     ) -> StepFault:
         return StepFault(kind, mode, *owner_of(mode), figure, truth, after)
 
-    growing_modes = [each for each in every if each.grown(h, steps) > np.log1p(TELLING) and not quiet[each.lane // 2]]
+    growing_modes = [
+        candidate
+        for candidate in every
+        if candidate.grown(h, steps) > np.log1p(TELLING) and not quiet[candidate.lane // 2]
+    ]
     if growing_modes:
-        worst = max(growing_modes, key=lambda each: (each.growth, not each.loose))
+        worst = max(growing_modes, key=lambda candidate: (candidate.growth, not candidate.loose))
         yield fault("grows", worst, worst.growth, 0.0, 0.0)
-    missing = [(each, *each.missed(h, steps)) for each in every]
-    missing = [one for one in missing if abs(one[1] - one[2]) > TELLING and owner_of(one[0])[1] not in held]
+    missing = [(candidate, *candidate.missed(h, steps)) for candidate in every]
+    missing = [miss for miss in missing if abs(miss[1] - miss[2]) > TELLING and owner_of(miss[0])[1] not in held]
     if missing:
-        mode, run, truth, k = max(missing, key=lambda one: (abs(one[1] - one[2]), not one[0].loose))
+        mode, run, truth, k = max(missing, key=lambda miss: (abs(miss[1] - miss[2]), not miss[0].loose))
         yield fault("misses", mode, run, truth, k * h)
-    fast = max(every, key=lambda each: _speed(each, h), default=None)
+    fast = max(every, key=lambda candidate: _speed(candidate, h), default=None)
     if fast is not None and abs(fast.root) * h > FAST * (1.0 + 1e-6):
         yield fault("fast", fast, abs(fast.root) * h, 0.0, 0.0)
 
 
 def remedy(
-    experiment: Experiment, found: StepMap, fault: StepFault, memory: Mapping[str, np.ndarray] | None = None
+    experiment: Experiment, step_map: StepMap, fault: StepFault, memory: Mapping[str, np.ndarray] | None = None
 ) -> Remedy:
     """The rate and the integrators that remove a fault, and the environment model that causes it.
 
@@ -268,14 +272,14 @@ def remedy(
     structure, mode = experiment.structure, fault.mode
     integrator, steps = models.find("integrator", structure.integrator), structure.schedule.ticks
     steps //= structure.schedule.dynamics
-    followed = abs(mode.root) * found.h <= FAST
+    followed = abs(mode.root) * step_map.h <= FAST
     others = tuple(
         name
-        for name, each in models.find_own("integrator").items()
-        if name != integrator.name and fault.kind != "fast" and (followed or each.order > 1)
-        if _followed(found, mode, each, steps)
+        for name, other in models.find_own("integrator").items()
+        if name != integrator.name and fault.kind != "fast" and (followed or other.order > 1)
+        if _followed(step_map, mode, other, steps)
     )
-    rate = slowest(found, mode, integrator, structure.schedule, follows=fault.kind != "grows")
+    rate = slowest(step_map, mode, integrator, structure.schedule, follows=fault.kind != "grows")
     return Remedy(rate, others, _cause(experiment, mode, fault.kind, memory))
 
 
@@ -302,11 +306,11 @@ def _owner(name: str) -> tuple[str, str]:
     return f"joint `{head}`", head
 
 
-def _followed(found: StepMap, mode: Mode, integrator: Integrator, steps: int) -> bool:
+def _followed(step_map: StepMap, mode: Mode, integrator: Integrator, steps: int) -> bool:
     """True where another integrator makes no mode of the lane grow with this step, and misses none."""
-    for each in modes(of_lane(found, mode.lane, found.h), integrator):
-        run, truth, _ = each.missed(found.h, steps)
-        if each.grown(found.h, steps) > np.log1p(TELLING) or abs(run - truth) > TELLING:
+    for other in modes(of_lane(step_map, mode.lane, step_map.h), integrator):
+        run, truth, _ = other.missed(step_map.h, steps)
+        if other.grown(step_map.h, steps) > np.log1p(TELLING) or abs(run - truth) > TELLING:
             return False
     return True
 
@@ -318,13 +322,13 @@ def _cause(experiment: Experiment, mode: Mode, kind: str, memory: Mapping[str, n
     for use in structure.environment:
         if models.find("environment", use.model).loads is None:
             continue
-        rest = tuple(each for each in structure.environment if each is not use)
+        rest = tuple(other for other in structure.environment if other is not use)
         try:
             without = replace(experiment, structure=replace(structure, environment=rest))
-            found = Linearizer(without, [mode.case], memory).map()
+            step_map = Linearizer(without, [mode.case], memory).map()
         except Problem:
             continue
-        lanes = [each for each in modes(found, integrator) if each.loose == mode.loose]
+        lanes = [other for other in modes(step_map, integrator) if other.loose == mode.loose]
         if kind == "grows" and all(lane.growth < 0.5 * mode.growth for lane in lanes):
             return use.name
         if kind != "grows" and all(abs(lane.root) < 0.8 * abs(mode.root) for lane in lanes):

@@ -72,18 +72,21 @@ class FlowAbreast(Flow):
         """Start the cases from the cells of one that has begun, with all loops settled; only numbers that differ
         between cases are computed."""
         self._follow(step for step in self.program.recording.start if not isinstance(step, Branch))
-        self.cells = dict(begun) | {name: each for name, each in self.cells.items() if np.ndim(each)}
+        self.cells = dict(begun) | {name: column for name, column in self.cells.items() if np.ndim(column)}
 
     def run(self, number: int) -> None:
         """Run one section for all cases."""
         section, moves = self.program.sections[number], bool(self.tangents)
         with np.errstate(all="ignore"):
-            of = values_abreast(section, self._leaf, self.opposite.get(self._runs, {}), plain=not moves)
-            cells = [(cell, of(ref)) for cell, ref in section.stores]
-            tangents = [(cell, of(ref)) for cell, ref in section.tangents] if moves else []
+            value_of = values_abreast(section, self._leaf, self.opposite.get(self._runs, {}), plain=not moves)
+            cells = [(cell, value_of(ref)) for cell, ref in section.stores]
+            tangents = [(cell, value_of(ref)) for cell, ref in section.tangents] if moves else []
             for kink in section.kinks if moves else ():
-                self._note(kink.nodes, self._of_each(of(kink.sides[0]) == of(kink.sides[1])) & self._any(of(kink.move)))
-        self._store(section, of, cells, tangents)
+                self._note(
+                    kink.nodes,
+                    self._of_each(value_of(kink.sides[0]) == value_of(kink.sides[1])) & self._any(value_of(kink.move)),
+                )
+        self._store(section, value_of, cells, tangents)
         self.sections_run.append(number)
         self._runs += 1
 
@@ -92,8 +95,8 @@ class FlowAbreast(Flow):
         stands = stands & self._going & ~self.unusual
         if stands.any():
             self.on_kink |= stands
-            here = self.kinks.setdefault(self._runs, {})
-            here |= {node: stands[:, None] | here.get(node, False) for node in nodes}
+            kinks = self.kinks.setdefault(self._runs, {})
+            kinks |= {node: stands[:, None] | kinks.get(node, False) for node in nodes}
 
     def refuse(self, truth: Any, what: Callable[[], str]) -> None:
         """Note the cases of which this is true as unusual."""
@@ -102,11 +105,11 @@ class FlowAbreast(Flow):
     def modes(self) -> dict[str, Any]:
         """Modes of everything that may have dry friction, as columns or numbers; 1 where a case has no friction
         there."""
-        found = {}
-        for each in self.program.builder.step.sticking:
-            has, mode = each.level is not None or self.rubs(each) != 0.0, self.mode(each)
-            found[each.name] = np.where(has, mode, 1.0) if np.ndim(has) else mode if has else 1.0
-        return found
+        modes = {}
+        for sticking in self.program.builder.step.sticking:
+            has, mode = sticking.level is not None or self.rubs(sticking) != 0.0, self.mode(sticking)
+            modes[sticking.name] = np.where(has, mode, 1.0) if np.ndim(has) else mode if has else 1.0
+        return modes
 
     def _of_each(self, truth: Any) -> np.ndarray:
         """A truth for each case, [case]."""
@@ -146,12 +149,12 @@ class FlowAbreast(Flow):
 
 def together(flows: Sequence[Flow], go: Callable[[Flow], object]) -> list[Flow]:
     """The flows, of one program at one tick, after an action that needs no tangents is done with them side by side."""
-    found = []
-    for at in range(0, len(flows), MOST_ABREAST):
-        moved = side_by_side(flows[at : at + MOST_ABREAST])
+    flows_after = []
+    for first in range(0, len(flows), MOST_ABREAST):
+        moved = side_by_side(flows[first : first + MOST_ABREAST])
         go(moved)
-        found += [moved.case(k) for k in range(moved.count)] if isinstance(moved, FlowAbreast) else [moved]
-    return found
+        flows_after += [moved.case(k) for k in range(moved.count)] if isinstance(moved, FlowAbreast) else [moved]
+    return flows_after
 
 
 def side_by_side(flows: Sequence[Flow]) -> Flow:
@@ -165,8 +168,10 @@ def alike(keys: Iterable[Key]) -> Iterator[tuple[Key, list[int]]]:
     places = dict[Key, list[int]]()
     for place, key in enumerate(keys):
         places.setdefault(key, []).append(place)
-    for key, of in places.items():
-        yield from ((key, of[at : at + MOST_ABREAST]) for at in range(0, len(of), MOST_ABREAST))
+    for key, key_places in places.items():
+        yield from (
+            (key, key_places[first : first + MOST_ABREAST]) for first in range(0, len(key_places), MOST_ABREAST)
+        )
 
 
 def of_case(value: Any, place: int) -> float:
@@ -176,8 +181,8 @@ def of_case(value: Any, place: int) -> float:
 
 def _joined(several: Sequence[Mapping[str, float]]) -> dict[str, Any]:
     """Numbers of cases by name: a float where all have the same bits, else a column."""
-    names = list(dict.fromkeys(name for each in several for name in each))
-    table = np.array([[each.get(name, 0.0) for name in names] for each in several], dtype=np.float64)
+    names = list(dict.fromkeys(name for numbers in several for name in numbers))
+    table = np.array([[numbers.get(name, 0.0) for name in names] for numbers in several], dtype=np.float64)
     bits = table.view(np.int64)
     alike = np.all(bits == bits[0], axis=0).tolist()
     return {name: float(table[0, k]) if alike[k] else table[:, k : k + 1].copy() for k, name in enumerate(names)}
@@ -188,17 +193,17 @@ def values_abreast(
 ) -> Callable[[int], Any]:
     """The value of each reference of a section, as from `met.trace.tangents.values`, where numbers may be columns."""
     nodes = section.nodes
-    found: list[Any] = [None] * len(nodes)
+    node_values: list[Any] = [None] * len(nodes)
     done: Mapping[int, list[int]] = {} if plain else section.last_uses  # tangents of many cases are large
     for i in section.plain_order if plain else section.order:
         node = nodes[i]
         op, count = node[0], OPERANDS[node[0]]
         if count == 0:
-            found[i] = node[1] if op == "const" else False if op == "false" else leaf(node)
+            node_values[i] = node[1] if op == "const" else False if op == "false" else leaf(node)
             continue
         operands, several = [], False
         for ref in node[1 : 1 + count]:
-            value = found[ref >> 1]
+            value = node_values[ref >> 1]
             if ref & 1:
                 value = _not(value) if nodes[ref >> 1][0] in TRUTHS else -value
             several = several or value.__class__ is np.ndarray
@@ -208,12 +213,12 @@ def values_abreast(
         value = (ARRAYS if of_columns else PRODUCTS)[op](*operands, *node[1 + count :])
         if i in opposite:
             value = np.where(opposite[i], _not(value) if op in TRUTHS else -value, value)
-        found[i] = value
+        node_values[i] = value
         for k in done.get(i, ()):
-            found[k] = None
+            node_values[k] = None
 
     def value_of(ref: int) -> Any:
-        return -found[ref >> 1] if ref & 1 else found[ref >> 1]
+        return -node_values[ref >> 1] if ref & 1 else node_values[ref >> 1]
 
     return value_of
 

@@ -153,21 +153,21 @@ class Linearized:
     @property
     def poles(self) -> tuple[Pole, ...]:
         """Its modes, the slowest first."""
-        made = [_of_period(z, shares, self.seconds) for z, shares in _modes(self.A, self.states)]
-        return tuple(sorted(made, key=lambda pole: (pole.hz, -pole.damping)))
+        poles = [_of_period(z, shares, self.seconds) for z, shares in _modes(self.A, self.states)]
+        return tuple(sorted(poles, key=lambda pole: (pole.hz, -pole.damping)))
 
     @property
     def natural(self) -> tuple[Pole, ...]:
         """Natural modes of the arm on its gears and springs while its computers hold, the slowest first."""
-        made = [Pole(0j, s, shares) for s, shares in _modes(self.plant.A, self.plant.states) if s.imag > 0.0]
-        return tuple(sorted(made, key=lambda pole: pole.hz))
+        poles = [Pole(0j, s, shares) for s, shares in _modes(self.plant.A, self.plant.states) if s.imag > 0.0]
+        return tuple(sorted(poles, key=lambda pole: pole.hz))
 
     def by_joint(self, pole: Pole) -> tuple[tuple[str, float], ...]:
         """The share of each joint that takes part in a mode, largest first."""
-        found: dict[str, float] = {}
+        shares: dict[str, float] = {}
         for state, share in pole.shares:
-            found[self.joints[state]] = found.get(self.joints[state], 0.0) + share
-        return tuple(sorted(found.items(), key=lambda each: -each[1]))
+            shares[self.joints[state]] = shares.get(self.joints[state], 0.0) + share
+        return tuple(sorted(shares.items(), key=lambda joint_share: -joint_share[1]))
 
 
 @frozen
@@ -195,9 +195,9 @@ class LinearQuestion:
         if not 0.0 <= self.at <= experiment.structure.schedule.duration:
             raise _outside(experiment, self.at)
         every = input_signals(experiment.structure)
-        solved = [each.path for each in every if not each.is_output] if self.stands else []
-        asked = tuple(dict.fromkeys((*self.inputs, *self.opened, *solved)))
-        named = _named(experiment.structure, every, asked, self.opened)
+        solved = [signal.path for signal in every if not signal.is_output] if self.stands else []
+        paths = tuple(dict.fromkeys((*self.inputs, *self.opened, *solved)))
+        named = _named(experiment.structure, every, paths, self.opened)
         program = PeriodProgram(experiment, named, _records(experiment, self.outputs))
         if program.ticks > MOST_TICKS:
             raise _too_long(program)
@@ -208,41 +208,41 @@ class LinearQuestion:
         """The loops to open, each as its signals: those of `opened` one by one, and all of them at once."""
         return [(path,) for path in self.opened] + ([self.opened] if len(self.opened) > 1 else [])
 
-    def flows(self, given: np.ndarray, threads: int | None = None) -> list[Flow | None]:
-        """The cases where the answer's period begins, as in the run; None for one that has failed before. given: the
+    def flows(self, inputs: np.ndarray, threads: int | None = None) -> list[Flow | None]:
+        """The cases where the answer's period begins, as in the run; None for one that has failed before. inputs: the
         program's inputs, [case, input]"""
-        return at_instants(self.program, given, self.program.begin(self.at), threads)
+        return at_instants(self.program, inputs, self.program.begin(self.at), threads)
 
     def lifted(self, flows: Sequence[Flow]) -> list[LiftedPeriod | Problem]:
         """The maps of the periods that begin where flows of `program` stand; Problem D370 in place of one across an
         event."""
         return [
-            found if isinstance(found, Problem) else _lifted(self.program, found)
-            for found in period_maps(self.program, flows)
+            period if isinstance(period, Problem) else _lifted(self.program, period)
+            for period in period_maps(self.program, flows)
         ]
 
     def of(self, case: int) -> Linearized:
         """The answers about a row of the case table. Raises Problem D370 where an event is in the period, D371 where
         the run has failed before, D377 where the arm does not stand, and as `program` does."""
-        (found,) = self.of_cases([case])
-        if isinstance(found, Problem):
-            raise found
-        return found
+        (answer,) = self.of_cases([case])
+        if isinstance(answer, Problem):
+            raise answer
+        return answer
 
     def of_cases(self, rows: Sequence[int]) -> Iterator[Linearized | Problem]:
         """The answer or Problem of each of these rows, of the bits of `of`. Raises Problem as `program` does."""
-        for at in range(0, len(rows), MOST_TOGETHER):
-            some = rows[at : at + MOST_TOGETHER]
-            given = engine.inputs(self.experiment, np.array(some))
+        for first in range(0, len(rows), MOST_TOGETHER):
+            some = rows[first : first + MOST_TOGETHER]
+            inputs = engine.inputs(self.experiment, np.array(some))
             stand, refused = list[Flow](), dict[int, Problem]()
-            begun = self.flows(given)
-            solved = iter(settled(self.program, [each for each in begun if each]) if self.stands else begun)
+            begun = self.flows(inputs)
+            solved = iter(settled(self.program, [flow for flow in begun if flow]) if self.stands else begun)
             for place, flow in enumerate(begun):
                 stood = None if flow is None else next(solved)
                 if flow is None:
                     refused[place] = failed(self.experiment, self.program.begin(self.at))
                 elif stood is None:
-                    too_weak = weak(self.experiment, given[place : place + 1])[0]
+                    too_weak = weak(self.experiment, inputs[place : place + 1])[0]
                     refused[place] = refusal(self.experiment, too_weak or moves(self.program, flow))
                 else:
                     stand.append(stood)
@@ -251,36 +251,39 @@ class LinearQuestion:
 
     def _answers(self, cases: Sequence[int], flows: Sequence[Flow]) -> Iterator[Linearized | Problem]:
         """The answers about cases where their flows stand, or the Problems in their place."""
-        found = self.lifted(flows)
-        there = [(flow, each) for flow, each in zip(flows, found, strict=True) if not isinstance(each, Problem)]
-        own = [flow for flow, _ in there]
-        more = zip(creeping(own), plants(self.program, own, [each.states for _, each in there]), strict=True)
-        for case, lifted in zip(cases, found, strict=True):
+        periods = self.lifted(flows)
+        pairs = [(flow, period) for flow, period in zip(flows, periods, strict=True) if not isinstance(period, Problem)]
+        own = [flow for flow, _ in pairs]
+        more = zip(creeping(own), plants(self.program, own, [period.states for _, period in pairs]), strict=True)
+        for case, lifted in zip(cases, periods, strict=True):
             yield lifted if isinstance(lifted, Problem) else self._answer(case, lifted, *next(more))
 
     def _answer(self, case: int, lifted: LiftedPeriod, slow: tuple[CreepingRate, ...], plant: PlantModel) -> Linearized:
-        program, inputs, found = self.program, self.inputs, lifted.found
-        paths = [program.inputs[tick.entry].path for tick in found.ticks]
+        program, inputs, period = self.program, self.inputs, lifted.map
+        paths = [program.inputs[tick.entry].path for tick in period.ticks]
 
         def summed(columns: np.ndarray) -> np.ndarray:
-            own = [columns[:, [k for k, each in enumerate(paths) if each == path]].sum(1) for path in inputs]
+            own = [
+                columns[:, [k for k, path_of_tick in enumerate(paths) if path_of_tick == path]].sum(1)
+                for path in inputs
+            ]
             return np.array(own).T.reshape(len(columns), len(inputs))
 
         return Linearized(
-            self.experiment.name, case, found.tick / program.schedule.base_hz, found.seconds, lifted.states, inputs,
-            found.outputs, lifted.A, summed(lifted.B), lifted.C, summed(found.D), plant,
-            tuple(lifted.opened(loop) for loop in self.loops), found.held, slow, found.at_limit,
-            {name: program.joint_of(name) for name in program.states}, self.stands, found.locked,
+            self.experiment.name, case, period.tick / program.schedule.base_hz, period.seconds, lifted.states, inputs,
+            period.outputs, lifted.A, summed(lifted.B), lifted.C, summed(period.D), plant,
+            tuple(lifted.opened(loop) for loop in self.loops), period.held, slow, period.at_limit,
+            {name: program.joint_of(name) for name in program.states}, self.stands, period.locked,
         )  # fmt: skip
 
 
-def _lifted(program: PeriodProgram, found: PeriodMap) -> LiftedPeriod:
+def _lifted(program: PeriodProgram, period: PeriodMap) -> LiftedPeriod:
     """The map of a period, restricted to the states that act on something."""
-    kept = _kept(program, found)
-    states = tuple(found.states[place] for place in kept)
+    places = _acting_states(program, period)
+    states = tuple(period.states[place] for place in places)
     return LiftedPeriod(
-        found.A[np.ix_(kept, kept)], found.B[kept], found.C[:, kept], found.Wx[:, kept], found.Wu, states,
-        program, found,
+        period.A[np.ix_(places, places)], period.B[places], period.C[:, places], period.Wx[:, places], period.Wu,
+        states, program, period,
     )  # fmt: skip
 
 
@@ -308,11 +311,11 @@ def of_deck(experiment: Experiment, name: str | None = None) -> LinearQuestion:
             message = f"`{experiment.name}` has {len(known) or 'no'} `linear` blocks, and none is named"
         near = nearest(name, known) if name is not None else None
         helps = [f"did you mean `{near}`?"] if near else []
-        helps += ["there are " + ", ".join(f"`{each}`" for each in known)] if known else []
+        helps += ["there are " + ", ".join(f"`{block}`" for block in known)] if known else []
         raise Problem(error("D376", message, experiment.place, help=tuple(helps)))
     use = known[name]
-    asked = experiment if use.pose is None else standing(experiment, use.pose)
-    return LinearQuestion(asked, use.at, use.inputs, use.outputs, use.opened, use.pose is not None)
+    posed = experiment if use.pose is None else standing(experiment, use.pose)
+    return LinearQuestion(posed, use.at, use.inputs, use.outputs, use.opened, use.pose is not None)
 
 
 def question_of(
@@ -350,54 +353,54 @@ class LiftedPeriod:
     Wu: np.ndarray
     states: tuple[str, ...]
     program: PeriodProgram
-    found: PeriodMap
+    map: PeriodMap
 
     @property
     def drift(self) -> float:
         """Growth of a period up to which it counts as none."""
-        return max(STABLE, GROWS * self.found.seconds / self.program.schedule.duration)
+        return max(STABLE, GROWS * self.map.seconds / self.program.schedule.duration)
 
     @property
     def poles(self) -> list[Pole]:
         """The poles without participation, unordered."""
         roots = np.linalg.eigvals(self.A).tolist() if len(self.A) else []
-        return [_of_period(complex(z), (), self.found.seconds) for z in roots]
+        return [_of_period(complex(z), (), self.map.seconds) for z in roots]
 
     def opened(self, paths: tuple[str, ...]) -> OpenLoop:
         """The loop opened at these signals: the map from the signals put in to those that come back."""
-        ticks = [k for k, each in enumerate(self.found.ticks) if self.program.inputs[each.entry].path in paths]
+        ticks = [k for k, tick in enumerate(self.map.ticks) if self.program.inputs[tick.entry].path in paths]
         Wx, inverse, B = self.Wx[ticks], np.linalg.inv(self.Wu[np.ix_(ticks, ticks)]), self.B[:, ticks]
         A, b, c, d = self.A - B @ inverse @ Wx, B @ inverse, inverse @ Wx, np.eye(len(ticks)) - inverse
         drift = self.drift
-        one = ScalarLoop(A, b[:, 0], c[0], float(d[0, 0]), self.found.seconds, drift) if len(ticks) == 1 else None
-        own = None if one is None else margins(one)
-        if one is not None and own is not None:
+        scalar_loop = ScalarLoop(A, b[:, 0], c[0], float(d[0, 0]), self.map.seconds, drift) if len(ticks) == 1 else None
+        own = None if scalar_loop is None else margins(scalar_loop)
+        if scalar_loop is not None and own is not None:
             gains: tuple[float | None, float | None] = own.gain_down, own.gain_up
         else:
             gains = gain_limits(A, b, c, d, drift)
         stable = bool(np.max(np.abs(np.linalg.eigvals(self.A)), initial=0.0) <= 1.0 + drift)
-        return OpenLoop(paths, len(ticks), one, own, gains, stable, comes_back(A, b, c, d))
+        return OpenLoop(paths, len(ticks), scalar_loop, own, gains, stable, comes_back(A, b, c, d))
 
 
-def _kept(program: PeriodProgram, found: PeriodMap) -> np.ndarray:
+def _acting_states(program: PeriodProgram, period: PeriodMap) -> np.ndarray:
     """Places of the arm's states, and of those through which it, or an input, acts on the arm or on an output."""
-    n, step = len(found.states), program.builder.step
+    n, step = len(period.states), program.builder.step
     arm = {*program.positions, *program.rates, *step.states, *program.of_beds}
-    links = np.abs(found.A) > TINY * np.max(np.abs(found.A), axis=0, initial=0.0)
-    own = np.array([name in arm for name in found.states], dtype=bool)
-    reached = _closed(links, own | np.any(found.B != 0.0, axis=1))
-    acts = _closed(links.T, own | np.any(found.C != 0.0, axis=0) | np.any(found.Wx != 0.0, axis=0))
+    links = np.abs(period.A) > TINY * np.max(np.abs(period.A), axis=0, initial=0.0)
+    own = np.array([name in arm for name in period.states], dtype=bool)
+    reached = _closed(links, own | np.any(period.B != 0.0, axis=1))
+    acts = _closed(links.T, own | np.any(period.C != 0.0, axis=0) | np.any(period.Wx != 0.0, axis=0))
     return np.flatnonzero(own | (reached & acts)) if n else np.zeros(0, int)
 
 
 def _closed(links: np.ndarray, first: np.ndarray) -> np.ndarray:
     """Everything that can be reached from the first ones. links: [to, from]"""
-    found = first.copy()
+    reached = first.copy()
     while True:
-        more = found | np.any(links[:, found], axis=1)
-        if np.array_equal(more, found):
-            return found
-        found = more
+        more = reached | np.any(links[:, reached], axis=1)
+        if np.array_equal(more, reached):
+            return reached
+        reached = more
 
 
 def _modes(A: np.ndarray, names: Sequence[str]) -> Iterable[tuple[complex, tuple[tuple[str, float], ...]]]:
@@ -410,9 +413,9 @@ def _modes(A: np.ndarray, names: Sequence[str]) -> Iterable[tuple[complex, tuple
     for place, root in enumerate(roots.tolist()):
         if root.imag < 0.0:
             continue
-        of = weights[:, place] / max(float(weights[:, place].sum()), 1e-300)
-        order = np.argsort(-of, kind="stable").tolist()
-        yield complex(root), tuple((names[k], float(of[k])) for k in order)
+        shares = weights[:, place] / max(float(weights[:, place].sum()), 1e-300)
+        order = np.argsort(-shares, kind="stable").tolist()
+        yield complex(root), tuple((names[k], float(shares[k])) for k in order)
 
 
 def _of_period(z: complex, shares: tuple[tuple[str, float], ...], seconds: float) -> Pole:
@@ -425,27 +428,27 @@ def _records(experiment: Experiment, outputs: Sequence[str]) -> tuple[Recorded, 
     for name in outputs:
         if name not in known:
             raise _unknown("output", name, known)
-    return tuple(each for name in outputs for each in known[name])
+    return tuple(recorded for name in outputs for recorded in known[name])
 
 
 def _named(
-    structure: Structure, every: Sequence[InputSignal], asked: Sequence[str], opened: Sequence[str]
+    structure: Structure, every: Sequence[InputSignal], paths: Sequence[str], opened: Sequence[str]
 ) -> tuple[InputSignal, ...]:
-    known = {each.path: each for each in every}
-    laws = {path: each for path, each in known.items() if each.is_output}
-    for path in asked:
+    known = {signal.path: signal for signal in every}
+    laws = {path: signal for path, signal in known.items() if signal.is_output}
+    for path in paths:
         if path in opened and path not in laws:
             raise _unknown("place to open a loop", path, laws, no_computer(structure, path))
         if path not in known:
             raise _unknown("input", path, known, no_computer(structure, path))
-    return tuple(known[path] for path in asked)
+    return tuple(known[path] for path in paths)
 
 
 def _unknown(what: str, name: str, known: Mapping[str, object], why: Sequence[str] = ()) -> Problem:
     near = nearest(name, known) if not why else None
     helps = [*why, *([f"did you mean `{near}`?"] if near else [])]
     if known and len(known) <= 12:
-        helps.append("there are " + ", ".join(f"`{each}`" for each in known))
+        helps.append("there are " + ", ".join(f"`{known_name}`" for known_name in known))
     elif what == "output":
         helps.append("an output is any name that `record` takes")
     return Problem(error("D373", f"there is no {what} `{name}`", help=tuple(helps)))
@@ -464,12 +467,12 @@ def _too_long(program: PeriodProgram) -> Problem:
     )
 
 
-def _outside(experiment: Experiment, at: float) -> Problem:
+def _outside(experiment: Experiment, time: float) -> Problem:
     duration = experiment.structure.schedule.duration
     return Problem(
         error(
             "D372",
-            f"t = {at:.6g} s is not in the run `{experiment.name}`",
+            f"t = {time:.6g} s is not in the run `{experiment.name}`",
             experiment.place,
             help=f"it goes from 0 to {duration:.6g} s",
         )

@@ -50,11 +50,11 @@ class BedLoop:
     def __init__(self, experiment: Experiment, joint: str) -> None:
         self.joint, self.program = joint, PeriodProgram(by_itself(experiment, joint))
 
-    def of_case(self, given: Mapping[str, float], motor: Motor) -> CaseLoop:
-        """The loop of a case. given: its inputs of the experiment's program;  motor: the joint's"""
+    def of_case(self, case_inputs: Mapping[str, float], motor: Motor) -> CaseLoop:
+        """The loop of a case. case_inputs: its inputs of the experiment's program;  motor: the joint's"""
         # back-EMF alone then takes half of the available torque
         rate = 0.5 * motor.tau_max * motor.resistance / (motor.kt * motor.kt * motor.ratio)
-        inputs = {**given, ARM: 1.0, RATE: float(rate), COMMAND: float(rate)}
+        inputs = {**case_inputs, ARM: 1.0, RATE: float(rate), COMMAND: float(rate)}
         begun = FlowAbreast(self.program, inputs, {}, 0, 1)
         begun.begin_settled()
         rotor, joint = float(motor.ratio * motor.ratio * motor.inertia), self.joint
@@ -80,17 +80,17 @@ class CaseLoop:
         in the tick or the shaft turns back; and its states: those that act on others, which leaves out an angle that
         only adds up."""
         names = self.program.states
-        found = np.full((len(ratios), len(names), len(names)), np.nan)
+        maps = np.full((len(ratios), len(names), len(names)), np.nan)
         left = np.arange(len(ratios))
         for push in PUSHES:
             some = self._maps(np.array(ratios)[left], push)
-            found[left] = some
+            maps[left] = some
             left = left[np.isnan(some).any((1, 2))]
             if not left.size:
                 break
-        known = found[~np.isnan(found).any((1, 2))]
+        known = maps[~np.isnan(maps).any((1, 2))]
         act = np.flatnonzero(np.any(known != np.eye(len(names)), axis=(0, 1)))
-        return found[:, act][:, :, act], tuple(names[place] for place in act)
+        return maps[:, act][:, :, act], tuple(names[place] for place in act)
 
     def _maps(self, ratios: np.ndarray, push: float) -> np.ndarray:
         """The maps over all states, [arm, state, state], while the joint is commanded `push` times its rate."""
@@ -104,25 +104,25 @@ class CaseLoop:
         flow.tangents = seeds(program, flow, names, n)
         flow.ticks()
         flow.finish()
-        found = np.stack([np.broadcast_to(flow.tangent(name), (len(arms), n)) for name in names], axis=1)
+        maps = np.stack([np.broadcast_to(flow.tangent(name), (len(arms), n)) for name in names], axis=1)
         turns = [name for name in names if name in self.turning]
         back = [np.broadcast_to(flow.cells[name] <= 0.0, (len(arms), 1))[:, 0] for name in turns]
-        found[np.logical_or.reduce([flow.unusual, flow.on_kink, *back])] = np.nan
-        return found
+        maps[np.logical_or.reduce([flow.unusual, flow.on_kink, *back])] = np.nan
+        return maps
 
     def radii(self, ratios: Sequence[float]) -> np.ndarray:
         """The spectral radius of a tick with an arm of each of these r, [arm]; infinite where it is not finite."""
         maps, _ = self.maps(ratios)
-        found, numbers = np.full(len(maps), np.inf), np.isfinite(maps).all((1, 2))
-        found[numbers] = np.abs(np.linalg.eigvals(maps[numbers])).max(1, initial=0.0)
-        return found
+        radii, numbers = np.full(len(maps), np.inf), np.isfinite(maps).all((1, 2))
+        radii[numbers] = np.abs(np.linalg.eigvals(maps[numbers])).max(1, initial=0.0)
+        return radii
 
 
 def by_itself(experiment: Experiment, joint: str) -> Experiment:
     """The experiment reduced to one substituted joint without the rest of its arm, at the ticks of its servo."""
     structure, formulas = experiment.structure, experiment.formulas
     servo = next(use for use in structure.servos if use.joint == joint)
-    moved = next(each for each in structure.joints if each.name == joint)
+    moved = next(other for other in structure.joints if other.name == joint)
     schedule = Schedule(structure.schedule.base_hz / servo.divisor, 1, 1, 2)
     kind = "rate" if servo.command is None else servo.command.kind
     alone = replace(
@@ -143,7 +143,7 @@ def by_itself(experiment: Experiment, joint: str) -> Experiment:
         balanced=False,
     )
     n, outputs, over = 2 * len(formulas.nodes), len(formulas.outputs), LONG / schedule.base_hz
-    made = Formulas(
+    own_formulas = Formulas(
         (*formulas.inputs, ARM, RATE, COMMAND),
         (
             *formulas.nodes,
@@ -152,27 +152,29 @@ def by_itself(experiment: Experiment, joint: str) -> Experiment:
         (*formulas.outputs, n, n + 2, n + 4, n + 8),
     )  # fmt: skip
     arm, rate, commanded, far = (_number(Formula(outputs + k)) for k in range(4))
-    told = f"{joint}.servo.command."
+    command = f"{joint}.servo.command."
     parameters = {
         path: value
         for path, value in experiment.parameters.items()
-        if path.startswith((f"{joint}.servo.", f"{joint}.bed.", f"{joint}.law.")) and not path.startswith(told)
+        if path.startswith((f"{joint}.servo.", f"{joint}.bed.", f"{joint}.law.")) and not path.startswith(command)
     }
     limits = (f"{joint}.servo.tau_max", f"{joint}.servo.v_max", f"{joint}.bed.tau_max")
     parameters |= {path: _number(BEYOND) for path in limits if path in parameters}
     places = [f"{joint}.{part}.{axis}" for part in ("at", "rpy", "axis") for axis in "xyz"]
-    inertias = [f"inertia.{of}" for of in ("xx", "yy", "zz", "xy", "xz", "yz")]
-    body = [f"links.{LINK}.{of}" for of in ("mass", "com.x", "com.y", "com.z", *inertias)]
-    parameters |= dict.fromkeys((*places, *body, f"initial.{joint}.q", f"{told}value", f"{told}begin"), _number(0.0))
+    inertias = [f"inertia.{axes}" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")]
+    body = [f"links.{LINK}.{entry}" for entry in ("mass", "com.x", "com.y", "com.z", *inertias)]
+    parameters |= dict.fromkeys(
+        (*places, *body, f"initial.{joint}.q", f"{command}value", f"{command}begin"), _number(0.0)
+    )
     parameters |= {f"{joint}.axis.z": _number(1.0), f"initial.{joint}.qd": rate}
     parameters[f"links.{LINK}.{'mass' if moved.kind == 'prismatic' else 'inertia.zz'}"] = arm
     if kind == "position":
-        parameters |= {f"{told}start": _number(0.0), f"{told}to": far, f"{told}over": _number(over)}
+        parameters |= {f"{command}start": _number(0.0), f"{command}to": far, f"{command}over": _number(over)}
     elif kind == "rate":
-        parameters[f"{told}value"] = commanded
+        parameters[f"{command}value"] = commanded
     inputs = (Coordinate(path, "", 1.0, np.zeros(experiment.cases.count), ()) for path in (ARM, RATE, COMMAND))
     return replace(
-        experiment, structure=alone, parameters=parameters, formulas=made, requirements=(), linear=(),
+        experiment, structure=alone, parameters=parameters, formulas=own_formulas, requirements=(), linear=(),
         linear_metrics=(), step_errors=(), tolerances=(), search=None,
         cases=replace(experiment.cases, coordinates=(*experiment.cases.coordinates, *inputs)),
     )  # fmt: skip

@@ -71,9 +71,9 @@ class Flow:
         self._recording, self._runs = False, 0
 
     def copy(self, *, tangents: bool = True) -> Flow:
-        made = Flow(self.program, self.inputs, self.cells, self.tick)
-        made.tangents = dict(self.tangents) if tangents else {}
-        return made
+        flow = Flow(self.program, self.inputs, self.cells, self.tick)
+        flow.tangents = dict(self.tangents) if tangents else {}
+        return flow
 
     def begin(self) -> None:
         """Run the start, up to the instant 0, at which nothing has ticked yet."""
@@ -125,33 +125,33 @@ class Flow:
         """Run one section."""
         section, moves = self.program.sections[number], bool(self.tangents)
         with np.errstate(all="ignore"):
-            of = values(section, self._leaf, self.opposite.get(self._runs, frozenset()), plain=not moves)
-        cells = [(cell, float(of(ref))) for cell, ref in section.stores]
-        tangents = [(cell, of(ref)) for cell, ref in section.tangents] if moves else []
+            value_of = values(section, self._leaf, self.opposite.get(self._runs, frozenset()), plain=not moves)
+        cells = [(cell, float(value_of(ref))) for cell, ref in section.stores]
+        tangents = [(cell, value_of(ref)) for cell, ref in section.tangents] if moves else []
         if moves:
             for kink in section.kinks:
                 a, b = kink.sides
-                if of(a) == of(b) and np.any(of(kink.move) != 0.0):
+                if value_of(a) == value_of(b) and np.any(value_of(kink.move) != 0.0):
                     self.edges.append(Edge(self._runs, kink.nodes, section.name, self.tick, self._moved(section, kink)))
-        self._store(section, of, cells, tangents)
+        self._store(section, value_of, cells, tangents)
         self._runs += 1
 
     def _store(
         self,
         section: TangentSection,
-        of: Callable[[int], Any],
+        value_of: Callable[[int], Any],
         cells: Iterable[tuple[str, Any]],
         tangents: Iterable[tuple[str, Any]],
     ) -> None:
-        """Store the results of a section. of: the value of a reference; cells, tangents: of its stores"""
+        """Store the results of a section. value_of: the value of a reference; cells, tangents: of its stores"""
         moves = bool(self.tangents)
         for cell, value in cells:
             self.cells[cell] = value
             self.tangents.pop(cell, None)
         self.tangents.update({cell: move for cell, move in tangents if np.any(move != 0.0)})
         if self._recording and moves:
-            self.rows.update({column: of(ref) for column, ref in section.records})
-            self.row_tangents.update({column: of(ref) for column, ref in section.record_tangents})
+            self.rows.update({column: value_of(ref) for column, ref in section.records})
+            self.row_tangents.update({column: value_of(ref) for column, ref in section.record_tangents})
 
     def _moved(self, section: TangentSection, kink: Kink) -> tuple[str, ...]:
         """The moving cells that a kink compares."""
@@ -197,19 +197,21 @@ class Flow:
     def modes(self) -> dict[str, float]:
         """Modes of everything with dry friction in this case, by the name of a joint or a servo's state: 0 sticks."""
         sticking = self.program.builder.step.sticking
-        return {each.name: self.mode(each) for each in sticking if each.level is not None or self.rubs(each) != 0.0}
+        return {part.name: self.mode(part) for part in sticking if part.level is not None or self.rubs(part) != 0.0}
 
-    def rubs(self, each: Sticking) -> float:
+    def rubs(self, sticking: Sticking) -> float:
         """A number other than 0 where a joint or a servo's state, whose friction is a parameter, has dry friction in
         this case."""
-        return self.cells.get(cell_names.HAS_FRICTION(each.name), 0.0)
+        return self.cells.get(cell_names.HAS_FRICTION(sticking.name), 0.0)
 
-    def mode(self, each: Sticking) -> float:
+    def mode(self, sticking: Sticking) -> float:
         """The friction mode of a joint or a servo's state: 0 sticks."""
-        return self.cells.get(cell_names.FRICTION_MODE(each.name), 0.0)
+        return self.cells.get(cell_names.FRICTION_MODE(sticking.name), 0.0)
 
     def _rate(self, name: str) -> float:
-        return next(self.cells[each.cell] for each in self.program.builder.step.sticking if each.name == name)
+        return next(
+            self.cells[sticking.cell] for sticking in self.program.builder.step.sticking if sticking.name == name
+        )
 
     def breaking_away(self) -> list[str]:
         """Joints at rest with dry friction that begin to slide."""

@@ -126,19 +126,19 @@ class GradientProgram:
         points = _POINTS if edges else _POINTS[:1]
         many = max(1, MOST_LANES // (len(self.paths) * len(points)))
         for first in range(0, len(rows), many):
-            found = _Found.of(self, engine.inputs(experiment, rows[first : first + many]), points, threads)
-            reasons, slope = dict(self._why_not(found, metrics)), found.slopes(metrics)
+            lanes = _Lanes.of(self, engine.inputs(experiment, rows[first : first + many]), points, threads)
+            reasons, slope = dict(self._why_not(lanes, metrics)), lanes.slopes(metrics)
             for place in reasons:
                 slope[place] = math.nan
             why_not |= {(first + case, metric, number): why for (case, metric, number), why in reasons.items()}
-            values.append(found.values(metrics))
+            values.append(lanes.values(metrics))
             slopes.append(slope)
         of_all = np.concatenate(values), np.concatenate(slopes)
         return MetricGradients(tuple(rows.tolist()), metrics, self.paths, *of_all, why_not)
 
-    def _why_not(self, found: _Found, metrics: Sequence[str]) -> Iterator[tuple[Place, str]]:
-        failed, value, slope = found.failed(), found.values(metrics), found.slopes(metrics)
-        edges = found.edges(metrics) if found.outputs.shape[2] == len(_POINTS) else np.zeros(slope.shape, dtype=bool)
+    def _why_not(self, lanes: _Lanes, metrics: Sequence[str]) -> Iterator[tuple[Place, str]]:
+        failed, value, slope = lanes.failed(), lanes.values(metrics), lanes.slopes(metrics)
+        edges = lanes.edges(metrics) if lanes.outputs.shape[2] == len(_POINTS) else np.zeros(slope.shape, dtype=bool)
         for case, metric, number in np.ndindex(*slope.shape):
             place, output = (case, metric, number), METRIC + metrics[metric]
             depends = self.dependences[self.paths[number]]
@@ -153,11 +153,11 @@ class GradientProgram:
             elif math.isnan(slope[place]) or math.isinf(slope[place]):
                 yield place, "a derivative on the way is no number"
             elif edges[place]:
-                yield place, f"on an event's edge: {found.event(case, number)}"
+                yield place, f"on an event's edge: {lanes.event(case, number)}"
 
 
 @frozen
-class _Found:
+class _Lanes:
     """The answers of the kernel: [case, number, point, output], with the points of `_POINTS`, or the first of them
     alone."""
 
@@ -166,14 +166,16 @@ class _Found:
     steps: np.ndarray
 
     @classmethod
-    def of(cls, program: GradientProgram, given: np.ndarray, points: tuple[float, ...], threads: int | None) -> _Found:
+    def of(
+        cls, program: GradientProgram, case_inputs: np.ndarray, points: tuple[float, ...], threads: int | None
+    ) -> _Lanes:
         """Run each case at each point of each number, with the tangent of that number, as lanes of one run."""
         kernel, n = program.kernel, len(program.paths)
-        cases, own = given.shape
-        steps = np.abs(given[:, :n])
+        cases, own = case_inputs.shape
+        steps = np.abs(case_inputs[:, :n])
         steps = np.where(steps > 0.0, steps, 1.0)
         inputs = np.zeros((cases, n, len(points), own + n))
-        inputs[..., :own] = given[:, None, None, :]
+        inputs[..., :own] = case_inputs[:, None, None, :]
         for number in range(n):
             inputs[:, number, :, number] += steps[:, number, None] * points
             inputs[:, number, :, own + number] = 1.0
@@ -212,9 +214,9 @@ class _Found:
             step = (near * self.steps)[:, :, None]
             with np.errstate(invalid="ignore"):
                 change = value[:, :, high] - value[:, :, low]
-                told = step / 3.0 * (slope[:, :, low] + 4.0 * slope[:, :, 0] + slope[:, :, high])
+                predicted = step / 3.0 * (slope[:, :, low] + 4.0 * slope[:, :, 0] + slope[:, :, high])
                 size = np.maximum(np.abs(change), 2.0 * step * np.abs(slope[:, :, 0]))
-                within = np.abs(change - told) <= SAME * size + ROUNDED * np.abs(value[:, :, 0])
+                within = np.abs(change - predicted) <= SAME * size + ROUNDED * np.abs(value[:, :, 0])
             on_edge &= ~within
         return np.moveaxis(on_edge, 1, 2)
 
@@ -250,7 +252,7 @@ def _refuse(experiment: Experiment, metrics: Sequence[str], paths: Sequence[str]
             raise Problem(error("D379", message, experiment.place, help="sweep the number, and compare"))
         if name not in known:
             helps = did_you_mean(name, known) or [
-                f"there are {', '.join(f'`{each}`' for each in known)}" if known else "a run's `metrics` name them"
+                f"there are {', '.join(f'`{metric}`' for metric in known)}" if known else "a run's `metrics` name them"
             ]
             raise Problem(error("D379", f"`{experiment.name}` has no metric `{name}`", experiment.place, help=helps))
     if not known:

@@ -20,11 +20,11 @@ class InjectedBuilder(Builder):
 
     def __init__(self, system: System, inputs: Sequence[InputSignal]) -> None:
         super().__init__(system)
-        self._added = frozenset(each.path for each in inputs)
+        self._added = frozenset(signal.path for signal in inputs)
 
     def setpoint(self, tape: Tape, actuator: Actuator) -> Setpoint:
-        found, path = super().setpoint(tape, actuator), f"{actuator.path}.command"
-        return replace(found, value=found.value + tape.read(ADDED + path)) if path in self._added else found
+        setpoint, path = super().setpoint(tape, actuator), f"{actuator.path}.command"
+        return replace(setpoint, value=setpoint.value + tape.read(ADDED + path)) if path in self._added else setpoint
 
     def compute(self, tape: Tape, actuator: Actuator, seen: Seen) -> None:
         super().compute(tape, actuator, seen)

@@ -67,28 +67,30 @@ class PeriodMap:
     locked: tuple[str, ...] = ()
 
 
-def at_instants(program: PeriodProgram, given: np.ndarray, tick: int, threads: int | None = None) -> list[Flow | None]:
-    """Cases at an instant; None for one that has failed before. given: the program's inputs, [case, input]."""
+def at_instants(
+    program: PeriodProgram, case_inputs: np.ndarray, tick: int, threads: int | None = None
+) -> list[Flow | None]:
+    """Cases at an instant; None for one that has failed before. case_inputs: the program's inputs, [case, input]."""
     prepared = program.prepared
-    inputs = [dict(zip(prepared.program.inputs, row, strict=True)) for row in given.tolist()]
+    inputs = [dict(zip(prepared.program.inputs, row, strict=True)) for row in case_inputs.tolist()]
     if not tick:
-        return [*together([Flow(program, each, {}, 0) for each in inputs], Flow.begin)]
+        return [*together([Flow(program, values, {}, 0) for values in inputs], Flow.begin)]
     from met.passing import run_past
 
     _, outputs, memory = run_past(
-        prepared.kernel, given, tick - 1, [tick - 1], record=False, threads=threads
+        prepared.kernel, case_inputs, tick - 1, [tick - 1], record=False, threads=threads
     )  # fmt: skip
     cells = prepared.recording.cells
-    if len(given) and (lost := program.remembered - set(cells)):
+    if len(case_inputs) and (lost := program.remembered - set(cells)):
         raise ValueError(f"the run keeps no {sorted(lost)}, which a period begins with")
     done = np.flatnonzero(outputs[:, prepared.program.outputs.index("failure")] == 0.0).tolist()
     before = [
         Flow(program, inputs[k], dict(zip(cells, memory[k, 0].tolist(), strict=True)), tick - 1) for k in done
     ]  # fmt: skip
-    found: list[Flow | None] = [None] * len(given)
+    flows: list[Flow | None] = [None] * len(case_inputs)
     for place, flow in zip(done, together(before, Flow.finish), strict=True):
-        found[place] = flow
-    return found
+        flows[place] = flow
+    return flows
 
 
 def failed(experiment: Experiment, tick: int) -> Problem:
@@ -110,48 +112,50 @@ def period_map(program: PeriodProgram, flow: Flow) -> PeriodMap:
     after.ticks()
     held = _held(flow, after)
     carried = partial(_carried, flow.copy, held.states)
-    found = carried({})
-    if found.flow.edges:
-        _refuse_kinks(found, carried)
-    if not found.finite:
+    period = carried({})
+    if period.flow.edges:
+        _refuse_kinks(period, carried)
+    if not period.finite:
         raise flow.event("a derivative is no number")
-    return found.map_of(held)
+    return period.map_of(held)
 
 
 def period_maps(program: PeriodProgram, flows: Sequence[Flow]) -> list[PeriodMap | Problem]:
     """The linearised periods that begin where these flows stand, all at one tick: each is the map of `period_map`, or
     the Problem that it raises, to the bit. Flows with the same held states are carried side by side; one with an event
     or a kink on the way is linearised alone."""
-    found: list[PeriodMap | Problem | None] = [None] * len(flows)
+    answers: list[PeriodMap | Problem | None] = [None] * len(flows)
     helds = list[_Held | None]()
     for place, (flow, after) in enumerate(zip(flows, together(flows, Flow.ticks), strict=True)):
         try:
             helds.append(_held(flow, after))
         except Problem as refused:
             helds.append(None)
-            found[place] = refused
-    for states, places in alike(None if each is None else each.states for each in helds):
+            answers[place] = refused
+    for states, places in alike(None if held is None else held.states for held in helds):
         if states is not None and len(places) > 1:
             maps = _side_by_side([flows[k] for k in places], states, [held for k in places if (held := helds[k])])
-            for place, each in zip(places, maps, strict=True):
-                found[place] = each
-    return [_by_itself(program, flow) if each is None else each for flow, each in zip(flows, found, strict=True)]
+            for place, answer in zip(places, maps, strict=True):
+                answers[place] = answer
+    return [
+        _by_itself(program, flow) if answer is None else answer for flow, answer in zip(flows, answers, strict=True)
+    ]
 
 
 def _side_by_side(flows: Sequence[Flow], states: tuple[str, ...], helds: Sequence[_Held]) -> Iterator[PeriodMap | None]:
     """The maps of flows with the same held states; None for one that has to be linearised alone."""
     carried = partial(_carried, partial(FlowAbreast.of, flows), states)
-    found = carried({})
-    flow: Any = found.flow
-    unusual = flow.unusual | ~found.finite
+    period = carried({})
+    flow: Any = period.flow
+    unusual = flow.unusual | ~period.finite
     if flow.on_kink.any():
         other = carried(flow.kinks)
         # where one jumps at a kink others may be led another way: its kinks are then not those of the other side
         led: Any = other.flow
         astray = led.unusual | (led.sections_run != flow.sections_run)
-        unusual = unusual | (flow.on_kink & (astray | found.differs(other)))
+        unusual = unusual | (flow.on_kink & (astray | period.differs(other)))
     for place, held in enumerate(helds):
-        yield None if unusual[place] else found.map_of(held, place)
+        yield None if unusual[place] else period.map_of(held, place)
 
 
 def _by_itself(program: PeriodProgram, flow: Flow) -> PeriodMap | Problem:
@@ -241,8 +245,8 @@ def _carried(begin: Callable[[], Flow], states: tuple[str, ...], opposite: Mappi
     program, tick, n = flow.program, flow.tick, len(states)
     ticks = tuple(
         InputTick(number, after)
-        for number, each in enumerate(program.inputs)
-        for after in range(0, program.ticks, each.divisor)
+        for number, signal in enumerate(program.inputs)
+        for after in range(0, program.ticks, signal.divisor)
     )
     width = n + len(ticks)
     unit = np.eye(width)
@@ -252,14 +256,14 @@ def _carried(begin: Callable[[], Flow], states: tuple[str, ...], opposite: Mappi
     modes: dict[str, float] | None = None
     at_limit, steps = dict[str, Any](), 0
     for after in range(program.ticks):
-        for place, each in enumerate(ticks):
-            if each.after == after:
-                flow.tangents[added(program.inputs[each.entry].path)] = unit[n + place]
+        for place, pulse in enumerate(ticks):
+            if pulse.after == after:
+                flow.tangents[added(program.inputs[pulse.entry].path)] = unit[n + place]
         turned = shaft_rates(flow)
         flow.ticks(recording=after == 0)
-        for place, each in enumerate(ticks):
-            path = program.inputs[each.entry].path
-            if each.after == after:
+        for place, pulse in enumerate(ticks):
+            path = program.inputs[pulse.entry].path
+            if pulse.after == after:
                 flow.tangents.pop(added(path))
                 W[place] = flow.tangent(path)
         now = flow.modes()
@@ -280,7 +284,7 @@ def _carried(begin: Callable[[], Flow], states: tuple[str, ...], opposite: Mappi
     rows = tangent_rows(flow, [flow.row_tangents.get(column, 0.0) for column in range(len(program.columns))], width)
     own = tangent_rows(flow, W, width)
     reached = [flow.cells[state] for state in states if state in flow.cells] + list(flow.rows.values())
-    numbers = np.concatenate([np.broadcast_to(each, (*flow.shape, 1)) for each in (*reached, 0.0)], axis=-1)
+    numbers = np.concatenate([np.broadcast_to(number, (*flow.shape, 1)) for number in (*reached, 0.0)], axis=-1)
     return _Carried(
         tick, states, ticks, ends[..., :n], ends[..., n:], rows[..., :n], rows[..., n:], own[..., :n], own[..., n:],
         numbers, at_limit, flow,
@@ -296,26 +300,26 @@ def tangent_rows(flow: Flow, moves: Sequence[Any], width: int) -> np.ndarray:
 
 def seeds(program: PeriodProgram, flow: Flow, states: Sequence[str], width: int) -> dict[str, np.ndarray]:
     """Tangents of cells, with one direction for each state."""
-    unit, found = np.eye(len(states), width), dict[str, np.ndarray]()
+    unit, tangents = np.eye(len(states), width), dict[str, np.ndarray]()
     places = {name: unit[place] for place, name in enumerate(states)}
     for body in program.bodies:
         a, b, c = (places[f"{name}.q"] for name in body.coordinates[3:])
         w, x, y, z = (flow.cells[cell] for cell in body.orientation)
         moves = (-x * a - y * b - z * c, w * a - z * b + y * c, z * a + w * b - x * c, x * b - y * a + w * c)
-        found |= {cell: 0.5 * move for cell, move in zip(body.orientation, moves, strict=True)}
-    found |= {name: move for name, move in places.items() if name not in program.turns}
-    return found
+        tangents |= {cell: 0.5 * move for cell, move in zip(body.orientation, moves, strict=True)}
+    tangents |= {name: move for name, move in places.items() if name not in program.turns}
+    return tangents
 
 
 def end_tangents(program: PeriodProgram, flow: Flow, states: Sequence[str], width: int) -> np.ndarray:
     """The tangents of the states where a flow stands: [state, direction], of a `FlowAbreast` [case, ...]."""
-    found: dict[str, Any] = {name: flow.tangent(name) for name in states}
+    tangents: dict[str, Any] = {name: flow.tangent(name) for name in states}
     for body in program.bodies:
         a, b, c, d = (flow.tangent(cell) for cell in body.orientation)
         w, x, y, z = (flow.cells[cell] for cell in body.orientation)
         turns = (w * b - x * a + z * c - y * d, w * c - y * a - z * b + x * d, y * b - z * a - x * c + w * d)
-        found |= {f"{name}.q": 2.0 * turn for name, turn in zip(body.coordinates[3:], turns, strict=True)}
-    return tangent_rows(flow, [found[name] for name in states], width)
+        tangents |= {f"{name}.q": 2.0 * turn for name, turn in zip(body.coordinates[3:], turns, strict=True)}
+    return tangent_rows(flow, [tangents[name] for name in states], width)
 
 
 def _changed(now: Mapping[str, float], before: Mapping[str, float]) -> str:
@@ -326,18 +330,18 @@ def _became(mode: float) -> str:
     return "comes to rest" if mode == 0.0 else "breaks away"
 
 
-def _refuse_kinks(found: _Carried, carried: Any) -> None:
+def _refuse_kinks(period: _Carried, carried: Any) -> None:
     """Raises Problem where the derivative is another from the other side of a kink that the memory stands on."""
-    if not found.differs(carried(_all(found.flow.edges))):
+    if not period.differs(carried(_all(period.flow.edges))):
         return
-    for edge in found.flow.edges:
-        if found.differs(carried(_all([edge]))):
-            raise found.flow.event(f"{edge.subject} is just where something begins to act", edge.tick)
-    raise found.flow.event("several numbers are just where something begins to act", found.flow.edges[0].tick)
+    for edge in period.flow.edges:
+        if period.differs(carried(_all([edge]))):
+            raise period.flow.event(f"{edge.subject} is just where something begins to act", edge.tick)
+    raise period.flow.event("several numbers are just where something begins to act", period.flow.edges[0].tick)
 
 
 def _all(edges: Sequence[Edge]) -> dict[int, frozenset[int]]:
-    found: dict[int, frozenset[int]] = {}
+    nodes_by_run: dict[int, frozenset[int]] = {}
     for edge in edges:
-        found[edge.run] = found.get(edge.run, frozenset()) | frozenset(edge.nodes)
-    return found
+        nodes_by_run[edge.run] = nodes_by_run.get(edge.run, frozenset()) | frozenset(edge.nodes)
+    return nodes_by_run

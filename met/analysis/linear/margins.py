@@ -56,8 +56,8 @@ class ScalarLoop:
         z = np.exp(1j * np.asarray(w, dtype=np.float64) * self.period)[:, None, None]
         B = np.broadcast_to(self.B[:, None], (len(z), len(self.B), 1))
         moved = np.linalg.solve(z * np.eye(len(self.A)) - self.A, B)
-        found: np.ndarray = -(moved[..., 0] @ self.C + self.D)
-        return found
+        L: np.ndarray = -(moved[..., 0] @ self.C + self.D)
+        return L
 
     def sizes(self, w: Sequence[float]) -> Iterator[tuple[float, float]]:
         """|L| at angular frequencies, rad/s, each with the frequency."""
@@ -66,8 +66,8 @@ class ScalarLoop:
     @cached_property
     def poles(self) -> np.ndarray:
         """The open-loop poles."""
-        found: np.ndarray = np.linalg.eigvals(self.A)
-        return found
+        poles: np.ndarray = np.linalg.eigvals(self.A)
+        return poles
 
     def closed(self, gain: float = 1.0) -> np.ndarray:
         """The closed loop's A, with the gain multiplied by this."""
@@ -164,10 +164,12 @@ def margins(loop: ScalarLoop) -> LoopMargins | None:
 def _gains(loop: ScalarLoop) -> tuple[tuple[float | None, float | None], tuple[float | None, float | None]]:
     """The gains at which the closed loop comes to the unit circle: the least above 1 and the largest below, each with
     its frequency."""
-    found = [(-1.0 / L.real, w) for w in _where_real(loop) if (L := loop.at(cmath.exp(1j * w * loop.period))).real < 0]
-    edge = [(1.0, w) for k, w in found if abs(k - 1.0) <= EDGE]
-    above = [(k, w) for k, w in found if k > 1.0 + EDGE] + (edge if loop.grows(1.01) else [])
-    below = [(k, w) for k, w in found if k < 1.0 - EDGE] + (edge if loop.grows(0.99) else [])
+    crossings = [
+        (-1.0 / L.real, w) for w in _where_real(loop) if (L := loop.at(cmath.exp(1j * w * loop.period))).real < 0
+    ]
+    edge = [(1.0, w) for k, w in crossings if abs(k - 1.0) <= EDGE]
+    above = [(k, w) for k, w in crossings if k > 1.0 + EDGE] + (edge if loop.grows(1.01) else [])
+    below = [(k, w) for k, w in crossings if k < 1.0 - EDGE] + (edge if loop.grows(0.99) else [])
     return min(above, default=(None, None)), max(below, default=(None, None))
 
 
@@ -177,23 +179,23 @@ def _roots(loop: ScalarLoop, last: Sequence[Sequence[np.ndarray | float]], by_ou
     from scipy.linalg import eig
 
     A, B, C, D, n = loop.A, loop.B[:, None], loop.C[None, :], np.array([[loop.D]]), len(loop.A)
-    none, one = np.zeros((n, n)), np.eye(n)
-    F = np.block([[A, none, B], [none, one, np.zeros((n, 1))], [np.atleast_2d(each) for each in last[0]]])
+    none, identity = np.zeros((n, n)), np.eye(n)
+    F = np.block([[A, none, B], [none, identity, np.zeros((n, 1))], [np.atleast_2d(row) for row in last[0]]])
     driven = [B @ C, A, B @ D] if by_output else [none, A, B]
-    E = np.block([[one, none, np.zeros((n, 1))], driven, [np.zeros((1, n)), np.zeros((1, n)), np.zeros((1, 1))]])
+    E = np.block([[identity, none, np.zeros((n, 1))], driven, [np.zeros((1, n)), np.zeros((1, n)), np.zeros((1, 1))]])
     over, under = eig(F, E, right=False, homogeneous_eigvals=True)
     with np.errstate(all="ignore"):
         z = over / under
     near = z[np.isfinite(z) & (np.abs(np.abs(z) - 1.0) < ON_CIRCLE)]
-    return sorted({abs(cmath.phase(each)) / loop.period for each in near.tolist()})
+    return sorted({abs(cmath.phase(eigenvalue)) / loop.period for eigenvalue in near.tolist()})
 
 
 def _where_real(loop: ScalarLoop) -> list[float]:
     """Frequencies at which L is real, the two ends among them."""
     C = loop.C[None, :]
-    found = _roots(loop, [[C, -C, np.zeros((1, 1))]], by_output=False)
+    frequencies = _roots(loop, [[C, -C, np.zeros((1, 1))]], by_output=False)
     nyquist = math.pi / loop.period
-    inner = _refined(found, lambda w: loop.at(cmath.exp(1j * w * loop.period)).imag, nyquist)
+    inner = _refined(frequencies, lambda w: loop.at(cmath.exp(1j * w * loop.period)).imag, nyquist)
     ends = [w for w in (0.0, nyquist) if _is_number(loop, w)]
     return [*inner, *ends]
 
@@ -202,13 +204,13 @@ def _where_size_is(loop: ScalarLoop, size: float) -> list[float]:
     """Frequencies at which |L| has this value."""
     C, D = loop.C[None, :], loop.D
     last = [[D * C, C, np.array([[D * D - size * size]])]]
-    found = _roots(loop, last, by_output=True)
+    frequencies = _roots(loop, last, by_output=True)
     nyquist = math.pi / loop.period
 
     def apart(w: float) -> float:
         return abs(loop.at(cmath.exp(1j * w * loop.period))) - size
 
-    inner = _refined(found, apart, nyquist)
+    inner = _refined(frequencies, apart, nyquist)
     return inner + [w for w in (nyquist,) if abs(apart(w)) <= 1e-12 * size]
 
 
@@ -224,12 +226,12 @@ def _is_number(loop: ScalarLoop, w: float) -> bool:
     )
 
 
-def _refined(found: Sequence[float], zero: Callable[[float], float], nyquist: float) -> list[float]:
+def _refined(estimates: Sequence[float], zero: Callable[[float], float], nyquist: float) -> list[float]:
     """Roots of a function near these, each refined in an interval in which the function changes its sign."""
     from scipy.optimize import brentq
 
-    made: list[float] = []
-    for w in found:
+    roots: list[float] = []
+    for w in estimates:
         for width in (1e-9, 1e-7, 1e-5, 1e-3):
             low, high = max(w * (1.0 - width) - 1e-12 * nyquist, 1e-12 * nyquist), min(w * (1.0 + width), nyquist)
             if low >= high:
@@ -237,10 +239,10 @@ def _refined(found: Sequence[float], zero: Callable[[float], float], nyquist: fl
             a, b = zero(low), zero(high)
             if math.isfinite(a) and math.isfinite(b) and (a < 0.0) != (b < 0.0):
                 root = float(brentq(zero, low, high, xtol=1e-15 * nyquist, rtol=8.9e-16))
-                if not any(abs(root - other) < 1e-12 * nyquist for other in made):
-                    made.append(root)
+                if not any(abs(root - other) < 1e-12 * nyquist for other in roots):
+                    roots.append(root)
                 break
-    return made
+    return roots
 
 
 def _disk(loop: ScalarLoop) -> tuple[float, float]:
@@ -253,7 +255,7 @@ def _disk(loop: ScalarLoop) -> tuple[float, float]:
     tried = [nyquist * k / 16 for k in range(1, 17)] + [
         abs(cmath.phase(z)) / loop.period for z in T.poles.tolist() if abs(z) > 0.0
     ]
-    size, at = max(T.sizes([w for w in tried if _is_number(T, w)]))
+    size, frequency = max(T.sizes([w for w in tried if _is_number(T, w)]))
     for _ in range(60):
         level = size * (1.0 + 1e-12)
         crossings = sorted({1e-9 * nyquist, *_where_size_is(T, level), nyquist})
@@ -261,8 +263,8 @@ def _disk(loop: ScalarLoop) -> tuple[float, float]:
         best, where = max(T.sizes([*middles, *crossings]))
         if best <= level:
             break
-        size, at = best, where
-    return 1.0 / size, at
+        size, frequency = best, where
+    return 1.0 / size, frequency
 
 
 def comes_back(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> bool:
@@ -296,12 +298,12 @@ def gain_limits(
 
     def sizes(gains: Sequence[float]) -> np.ndarray:
         """The spectral radius of the closed loop for each gain."""
-        each = np.array(gains)[:, None, None]
+        factors = np.array(gains)[:, None, None]
         try:
-            back = np.linalg.solve(np.eye(len(D)) - each * D, np.broadcast_to(C, (len(gains), *C.shape)))
+            back = np.linalg.solve(np.eye(len(D)) - factors * D, np.broadcast_to(C, (len(gains), *C.shape)))
         except np.linalg.LinAlgError:
             return np.concatenate([sizes([gain]) for gain in gains]) if len(gains) > 1 else np.array([HUGE])
-        poles = np.linalg.eigvals(A + each * (B @ back)) if len(A) else np.zeros((len(gains), 0))
+        poles = np.linalg.eigvals(A + factors * (B @ back)) if len(A) else np.zeros((len(gains), 0))
         largest: np.ndarray = np.max(np.abs(poles), axis=-1, initial=0.0)
         return largest
 
@@ -309,18 +311,18 @@ def gain_limits(
     if own > 1.0 + drift:
         return None, None
     edge = max(1.0, own) + 1e-2 * STABLE
-    found: list[float | None] = []
+    limits: list[float | None] = []
     for stride in (1.0 / STRIDE, STRIDE):
         tried = [1.0]
         while 1.0 / FARTHEST < tried[-1] < FARTHEST:
             tried.append(tried[-1] * stride)
-        for at in range(1, len(tried), AT_ONCE):
-            grows = np.flatnonzero(sizes(tried[at : at + AT_ONCE]) > edge)
+        for first in range(1, len(tried), AT_ONCE):
+            grows = np.flatnonzero(sizes(tried[first : first + AT_ONCE]) > edge)
             if len(grows):
-                good, bad = tried[at + int(grows[0]) - 1 : at + int(grows[0]) + 1]
+                good, bad = tried[first + int(grows[0]) - 1 : first + int(grows[0]) + 1]
                 root = brentq(lambda gain: sizes([gain])[0] - edge, good, bad, xtol=1e-18, rtol=1e-13, maxiter=1000)
-                found.append(float(root))
+                limits.append(float(root))
                 break
         else:
-            found.append(None)
-    return found[0], found[1]
+            limits.append(None)
+    return limits[0], limits[1]

@@ -53,10 +53,10 @@ def compute(
 
     progress  where there are such metrics, the first half of the cases counts as done when all have run
     """
-    uses = _asked(prepared)
-    told = progress if not uses or progress is None else partial(_half, progress)
+    uses = _linear_uses(prepared)
+    report = progress if not uses or progress is None else partial(_half, progress)
     history, outputs = engine.compute(
-        prepared, rows, threads=threads, record=record, progress=told, memories=memories
+        prepared, rows, threads=threads, record=record, progress=report, memories=memories
     )  # fmt: skip
     for number, use in enumerate(uses):
         share = None if progress is None else partial(_rest, progress, number, len(uses), len(rows))
@@ -74,11 +74,11 @@ def _rest(progress: Callable[[int], None], number: int, uses: int, cases: int, d
 
 def check(prepared: engine.Prepared) -> None:
     """Raise Problem where a question of an experiment's metrics is wrong for all its cases: D372 to D374."""
-    for use in _asked(prepared):
+    for use in _linear_uses(prepared):
         question(prepared, use).program  # noqa: B018 - making it is what finds it
 
 
-def _asked(prepared: engine.Prepared) -> list[LinearUse]:
+def _linear_uses(prepared: engine.Prepared) -> list[LinearUse]:
     """The linear answers of which an experiment has metrics; none where it is driven on beds."""
     named = {linear_metric.of for linear_metric in prepared.experiment.linear_metrics}
     return [use for use in prepared.experiment.linear if use.name in named and not prepared.wire]
@@ -88,12 +88,12 @@ def question(prepared: engine.Prepared, use: LinearUse) -> LinearQuestion:
     """The deck's question about an experiment, kept with its prepared program."""
     key = QUESTION + use.name
     if key not in prepared.companions:
-        made = of_deck(prepared.experiment, use.name)
+        deck_question = of_deck(prepared.experiment, use.name)
         if use.pose is None:
-            made.program.prepared = prepared
-        prepared.companions[key] = made
-    found: LinearQuestion = prepared.companions[key]
-    return found
+            deck_question.program.prepared = prepared
+        prepared.companions[key] = deck_question
+    companion: LinearQuestion = prepared.companions[key]
+    return companion
 
 
 def _answer(
@@ -105,46 +105,50 @@ def _answer(
     progress: Callable[[int], None] | None,
 ) -> None:
     """Write the metrics of one question into the outputs of these cases."""
-    asked, names = question(prepared, use), prepared.outputs
+    linear_question, names = question(prepared, use), prepared.outputs
     wanted = [linear_metric for linear_metric in prepared.experiment.linear_metrics if linear_metric.of == use.name]
-    columns, why = [names.index(METRIC + each.name) for each in wanted], names.index(WHY_ANSWER + use.name)
+    columns, why = [names.index(METRIC + metric.name) for metric in wanted], names.index(WHY_ANSWER + use.name)
     done = np.flatnonzero(outputs[:, names.index("failure")] == 0.0)
-    given = engine.inputs(prepared.experiment, rows[done])
-    for at in range(0, len(done), MOST_TOGETHER):
-        some = done[at : at + MOST_TOGETHER].tolist()
-        begun = asked.flows(given[at : at + MOST_TOGETHER], threads)
+    inputs = engine.inputs(prepared.experiment, rows[done])
+    for first in range(0, len(done), MOST_TOGETHER):
+        some = done[first : first + MOST_TOGETHER].tolist()
+        begun = linear_question.flows(inputs[first : first + MOST_TOGETHER], threads)
         places = [place for place, flow in zip(some, begun, strict=True) if flow is not None]
-        stood = _standing(asked, [flow for flow in begun if flow is not None])
-        maps = iter(asked.lifted([flow for flow in stood if flow is not None]))
+        stood = _standing(linear_question, [flow for flow in begun if flow is not None])
+        maps = iter(linear_question.lifted([flow for flow in stood if flow is not None]))
         for place, flow in zip(places, stood, strict=True):
-            found = NO_EQUILIBRIUM if flow is None else next(maps)
-            outputs[place, columns], outputs[place, why] = _figures(asked, wanted, found)
+            lifted = NO_EQUILIBRIUM if flow is None else next(maps)
+            outputs[place, columns], outputs[place, why] = _figures(linear_question, wanted, lifted)
             if progress is not None:
                 progress(place + 1)
 
 
-def _standing(asked: LinearQuestion, flows: Sequence[Flow]) -> Sequence[Flow | None]:
+def _standing(linear_question: LinearQuestion, flows: Sequence[Flow]) -> Sequence[Flow | None]:
     """The flows for the question: None for an arm that is to stand still and does not."""
-    return settled(asked.program, flows) if asked.stands else flows
+    return settled(linear_question.program, flows) if linear_question.stands else flows
 
 
 def _figures(
-    asked: LinearQuestion, wanted: Sequence[MetricUse], lifted: LiftedPeriod | Problem | int
+    linear_question: LinearQuestion, wanted: Sequence[MetricUse], lifted: LiftedPeriod | Problem | int
 ) -> tuple[list[float], float]:
     """The figures of a case, and the reasons why one or all are missing: `ANSWERED` where none is. lifted: its period,
     or why it has none"""
     if not isinstance(lifted, LiftedPeriod):
         return [math.nan] * len(wanted), float(EVENT if isinstance(lifted, Problem) else lifted)
-    loops = [lifted.opened(loop) for loop in asked.loops] if any(FIGURES[e.model].of_loops for e in wanted) else []
-    found = [_figure(FIGURES[each.model], lifted, loops) for each in wanted]
-    return [value for value, _ in found], float(max(why for _, why in found))
+    loops = (
+        [lifted.opened(loop) for loop in linear_question.loops]
+        if any(FIGURES[e.model].of_loops for e in wanted)
+        else []
+    )
+    figures = [_figure(FIGURES[metric.model], lifted, loops) for metric in wanted]
+    return [value for value, _ in figures], float(max(why for _, why in figures))
 
 
 def _figure(figure: LinearFigure, lifted: LiftedPeriod, loops: Sequence[OpenLoop]) -> tuple[float, int]:
     if not figure.of_loops:
-        if lifted.found.at_limit:
+        if lifted.map.at_limit:
             return math.nan, AT_LIMIT
-        poles = [pole for pole in lifted.poles if not pole.stays(lifted.found.seconds)]
+        poles = [pole for pole in lifted.poles if not pole.stays(lifted.map.seconds)]
         if not poles:
             return math.nan, NOTHING_DECAYS
         if figure.name == "damping":
@@ -157,7 +161,7 @@ def _figure(figure: LinearFigure, lifted: LiftedPeriod, loops: Sequence[OpenLoop
     if figure.name == "gain_margin":
         room = [1.0 / down for down, _ in (loop.gains for loop in loops) if down]
         above = [loop.searched if loop.gains[1] is None else loop.gains[1] for loop in loops]
-        return min([*room, *(each for each in above if each is not None)], default=math.inf), ANSWERED
+        return min([*room, *(limit for limit in above if limit is not None)], default=math.inf), ANSWERED
     single = [loop for loop in loops if len(loop.paths) == 1]
     if any(loop.margins is None for loop in single):
         return math.nan, SEVERAL_TICKS

@@ -50,7 +50,7 @@ class PeriodProgram:
         self.builder = InjectedBuilder(self.system, inputs)
         self.schedule = structure.schedule
         program = self.builder.program()
-        added = tuple(ADDED + each.path for each in inputs)
+        added = tuple(ADDED + signal.path for signal in inputs)
         self.recording = record(replace(program, counters=(*program.counters, *added)), fuse=False)
         finish, *rest = self.recording.tick
         self.finish, self.rest = (finish,), tuple(rest)
@@ -63,7 +63,7 @@ class PeriodProgram:
         self._orientations = tuple(cell for body in self.bodies for cell in body.orientation)
         plain = tuple(name for name in self.positions if name not in self.turns)
         self.of_beds = tuple(
-            f"{a.use.joint}.bed.{each.name}" for a, bed, _ in self.system.mounted for each in bed.memory
+            f"{a.use.joint}.bed.{memory.name}" for a, bed, _ in self.system.mounted for memory in bed.memory
         )
         self._arm = (*plain, *self.rates, *self.builder.step.states, *self._orientations, *self.of_beds)
 
@@ -85,9 +85,9 @@ class PeriodProgram:
     def begin(self, time: float) -> int:
         """The tick of the last start of a period up to a time, s. Tick 0 is excluded where a bed is not under way
         yet."""
-        found = math.floor(time * self.schedule.base_hz * (1.0 + 1e-12)) // self.ticks * self.ticks
+        tick = math.floor(time * self.schedule.base_hz * (1.0 + 1e-12)) // self.ticks * self.ticks
         waits = any(isinstance(step, Branch) and isinstance(step.condition, Unless0) for step in self.rest)
-        return self.ticks if waits and found == 0 else found
+        return self.ticks if waits and tick == 0 else tick
 
     @property
     def seconds(self) -> float:
@@ -97,13 +97,13 @@ class PeriodProgram:
     @cached_property
     def moving(self) -> frozenset[str]:
         """The cells that move with the arm, or with a number added to an input."""
-        found = {*self._arm, *(ADDED + each.path for each in self.inputs)}
+        cells = {*self._arm, *(ADDED + signal.path for signal in self.inputs)}
         sections, last = [self.recording.sections[n] for n in self._used], 0
-        while len(found) != last:
-            last = len(found)
+        while len(cells) != last:
+            last = len(cells)
             for section in sections:
-                found |= moved_by(section, found)
-        return frozenset(found)
+                cells |= moved_by(section, cells)
+        return frozenset(cells)
 
     @cached_property
     def sections(self) -> dict[int, TangentSection]:

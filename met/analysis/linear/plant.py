@@ -26,12 +26,12 @@ class PlantModel:
     B: np.ndarray
 
 
-def plants(program: PeriodProgram, flows: Sequence[Flow], kept: Sequence[Sequence[str]]) -> list[PlantModel]:
-    """The plant where each of these flows stands, before its computers tick there. kept: the states of each, of which
-    those of the arm are used"""
-    step, found = program.builder.step, dict[int, PlantModel]()
+def plants(program: PeriodProgram, flows: Sequence[Flow], case_states: Sequence[Sequence[str]]) -> list[PlantModel]:
+    """The plant where each of these flows stands, before its computers tick there. case_states: the states of each, of
+    which those of the arm are used"""
+    step, by_place = program.builder.step, dict[int, PlantModel]()
     arm = {*program.positions, *program.rates, *step.states}
-    own = [tuple(name for name in names if name in arm) for names in kept]
+    own = [tuple(name for name in names if name in arm) for names in case_states]
     inputs = tuple(
         f"{actuator.path}.{output.name}"
         for actuator in program.system.working
@@ -41,8 +41,8 @@ def plants(program: PeriodProgram, flows: Sequence[Flow], kept: Sequence[Sequenc
     for states, places in alike(own):
         A, B = _slopes(side_by_side([flows[k] for k in places]), states, inputs)
         for number, place in enumerate(places):
-            found[place] = PlantModel(states, inputs, *((A, B) if A.ndim == 2 else (A[number], B[number])))
-    return [found[place] for place in range(len(flows))]
+            by_place[place] = PlantModel(states, inputs, *((A, B) if A.ndim == 2 else (A[number], B[number])))
+    return [by_place[place] for place in range(len(flows))]
 
 
 def _slopes(now: Flow, states: tuple[str, ...], inputs: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:

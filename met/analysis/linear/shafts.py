@@ -32,7 +32,7 @@ def bring_to_rest(flow: Flow) -> None:
 
 def shaft_rates(flow: Flow) -> dict[str, Any]:
     """Rates of the shafts of beds, rad/s, by joint; of a `FlowAbreast`, [case, 1] or a number each."""
-    joints = [each.use.joint for each, _, _ in flow.program.system.mounted]
+    joints = [actuator.use.joint for actuator, _, _ in flow.program.system.mounted]
     cells = {joint: f"{joint}.bed.shaft_rate" for joint in joints}
     return {joint: flow.cells[cell] for joint, cell in cells.items() if cell in flow.cells}
 

@@ -47,13 +47,15 @@ def standing(experiment: Experiment, q: Sequence[float] = ()) -> Experiment:
         for use in structure.servos
     )
     commanded = tuple(f"{use.joint}.servo.command." for use in servos if use.command is not None)
-    parameters = {path: of for path, of in experiment.parameters.items() if not path.startswith((*commanded, *lost))}
+    parameters = {
+        path: quantity for path, quantity in experiment.parameters.items() if not path.startswith((*commanded, *lost))
+    }
     places = dict(zip((joint.name for joint in structure.independent), q, strict=True)) if q else {}
     for joint in structure.independent:
-        at = parameters[f"initial.{joint.name}.q"]
-        at = replace(at, value=places[joint.name]) if q else at
+        position = parameters[f"initial.{joint.name}.q"]
+        position = replace(position, value=places[joint.name]) if q else position
         still = replace(parameters[f"initial.{joint.name}.qd"], value=0.0)
-        parameters |= {f"initial.{joint.name}.q": at, f"initial.{joint.name}.qd": still}
+        parameters |= {f"initial.{joint.name}.q": position, f"initial.{joint.name}.qd": still}
     for use in servos:
         if use.command is not None:
             stays = parameters[f"initial.{use.joint}.q"] if use.command.kind == "position" else _ZERO
@@ -77,14 +79,14 @@ def standing(experiment: Experiment, q: Sequence[float] = ()) -> Experiment:
 _ZERO = Quantity(0.0, "", Origin("default"))
 
 
-def weak(experiment: Experiment, given: np.ndarray) -> list[Reason]:
+def weak(experiment: Experiment, inputs: np.ndarray) -> list[Reason]:
     """For each of these inputs, [case, input], why servos cannot hold an arm that is to stand; "" where they can."""
-    return ["; ".join(map(_of_unheld, joints)) for joints in unheld(experiment, given, commanded=True)]
+    return ["; ".join(map(_of_unheld, joints)) for joints in unheld(experiment, inputs, commanded=True)]
 
 
-def _of_unheld(of: Unheld) -> str:
-    takes = f"`{of.joint.name}` takes {of.wanted:.3g} {of.unit}, and its servo can hold {of.there:.3g} {of.unit}"
-    return f"{takes}: {of.reason}"
+def _of_unheld(joint: Unheld) -> str:
+    takes = f"`{joint.joint.name}` takes {joint.wanted:.3g} {joint.unit}, and its servo can hold {joint.there:.3g}"
+    return f"{takes} {joint.unit}: {joint.reason}"
 
 
 def settled(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow | None]:
@@ -94,51 +96,51 @@ def settled(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow | None]:
     The joints stay where they are; the unknowns are all other memory of the arm and its laws, and a number added to
     each servo's command: behind a gear that is wound up, a law sees another position than the joint's.
     """
-    found: list[Flow | None] = [None] * len(flows)
+    answers: list[Flow | None] = [None] * len(flows)
     if program.bodies:
-        return found
+        return answers
     never = dict.fromkeys(program.states, 0.0)  # cells that the run has not written yet
-    commanded = (_commanded(program, each) for each in flows)
-    begun = [Flow(program, each.inputs, never | each.cells, each.tick) for each in commanded]
+    commanded = (_commanded(program, flow) for flow in flows)
+    begun = [Flow(program, flow.inputs, never | flow.cells, flow.tick) for flow in commanded]
     moving = dict(enumerate(_under_way(program, begun)))
     for _ in range(MOST_STEPS):
         now = list(moving.values())
         for flow in now:
             bring_to_rest(flow)
         maps, later = period_maps(program, now), together(now, Flow.period)
-        for place, of, after in zip(list(moving), maps, later, strict=True):
+        for place, period, after in zip(list(moving), maps, later, strict=True):
             # a limit that is reached, or something breaks away: it does not stand
-            stands = False if isinstance(of, Problem) else _step(moving[place], after, of)
+            stands = False if isinstance(period, Problem) else _step(moving[place], after, period)
             if stands is not None:
                 flow = moving.pop(place)
-                found[place] = flow if stands and not loose_beds(flow) else None
-    return found
+                answers[place] = flow if stands and not loose_beds(flow) else None
+    return answers
 
 
-def _step(flow: Flow, after: Flow, found: PeriodMap) -> bool | None:
+def _step(flow: Flow, after: Flow, period: PeriodMap) -> bool | None:
     """Do a step of Newton's method on the flow. True where it stands already, False where it never will. after: a
-    period later; found: of that period"""
+    period later; period: of that period"""
     program = flow.program
-    now = np.array([flow.cells[name] for name in found.states])
-    change = np.array([after.cells[name] for name in found.states]) - now
+    now = np.array([flow.cells[name] for name in period.states])
+    change = np.array([after.cells[name] for name in period.states]) - now
     if not np.isfinite(change).all():
         return False
     if np.all(np.abs(change) <= CLOSE * np.maximum(np.abs(now), 1.0)):
         return True
     fixed = _places(program)
     # while friction holds a joint, several torques do; the one that it begins with is as good as any
-    of_torque, held = _of_torque(program), {*found.held}
+    of_torque, held = _of_torque(program), {*period.held}
     stays = {path for path, joint in of_torque.items() if {joint, f"{joint}.bed"} & held}
-    commands = [k for k, each in enumerate(program.inputs) if not each.is_output and each.path not in stays]
-    sought = [place for place, name in enumerate(found.states) if name not in fixed]
-    added = [[k for k, each in enumerate(found.ticks) if each.entry == number] for number in commands]
-    columns = [(found.A - np.eye(len(now)))[:, sought], *(found.B[:, ticks].sum(1)[:, None] for ticks in added)]
+    commands = [k for k, signal in enumerate(program.inputs) if not signal.is_output and signal.path not in stays]
+    sought = [place for place, name in enumerate(period.states) if name not in fixed]
+    added = [[k for k, tick in enumerate(period.ticks) if tick.entry == number] for number in commands]
+    columns = [(period.A - np.eye(len(now)))[:, sought], *(period.B[:, ticks].sum(1)[:, None] for ticks in added)]
     moves_by = np.hstack(columns)
     sizes = np.linalg.norm(moves_by, axis=0)
     sizes[sizes == 0.0] = 1.0  # a state that moves nothing stays as it is, as the integral of a joint that sticks
     step = np.linalg.lstsq(moves_by / sizes, -change, rcond=1e-13)[0] / sizes
     for place, size in zip(sought, step, strict=False):
-        flow.cells[found.states[place]] += float(size)
+        flow.cells[period.states[place]] += float(size)
     for number, size in zip(commands, step[len(sought) :], strict=True):
         cell = ADDED + program.inputs[number].path
         flow.cells[cell] = flow.cells.get(cell, 0.0) + float(size)
@@ -148,7 +150,11 @@ def _step(flow: Flow, after: Flow, found: PeriodMap) -> bool | None:
 def _of_torque(program: PeriodProgram) -> dict[str, str]:
     """Joints whose servos take a torque command that can be solved for, by the paths of these commands."""
     kinds = {actuator.use.joint: actuator.command_kind for actuator in program.system.working}
-    return {each.path: each.joint for each in program.inputs if not each.is_output and kinds[each.joint] == "torque"}
+    return {
+        signal.path: signal.joint
+        for signal in program.inputs
+        if not signal.is_output and kinds[signal.joint] == "torque"
+    }
 
 
 def _commanded(program: PeriodProgram, flow: Flow) -> Flow:
@@ -158,30 +164,37 @@ def _commanded(program: PeriodProgram, flow: Flow) -> Flow:
     if not of_torque:
         return flow
     torques = holding_torques(program.experiment, flow.inputs)
-    found = Flow(program, flow.inputs, {}, 0)
-    found.begin()
-    found.cells |= {ADDED + path: torques[joint] for path, joint in of_torque.items() if joint in torques}
-    while found.tick < flow.tick:
-        found.ticks()
-        found.finish()
-    return found
+    moved = Flow(program, flow.inputs, {}, 0)
+    moved.begin()
+    moved.cells |= {ADDED + path: torques[joint] for path, joint in of_torque.items() if joint in torques}
+    while moved.tick < flow.tick:
+        moved.ticks()
+        moved.finish()
+    return moved
 
 
 def _under_way(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow]:
     """The flows with beds under way: amplifiers and queues hold what laws ask for at that point. All else stays as at
     the run's start."""
-    found = [flow.copy(tangents=False) for flow in flows]
-    heads = tuple(f"{each.use.joint}{part}" for each, _, _ in program.system.mounted for part in HOLD)
-    rates = {cell_names.REFERENCE_RATE(each.use.joint): 0.0 for each, _, law in program.system.mounted if law.observer}
+    copies = [flow.copy(tangents=False) for flow in flows]
+    heads = tuple(f"{actuator.use.joint}{part}" for actuator, _, _ in program.system.mounted for part in HOLD)
+    rates = {
+        cell_names.REFERENCE_RATE(actuator.use.joint): 0.0
+        for actuator, _, law in program.system.mounted
+        if law.observer
+    }
     for _ in range(QUEUE + 1 if heads else 0):
-        for flow, later in zip(found, together(found, Flow.period), strict=True):
+        for flow, later in zip(copies, together(copies, Flow.period), strict=True):
             flow.cells |= {name: value for name, value in later.cells.items() if name.startswith(heads)} | rates
-    return found
+    return copies
 
 
 def _places(program: PeriodProgram) -> tuple[str, ...]:
     """Cells of the positions of joints and of shafts of beds."""
-    return (*program.positions, *(cell_names.SHAFT_ANGLE(each.use.joint) for each, _, _ in program.system.mounted))
+    return (
+        *program.positions,
+        *(cell_names.SHAFT_ANGLE(actuator.use.joint) for actuator, _, _ in program.system.mounted),
+    )
 
 
 def _faults(program: PeriodProgram) -> Iterator[str]:
@@ -200,7 +213,7 @@ def moves(program: PeriodProgram, flow: Flow) -> Reason:
     (flow,) = _under_way(program, [_commanded(program, flow)])
     bring_to_rest(flow)
     (after,) = together([flow], Flow.period)
-    found = {name: abs(after.cells[name] - flow.cells[name]) / program.seconds for name in program.rates}
+    changes = {name: abs(after.cells[name] - flow.cells[name]) / program.seconds for name in program.rates}
     faults = ", ".join(f"`{path}`" for path in _faults(program))
     if program.of_beds and faults:
         return f"its beds have faults, with which nothing comes to rest or goes evenly: {faults}"
@@ -209,21 +222,21 @@ def moves(program: PeriodProgram, flow: Flow) -> Reason:
             f"no dry friction, `f_c`, holds the shaft of the bed of `{loose[0]}`, and an emulated bed stops a shaft "
             "that would turn back for the rest of a substep, so that there is no derivative at rest"
         )
-    if not any(found.values()):
+    if not any(changes.values()):
         try:
             period_map(program, flow)
         except Problem as edge:
             return f"it stands still there, on an edge: {edge.diagnostics[0].message.partition(': ')[2]}"
-    name = max(found, key=lambda each: found[each])
+    name = max(changes, key=lambda rate: changes[rate])
     first = name.removesuffix(".qd")
     sliding = {joint.name for joint in program.experiment.structure.moving if joint.kind == "prismatic"}
-    size = f"{found[name]:.3g} {'m/s^2' if first in sliding else 'rad/s^2'}"
+    size = f"{changes[name]:.3g} {'m/s^2' if first in sliding else 'rad/s^2'}"
     if first in {a.use.joint for a in program.system.working if a.command_kind == "torque" and not a.ticks}:
         return (
             f"`{first}` begins to move, by {size}, and the torque that would hold it is not sought: the law of its "
             "servo is `continuous`, so give it a `rate`"
         )
-    mounted = {each.use.joint for each, _, _ in program.system.mounted}
+    mounted = {actuator.use.joint for actuator, _, _ in program.system.mounted}
     if first in mounted and after.cells.get(LIMITED, 0.0) > flow.cells.get(LIMITED, 0.0):
         return (
             f"`{first}` begins to move, by {size}: the load motor of its bed is at its limit, "

@@ -35,7 +35,7 @@ def audited(text: str, known: Mapping[bytes, Any]) -> tuple[Compiled, dict[bytes
     found: list[None] = []
     memo = AnalysisMemo(pickle.loads(pickle.dumps(known)), lambda: found.append(None))
     compiled = check("", include_dirs=(), defines=(), select="all", text=text, memo=memo)
-    return compiled, memo.asked, len(found)
+    return compiled, memo.answers, len(found)
 
 
 def plain(text: str) -> Compiled:

@@ -157,7 +157,7 @@ def test_of_an_arm_in_which_a_number_has_changed_only_its_chain_is_looked_at_aga
     monkeypatch.setattr(audit, "build", recorded)
     brought = memo
     for _ in range(2):  # of what is known as a whole the parts are kept too
-        brought = step_size.AnalysisMemo(pickle.loads(pickle.dumps(brought.asked)))
+        brought = step_size.AnalysisMemo(pickle.loads(pickle.dumps(brought.answers)))
         again = asked(brought)
     assert (again[0].owner, again[0].fastest, again[1]) == (first[0].owner, first[0].fastest, first[1])
     assert looks == []
