@@ -54,8 +54,8 @@ class Parameter:
     ticks        of a frequency: how often something is done, which turns no angle: 1/s is as plain there as Hz
     as_many_as   of a list: the list that it has a number for each of; it may be empty where that is its default
     if_negative  of a number above 0: what a negative one stands for, where its magnitude may be written in its place
-    timing       of an environment's number that says when the model acts: a plan holds it only where it is set. Without
-                 it the model acts always and in full, as checks of steps have it
+    timing       of a number that says when an environment acts, or a metric watches: a plan holds it only where it is
+                 set. Without it the model acts always and in full, as checks of steps have it
     """
 
     name: str

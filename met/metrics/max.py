@@ -1,4 +1,7 @@
-"""The largest value of the signal in the run."""
+"""The largest value of the signal in the run, or in a window of it.
+
+It is not a number if the window has no sample.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +11,17 @@ from functools import reduce
 from typing import Any
 
 from met.metrics.metric import Metric, OverJoints, as_channel
+from met.metrics.window import PART, after_sample, extreme_seen
 from met.parameter import Memory
 from met.trace import Real, maximum
 
 
 def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
-    return {"most": maximum(held.most, x)}
+    return {"most": after_sample(p, t, maximum(held.most, x), held.most, -math.inf)}
 
 
 def result(p: Any, held: Any, t: Real) -> Real:
-    return held.most
+    return extreme_seen(p, held.most)
 
 
 METRIC = Metric(
@@ -26,6 +30,7 @@ METRIC = Metric(
     bounds=as_channel,
     extreme="most",
     unit="of",
+    parameters=PART,
     over_joints=OverJoints("max", lambda values: reduce(maximum, values)),
     memory=(Memory(name="most", unit="of", doc="largest so far", start=-math.inf),),
     update=update,

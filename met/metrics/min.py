@@ -1,4 +1,7 @@
-"""The smallest value of the signal in the run."""
+"""The smallest value of the signal in the run, or in a window of it.
+
+It is not a number if the window has no sample.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +11,17 @@ from functools import reduce
 from typing import Any
 
 from met.metrics.metric import Metric, OverJoints, as_channel
+from met.metrics.window import PART, after_sample, extreme_seen
 from met.parameter import Memory
 from met.trace import Real, minimum
 
 
 def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
-    return {"least": minimum(held.least, x)}
+    return {"least": after_sample(p, t, minimum(held.least, x), held.least, math.inf)}
 
 
 def result(p: Any, held: Any, t: Real) -> Real:
-    return held.least
+    return extreme_seen(p, held.least)
 
 
 METRIC = Metric(
@@ -26,6 +30,7 @@ METRIC = Metric(
     bounds=as_channel,
     extreme="least",
     unit="of",
+    parameters=PART,
     over_joints=OverJoints("min", lambda values: reduce(minimum, values)),
     memory=(Memory(name="least", unit="of", doc="smallest so far", start=math.inf),),
     update=update,

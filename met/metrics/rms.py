@@ -1,4 +1,7 @@
-"""The root mean square of the signal over its samples."""
+"""The root mean square of the signal over its samples, or over those in a window of the run.
+
+It is not a number if the window has no sample.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,16 @@ from collections.abc import Mapping
 from typing import Any
 
 from met.metrics.metric import Metric, OverJoints, as_size
+from met.metrics.window import PART, after_sample
 from met.parameter import Memory
 from met.trace import Real, sqrt
 
 
 def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
-    return {"squares": held.squares + x * x, "count": held.count + 1.0}
+    return {
+        "squares": after_sample(p, t, held.squares + x * x, held.squares, 0.0),
+        "count": after_sample(p, t, held.count + 1.0, held.count, 0.0),
+    }
 
 
 def result(p: Any, held: Any, t: Real) -> Real:
@@ -32,6 +39,7 @@ METRIC = Metric(
     bounds=as_size,
     unit="of",
     least=0.0,
+    parameters=PART,
     over_joints=OverJoints("rms", root_mean_square),
     memory=(
         Memory(name="squares", unit="1", doc="sum of squares"),

@@ -76,10 +76,13 @@ def of_environment(experiment: Experiment) -> Iterator[tuple[str, tuple[Paramete
 
 
 def timing_defaults(experiment: Experiment) -> dict[str, Quantity]:
-    """The numbers with which all environment models act always and in full (`Parameter.timing`), by path."""
+    """The numbers with which all environment models act always and in full, and metrics watch the whole run
+    (`Parameter.timing`), by path."""
+    metrics = experiment.structure.metrics
+    watching = ((f"metrics.{use.name}", models.find("metric", use.model, use.place).parameters) for use in metrics)
     return {
         f"{prefix}.{each.name}": Quantity(each.default, each.unit, Origin("default"))
-        for prefix, declared in of_environment(experiment)
+        for prefix, declared in (*of_environment(experiment), *watching)
         for each in declared
         if each.timing and each.default is not None
     }

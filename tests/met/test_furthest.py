@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -88,6 +89,17 @@ def test_outside_a_window_nothing_is_missed() -> None:
         assert worth(more, course, after=5.0) == worth(BY_NAME["eventually"], course, after=5.0) == -1.0
 
 
+@pytest.mark.parametrize("name", ["max", "peak", "min"])
+def test_outside_the_window_of_an_extreme_nothing_is_missed(name: str) -> None:
+    """Kinks before the window and behind it are none of its own."""
+    course = sign(name) * np.array([0.0, 1.0, 9.0, 1.0, 0.0, 1.0, 2.0, 1.0, 0.0, 1.0, 9.0, 1.0, 0.0])
+    more = furthest(BY_NAME[name])
+    assert more is not None
+    with np.errstate(invalid="ignore"):
+        seen, far = (worth(metric, course.tolist(), after=4.0, within=4.0) for metric in (BY_NAME[name], more))
+    assert seen == far == sign(name) * 2.0
+
+
 def test_a_share_of_time_may_miss_a_sample_at_each_turn() -> None:
     seen, far = with_furthest("share_of_time", np.array([1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0, -1.0]))
     assert seen == 3 / 8 and far == (3 + 3) / 8
@@ -105,4 +117,4 @@ def test_one_step_of_it_is_the_metric_s_own(metric: Metric = BY_NAME["max"]) -> 
     assert more is not None and more.memory[: len(metric.memory)] == metric.memory
     held = SimpleNamespace(**{each.name: each.start for each in more.memory})
     with np.errstate(invalid="ignore"):
-        assert more.update(SimpleNamespace(), held, 0.25, 0.0, 0.0)["most"] == 0.25
+        assert more.update(SimpleNamespace(after=0.0, within=math.inf), held, 0.25, 0.0, 0.0)["most"] == 0.25

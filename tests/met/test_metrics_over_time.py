@@ -51,6 +51,10 @@ def test_margins_are_those_of_all_samples_in_the_window(seed: int, first: int, l
         ("eventually", seen.max(axis=0)),
         ("never", (-seen).min(axis=0)),
         ("share_of_time", (seen >= 0.0).mean(axis=0)),
+        ("max", seen.max(axis=0)),
+        ("min", seen.min(axis=0)),
+        ("peak", np.abs(seen).max(axis=0)),
+        ("rms", np.sqrt(np.square(seen).mean(axis=0))),
     ):
         np.testing.assert_allclose(worth(name, x, **given), wanted, rtol=CLOSE, atol=CLOSE, err_msg=name)
 
@@ -71,7 +75,9 @@ def test_holds_for_is_met_where_every_sample_of_some_stretch_is(steps: int, firs
     assert 0 < holds.sum() < TRACES or steps == 100
 
 
-@pytest.mark.parametrize("name", ["always", "eventually", "never", "share_of_time", "holds_for"])
+@pytest.mark.parametrize(
+    "name", ["always", "eventually", "never", "share_of_time", "holds_for", "max", "min", "peak", "rms"]
+)
 def test_a_window_without_a_sample_gives_no_number(name: str) -> None:
     x = margins(4)[:10]
     assert np.isnan(worth(name, x, after=1.0, time=0.1)).all()

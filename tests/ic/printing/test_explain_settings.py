@@ -69,6 +69,8 @@ def test_a_metric_is_written_where_its_model_and_its_channel_are(capsys: pytest.
     assert explained(capsys, "b.ic", "metrics.top") == {
         "metrics.top.model": ("max", "", 17),
         "metrics.top.of": ("hinge.qd", "", 18),
+        "metrics.top.after": (0.0, "s", None),
+        "metrics.top.within": ("inf", "s", None),
     }
 
 

@@ -81,9 +81,10 @@ def by_richardson(program: GradientProgram, number: int, share: float) -> dict[s
 
 
 @pytest.mark.slow
-def test_they_are_those_of_settling_peak_and_rms_through_20_sticks() -> None:
+def test_they_are_those_of_settling_peak_rms_and_a_window_through_20_sticks() -> None:
     """Both joints stick where they turn around, ten times each: by extrapolated differences to 1e-6."""
-    program = GradientProgram(varied(SWAY, NUMBERS))
+    late = "metric late = peak { of = wrist.qd;  after = 2.2 s;  within = 2 s; }\n    metric last"
+    program = GradientProgram(varied(changed(SWAY, ("metric last", late)), NUMBERS))
     found = program.of([0])
     assert not found.why_not
     outputs = program.recording.program.outputs
