@@ -169,7 +169,7 @@ error[D153]: `max` takes its values by name
    |
 15 |     metric top = max(hinge.q, of = hinge.qd);
    |                      ^^^^^^^
-   = help: write `max(of = ...)`
+   = help: write `max(of = ..., after = ..., within = ...)`
 """,
     ),
     "a metric of what is no channel": (
