@@ -62,8 +62,8 @@ def report(
 
             groups_named(file, experiments)
             texts = [tolerances] if isinstance(tolerances, str) else tolerances
-            found = rename_archives(diff(Path(against), archive, read(texts)), *display_names(Path(against), archive))
-            other = ComparedArchive(stack.enter_context(ArchiveFile(Path(against))), found)
+            diff_ = rename_archives(diff(Path(against), archive, read(texts)), *display_names(Path(against), archive))
+            other = ComparedArchive(stack.enter_context(ArchiveFile(Path(against))), diff_)
         text = page(gather(file, experiments, title, progress, other, simulate=simulate))
     write(target, text)
     return target

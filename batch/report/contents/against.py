@@ -71,8 +71,8 @@ class EarlierCases:
     @cached_property
     def most(self) -> tuple[int, ...]:
         """Numbers of the cases that differ most, the largest difference first."""
-        ranked = [each for _, _, experiment in self.pairs for each in experiment.worst]
-        return tuple(each.case_b for each in sorted(ranked, key=lambda each: -each.score))
+        ranked = [case_diff for _, _, experiment in self.pairs for case_diff in experiment.worst]
+        return tuple(case_diff.case_b for case_diff in sorted(ranked, key=lambda case_diff: -case_diff.score))
 
     def experiments(self) -> dict[str, Experiment]:
         """The experiments of the other archive's plan, by name; none where the plan cannot be read here."""
@@ -93,7 +93,7 @@ class EarlierCases:
             ]
             for pool in (self.now, self.pool)
         )
-        if not theirs or {metric.unit for metric in theirs} != {each.unit for each in mine}:
+        if not theirs or {metric.unit for metric in theirs} != {column.unit for column in mine}:
             return None
         before = self.pool.gathered(name) / deck_unit(mine[0])[0]
         return np.where(self.there, before[self.place], np.nan)
@@ -103,17 +103,20 @@ class EarlierCases:
         other has no history of it."""
         for mine, group, experiment in self.pairs:
             if mine == number:
-                found = np.flatnonzero(experiment.cases.b == position)
-                if len(found) and (there := int(experiment.cases.a[found[0]])) in group.recorded_positions:
-                    return group, there
+                matches = np.flatnonzero(experiment.cases.b == position)
+                if (
+                    len(matches)
+                    and (former_position := int(experiment.cases.a[matches[0]])) in group.recorded_positions
+                ):
+                    return group, former_position
         return None
 
 
 def _places(pool: Pool, number: int) -> np.ndarray:
     """For each position in one of a pool's groups, the place of that case in the pool."""
-    here = np.flatnonzero(pool.group_of == number)
-    out = np.empty(len(here), np.int64)
-    out[pool.position_of[here]] = here
+    places = np.flatnonzero(pool.group_of == number)
+    out = np.empty(len(places), np.int64)
+    out[pool.position_of[places]] = places
     return out
 
 
@@ -129,35 +132,35 @@ def change(column: CaseColumn) -> CaseColumn | None:
 
 def display_names(before: Path, now: Path) -> tuple[str, str]:
     """The names of two archives in a page: their files' names, or as much of their paths as distinguishes them."""
-    one, two = before.absolute().parts, now.absolute().parts
-    for length in range(1, max(len(one), len(two)) + 1):
-        if one[-length:] != two[-length:]:
-            return str(Path(*one[-length:])), str(Path(*two[-length:]))
+    former, two = before.absolute().parts, now.absolute().parts
+    for length in range(1, max(len(former), len(two)) + 1):
+        if former[-length:] != two[-length:]:
+            return str(Path(*former[-length:])), str(Path(*two[-length:]))
     return before.name, now.name
 
 
-def rename_archives(found: Diff, before: str, now: str) -> Diff:
+def rename_archives(differences: Diff, before: str, now: str) -> Diff:
     """The same differences with these names for the two archives in all texts."""
-    names = {str(found.b): now, str(found.a): before}
+    names = {str(differences.b): now, str(differences.a): before}
     either = re.compile("|".join(re.escape(path) for path in sorted(names, key=len, reverse=True)))
 
-    def said(text: str) -> str:
+    def renamed(text: str) -> str:
         return either.sub(lambda match: names[match[0]], text)
 
     experiments = tuple(
         replace(
             experiment,
-            signals=[replace(signal, why=said(signal.why)) for signal in experiment.signals],
-            notes=[said(note) for note in experiment.notes],
+            signals=[replace(signal, why=renamed(signal.why)) for signal in experiment.signals],
+            notes=[renamed(note) for note in experiment.notes],
         )
-        for experiment in found.experiments
+        for experiment in differences.experiments
     )
-    return replace(found, a=Path(before), b=Path(now), experiments=experiments)
+    return replace(differences, a=Path(before), b=Path(now), experiments=experiments)
 
 
-def of_groups(found: Diff, groups: Sequence[ArchiveGroup]) -> Diff:
+def of_groups(differences: Diff, groups: Sequence[ArchiveGroup]) -> Diff:
     """The differences restricted to these runs and sweeps of the second archive."""
     names = {group.name for group in groups}
-    experiments = tuple(experiment for experiment in found.experiments if experiment.name_b in names)
-    only_b = tuple(name for name in found.only_b if name in names)
-    return replace(found, experiments=experiments, only_a=(), only_b=only_b)
+    experiments = tuple(experiment for experiment in differences.experiments if experiment.name_b in names)
+    only_b = tuple(name for name in differences.only_b if name in names)
+    return replace(differences, experiments=experiments, only_a=(), only_b=only_b)

@@ -31,38 +31,41 @@ KINDS = {
 }
 
 
-def archive_changes(found: Diff) -> ArchiveChanges:
+def archive_changes(differences: Diff) -> ArchiveChanges:
     """Differences in the provenance of the two archives, and the runs that only one of them has."""
     origins = tuple(
         OtherOrigin(KINDS[kind], lines[:MOST_LINES], max(0, len(lines) - MOST_LINES))
-        for kind, lines in words.provenance_lines(found)
+        for kind, lines in words.provenance_lines(differences)
         if kind in KINDS
     )
     decks = tuple(
         DeckTextChange(
             visible(deck.said), tuple(map(visible, deck.lines[:MOST_LINES])), max(0, len(deck.lines) - MOST_LINES)
         )
-        for deck in found.changed.decks
+        for deck in differences.changed.decks
     )
-    return ArchiveChanges(str(found.a), str(found.b), origins, decks, tuple(words.unmatched_runs(found)))
+    return ArchiveChanges(
+        str(differences.a), str(differences.b), origins, decks, tuple(words.unmatched_runs(differences))
+    )
 
 
-def run_changes(found: Diff, before: EarlierCases | None) -> tuple[RunChanges, ...]:
+def run_changes(differences: Diff, before: EarlierCases | None) -> tuple[RunChanges, ...]:
     """The changes of each of a section's structures that both archives have."""
     if before is None:
         return ()
     several = len(before.pairs) > 1
-    return tuple(_run_changes(found, experiment, several) for _, _, experiment in before.pairs)
+    return tuple(_run_changes(differences, experiment, several) for _, _, experiment in before.pairs)
 
 
-def _run_changes(found: Diff, experiment: ExperimentDiff, several: bool) -> RunChanges:
+def _run_changes(differences: Diff, experiment: ExperimentDiff, several: bool) -> RunChanges:
     """The changes of one structure. several: True where there are others, so that its requirements are listed here;
     otherwise the verdict has them"""
-    alone = words.unmatched_cases(found, experiment)
+    alone = words.unmatched_cases(differences, experiment)
     if several:
         alone += words.requirement_lines(experiment)
     allowed = (
-        line.replace("the deck of b ", f"the deck of {found.b} ") for line in words.tolerance_lines(found, experiment)
+        line.replace("the deck of b ", f"the deck of {differences.b} ")
+        for line in words.tolerance_lines(differences, experiment)
     )
     paired = words.paired_metrics(experiment)
     return RunChanges(
@@ -72,14 +75,14 @@ def _run_changes(found: Diff, experiment: ExperimentDiff, several: bool) -> RunC
         endings=tuple(words.endings(experiment)),
         notes=(
             *experiment.notes,
-            *(f"{words.EVIDENCE}: {what}: {said}" for what, said in words.evidence_pairs(experiment)),
+            *(f"{words.EVIDENCE}: {what}: {text}" for what, text in words.evidence_pairs(experiment)),
             *([f"{words.PAIRED}: {'; '.join(paired)}"] if paired else []),
         ),
         allowed=tuple(allowed),
         signals=tuple(map(words.signal_row, experiment.signals)),
         samples=tuple(map(words.distribution, experiment.samples)),
         starred=words.star_note(experiment),
-        worst=tuple(words.worst_cases(found, experiment)),
+        worst=tuple(words.worst_cases(differences, experiment)),
         left=max(0, experiment.cases_different - len(experiment.worst)),
     )
 
@@ -90,18 +93,18 @@ def _run_changes(found: Diff, experiment: ExperimentDiff, several: bool) -> RunC
 def verdict(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases | None]]) -> Verdict:
     """The verdict of the comparison, over all cases. pairs: runs and sweeps of the page, with their earlier
     counterparts"""
-    found = against.found
+    differences = against.found
     both = [(pool, before) for pool, before in pairs if before is not None]
-    said = words.verdict(found).removeprefix(found.verdict).lstrip(",;: ")
-    if not any(experiment.cases.count for experiment in found.experiments):
-        said = "the two have no case in common"
+    headline = words.verdict(differences).removeprefix(differences.verdict).lstrip(",;: ")
+    if not any(experiment.cases.count for experiment in differences.experiments):
+        headline = "the two have no case in common"
     return Verdict(
         kind="comparison",
-        about=f"Against {found.a}",
-        ok=found.verdict in (IDENTICAL, EQUIVALENT),
-        headline=said[:1].upper() + said[1:],
+        about=f"Against {differences.a}",
+        ok=differences.verdict in (IDENTICAL, EQUIVALENT),
+        headline=headline[:1].upper() + headline[1:],
         parts=_parts(against, pairs),
-        word=found.verdict,
+        word=differences.verdict,
         figure=_figure(both),
         flows=tuple(flow for pool, before in both for flow in _flows(pool, before, named=len(pairs) > 1)),
         ends=_ends(both),
@@ -109,13 +112,13 @@ def verdict(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases |
 
 
 def _parts(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases | None]]) -> tuple[OutcomeCount, ...]:
-    found = against.found
-    how = np.concatenate([np.zeros(0, np.int8), *(experiment.how for experiment in found.experiments)])
+    differences = against.found
+    how = np.concatenate([np.zeros(0, np.int8), *(experiment.how for experiment in differences.experiments)])
     counts = {word: int((how == VERDICTS.index(word)).sum()) for word in (IDENTICAL, EQUIVALENT, DIFFERENT)}
-    gone = sum(group.count for group in against.file.groups if group.name in found.only_a)
-    new = sum(group.count for pool, _ in pairs for group in pool.groups if group.name in found.only_b)
-    counts["only before"] = sum(len(experiment.only_a) for experiment in found.experiments) + gone
-    counts["only now"] = sum(len(experiment.only_b) for experiment in found.experiments) + new
+    gone = sum(group.count for group in against.file.groups if group.name in differences.only_a)
+    new = sum(group.count for pool, _ in pairs for group in pool.groups if group.name in differences.only_b)
+    counts["only before"] = sum(len(experiment.only_a) for experiment in differences.experiments) + gone
+    counts["only now"] = sum(len(experiment.only_b) for experiment in differences.experiments) + new
     return tuple(OutcomeCount(word, count) for word, count in counts.items() if count)
 
 
@@ -147,10 +150,14 @@ def _flows(pool: Pool, before: EarlierCases, *, named: bool) -> list[Requirement
         met = words.met_by_text(int(was.sum()), int(now.sum()), int(before.there.sum()))
         if len(before.pairs) == 1:
             met += words.pairs_text(pairs[text])
-        said = words.requirement_text(pairs[text])
+        requirement_name = words.requirement_text(pairs[text])
         gained, lost = (ranges(pool.cases[which].tolist()) for which in (now & ~was, was & ~now))
         better, worse = metric_moves(pool, before, text)
-        out.append(RequirementFlow(f"{pool.name}: {said}" if named else said, met, gained, lost, better, worse))
+        out.append(
+            RequirementFlow(
+                f"{pool.name}: {requirement_name}" if named else requirement_name, met, gained, lost, better, worse
+            )
+        )
     return out
 
 
@@ -158,16 +165,16 @@ def _ends(both: Sequence[tuple[Pool, EarlierCases]]) -> RequirementFlow | None:
     """The cases that reach their end now, and those that no longer do; None where nothing has changed."""
     gained: list[str] = []
     lost: list[str] = []
-    was = now = of = 0
+    was = now = total = 0
     for pool, before in both:
-        here, there = pool.ended < ENDED.index("failed"), before.ended < ENDED.index("failed")
+        now_ended, was_ended = pool.ended < ENDED.index("failed"), before.ended < ENDED.index("failed")
         name = f"{pool.name}: " if len(both) > 1 else ""
-        for which, found in ((here & ~there, gained), (there & ~here, lost)):
+        for which, names in ((now_ended & ~was_ended, gained), (was_ended & ~now_ended, lost)):
             if (which & before.there).any():
-                found.append(f"{name}{ranges(pool.cases[which & before.there].tolist())}")
-        was, now = was + int((there & before.there).sum()), now + int((here & before.there).sum())
-        of += int(before.there.sum())
+                names.append(f"{name}{ranges(pool.cases[which & before.there].tolist())}")
+        was, now = was + int((was_ended & before.there).sum()), now + int((now_ended & before.there).sum())
+        total += int(before.there.sum())
     if not gained and not lost:
         return None
-    met = f"by {was:,}, now by {now:,} of {of:,}" if was != now else f"by {now:,} of {of:,}, other ones"
+    met = f"by {was:,}, now by {now:,} of {total:,}" if was != now else f"by {now:,} of {total:,}, other ones"
     return RequirementFlow("reaches its end", met, "; ".join(gained), "; ".join(lost))

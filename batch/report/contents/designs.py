@@ -36,7 +36,7 @@ def design_answer(archive: ArchiveFile, pool: Pool) -> DesignAnswer | None:
         return DesignAnswer(
             _sentence(answer.headline), "Those that come nearest are below.", table, None, "", "", (), None
         )
-    said, command = answer.confirmation()
+    sentence, command = answer.confirmation()
     stretches = tuple(map(tuple, answer.stretches()))
     heads = ("how far each may go", "by itself", "what ends it")
     return DesignAnswer(
@@ -44,7 +44,7 @@ def design_answer(archive: ArchiveFile, pool: Pool) -> DesignAnswer | None:
         why=_sentence(answer.why),
         table=_table(answer.cells(answer.rows()), answer.right),
         stretches=TextTable(heads, ("",) * 3, stretches) if stretches else None,
-        said=_sentence(said),
+        said=_sentence(sentence),
         command=command,
         notes=tuple(f"{_sentence(note)}." for note in (*answer.stability(), *answer.notes())),
         map=design_map(designs, answer.best),
@@ -64,14 +64,14 @@ def design_map(designs: Designs, best: int) -> DesignMap | None:
     if len(sides) < 2 or steps is None or len(sides[0].values) * len(sides[1].values) > MOST_CELLS:
         return None
     x, y = sorted(sides, key=designs.axes.index)
-    shown = np.ones(designs.count, bool)
+    in_plane = np.ones(designs.count, bool)
     for axis in designs.axes:
         if axis is not x and axis is not y:
-            shown &= axis.level == axis.level[best]
+            in_plane &= axis.level == axis.level[best]
     cells = np.full((len(y.values), len(x.values)), -1)
-    cells[y.level[shown], x.level[shown]] = steps[shown]
-    at = int(y.level[best]), int(x.level[best])
-    return DesignMap(_name(x), _name(y), _unit(x), _unit(y), _texts(x), _texts(y), cells, at)
+    cells[y.level[in_plane], x.level[in_plane]] = steps[in_plane]
+    best_cell = int(y.level[best]), int(x.level[best])
+    return DesignMap(_name(x), _name(y), _unit(x), _unit(y), _texts(x), _texts(y), cells, best_cell)
 
 
 def _sentence(text: str) -> str:

@@ -18,33 +18,34 @@ from batch.report.contents.thinning import thin, thin_clock
 class EarlierHistories:
     """Histories of the other archive, in the panels of a page.
 
-    found   the page's panels;  points  of a line at most
-    scaled  the page's unit for each signal, as a panel of this archive, by name and SI unit
-    clocks  the page's times, to which those of the other archive are added
+    signal_panels  the page's panels;  points: of a line at most
+    scaled         the page's unit for each signal, as a panel of this archive, by name and SI unit
+    clocks         the page's times, to which those of the other archive are added
     """
 
     def __init__(
         self,
         before: EarlierCases,
-        found: Sequence[SignalPanel],
+        signal_panels: Sequence[SignalPanel],
         scaled: Mapping[tuple[str, str], Panel],
         clocks: list[np.ndarray],
         points: int,
     ) -> None:
-        self.before, self.found, self.scaled, self.clocks, self.points = before, found, scaled, clocks, points
+        self.before, self.signal_panels, self.scaled = before, signal_panels, scaled
+        self.clocks, self.points = clocks, points
         self._panels: dict[tuple[bool, str], dict[tuple[str, str], Panel]] = {}
 
     def of(self, case: int, number: int, position: int) -> tuple[History | None, History | None]:
         """The other archive's history of the case at a position of the pool's structure `number`, and the change since,
         at the common instants; None where it has no history there."""
-        there = self.before.history_of(number, position)
-        if there is None:
+        match_ = self.before.history_of(number, position)
+        if match_ is None:
             return None, None
-        (other, place), group = there, self.before.now.groups[number]
+        (other, place), group = match_, self.before.now.groups[number]
         time, was_time = group.values("time"), other.values("time")
         rows, was_rows = match_instants(time, was_time, 0.0)
         was_values, changes = {}, {}
-        for n, panel in enumerate(self.found):
+        for n, panel in enumerate(self.signal_panels):
             key = panel.name, panel.unit
             mine, theirs = self._of(False, group).get(key), self._of(True, other).get(key)
             if theirs is None:
@@ -65,8 +66,8 @@ class EarlierHistories:
         return self._panels[key]
 
     def _in_unit(self, panel: Panel) -> Panel:
-        one = self.scaled.get((panel.name, panel.si))
-        return panel if one is None else replace(panel, unit=one.unit, scale=one.scale, in_si=one.in_si)
+        scaled = self.scaled.get((panel.name, panel.si))
+        return panel if scaled is None else replace(panel, unit=scaled.unit, scale=scaled.scale, in_si=scaled.in_si)
 
     def _clock(self, time: np.ndarray) -> int:
         thinned = thin_clock(time, self.points)

@@ -17,22 +17,22 @@ def evidence_part(pool: Pool, archive: str, *, several: bool) -> EvidencePart | 
     whose verdict says everything. archive: its name in commands; several: whether these must name the run or sweep"""
     if any(map(is_search, pool.groups)):
         return None
-    found = requirement_evidence(pool.groups, archive, several=several)
-    if not found:
+    evidence = requirement_evidence(pool.groups, archive, several=several)
+    if not evidence:
         return None
-    shown = found if len(found) <= MOST_ROWS else sorted(found, key=lambda row: row.ok)[:MOST_ROWS]
-    notes = notes_of(shown)
-    if len(shown) < len(found):
+    shown_rows = evidence if len(evidence) <= MOST_ROWS else sorted(evidence, key=lambda row: row.ok)[:MOST_ROWS]
+    notes = notes_of(shown_rows)
+    if len(shown_rows) < len(evidence):
         command = f"met show {quoted(archive)} --evidence"
-        notes.append(f"{len(found) - len(shown):,} rows more: `{command}`")
+        notes.append(f"{len(evidence) - len(shown_rows):,} rows more: `{command}`")
     rows = (
         EvidenceLine(row.requirement, row.at, row.ok, row.worst_case, row.again, _page(texts_of(row, page_number)))
-        for row in shown
+        for row in shown_rows
     )
     return EvidencePart(tuple(rows), tuple(notes))
 
 
-def _page(found: EvidenceTexts) -> EvidenceTexts:
+def _page(texts: EvidenceTexts) -> EvidenceTexts:
     """The texts with the page's dash in place of missing ones."""
     names = EvidenceTexts.__dataclass_fields__
-    return EvidenceTexts(**{n: "\N{EN DASH}" if (text := getattr(found, n)) == NONE else text for n in names})
+    return EvidenceTexts(**{n: "\N{EN DASH}" if (text := getattr(texts, n)) == NONE else text for n in names})

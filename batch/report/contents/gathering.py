@@ -60,14 +60,14 @@ def gather(
     simulate  whether the page is to run cases again
     """
     groups = groups_named(archive, names)
-    found = pools(groups)
+    pools_ = pools(groups)
     several = len(by_run(archive.groups)) > 1
     experiments, trouble = _experiments(archive)
     if against is not None and names:
         against = replace(against, found=of_groups(against.found, groups))
     name = archive.path.name if against is None else str(against.found.b)
-    share = MOST_VALUES // max(1, len(found))
-    befores = [None if against is None else against.of(pool) for pool in found]
+    share = MOST_VALUES // max(1, len(pools_))
+    befores = [None if against is None else against.of(pool) for pool in pools_]
     sections = tuple(
         replace(
             _section(
@@ -84,23 +84,23 @@ def gather(
             ),
             changes=() if against is None else comparison.run_changes(against.found, before),
         )
-        for pool, before in zip(found, befores, strict=True)
+        for pool, before in zip(pools_, befores, strict=True)
     )
-    verdicts = [verdict(pool, experiments, named=len(found) > 1) for pool in found]
+    verdicts = [verdict(pool, experiments, named=len(pools_) > 1) for pool in pools_]
     if against is not None:
-        verdicts.append(comparison.verdict(against, list(zip(found, befores, strict=True))))
+        verdicts.append(comparison.verdict(against, list(zip(pools_, befores, strict=True))))
     return Report(
-        title=title[:BEGINS] or f"{_stem(archive.deck)} · {', '.join(pool.name for pool in found)}",
+        title=title[:BEGINS] or f"{_stem(archive.deck)} · {', '.join(pool.name for pool in pools_)}",
         archive=name,
         deck=archive.deck,
-        replay=replay(name, found[0].name if several else "", int(found[0].cases[0]) if found[0].count else 0),
+        replay=replay(name, pools_[0].name if several else "", int(pools_[0].cases[0]) if pools_[0].count else 0),
         verdicts=tuple(verdicts),
         sections=sections,
         sources=_sources(archive),
         provenance=_provenance(archive, groups) + (() if against is None else _compared_with(against)),
         changes=None if against is None else comparison.archive_changes(against.found),
         again=tuple(
-            f"met run {quoted(each)} --all" for each in (name, *(() if against is None else [str(against.found.a)]))
+            f"met run {quoted(path)} --all" for path in (name, *(() if against is None else [str(against.found.a)]))
         ),
     )
 
@@ -153,7 +153,7 @@ def _section(
         first = [
             *drawn.shown,
             *opens,
-            *(case for each in (best_cases, worst_cases) if each is not None for case in each.cases),
+            *(case for notable in (best_cases, worst_cases) if notable is not None for case in notable.cases),
         ]
         first += [] if before is None else before.most
         played = simulation(pool, own, drawn, first, points, before)
@@ -210,10 +210,12 @@ def _lede(pool: Pool) -> str:
     if pool.count < table:
         most = "at most " * any("until_shown" in group.attributes for group in pool.groups)
         cases += f" of {most}{table:,}"
-    each = f"{_all(pool, 'duration_s', '{:g} s')}{' each' if pool.count > 1 else ''}"
+    length = f"{_all(pool, 'duration_s', '{:g} s')}{' each' if pool.count > 1 else ''}"
     kinds = f" in {len(pool.groups)} structures" if len(pool.groups) > 1 else ""
     how = f"{_all(pool, 'integrator')} at {_all(pool, 'dynamics_hz', '{:g} Hz')}"
-    return f"{cases}{kinds}, {each}. Arm {_all(pool, 'arm')}, {how}, recorded at {_all(pool, 'record_hz', '{:g} Hz')}."
+    return (
+        f"{cases}{kinds}, {length}. Arm {_all(pool, 'arm')}, {how}, recorded at {_all(pool, 'record_hz', '{:g} Hz')}."
+    )
 
 
 def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Fact, ...]:
@@ -232,8 +234,12 @@ def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Fact, ...
     for experiment in experiments.values():
         structure, base = experiment.structure, experiment.structure.schedule.base_hz
         for use in structure.servos:
-            told = use.command
-            command = f", told a {told.kind} ({told.model or told.guide})" if told is not None else ""
+            command_use = use.command
+            command = (
+                f", told a {command_use.kind} ({command_use.model or command_use.guide})"
+                if command_use is not None
+                else ""
+            )
             rate = "continuous" if use.continuous else f"at {base / use.divisor:g} Hz"
             servos.setdefault(f"{use.model} {rate}{command}", {})[use.joint] = None
         for on_bed in structure.substitutions:
@@ -262,32 +268,32 @@ def _sources(archive: ArchiveFile) -> tuple[SourceListing, ...]:
         lines = text.split("\n")
         if lines and not lines[-1]:
             lines.pop()
-        kept = lines[:MOST_LINES]
-        while sum(map(len, kept)) > MOST_LETTERS and kept:
-            kept = kept[: len(kept) // 2]
+        shown_lines = lines[:MOST_LINES]
+        while sum(map(len, shown_lines)) > MOST_LETTERS and shown_lines:
+            shown_lines = shown_lines[: len(shown_lines) // 2]
         digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
-        out.append(SourceListing(name, "\n".join(kept), digest, len(lines) - len(kept)))
+        out.append(SourceListing(name, "\n".join(shown_lines), digest, len(lines) - len(shown_lines)))
     return tuple(out)
 
 
 def _provenance(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> tuple[Fact, ...]:
-    told = archive.provenance
+    provenance = archive.provenance
     size = archive.path.stat().st_size
-    changed = {"yes": ", with changes that were not committed", "unknown": ""}.get(str(told.get("git_dirty")), "")
+    changed = {"yes": ", with changes that were not committed", "unknown": ""}.get(str(provenance.get("git_dirty")), "")
     facts = [
         Fact("archive", f"{archive.path.name} ({size_text(size)})"),
         Fact("SHA-256 of it", _digest(archive.path) if size <= MOST_HASHED else "not computed: it is large", True),
         Fact("deck", archive.deck),
-        Fact("commit of MET", f"{told.get('git_commit', 'unknown')}{changed}", True),
+        Fact("commit of MET", f"{provenance.get('git_commit', 'unknown')}{changed}", True),
     ]
-    versions = {name[8:]: str(value) for name, value in told.items() if name.startswith("version_")}
+    versions = {name[8:]: str(value) for name, value in provenance.items() if name.startswith("version_")}
     facts += [Fact(f"version of {'MET' if name == 'met' else name}", versions[name]) for name in sorted(versions)]
-    facts.append(Fact("defines", str(told.get("defines") or "none"), True))
+    facts.append(Fact("defines", str(provenance.get("defines") or "none"), True))
     for group in groups:
-        of = f" of {group.name}" if len(groups) > 1 else ""
+        of_group = f" of {group.name}" if len(groups) > 1 else ""
         for name, about in (("structure_key", "key of the structure"), ("code_key", "key of the program")):
             if name in group.attributes:
-                facts.append(Fact(f"{about}{of}", str(group.attributes[name]), True))
+                facts.append(Fact(f"{about}{of_group}", str(group.attributes[name]), True))
     return tuple(facts)
 
 

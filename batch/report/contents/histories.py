@@ -53,7 +53,7 @@ def signals(
     computed  by place in the pool, groups of which the page runs cases again, as they are with histories
     before  another archive to compare with: the cases that differ most from it come first, each with what it was there
     """
-    known = _kept(pool, before)
+    known = _recorded_cases(pool, before)
     if not known and not computed:
         return None
     values = values if before is None else values // 3  # now, before, and the difference
@@ -63,70 +63,80 @@ def signals(
         own = units[n] if units else None
         places = [place for number, place in known if number == n]
         groups.append(_Group(group if places else computed.get(n, group), places, own, scaled))
-    if not any(each.panels for each in groups):
+    if not any(group.panels for group in groups):
         return None
-    width = max(max((each.width for each in groups), default=1), 1)
+    width = max(max((group.width for group in groups), default=1), 1)
     few = max(1, min(len(known), COMPARED))
     points = int(np.clip(values // (width * few), FEWEST_POINTS, MOST_POINTS))
-    rows = max(min(each.rows, points) for each in groups if each.panels)
+    rows = max(min(group.rows, points) for group in groups if group.panels)
     most = int(np.clip(values // max(1, width * rows), few, MOST_HISTORIES))
     clocks: list[np.ndarray] = []
     clock_of: dict[int, int] = {}
     names: dict[tuple[str, str], SignalPanel] = {}
-    for number, each in enumerate(groups):
-        if each.panels:
-            time = thin_clock(each.group.values("time"), points)
+    for number, structure in enumerate(groups):
+        if structure.panels:
+            time = thin_clock(structure.group.values("time"), points)
             same = [n for n, other in enumerate(clocks) if np.array_equal(other, time)]
             clock_of[number] = same[0] if same else len(clocks)
             clocks += [] if same else [time]
-        for panel in each.panels:
+        for panel in structure.panels:
             key = panel.name, panel.unit
-            names[key] = _joined(names.get(key), each.described(panel))
-    found = tuple(names.values())[:MOST_PANELS]
+            names[key] = _joined(names.get(key), structure.described(panel))
+    signal_panels = tuple(names.values())[:MOST_PANELS]
     wanted, middle = known[:most], None
     if len(known) >= FEWEST_COMPARED and before is None:
         middle = known[len(known) // 2]
         wanted = wanted if middle in wanted else [*wanted[:-1], middle]
-    numbers = {each: int(pool.groups[each[0]].at("case", [each[1]])[0]) for each in wanted}
-    was = None if before is None else EarlierHistories(before, found, scaled, clocks, points)
+    numbers = {case: int(pool.groups[case[0]].at("case", [case[1]])[0]) for case in wanted}
+    was = None if before is None else EarlierHistories(before, signal_panels, scaled, clocks, points)
     histories = tuple(
         History(
             numbers[n, position],
             clock_of[n],
-            groups[n].thinned(found, position, points),
+            groups[n].thinned(signal_panels, position, points),
             *(was.of(numbers[n, position], n, position) if was is not None else ()),
         )
         for n, position in wanted
     )
-    joints = tuple(dict.fromkeys(joint for each in groups if each.panels for joint in joints_of(each.group)))
-    shown = [numbers[each] for each in wanted[: COMPARED if before is None else 1]]
-    here = {each.case for each in histories}
-    worst = next((case for case in pool.cases[pool.worst_first[:1]].tolist() if case in here), None)
-    changed = () if before is None else tuple(case for case in before.most if case in here)
+    joints = tuple(dict.fromkeys(joint for group in groups if group.panels for joint in joints_of(group.group)))
+    first_cases = [numbers[case] for case in wanted[: COMPARED if before is None else 1]]
+    cases = {case_history.case for case_history in histories}
+    worst = next((case for case in pool.cases[pool.worst_first[:1]].tolist() if case in cases), None)
+    changed = () if before is None else tuple(case for case in before.most if case in cases)
     if middle is not None:
-        shown[-1] = numbers[middle]
+        first_cases[-1] = numbers[middle]
     compared = None if middle is None else numbers[middle]
     if not known:
         order = pool.cases[pool.worst_first]
         middle_too = len(order) >= FEWEST_COMPARED and before is None
-        shown = order[: COMPARED - 1 if middle_too else COMPARED].tolist()
+        first_cases = order[: COMPARED - 1 if middle_too else COMPARED].tolist()
         compared = int(order[len(order) // 2]) if middle_too else None
-        shown += [] if compared is None else [compared]
+        first_cases += [] if compared is None else [compared]
         if before is not None:
             changed = before.most
-            shown = [*changed, *shown][:1]
-    said = _said(groups, len(known), len(histories), len(names), points, before is not None, again=bool(computed))
-    sources = tuple(each.sources(found) for each in groups)
+            first_cases = [*changed, *first_cases][:1]
+    notes = _notes(groups, len(known), len(histories), len(names), points, before is not None, again=bool(computed))
+    sources = tuple(group.sources(signal_panels) for group in groups)
     return Signals(
-        found, joints, tuple(clocks), histories, tuple(shown), compared, said, changed, worst, compared, sources
+        signal_panels,
+        joints,
+        tuple(clocks),
+        histories,
+        tuple(first_cases),
+        compared,
+        notes,
+        changed,
+        worst,
+        compared,
+        sources,
     )
 
 
-def _kept(pool: Pool, before: EarlierCases | None = None) -> list[tuple[int, int]]:
+def _recorded_cases(pool: Pool, before: EarlierCases | None = None) -> list[tuple[int, int]]:
     """Group and position of the cases that have histories, worst first; with `before`, those that differ most from it
     come first, and the worst of all second."""
-    kept = [set(group.recorded_positions.tolist()) if group.role("signal") else set() for group in pool.groups]
-    if not any(kept):
+    recorded = [set(group.recorded_positions.tolist()) if group.role("signal") else set() for group in pool.groups]
+    if not any(recorded):
         return []
     order = pool.worst_first
     if before is not None:
@@ -134,25 +144,27 @@ def _kept(pool: Pool, before: EarlierCases | None = None) -> list[tuple[int, int
         ranked = most[np.argsort([before.most.index(number) for number in pool.cases[most].tolist()])]
         order = np.concatenate([ranked[:1], order[:1], ranked[1:], order])
     places = zip(pool.group_of[order].tolist(), pool.position_of[order].tolist(), strict=True)
-    found = [(number, position) for number, position in places if position in kept[number]]
-    return list(dict.fromkeys(found))
+    cases = [(number, position) for number, position in places if position in recorded[number]]
+    return list(dict.fromkeys(cases))
 
 
-def _said(
-    groups: Sequence[_Group], known: int, here: int, plots: int, points: int, compared: bool, *, again: bool
+def _notes(
+    groups: Sequence[_Group], known: int, in_page: int, plots: int, points: int, compared: bool, *, again: bool
 ) -> tuple[str, ...]:
-    """A sentence about histories that are not in the page. known, here: the numbers of recorded cases, and of those in
-    the page; again: whether others are run again there"""
+    """A sentence about histories that are not in the page. known, in_page: the numbers of recorded cases, and of those
+    in the page; again: whether others are run again there"""
     out = []
-    if again and here < known:
-        out.append(f"{here:,} of {known:,} recorded cases are in this page; the others are run again where it is read.")
-    elif here < known:
-        which = "those that changed most and of the worst" if compared else "the worst"
-        out.append(f"Signals of {which} of {known:,} recorded cases are in this page, {here:,} of them.")
-    each = max(stretch(group.rows, points) for group in groups)
-    if each > 1:
+    if again and in_page < known:
         out.append(
-            f"Lines have the smallest and the largest value of every {each} rows, {points:,} points at most: "
+            f"{in_page:,} of {known:,} recorded cases are in this page; the others are run again where it is read."
+        )
+    elif in_page < known:
+        which = "those that changed most and of the worst" if compared else "the worst"
+        out.append(f"Signals of {which} of {known:,} recorded cases are in this page, {in_page:,} of them.")
+    rows_per_point = max(stretch(group.rows, points) for group in groups)
+    if rows_per_point > 1:
+        out.append(
+            f"Lines have the smallest and the largest value of every {rows_per_point} rows, {points:,} points at most: "
             "no peak is lost, and its time is true to that stretch."
         )
     if plots > MOST_PANELS:
@@ -187,11 +199,11 @@ class _Group:
         self.commands: dict[tuple[str, str], list[tuple[int, CommandCurve]]] = {}
         if not group.role("signal"):
             return
-        found = [self._in_unit(panel, units, scaled) for panel in panels(group)]
+        own_panels = [self._in_unit(panel, units, scaled) for panel in panels(group)]
         self.rows = int(group.values("time").shape[0])
-        commands = command_curves(group, found, positions[:COMPARED], apart=True) if positions else {}
+        commands = command_curves(group, own_panels, positions[:COMPARED], apart=True) if positions else {}
         drawn = {(command.variable, command.column) for command in commands.values()}
-        self.panels = tuple(p for p in found if not drawn.issuperset((p.variable, column) for column in p.columns))
+        self.panels = tuple(p for p in own_panels if not drawn.issuperset((p.variable, column) for column in p.columns))
         self.commands = {
             (p.name, p.unit): [
                 (line, commands[p.name, p.unit, line])
@@ -203,8 +215,8 @@ class _Group:
 
     @staticmethod
     def _in_unit(panel: Panel, units: DeckUnits | None, scaled: dict[tuple[str, str], Panel]) -> Panel:
-        one = scaled.setdefault((panel.name, panel.si), panel if units is None else units.panel(panel))
-        return replace(panel, unit=one.unit, scale=one.scale, in_si=one.in_si)
+        unit_panel = scaled.setdefault((panel.name, panel.si), panel if units is None else units.panel(panel))
+        return replace(panel, unit=unit_panel.unit, scale=unit_panel.scale, in_si=unit_panel.in_si)
 
     @property
     def width(self) -> int:
@@ -216,10 +228,10 @@ class _Group:
         lines += [PanelLine(lines[n].label, lines[n].joint, True) for n, _ in self.commands[panel.name, panel.unit]]
         return SignalPanel(panel.name, panel.about, panel.unit, tuple(lines), panel.scale)
 
-    def sources(self, found: Sequence[SignalPanel]) -> tuple[tuple[str, ...], ...]:
+    def sources(self, page_panels: Sequence[SignalPanel]) -> tuple[tuple[str, ...], ...]:
         """The channel of each line of each of the page's panels; "" where this structure has none."""
-        out = [[""] * len(panel.lines) for panel in found]
-        keys = [(panel.name, panel.unit) for panel in found]
+        out = [[""] * len(panel.lines) for panel in page_panels]
+        keys = [(panel.name, panel.unit) for panel in page_panels]
         for panel in self.panels:
             key = panel.name, panel.unit
             if key in keys:
@@ -227,34 +239,36 @@ class _Group:
                 channels = [self._channel(panel.variable, column) for column in panel.columns]
                 channels += [self._channel(command.variable, command.column) for _, command in self.commands[key]]
                 for line, channel in zip(self.described(panel).lines, channels, strict=True):
-                    out[place][found[place].lines.index(line)] = channel
+                    out[place][page_panels[place].lines.index(line)] = channel
         return tuple(map(tuple, out))
 
     def _channel(self, variable: str, column: int) -> str:
         stored = self.group.variables[variable]
         return channel_paths(variable, self.group.joints(stored), self.group.components(stored))[column]
 
-    def thinned(self, found: Sequence[SignalPanel], position: int, points: int) -> dict[int, np.ndarray]:
+    def thinned(self, page_panels: Sequence[SignalPanel], position: int, points: int) -> dict[int, np.ndarray]:
         """The lines of each of the page's panels, by its place: (point, line of that panel), not a number where this
         structure has none."""
         out = {}
         for panel in self.panels:
             key = panel.name, panel.unit
-            place = next((n for n, each in enumerate(found) if (each.name, each.unit) == key), None)
+            place = next((n for n, panel in enumerate(page_panels) if (panel.name, panel.unit) == key), None)
             if place is None:
                 continue
             own = [history(self.group, panel, position)]
             own += [command.values(self.group, position)[:, None] for _, command in self.commands[key]]
             values = thin(np.concatenate(own, axis=1).astype(np.float64), points)
-            full = np.full((len(values), len(found[place].lines)), np.nan)
+            full = np.full((len(values), len(page_panels[place].lines)), np.nan)
             for column, line in enumerate(self.described(panel).lines):
-                full[:, found[place].lines.index(line)] = values[:, column]
+                full[:, page_panels[place].lines.index(line)] = values[:, column]
             out[place] = full
         return out
 
 
-def _joined(one: SignalPanel | None, other: SignalPanel) -> SignalPanel:
+def _joined(panel: SignalPanel | None, other: SignalPanel) -> SignalPanel:
     """The panel of two structures: the lines of both."""
-    if one is None:
+    if panel is None:
         return other
-    return SignalPanel(one.name, one.about, one.unit, tuple(dict.fromkeys((*one.lines, *other.lines))), one.scale)
+    return SignalPanel(
+        panel.name, panel.about, panel.unit, tuple(dict.fromkeys((*panel.lines, *other.lines))), panel.scale
+    )

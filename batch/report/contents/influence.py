@@ -40,29 +40,33 @@ def _metrics(group: ArchiveGroup) -> list[str]:
     return list(dict.fromkeys([*required, *(variable.name for variable in group.role("metric"))]))
 
 
-def _part(found: Sensitivity) -> InfluencePart:
-    count = f"{found.cases:,} cases" + (f"; {found.left:,} are left out, with no finite value" if found.left else "")
-    if found.cases < found.fewest:
-        said = f"not enough cases, {count}; {found.fewest:,} at least"
-        return InfluencePart(found.name, said, found.unit, 0.0, (), ())
-    if not found.shares:
-        return InfluencePart(found.name, f"the same in all cases, {count}", found.unit, 0.0, (), ())
+def _part(sensitivity: Sensitivity) -> InfluencePart:
+    count = f"{sensitivity.cases:,} cases" + (
+        f"; {sensitivity.left:,} are left out, with no finite value" if sensitivity.left else ""
+    )
+    if sensitivity.cases < sensitivity.fewest:
+        why_none = f"not enough cases, {count}; {sensitivity.fewest:,} at least"
+        return InfluencePart(sensitivity.name, why_none, sensitivity.unit, 0.0, (), ())
+    if not sensitivity.shares:
+        return InfluencePart(sensitivity.name, f"the same in all cases, {count}", sensitivity.unit, 0.0, (), ())
     rows = []
-    for place in found.order[:MOST_INPUTS]:
-        share = found.shares[place]
-        low, high = share.low / found.scale, share.high / found.scale
+    for place in sensitivity.order[:MOST_INPUTS]:
+        share = sensitivity.shares[place]
+        low, high = share.low / sensitivity.scale, share.high / sensitivity.scale
         rows.append(
             InfluenceRow(
-                path=found.inputs[place],
+                path=sensitivity.inputs[place],
                 alone=share_text(share.first, share.first_by),
                 together=total_text(share),
                 low=low,
                 high=high,
-                ends=found.ends(share, f"{page_number(low)} …", page_number(high)),
+                ends=sensitivity.ends(share, f"{page_number(low)} …", page_number(high)),
                 rank=f"{share.rank:+.2f}",
             )
         )
-    notes = notes_of(found)
-    if len(found.order) > len(rows):
-        notes.append(f"{len(found.order) - len(rows):,} parameters more explain less")
-    return InfluencePart(found.name, count, found.unit, found.mean / found.scale, tuple(rows), tuple(notes))
+    notes = notes_of(sensitivity)
+    if len(sensitivity.order) > len(rows):
+        notes.append(f"{len(sensitivity.order) - len(rows):,} parameters more explain less")
+    return InfluencePart(
+        sensitivity.name, count, sensitivity.unit, sensitivity.mean / sensitivity.scale, tuple(rows), tuple(notes)
+    )

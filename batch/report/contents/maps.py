@@ -34,7 +34,7 @@ def _map(pool: Pool, x: CaseColumn, y: CaseColumn, metrics: Sequence[CaseColumn]
     across, up = column_levels(x.values, x.words), column_levels(y.values, y.words)
     shape = (len(up.texts), len(across.texts))
     cells = cells_of(across, up)
-    there, done = cells >= 0, pool.status == DONE
+    in_cells, done = cells >= 0, pool.status == DONE
     values, cases, missed, reaches = {}, {}, {}, {}
     for column in metrics:
         chosen = cell_cases(column.values, cells, shape[0] * shape[1], column.limits[0].sense if column.limits else "")
@@ -43,37 +43,38 @@ def _map(pool: Pool, x: CaseColumn, y: CaseColumn, metrics: Sequence[CaseColumn]
         limits = [limit.value for limit in column.limits]
         reaches[column.key] = reach(values[column.key], limits, parting=column.role == "change")
         cases[column.key] = np.where(has, pool.cases[chosen], -1).reshape(shape)
-        bad = cells[there & pool.missed(column)]
+        bad = cells[in_cells & pool.missed(column)]
         missed[column.key] = np.bincount(bad, minlength=shape[0] * shape[1]).reshape(shape)
     counts, failed = (
-        np.bincount(cells[which], minlength=shape[0] * shape[1]).reshape(shape) for which in (there, there & ~done)
+        np.bincount(cells[which], minlength=shape[0] * shape[1]).reshape(shape)
+        for which in (in_cells, in_cells & ~done)
     )
     return Map(
         x.key, y.key, across.texts, up.texts, counts, values, cases, missed, failed, reaches, ruler(across), ruler(up)
     )
 
 
-def ruler(found: Levels) -> Ruler:
+def ruler(levels: Levels) -> Ruler:
     """The positions of values along an axis, by their steps or factors, as in `met plot`: for stretches of values,
     round numbers are written."""
-    count = len(found.texts)
-    if found.scale == "place":
+    count = len(levels.texts)
+    if levels.scale == "place":
         edges = np.linspace(0.0, 1.0, count + 1)
-        heads = [text.partition(" … ")[0] for text in found.texts]
+        heads = [text.partition(" … ")[0] for text in levels.texts]
         return Ruler(tuple(edges.tolist()), (tuple(zip((edges[1:] + edges[:-1]) / 2, heads, strict=True)),))
-    ends = found.values if found.stretches else edges_of(found.values, found.scale)
+    ends = levels.values if levels.stretches else edges_of(levels.values, levels.scale)
     low, high = float(ends[0]), float(ends[-1])
 
     def where(values: np.ndarray) -> np.ndarray:
-        if found.scale == "log":
+        if levels.scale == "log":
             return np.asarray(np.log(values / low) / np.log(high / low))
         return (values - low) / (high - low)
 
-    choices = [found.values] if not found.stretches else []
-    if found.scale == "log":
+    choices = [levels.values] if not levels.stretches else []
+    if levels.scale == "log":
         choices += [np.array(round_numbers(low, high, steps)) for steps in ROUND]
     choices = [choice for choice in choices if len(choice) > 1] or [_steps(low, high)]
-    if found.scale == "linear":
+    if levels.scale == "linear":
         choices.append(_steps(low, high))
     ticks = tuple(
         tuple(zip(where(choice).tolist(), map(number_text, choice.tolist()), strict=True)) for choice in choices
@@ -84,5 +85,7 @@ def ruler(found: Levels) -> Ruler:
 def _steps(low: float, high: float) -> np.ndarray:
     """Five to twelve round numbers by equal steps."""
     size = 10.0 ** np.floor(np.log10((high - low) / 5))
-    step = next(each for each in (5 * size, 2 * size, size) if (high - low) / each > 4.999)  # of exactly 5, rounded
+    step = next(
+        candidate for candidate in (5 * size, 2 * size, size) if (high - low) / candidate > 4.999
+    )  # of exactly 5, rounded
     return np.asarray(np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step)

@@ -21,8 +21,8 @@ def metric_moves(pool: Pool, before: EarlierCases, requirement: str) -> tuple[Me
             continue
         moved = _beyond(pool, before, column)
         lower, higher = (moved & way for way in (column.values < was, column.values > was))
-        found = (lower, higher) if sense == "<" else (higher, lower)
-        return _move(pool, column, was, found[0]), _move(pool, column, was, found[1])
+        better_and_worse = (lower, higher) if sense == "<" else (higher, lower)
+        return _move(pool, column, was, better_and_worse[0]), _move(pool, column, was, better_and_worse[1])
     return None, None
 
 
@@ -33,15 +33,15 @@ def _beyond(pool: Pool, before: EarlierCases, column: CaseColumn) -> np.ndarray:
     was = np.where(before.there, before.pool.gathered(name)[before.place], np.nan)
     out = np.zeros(pool.count, bool)
     for number, _, experiment in before.pairs:
-        told = next(
+        diff = next(
             (signal for signal in experiment.signals if signal.metric and signal.name == name and not signal.why), None
         )
-        if told is not None:
-            here = (pool.group_of == number) & before.there
-            a, b, allowed = was[here], now[here], told.tolerance
+        if diff is not None:
+            in_both = (pool.group_of == number) & before.there
+            a, b, allowed = was[in_both], now[in_both], diff.tolerance
             with np.errstate(invalid="ignore", over="ignore"):
                 limit = allowed.absolute + allowed.relative * magnitude(a, b)
-                out[here] = (a != b) & ~(np.abs(b - a) <= limit)
+                out[in_both] = (a != b) & ~(np.abs(b - a) <= limit)
     return out
 
 

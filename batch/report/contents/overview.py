@@ -37,14 +37,14 @@ def overview(pool: Pool, before: EarlierCases | None = None) -> Overview | None:
     changes: tuple[CaseColumn, ...] = ()
     if before is not None:
         metrics = tuple(replace(column, before=before.values(column)) for column in metrics)
-        changes = tuple(each for each in map(change, metrics) if each is not None)
+        changes = tuple(column for column in map(change, metrics) if column is not None)
     places, dots = _drawn(pool, against, metrics, _noted(pool, before, changes))
     compared = _compared(pool, before) if before is not None else ()
-    shown = tuple(_at(column, places) for column in (*against, *compared, *metrics, *changes))
-    said = ""
+    columns = tuple(_selected(column, places) for column in (*against, *compared, *metrics, *changes))
+    note = ""
     if len(places) < pool.count:
         where = f"one of {dots[0]} × {dots[1]} dots of the plot" if dots else "the same dot of the plot"
-        said = (
+        note = (
             f"{len(places):,} of {pool.count:,} cases are drawn. Where several lie on {where}, one stands for them; "
             f"a case that lies alone is always drawn, and so are the {KEPT} worst."
         )
@@ -55,12 +55,12 @@ def overview(pool: Pool, before: EarlierCases | None = None) -> Overview | None:
         cases=pool.cases[places],
         ids=tuple(text[:8] for text in pool.texts("case_id", places)),
         ended=pool.ended[places],
-        columns=shown,
+        columns=columns,
         causes=dict(zip(failed, causes, strict=False)),
         total=pool.count,
         start=(against[0].key, judged.key, varied[1].key if len(varied) > 1 else ""),
         maps=maps(pool, varied, (*metrics, *changes)),
-        said=said,
+        said=note,
     )
 
 
@@ -70,7 +70,7 @@ def _interest(pool: Pool, column: CaseColumn) -> tuple[bool, int]:
     return bool(outcomes), max((int((outcome == 0).sum()) for outcome in outcomes), default=0)
 
 
-def _at(column: CaseColumn, places: np.ndarray) -> CaseColumn:
+def _selected(column: CaseColumn, places: np.ndarray) -> CaseColumn:
     before = None if column.before is None else column.before[places]
     return replace(column, values=column.values[places], before=before)
 
@@ -123,8 +123,8 @@ def _drawn(
     always = [pool.worst_first[:KEPT], noted, *map(_extremes, metrics)]
     across, up = DOTS
     while True:
-        found = [_on_dots(x.values, y.values, rank, across, up) for x in against for y in metrics]
-        places = distinct(np.concatenate([*always, *found]))
+        drawn = [_on_dots(x.values, y.values, rank, across, up) for x in against for y in metrics]
+        places = distinct(np.concatenate([*always, *drawn]))
         if len(places) <= MOST_POINTS or (across, up) == (1, 1):
             return places, (across, up)
         across, up = max(1, across * 4 // 5), max(1, up * 4 // 5)

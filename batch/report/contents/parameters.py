@@ -30,24 +30,24 @@ def spot(place: Place | None) -> Spot | None:
     """The line of the deck that its author should look at."""
     if place is None:
         return None
-    shown = shown_place(place)
-    return Spot(shown.file, shown.line)
+    deck_place = shown_place(place)
+    return Spot(deck_place.file, deck_place.line)
 
 
 def parameters(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[ParameterRow, ...]:
     """The parameters of all structures: settings of the run, then parameters, each once where all structures have it
     alike."""
-    found: dict[str, dict[ParameterRow, list[str]]] = {}
+    rows_of_path: dict[str, dict[ParameterRow, list[str]]] = {}
     names = [group.name for group in pool.groups if group.name in experiments]
     for name in names:
         experiment = experiments[name]
-        given = {**settings(experiment), **experiment.parameters}
+        quantities = {**settings(experiment), **experiment.parameters}
         spans = _spans(experiment)
-        for path, quantity in given.items():
+        for path, quantity in quantities.items():
             row = _row(path, quantity, spans)
-            found.setdefault(path, {}).setdefault(row, []).append(name)
+            rows_of_path.setdefault(path, {}).setdefault(row, []).append(name)
     out = []
-    for rows in found.values():
+    for rows in rows_of_path.values():
         for row, among in rows.items():
             alike = len(among) == len(names)
             out.append(row if alike else replace(row, among=tuple(among)))
@@ -70,13 +70,13 @@ def _row(path: str, quantity: Quantity, spans: Mapping[int, tuple[float, float]]
         path,
         _value(quantity, spans),
         unit,
-        _said(origin),
+        _origin_text(origin),
         spot(origin.place),
         tuple(dict.fromkeys(place for place in map(spot, origin.overrides) if place is not None)),
     )
 
 
-def _said(origin: Origin) -> str:
+def _origin_text(origin: Origin) -> str:
     if origin.kind == "case":
         return SAID["case"]
     return f"{SAID[origin.kind]}: {origin.note}" if origin.note else SAID[origin.kind]
@@ -87,11 +87,11 @@ def _value(quantity: Quantity, spans: Mapping[int, tuple[float, float]]) -> str:
         case str() as text:
             return text
         case tuple() as values:
-            shown = [number(value) for value in values]
-            if len(shown) > MOST_LISTED:
-                shown = [*shown[:2], "…", shown[-1]]
-                return f"[{', '.join(shown)}] ({len(values)} values)"
-            return f"[{', '.join(shown)}]"
+            texts = [number(value) for value in values]
+            if len(texts) > MOST_LISTED:
+                texts = [*texts[:2], "…", texts[-1]]
+                return f"[{', '.join(texts)}] ({len(values)} values)"
+            return f"[{', '.join(texts)}]"
         case Formula() as formula:
             low, high = spans[formula.output]
             return number(low) if low == high else f"{number(low)} … {number(high)}"

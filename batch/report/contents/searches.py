@@ -22,7 +22,7 @@ def search_answer(archive: ArchiveFile, group: ArchiveGroup) -> DesignAnswer | N
     if answer is None or result is None:
         return None
     search = answer.search
-    said, command = result.commands[-1]
+    purpose, command = result.commands[-1]
     tunes = search.kind == "tune"
     heads = ("generation", "cases", search.metric, "", *([f"tried with, of {max(1, len(search.plants))}"] * tunes))
     rows: list[tuple[str, ...]] = []
@@ -32,15 +32,15 @@ def search_answer(archive: ArchiveFile, group: ArchiveGroup) -> DesignAnswer | N
         row = (str(number), f"{cases:,}", answer.value(best), how, *([str(best.tried)] * tunes))
         if not rows or rows[-1][2:] != row[2:]:
             rows.append(row)
-    shown = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_ROWS)).astype(int))
-    scale, _ = deck_unit(next(each for each in group.role("metric") if each.path == search.metric))
+    row_numbers = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_ROWS)).astype(int))
+    scale, _ = deck_unit(next(metric for metric in group.role("metric") if metric.path == search.metric))
     headline, *why = unwrapped(answer.lines())
     return DesignAnswer(
         headline=headline[:1].upper() + headline[1:],
         why="\n".join(why),
-        table=TextTable(heads, ("",) * len(heads), tuple(rows[n] for n in shown), frozenset({0, 1, 2, 4})),
+        table=TextTable(heads, ("",) * len(heads), tuple(rows[n] for n in row_numbers), frozenset({0, 1, 2, 4})),
         stretches=None,
-        said=said,
+        said=purpose,
         command=command,
         notes=(),
         map=None,

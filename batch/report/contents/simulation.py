@@ -53,26 +53,26 @@ def simulation(
     others = pool.cases[pool.worst_first]
     others = others[np.isin(others, points.cases)] if points is not None else others[:MOST_POINTS]
     numbers = np.array(list(dict.fromkeys([*first, *others.tolist()])), np.int64)
-    found, left = [], MOST_EXACT
+    structures, left = [], MOST_EXACT
     earlier = {} if before is None else before.experiments()
     for number, group in enumerate(pool.groups):
         if group not in groups:
             continue
-        here = pool.group_of == number
-        mine = numbers[np.isin(numbers, pool.cases[here])]
+        of_group = pool.group_of == number
+        mine = numbers[np.isin(numbers, pool.cases[of_group])]
         sources = drawn.sources[number]
-        made, left = _structure(group, experiments[group.name], mine, sources, left)
+        structure, left = _structure(group, experiments[group.name], mine, sources, left)
         if before is not None:
-            was, left = _earlier(before, earlier, number, made, sources, left)
-            made = replace(made, before=was)
-        found.append(made)
-    said = []
-    count = sum(len(each.cases) for each in found)
+            was, left = _earlier(before, earlier, number, structure, sources, left)
+            structure = replace(structure, before=was)
+        structures.append(structure)
+    notes = []
+    count = sum(len(structure.cases) for structure in structures)
     if count < pool.count:
-        said.append(f"{count:,} of {pool.count:,} cases can be run again in this page.")
+        notes.append(f"{count:,} of {pool.count:,} cases can be run again in this page.")
     if len(groups) < len(pool.groups):
-        said.append(f"The first {len(groups)} of {len(pool.groups)} structures can be run again in this page.")
-    return PageSimulation(tuple(found), tuple(said))
+        notes.append(f"The first {len(groups)} of {len(pool.groups)} structures can be run again in this page.")
+    return PageSimulation(tuple(structures), tuple(notes))
 
 
 def _earlier(
@@ -92,10 +92,10 @@ def _earlier(
         pairs = dict(zip(mine[matched.cases.b].tolist(), theirs[matched.cases.a].tolist(), strict=True))
         both = [case for case in now.cases.tolist() if case in pairs]
         wanted = np.array([pairs[case] for case in both], np.int64)
-        found, left = _structure(group, experiments[group.name], wanted, sources, left)
-        cases = np.array(both[: len(found.cases)], np.int64)
+        structure, left = _structure(group, experiments[group.name], wanted, sources, left)
+        cases = np.array(both[: len(structure.cases)], np.int64)
         # on the arm of an earlier archive, a ghost, nothing is drawn that acts on it
-        return replace(found, cases=cases, arm=replace(found.arm, acting=None)), left
+        return replace(structure, cases=cases, arm=replace(structure.arm, acting=None)), left
     return None, left
 
 
@@ -108,17 +108,17 @@ def _structure(
 
     prepared = prepare(experiment)
     module = compiled(prepared.recording)
-    told = described(prepared, module)
-    stored = {each.name.removeprefix("metrics."): each.name for each in group.role("metric")}
-    metrics = [stored[each["name"]] for each in told["metrics"] if each["name"] in stored]
-    width = 8 * (len(told["inputs"]) + len(metrics)) or 8
+    description = described(prepared, module)
+    stored = {metric.name.removeprefix("metrics."): metric.name for metric in group.role("metric")}
+    metrics = [stored[metric["name"]] for metric in description["metrics"] if metric["name"] in stored]
+    width = 8 * (len(description["inputs"]) + len(metrics)) or 8
     wanted = wanted[: left // width]
     positions = np.searchsorted(group.values("case"), wanted)
     rows = np.searchsorted(experiment.cases.table, wanted)
-    columns = {each["channel"]: place for place, each in enumerate(told["columns"])}
-    made = SimulatedStructure(
+    columns = {column["channel"]: place for place, column in enumerate(description["columns"])}
+    structure = SimulatedStructure(
         code=module.code,
-        told=told,
+        told=description,
         same_code=prepared.code_key == group.attributes.get("code_key"),
         cases=wanted,
         inputs=inputs(experiment, np.asarray(rows, np.int64)),
@@ -127,7 +127,7 @@ def _structure(
         panels=tuple(tuple(columns.get(channel, -1) for channel in panel) for panel in sources),
         arm=drawn_arm(experiment, list(columns)),
     )
-    return made, left - width * len(wanted)
+    return structure, left - width * len(wanted)
 
 
 class ComputedGroup(ArchiveGroup):
@@ -138,16 +138,16 @@ class ComputedGroup(ArchiveGroup):
         laid = layout(experiment, 1, 1).variables
         self._dimensions = values_of_dimensions(experiment) | {"time": times_of(experiment)}
         self.__dict__["variables"] = {
-            each.name: Stored(
-                each.name,
-                each.dims,
-                each.role,
-                each.unit,
-                tuple(each.attributes.get("units_by_joint", ())),
-                each.long_name,
-                dict(each.attributes),
+            variable.name: Stored(
+                variable.name,
+                variable.dims,
+                variable.role,
+                variable.unit,
+                tuple(variable.attributes.get("units_by_joint", ())),
+                variable.long_name,
+                dict(variable.attributes),
             )
-            for each in laid
+            for variable in laid
         }
 
     def values(self, name: str) -> np.ndarray:

@@ -26,7 +26,7 @@ def stability(
     pool: Pool, experiments: Mapping[str, Experiment], progress: Callable[[int], None] | None = None
 ) -> Stability | None:
     """The stability of the beds of all structures that have one; None where none has."""
-    found: dict[int, tuple[Margin, ...]] = {}
+    margins_of: dict[int, tuple[Margin, ...]] = {}
     left = 0
     for number, group in enumerate(pool.groups):
         experiment = experiments.get(group.name)
@@ -36,17 +36,19 @@ def stability(
         chosen = _chosen(pool, experiment, places)
         left += len(places) - len(chosen)
         rows = np.searchsorted(experiment.cases.table, pool.cases[chosen]).tolist()
-        found |= dict(zip(chosen.tolist(), margins(experiment, rows, progress), strict=True))
-    if not found:
+        margins_of |= dict(zip(chosen.tolist(), margins(experiment, rows, progress), strict=True))
+    if not margins_of:
         return None
-    places = np.array(sorted(found))
-    joints = list(dict.fromkeys(one.joint for place in places.tolist() for one in found[place]))
+    places = np.array(sorted(margins_of))
+    joints = list(dict.fromkeys(margin.joint for place in places.tolist() for margin in margins_of[place]))
     columns = [replace(c, values=c.values[places]) for c in pool.varied()]
     columns.append(CaseColumn("case", "case", "", "case", pool.cases[places].astype(float)))
-    spans = any(one.lower > 0.0 for case in found.values() for one in case)
-    beds = tuple(_bed(joint, [_of(found[place], joint) for place in places.tolist()], spans) for joint in joints)
-    said = f"Computed for {len(places):,} of {len(places) + left:,} cases, spread over all." if left else ""
-    return Stability(pool.cases[places], tuple(columns), beds, _unstable(pool, places, found, joints), spans, said)
+    spans = any(margin.lower > 0.0 for case in margins_of.values() for margin in case)
+    beds = tuple(
+        _bed(joint, [_joint_margin(margins_of[place], joint) for place in places.tolist()], spans) for joint in joints
+    )
+    note = f"Computed for {len(places):,} of {len(places) + left:,} cases, spread over all." if left else ""
+    return Stability(pool.cases[places], tuple(columns), beds, _unstable(pool, places, margins_of, joints), spans, note)
 
 
 def _chosen(pool: Pool, experiment: Experiment, places: np.ndarray) -> np.ndarray:
@@ -59,8 +61,8 @@ def _chosen(pool: Pool, experiment: Experiment, places: np.ndarray) -> np.ndarra
         rows = np.searchsorted(experiment.cases.table, pool.cases[places])
         loops = np.unique(np.stack([c.values[rows] for c in deciding], axis=1), axis=0, return_inverse=True)[1].ravel()
         count = int(loops.max(initial=0)) + 1
-        kept = distinct(np.linspace(0, count - 1, min(count, MOST_LOOPS)).astype(int))
-        places = places[np.isin(loops, kept)]
+        examined = distinct(np.linspace(0, count - 1, min(count, MOST_LOOPS)).astype(int))
+        places = places[np.isin(loops, examined)]
     if len(places) <= MOST_CASES:
         return places
     spread = places[np.linspace(0, len(places) - 1, MOST_CASES - 1).astype(int)]
@@ -68,26 +70,28 @@ def _chosen(pool: Pool, experiment: Experiment, places: np.ndarray) -> np.ndarra
     return distinct(np.concatenate([spread, worst]))
 
 
-def _of(case: Sequence[Margin], joint: str) -> Margin | None:
-    return next((one for one in case if one.joint == joint), None)
+def _joint_margin(case: Sequence[Margin], joint: str) -> Margin | None:
+    return next((margin for margin in case if margin.joint == joint), None)
 
 
-def _bed(joint: str, each: Sequence[Margin | None], spans: bool) -> BedStability:
-    there = [one for one in each if one is not None]
-    tightest = min(there, key=lambda one: one.room)
-    r = np.array([np.nan if one is None else one.together for one in each])
-    limit = np.array([np.nan if one is None or one.limit is None else one.limit for one in each])
-    lower = np.array([np.nan if one is None or one.lower == 0.0 else one.lower for one in each])
-    unstable = np.array([one is not None and not one.stable for one in each])
+def _bed(joint: str, margins_of_cases: Sequence[Margin | None], spans: bool) -> BedStability:
+    with_bed = [margin for margin in margins_of_cases if margin is not None]
+    tightest = min(with_bed, key=lambda margin: margin.room)
+    r = np.array([np.nan if margin is None else margin.together for margin in margins_of_cases])
+    limit = np.array(
+        [np.nan if margin is None or margin.limit is None else margin.limit for margin in margins_of_cases]
+    )
+    lower = np.array([np.nan if margin is None or margin.lower == 0.0 else margin.lower for margin in margins_of_cases])
+    unstable = np.array([margin is not None and not margin.stable for margin in margins_of_cases])
     known = r[np.isfinite(r)]
     spread = "-" if not len(known) else f"{known.min():.3g}"
     if len(known) and f"{known.max():.3g}" != spread:
         spread += f" to {known.max():.3g}"
     return BedStability(
         joint,
-        _words(one.law for one in there),
-        _words(f"{one.rate_hz:g} Hz" for one in there),
-        _words(f"{one.delay:g}" for one in there),
+        _words(margin.law for margin in with_bed),
+        _words(f"{margin.rate_hz:g} Hz" for margin in with_bed),
+        _words(f"{margin.delay:g}" for margin in with_bed),
         r,
         lower,
         limit,
@@ -104,13 +108,13 @@ def _words(texts: Iterable[str]) -> str:
 
 
 def _unstable(
-    pool: Pool, places: np.ndarray, found: Mapping[int, Sequence[Margin]], joints: Sequence[str]
+    pool: Pool, places: np.ndarray, margins_of: Mapping[int, Sequence[Margin]], joints: Sequence[str]
 ) -> tuple[str, ...]:
     """The cases in which each joint is not stable, in words."""
     out = []
     for joint in joints:
-        here = [(place, _of(found[place], joint)) for place in places.tolist()]
-        bad = [int(pool.cases[place]) for place, one in here if one is not None and not one.stable]
+        margin_of_case = [(place, _joint_margin(margins_of[place], joint)) for place in places.tolist()]
+        bad = [int(pool.cases[place]) for place, margin in margin_of_case if margin is not None and not margin.stable]
         if bad:
-            out.append(f"{joint}: not stable in {len(bad):,} of {len(here):,} cases: {ranges(bad)}")
+            out.append(f"{joint}: not stable in {len(bad):,} of {len(margin_of_case):,} cases: {ranges(bad)}")
     return tuple(out)

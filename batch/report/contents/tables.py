@@ -31,10 +31,10 @@ def best(pool: Pool, archive: str, only: str, before: EarlierCases | None = None
     places = order[pool.ended[order] == ENDED.index("met")]
     if not len(places):
         return None
-    made = _case_table(pool, places[:MOST_BEST], archive, only, before)
-    left = len(places) - len(made.cases)
+    table = _case_table(pool, places[:MOST_BEST], archive, only, before)
+    left = len(places) - len(table.cases)
     more = f"{counted(left, 'more case')} {'meets' if left == 1 else 'meet'} all." if left else ""
-    return replace(made, title="Best cases", more=more)
+    return replace(table, title="Best cases", more=more)
 
 
 def worst(pool: Pool, archive: str, only: str, before: EarlierCases | None = None) -> NotableCases | None:
@@ -42,10 +42,10 @@ def worst(pool: Pool, archive: str, only: str, before: EarlierCases | None = Non
     outcomes in another archive"""
     if pool.count < 2:
         return None
-    made = _case_table(pool, pool.worst_first[:MOST_CASES], archive, only, before)
-    left = pool.count - len(made.cases)
+    table = _case_table(pool, pool.worst_first[:MOST_CASES], archive, only, before)
+    left = pool.count - len(table.cases)
     more = f"{counted(left, 'more case')} {'is' if left == 1 else 'are'} in the archive." if left else ""
-    return replace(made, title=_title(pool, len(made.cases)), more=more)
+    return replace(table, title=_title(pool, len(table.cases)), more=more)
 
 
 def _case_table(pool: Pool, places: np.ndarray, archive: str, only: str, before: EarlierCases | None) -> NotableCases:
@@ -56,10 +56,10 @@ def _case_table(pool: Pool, places: np.ndarray, archive: str, only: str, before:
     ids = pool.texts("case_id", places)
     for number, place in enumerate(places.tolist()):
         cells = [f"#{pool.cases[place]}", ids[number][:8]]
-        for at, column in enumerate(columns):
+        for column_number, column in enumerate(columns):
             text = cell_text(column, place)
-            if missed[at][place]:
-                marked.add((number, at + 2))
+            if missed[column_number][place]:
+                marked.add((number, column_number + 2))
                 text = f"{text} {MISSES}"
             cells.append(text)
         was = ENDED[before.ended[place]] if before is not None and before.there[place] else page_number(np.nan)
@@ -69,7 +69,9 @@ def _case_table(pool: Pool, places: np.ndarray, archive: str, only: str, before:
         heads=("case", "id", *(column.label for column in columns), *ends),
         units=("", "", *(column.unit for column in columns), *("" for _ in ends)),
         rows=tuple(rows),
-        right=frozenset([0, *(at + 2 for at, column in enumerate(columns) if column.role != "choice")]),
+        right=frozenset(
+            [0, *(column_number + 2 for column_number, column in enumerate(columns) if column.role != "choice")]
+        ),
         marked=frozenset(marked),
     )
     numbers = tuple(int(pool.cases[place]) for place in places)
@@ -90,9 +92,9 @@ def cell_text(column: CaseColumn, place: int) -> str:
     return page_number(value)
 
 
-def _title(pool: Pool, shown: int) -> str:
-    every, equal = shown == pool.count, pool.ranking.equal(shown)
-    if any(ENDED[each] not in ("met", "done") for each in distinct(pool.ended)):
+def _title(pool: Pool, count: int) -> str:
+    every, equal = count == pool.count, pool.ranking.equal(count)
+    if any(ENDED[ended] not in ("met", "done") for ended in distinct(pool.ended)):
         many = f" ({equal:,} are equally bad)" if equal else ""
         return "Cases, worst first" if every else f"Worst cases{many}"
     if not pool.requirements:
@@ -111,14 +113,14 @@ def structures(pool: Pool, before: EarlierCases | None = None) -> TextTable | No
     choices = [column for column in pool.columns if column.role == "choice"]
     rows = []
     for number, _ in enumerate(pool.groups):
-        here = np.flatnonzero(pool.group_of == number)
-        chosen = [cell_text(column, int(here[0])) if len(here) else "" for column in choices]
-        counts = [_good(pool.ended[here])]
+        places = np.flatnonzero(pool.group_of == number)
+        chosen = [cell_text(column, int(places[0])) if len(places) else "" for column in choices]
+        counts = [_good(pool.ended[places])]
         if before is not None:
-            both = here[before.there[here]]
+            both = places[before.there[places]]
             counts.append(_good(before.ended[both]) if len(both) else page_number(np.nan))
-        medians = (median_text(column.values[here], infinite="∞", none=page_number(np.nan)) for column in metrics)
-        rows.append((*chosen, f"{len(here):,}", *counts, *medians))
+        medians = (median_text(column.values[places], infinite="∞", none=page_number(np.nan)) for column in metrics)
+        rows.append((*chosen, f"{len(places):,}", *counts, *medians))
     heads = (*(c.label for c in choices), "cases", "meet all" if judged else "reached their end")
     heads += ("before",) if before is not None else ()
     return TextTable(

@@ -12,11 +12,11 @@ def stretch(rows: int, points: int) -> int:
 
 def thin_clock(time: np.ndarray, points: int) -> np.ndarray:
     """The times of the points: the first row and the middle one of each stretch."""
-    each = stretch(len(time), points)
-    if each == 1:
+    length = stretch(len(time), points)
+    if length == 1:
         return time
-    first = np.arange(0, len(time), each)
-    return np.stack([time[first], time[np.minimum(first + each // 2, len(time) - 1)]], axis=1).ravel()
+    first = np.arange(0, len(time), length)
+    return np.stack([time[first], time[np.minimum(first + length // 2, len(time) - 1)]], axis=1).ravel()
 
 
 def thin(values: np.ndarray, points: int) -> np.ndarray:
@@ -25,14 +25,14 @@ def thin(values: np.ndarray, points: int) -> np.ndarray:
     values: (time, line). Values that are not finite are none; a stretch of nothing else is not a number.
     """
     values = np.where(np.isfinite(values), values, np.nan)
-    each = stretch(len(values), points)
-    if each == 1:
+    length = stretch(len(values), points)
+    if length == 1:
         return values
-    count = -(-len(values) // each)
-    padded = np.full((count * each, values.shape[1]), np.nan)
+    count = -(-len(values) // length)
+    padded = np.full((count * length, values.shape[1]), np.nan)
     padded[: len(values)] = values
-    parts = padded.reshape(count, each, -1)
+    parts = padded.reshape(count, length, -1)
     none = np.isnan(parts)
-    at = [np.where(none, other, sign * parts).argmin(axis=1) for sign, other in ((1.0, np.inf), (-1.0, np.inf))]
-    pair = np.sort(np.stack(at, axis=1), axis=1)
+    extremes = [np.where(none, other, sign * parts).argmin(axis=1) for sign, other in ((1.0, np.inf), (-1.0, np.inf))]
+    pair = np.sort(np.stack(extremes, axis=1), axis=1)
     return np.take_along_axis(parts, pair, axis=1).reshape(2 * count, -1)

@@ -53,7 +53,7 @@ def verdict(pool: Pool, experiments: Mapping[str, Experiment], *, named: bool) -
     ended = np.bincount(pool.ended, minlength=len(ENDED))
     parts = tuple(OutcomeCount(word, int(n)) for word, n in zip(ENDED, ended, strict=True) if n)
     good = int(ended[ENDED.index("met")] + ended[ENDED.index("done")])
-    errors = [each for group in pool.groups for each in verdicts(group, figures(group))]
+    errors = [error for group in pool.groups for error in verdicts(group, figures(group))]
     shares: dict[str, list[EvidenceRow]] = {}
     for row in (row for group in pool.groups for row in evidence(group)):
         shares.setdefault(row.requirement.text, []).append(row)
@@ -86,9 +86,9 @@ def _of_answer(pool: Pool, answer: SearchAnswer, experiments: Mapping[str, Exper
     summary, errors = summary_of(pool.groups[0]), verdicts(pool.groups[0], figures(pool.groups[0]))
     outcome = answer_outcome(answer)
     tunes = answer.search.kind == "tune"
-    asked = outcome.requirements
+    requirements = outcome.requirements
     words = ("Requirements met", "Requirements not met") if tunes else ("No miss found", "A miss was found")
-    if not asked:
+    if not requirements:
         words = ("Reached its end", "Did not reach its end") if tunes else ("No failure found", "A failure was found")
     return Verdict(
         kind="answer",
@@ -98,17 +98,17 @@ def _of_answer(pool: Pool, answer: SearchAnswer, experiments: Mapping[str, Exper
         parts=(),
         demands=tuple(
             RequirementCounts(
-                each.text,
-                each.met,
-                each.missed,
-                each.unknown,
-                each.met + each.missed + each.unknown,
-                each.worst,
-                each.case,
-                each.outcome,
-                each.ok,
+                requirement.text,
+                requirement.met,
+                requirement.missed,
+                requirement.unknown,
+                requirement.met + requirement.missed + requirement.unknown,
+                requirement.worst,
+                requirement.case,
+                requirement.outcome,
+                requirement.ok,
             )
-            for each in asked
+            for requirement in requirements
         ),
         failing=() if tunes and not answer.found.failed else _failing(pool),
         notes=(*_notes(pool), *map(_of_step_error, errors)),
@@ -129,8 +129,8 @@ def _report_warnings(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple
     )
 
 
-def _of_step_error(each: StepErrorVerdict) -> str:
-    return f"{each.text}: {each.word}, {each.said}."
+def _of_step_error(step_error: StepErrorVerdict) -> str:
+    return f"{step_error.text}: {step_error.word}, {step_error.said}."
 
 
 def _headline(pool: Pool, good: int) -> str:
@@ -155,7 +155,7 @@ def _demand(pool: Pool, place: int, text: str) -> RequirementCounts:
     met, missed, unknown = (int((outcomes == value).sum()) for value in (1, 0, -1))
     furthest, case = "", None
     for column in pool.metrics():
-        for limit in (each for each in column.limits if each.text == text):
+        for limit in (limit_ for limit_ in column.limits if limit_.text == text):
             values = np.where(np.isnan(column.values), -np.inf if limit.sense == "<" else np.inf, column.values)
             worst = int(values.argmax() if limit.sense == "<" else values.argmin())
             if not np.isnan(column.values[worst]):
@@ -181,12 +181,14 @@ def _notes(pool: Pool) -> tuple[str, ...]:
     notes = []
     limited = int((pool.gathered("bed_limited", 0.0) > 0).sum())
     if limited:
-        of = "" if pool.count == 1 else f" in {limited:,} of {pool.count:,} cases"
-        notes.append(f"The load motor of a bed was at its limit{of}: there the run is not what the joint would do.")
+        cases_text = "" if pool.count == 1 else f" in {limited:,} of {pool.count:,} cases"
+        notes.append(
+            f"The load motor of a bed was at its limit{cases_text}: there the run is not what the joint would do."
+        )
     for group in pool.groups:
-        told = reached_texts(limit_summaries(group), group.count)
+        texts = reached_texts(limit_summaries(group), group.count)
         named = f" of {group.name}" if len(pool.groups) > 1 else ""
-        notes += [f"{text[0].upper()}{text[1:]}{named}." for text in told]
+        notes += [f"{text[0].upper()}{text[1:]}{named}." for text in texts]
     return (*notes, *_warnings(pool))
 
 
@@ -194,8 +196,8 @@ def _warnings(pool: Pool) -> list[str]:
     """The doubts about finished cases, each with its cases."""
     warnings = np.array(pool.texts("warning", np.arange(pool.count)), dtype=object)
     doubtful = np.flatnonzero(warnings != "")
-    found = failures(np.zeros(len(doubtful)), warnings[doubtful], pool.cases[doubtful], pool.cases[doubtful])
-    return [f"Warning of {ranges(each.cases)}: {each.cause}" for each in found]
+    doubts = failures(np.zeros(len(doubtful)), warnings[doubtful], pool.cases[doubtful], pool.cases[doubtful])
+    return [f"Warning of {ranges(doubt.cases)}: {doubt.cause}" for doubt in doubts]
 
 
 def metric_rows(
@@ -215,23 +217,23 @@ def _by_step(pool: Pool, column: CaseColumn, errors: Verification | None) -> str
         return ""
     name = column.key.partition(":")[2]
     [variable, *_] = (group.variables[name] for group in pool.groups if name in group.variables)
-    found = error_text(errors.metrics.get(name), deck_unit(variable)[0])
-    return page_number(np.nan) if found == NONE else found
+    error = error_text(errors.metrics.get(name), deck_unit(variable)[0])
+    return page_number(np.nan) if error == NONE else error
 
 
 def _metric(column: CaseColumn, before: np.ndarray | None, by_step: str) -> MetricRow:
     """The spread of the finite values, with a remark on the number of others. before: the values of the other
     archive"""
-    found, finite = spread(column.values), column.values[np.isfinite(column.values)]
+    moments, finite = spread(column.values), column.values[np.isfinite(column.values)]
     was = np.zeros(0) if before is None else np.sort(before[np.isfinite(before)])
     was_text = "" if before is None else page_number(spread(was).median)
-    said = [f"infinite in {counted(found.infinite, 'case')}"] if found.infinite else []
-    said += [f"no value in {counted(found.unknown, 'case')}"] if found.unknown else []
+    remarks = [f"infinite in {counted(moments.infinite, 'case')}"] if moments.infinite else []
+    remarks += [f"no value in {counted(moments.unknown, 'case')}"] if moments.unknown else []
     if not len(finite):
         return MetricRow(
-            column.label, column.about, column.unit, found, ", ".join(said), by_step=by_step, before=was_text
+            column.label, column.about, column.unit, moments, ", ".join(remarks), by_step=by_step, before=was_text
         )
-    low, middle, high = found.minimum, found.median, found.maximum
+    low, middle, high = moments.minimum, moments.median, moments.maximum
     bars: tuple[int, ...] = ()
     bars_before: tuple[int, ...] = ()
     from_, to = min([low, *was[:1]]), max([high, *was[-1:]])
@@ -245,8 +247,8 @@ def _metric(column: CaseColumn, before: np.ndarray | None, by_step: str) -> Metr
         name=column.label,
         about=column.about,
         unit=column.unit,
-        spread=found,
-        remark=", ".join(said),
+        spread=moments,
+        remark=", ".join(remarks),
         bars=bars,
         low=from_,
         high=to,

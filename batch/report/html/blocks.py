@@ -30,23 +30,23 @@ ALL_SHOWN = ("Requirements demonstrated", "Requirements not demonstrated")
 NOTHING_ASKED = ("All ran to the end", "Not all ran to the end")
 
 
-def share(part: int, of: int) -> str:
+def share(part: int, whole: int) -> str:
     """The share in per cent; 100 and 0 are shown only for all and none."""
-    if part in (0, of) or of == 0:
-        return "100 %" if part and part == of else "0 %"
-    text = f"{100 * part / of:.3g}"
-    return "> 99.9 %" if text == "100" else f"{text} %" if 100 * part / of >= 0.1 else "< 0.1 %"
+    if part in (0, whole) or whole == 0:
+        return "100 %" if part and part == whole else "0 %"
+    text = f"{100 * part / whole:.3g}"
+    return "> 99.9 %" if text == "100" else f"{text} %" if 100 * part / whole >= 0.1 else "< 0.1 %"
 
 
 def bar(parts: Sequence[tuple[str, int]], label: str) -> Html:
     """Shares as a bar: class and count of each part, from left to right."""
     total = sum(count for _, count in parts) or 1
-    rects, at = [], 0.0
+    rects, left = [], 0.0
     for cls, count in parts:
         width = 100.0 * count / total
         if count:
-            rects.append(el("rect", x=f"{at:.3f}", y=0, width=f"{width:.3f}", height=8, cls=cls))
-        at += width
+            rects.append(el("rect", x=f"{left:.3f}", y=0, width=f"{width:.3f}", height=8, cls=cls))
+        left += width
     return el("svg", rects, cls="bar", viewBox="0 0 100 8", preserveAspectRatio="none", role="img", aria_label=label)
 
 
@@ -64,25 +64,25 @@ def spot_link(spot: Spot | None, anchors: Anchors) -> Html | None:
 # The verdict
 
 
-def verdict(found: Verdict, anchors: Anchors, *, tried: bool = False, again: str = "") -> Html:
+def verdict(verdict_part: Verdict, anchors: Anchors, *, tried: bool = False, again: str = "") -> Html:
     """The answer, large, beside its grounds and doubts. tried: it is of all candidates, and neither yes nor no; again:
     the command that runs all again, if it is to be here"""
-    yes, no = (found.word, found.word) if found.kind == "answer" else _words(found)
+    yes, no = (verdict_part.word, verdict_part.word) if verdict_part.kind == "answer" else _words(verdict_part)
     answer = el(
         "div",
-        el("p", found.about, cls="about") if found.about else None,
-        None if tried else el("p", mark(found.ok), yes if found.ok else no, cls="word"),
-        el("p", share(found.good, found.cases), cls="share") if found.cases > 1 else None,
-        el("p", found.headline, ".", cls="headline"),
+        el("p", verdict_part.about, cls="about") if verdict_part.about else None,
+        None if tried else el("p", mark(verdict_part.ok), yes if verdict_part.ok else no, cls="word"),
+        el("p", share(verdict_part.good, verdict_part.cases), cls="share") if verdict_part.cases > 1 else None,
+        el("p", verdict_part.headline, ".", cls="headline"),
         _again("Run it again:", [again]) if again else None,
         cls="answer",
     )
-    evidence = [_parts(found) if found.cases > 1 else None, _demands(found)]
-    if found.failing:
-        evidence.append(_failing(found.failing, single=found.cases == 1))
-    evidence += [_warning(warning, anchors) for warning in found.warnings]
-    evidence += [el("p", note, cls="note") for note in found.notes]
-    kind = "" if tried else " yes" if found.ok else " no"
+    evidence = [_parts(verdict_part) if verdict_part.cases > 1 else None, _demands(verdict_part)]
+    if verdict_part.failing:
+        evidence.append(_failing(verdict_part.failing, single=verdict_part.cases == 1))
+    evidence += [_warning(warning, anchors) for warning in verdict_part.warnings]
+    evidence += [el("p", note, cls="note") for note in verdict_part.notes]
+    kind = "" if tried else " yes" if verdict_part.ok else " no"
     return el("div", answer, el("div", evidence, cls="evidence"), cls=f"verdict{kind}")
 
 
@@ -93,31 +93,33 @@ def command(words: str) -> Html:
 
 
 def _again(words: str, commands: Sequence[str]) -> Html:
-    return join([el("p", words, cls="said"), *(el("p", command(each), cls="command") for each in commands)])
+    return join(
+        [el("p", words, cls="said"), *(el("p", command(command_text), cls="command") for command_text in commands)]
+    )
 
 
-def _words(found: Verdict) -> tuple[str, str]:
+def _words(verdict_part: Verdict) -> tuple[str, str]:
     """The answer in two words, for yes and for no."""
-    if not found.demands:
+    if not verdict_part.demands:
         return NOTHING_ASKED
     of_all = {"demonstrated", "not shown", "refuted"}  # cases that may be drawn
-    return ALL_SHOWN if any(demand.verdict in of_all for demand in found.demands) else ALL_MET
+    return ALL_SHOWN if any(demand.verdict in of_all for demand in verdict_part.demands) else ALL_MET
 
 
-def _warning(each: ReportWarning, anchors: Anchors) -> Html:
+def _warning(warning: ReportWarning, anchors: Anchors) -> Html:
     """A warning beside the verdict: the finding, the line of the deck, and the remedies."""
-    place = spot_link(each.spot, anchors)
+    place = spot_link(warning.spot, anchors)
     return el(
         "div",
         el(
             "p",
-            el("strong", f"Warning {each.code}"),
+            el("strong", f"Warning {warning.code}"),
             [", ", place] if place is not None else None,
             ": ",
-            each.message,
+            warning.message,
             ".",
         ),
-        [el("p", help, cls="under") for help in each.help],
+        [el("p", help, cls="under") for help in warning.help],
         cls="note warning",
     )
 
@@ -153,50 +155,50 @@ SHARES = {
 }
 
 
-def comparison(found: Verdict, changed: Sequence[Child], again: Sequence[str]) -> Html:
+def comparison(comparison_part: Verdict, changed: Sequence[Child], again: Sequence[str]) -> Html:
     """The share of cases that meet all requirements, before and now, with what changed; the number of differing cases;
     gains and losses of each requirement.
 
     changed  the lines about the parameters that differ;  again: the commands that run both archives again
     """
     figure: list[Child] = []
-    if found.figure is not None:
-        was, now, of = found.figure
-        text = share(now, of) if was == now else [share(was, of), el("span", " → ", cls="to"), share(now, of)]
-        said = f"of the {of:,} cases in both meet all{', as before' if was == now else ''}"
-        figure = [el("p", text, cls="share two"), el("p", said, cls="under")]
+    if comparison_part.figure is not None:
+        was, now, total = comparison_part.figure
+        text = share(now, total) if was == now else [share(was, total), el("span", " → ", cls="to"), share(now, total)]
+        caption = f"of the {total:,} cases in both meet all{', as before' if was == now else ''}"
+        figure = [el("p", text, cls="share two"), el("p", caption, cls="under")]
     answer = el(
         "div",
-        el("p", found.about, cls="about"),
-        el("p", likeness(found.word), found.word.capitalize(), cls="word"),
+        el("p", comparison_part.about, cls="about"),
+        el("p", likeness(comparison_part.word), comparison_part.word.capitalize(), cls="word"),
         figure,
-        el("p", found.headline, ".", cls="headline") if found.headline else None,
+        el("p", comparison_part.headline, ".", cls="headline") if comparison_part.headline else None,
         _again("Run both again:", again),
         changed,
         cls="answer",
     )
-    parts = [(*SHARES.get(part.word, ("other", part.word)), part.count) for part in found.parts]
-    moves = [*found.flows, *([found.ends] if found.ends is not None else [])]
+    parts = [(*SHARES.get(part.word, ("other", part.word)), part.count) for part in comparison_part.parts]
+    moves = [*comparison_part.flows, *([comparison_part.ends] if comparison_part.ends is not None else [])]
     apart = [_moves(moves, better=better) for better in (True, False)] if moves else []
-    evidence = [_bar_of(parts) if found.cases > 1 else None, apart, _flows(found.flows)]
+    evidence = [_bar_of(parts) if comparison_part.cases > 1 else None, apart, _flows(comparison_part.flows)]
     return el("div", answer, el("div", evidence, cls="evidence"), cls="verdict against")
 
 
-def _flows(found: Sequence[RequirementFlow]) -> Html | None:
-    if not found:
+def _flows(flows: Sequence[RequirementFlow]) -> Html | None:
+    if not flows:
         return None
     rows = [
-        el("tr", el("th", el("code", breaking(each.text)), scope="row"), el("td", each.met, cls="words"))
-        for each in found
+        el("tr", el("th", el("code", breaking(flow.text)), scope="row"), el("td", flow.met, cls="words"))
+        for flow in flows
     ]
     return rows_under(headings(("requirement", "cases in both")), rows, "Requirements, before and now")
 
 
-def _moves(found: Sequence[RequirementFlow], *, better: bool) -> Html:
+def _moves(flows: Sequence[RequirementFlow], *, better: bool) -> Html:
     """The requirements with better, or worse, values in some case: a row for each."""
     rows = []
-    for each in found:
-        crossed, moved = (each.gained, each.better) if better else (each.lost, each.worse)
+    for flow in flows:
+        crossed, moved = (flow.gained, flow.better) if better else (flow.lost, flow.worse)
         if not crossed and moved is None:
             continue
         furthest: Child = "–"
@@ -206,7 +208,7 @@ def _moves(found: Sequence[RequirementFlow], *, better: bool) -> Html:
         rows.append(
             el(
                 "tr",
-                el("th", el("code", breaking(each.text)), scope="row"),
+                el("th", el("code", breaking(flow.text)), scope="row"),
                 el("td", crossed or "–", cls=f"{'good' if better else 'bad'} words" if crossed else None),
                 el("td", f"{moved.cases:,}" if moved is not None else "–", cls="right"),
                 el("td", furthest, cls="words"),
@@ -220,10 +222,10 @@ def _moves(found: Sequence[RequirementFlow], *, better: bool) -> Html:
     return join([el("h4", name), rows_under(heads, rows, name)])
 
 
-def _parts(found: Verdict) -> Html:
+def _parts(verdict_part: Verdict) -> Html:
     order = {"met": "good", "done": "good", "missed": "bad", "unknown": "open"}
     return _bar_of(
-        [(order.get(part.word, "lost"), WORDS.get(part.word, part.word), part.count) for part in found.parts]
+        [(order.get(part.word, "lost"), WORDS.get(part.word, part.word), part.count) for part in verdict_part.parts]
     )
 
 
@@ -234,15 +236,15 @@ def _bar_of(parts: Sequence[tuple[str, str, int]]) -> Html:
     return join([bar([(cls, count) for cls, _, count in parts], "; ".join(text for _, text in words)), legend])
 
 
-def _demands(found: Verdict) -> Html | None:
-    if not found.demands:
+def _demands(verdict_part: Verdict) -> Html | None:
+    if not verdict_part.demands:
         return None
-    if found.kind == "answer":
-        return _answered(found.demands)
-    single = found.cases == 1
-    missed = not single and any(demand.missed for demand in found.demands)
-    unknown = not single and any(demand.unknown for demand in found.demands)
-    shares = not single and any(demand.verdict for demand in found.demands)
+    if verdict_part.kind == "answer":
+        return _answered(verdict_part.demands)
+    single = verdict_part.cases == 1
+    missed = not single and any(demand.missed for demand in verdict_part.demands)
+    unknown = not single and any(demand.unknown for demand in verdict_part.demands)
+    shares = not single and any(demand.verdict for demand in verdict_part.demands)
     heads = [
         "requirement",
         *(["outcome"] if single else ["met by", "yield"]),
@@ -251,58 +253,74 @@ def _demands(found: Verdict) -> Html | None:
         *(["not known"] if unknown else []),
         "value" if single else "worst value",
     ]
-    rows = [el("tr", _demand(demand, single, shares, missed, unknown)) for demand in found.demands]
+    rows = [el("tr", _demand(demand, single, shares, missed, unknown)) for demand in verdict_part.demands]
     right = {n for n, head in enumerate(heads) if head not in ("requirement", "outcome", "verdict")}
     return rows_under(headings(heads, right), rows, "Requirements")
 
 
-def _answered(found: Sequence[RequirementCounts]) -> Html:
+def _answered(requirements: Sequence[RequirementCounts]) -> Html:
     """The requirements in the cases of a search's answer."""
     rows = [
         el(
             "tr",
-            el("th", el("code", breaking(each.text)), scope="row"),
-            el("td", mark(each.ok), each.verdict, cls="good words" if each.ok else "bad words"),
-            el("td", each.furthest, [" ", case_link(each.case)] if each.case is not None else None, cls="right"),
+            el("th", el("code", breaking(requirement.text)), scope="row"),
+            el("td", mark(requirement.ok), requirement.verdict, cls="good words" if requirement.ok else "bad words"),
+            el(
+                "td",
+                requirement.furthest,
+                [" ", case_link(requirement.case)] if requirement.case is not None else None,
+                cls="right",
+            ),
         )
-        for each in found
+        for requirement in requirements
     ]
     heads = headings(("requirement", "outcome", "worst value of the answer"), right={2})
     return rows_under(heads, rows, "Requirements")
 
 
-def _demand(each: RequirementCounts, single: bool, shares: bool, missed: bool, unknown: bool) -> list[Html | None]:
-    name = el("th", el("code", breaking(each.text)), scope="row")
+def _demand(
+    requirement: RequirementCounts, single: bool, shares: bool, missed: bool, unknown: bool
+) -> list[Html | None]:
+    name = el("th", el("code", breaking(requirement.text)), scope="row")
     if single:
-        word = "met" if each.met else "missed" if each.missed else "not known"
+        word = "met" if requirement.met else "missed" if requirement.missed else "not known"
         return [
             name,
-            el("td", mark(word == "met") if word != "not known" else None, word, cls="good" if each.met else "bad"),
-            el("td", each.furthest, cls="right"),
+            el(
+                "td",
+                mark(word == "met") if word != "not known" else None,
+                word,
+                cls="good" if requirement.met else "bad",
+            ),
+            el("td", requirement.furthest, cls="right"),
         ]
-    far: Child = each.furthest
-    if each.case is not None:
-        far = [each.furthest, " ", case_link(each.case)]
+    far: Child = requirement.furthest
+    if requirement.case is not None:
+        far = [requirement.furthest, " ", case_link(requirement.case)]
     return [
         name,
-        el("td", f"{each.met:,} of {each.of:,}", cls="right"),
-        el("td", share(each.met, each.of), cls="right strong"),
-        _share_verdict(each) if shares else None,
-        el("td", f"{each.missed:,}" if each.missed else "–", cls="right bad" if each.missed else "right")
+        el("td", f"{requirement.met:,} of {requirement.of:,}", cls="right"),
+        el("td", share(requirement.met, requirement.of), cls="right strong"),
+        _share_verdict(requirement) if shares else None,
+        el(
+            "td",
+            f"{requirement.missed:,}" if requirement.missed else "–",
+            cls="right bad" if requirement.missed else "right",
+        )
         if missed
         else None,
-        el("td", f"{each.unknown:,}" if each.unknown else "–", cls="right") if unknown else None,
+        el("td", f"{requirement.unknown:,}" if requirement.unknown else "–", cls="right") if unknown else None,
         el("td", far, cls="right"),
     ]
 
 
-def _share_verdict(each: RequirementCounts) -> Html:
+def _share_verdict(requirement: RequirementCounts) -> Html:
     """The verdict on a requirement over a share of cases, with its bound; empty for one on every case."""
-    if not each.verdict:
+    if not requirement.verdict:
         return el("td", "–")
-    ok = each.verdict in ("met", "demonstrated")
-    bound = el("span", each.bound, cls="under") if each.bound else None
-    return el("td", mark(ok), each.verdict, bound, cls="good" if ok else "bad")
+    ok = requirement.verdict in ("met", "demonstrated")
+    bound = el("span", requirement.bound, cls="under") if requirement.bound else None
+    return el("td", mark(ok), requirement.verdict, bound, cls="good" if ok else "bad")
 
 
 def case_link(case: int) -> Html:
@@ -310,16 +328,21 @@ def case_link(case: int) -> Html:
     return el("button", f"#{case}", type="button", cls="case", data_case=case, title=f"Choose case #{case}")
 
 
-def _failing(found: Sequence[FailureRow], *, single: bool) -> Html:
+def _failing(failures: Sequence[FailureRow], *, single: bool) -> Html:
     """The causes of failures, with the cases of each, and their common properties once."""
     rows = []
-    for each in found:
-        who: Child = f"case #{each.first}" if each.count == 1 else f"{each.count:,} cases"
+    for failure in failures:
+        who: Child = f"case #{failure.first}" if failure.count == 1 else f"{failure.count:,} cases"
         rows.append(
             el(
                 "li",
-                el("p", el("strong", "The case" if single else who, " ", each.status), " ", el("span", each.cause)),
-                el("p", each.cases, cls="cases") if each.count > 1 else None,
+                el(
+                    "p",
+                    el("strong", "The case" if single else who, " ", failure.status),
+                    " ",
+                    el("span", failure.cause),
+                ),
+                el("p", failure.cases, cls="cases") if failure.count > 1 else None,
             )
         )
     return join([el("h4", "Why" if single else "Did not reach their end"), el("ul", rows, cls="failing")])
@@ -328,36 +351,39 @@ def _failing(found: Sequence[FailureRow], *, single: bool) -> Html:
 # What was run
 
 
-def facts(found: Sequence[Fact]) -> Html:
+def facts(fact_list: Sequence[Fact]) -> Html:
     return el(
         "dl",
-        [el("div", el("dt", fact.name), el("dd", el("code", fact.text) if fact.code else fact.text)) for fact in found],
+        [
+            el("div", el("dt", fact.name), el("dd", el("code", fact.text) if fact.code else fact.text))
+            for fact in fact_list
+        ],
         cls="facts",
     )
 
 
-def varied(found: Sequence[VariedParameter], anchors: Anchors) -> Html | None:
-    if not found:
+def varied(parameters: Sequence[VariedParameter], anchors: Anchors) -> Html | None:
+    if not parameters:
         return None
-    decides = any(each.sets for each in found)
+    decides = any(parameter.sets for parameter in parameters)
     rows = [
         el(
             "tr",
-            el("th", el("code", breaking(each.path)), scope="row"),
-            el("td", each.text, cls="words"),
-            el("td", each.unit),
-            el("td", _sets(each.sets)) if decides else None,
-            el("td", spot_link(each.spot, anchors)),
+            el("th", el("code", breaking(parameter.path)), scope="row"),
+            el("td", parameter.text, cls="words"),
+            el("td", parameter.unit),
+            el("td", _sets(parameter.sets)) if decides else None,
+            el("td", spot_link(parameter.spot, anchors)),
         )
-        for each in found
+        for parameter in parameters
     ]
     heads = ("varied", "values", "unit", *(["decides"] if decides else []), "written in")
     return rows_under(headings(heads), rows, "What was varied")
 
 
 def _sets(paths: Sequence[str]) -> list[Child]:
-    shown = [part for path in paths[:3] for part in (", ", el("code", path))][1:]
-    return [*shown, f" and {len(paths) - 3} more" if len(paths) > 3 else None]
+    shown_paths = [part for path in paths[:3] for part in (", ", el("code", path))][1:]
+    return [*shown_paths, f" and {len(paths) - 3} more" if len(paths) > 3 else None]
 
 
 def metrics(section: ReportSection) -> Html | None:
@@ -365,7 +391,7 @@ def metrics(section: ReportSection) -> Html | None:
     if not section.metrics:
         return None
     compared = any(metric.before for metric in section.metrics)
-    values = [*(each.page_head for each in SPREAD_COLUMNS), *(["median before"] if compared else [])]
+    values = [*(column.page_head for column in SPREAD_COLUMNS), *(["median before"] if compared else [])]
     if section.single:
         values = ["before", "now"] if compared else ["value"]
     verified = any(metric.by_step for metric in section.metrics)
@@ -375,33 +401,33 @@ def metrics(section: ReportSection) -> Html | None:
     remarks = any(metric.remark for metric in section.metrics)
     heads += [""] if remarks else []
     rows = [el("tr", _metric(metric, section.single, remarks, compared, verified)) for metric in section.metrics]
-    made = rows_under(
+    table = rows_under(
         headings(heads, range(1, len(values) + 1)), rows, "Metrics", cls="few" if section.single else None
     )
     outline = any(metric.bars_before for metric in section.metrics)
-    said = el("p", "Bars: how often now. Outline: before.", cls="said") if outline else None
+    legend = el("p", "Bars: how often now. Outline: before.", cls="said") if outline else None
     by_step = el("p", f"{section.by_step}.", cls="said") if section.by_step else None
-    return join([made, said, by_step])
+    return join([table, legend, by_step])
 
 
-def _metric(each: MetricRow, single: bool, remarks: bool, compared: bool, verified: bool) -> list[Html]:
-    before = [each.before] if compared else []
-    spread = [page_number(getattr(each.spread, column.field)) for column in SPREAD_COLUMNS]
-    values = [*before, page_number(each.spread.median)] if single else [*spread, *before]
-    values += [each.by_step] if verified else []
-    cells = [el("th", el("code", breaking(each.name)), el("span", each.about, cls="under"), scope="row")]
+def _metric(row: MetricRow, single: bool, remarks: bool, compared: bool, verified: bool) -> list[Html]:
+    before = [row.before] if compared else []
+    spread = [page_number(getattr(row.spread, column.field)) for column in SPREAD_COLUMNS]
+    values = [*before, page_number(row.spread.median)] if single else [*spread, *before]
+    values += [row.by_step] if verified else []
+    cells = [el("th", el("code", breaking(row.name)), el("span", row.about, cls="under"), scope="row")]
     cells += [el("td", value, cls="right") for value in values]
-    cells.append(el("td", each.unit))
+    cells.append(el("td", row.unit))
     if not single:
-        cells.append(el("td", histogram(each)))
-    return [*cells, el("td", each.remark)] if remarks else cells
+        cells.append(el("td", histogram(row)))
+    return [*cells, el("td", row.remark)] if remarks else cells
 
 
-def histogram(each: MetricRow) -> Html | None:
+def histogram(row: MetricRow) -> Html | None:
     """Counts as bars, limits as lines; those of the earlier archive as an outline."""
-    if not each.bars:
+    if not row.bars:
         return None
-    top, wide = max(each.bars + each.bars_before), 160 / len(each.bars)
+    top, wide = max(row.bars + row.bars_before), 160 / len(row.bars)
     bars = [
         el(
             "rect",
@@ -411,20 +437,20 @@ def histogram(each: MetricRow) -> Html | None:
             height=f"{24 * count / top:.2f}",
             cls="count",
         )
-        for n, count in enumerate(each.bars)
+        for n, count in enumerate(row.bars)
         if count
     ]
     limits = []
-    for limit in each.limits:
-        at = f"{160 * (limit - each.low) / (each.high - each.low):.2f}"
-        limits.append(el("line", x1=at, x2=at, y1=0, y2=28, cls="limit"))
+    for limit in row.limits:
+        x = f"{160 * (limit - row.low) / (row.high - row.low):.2f}"
+        limits.append(el("line", x1=x, x2=x, y1=0, y2=28, cls="limit"))
     before = ""
-    for n, count in enumerate(each.bars_before):
+    for n, count in enumerate(row.bars_before):
         y = f"{26 - 24 * count / top:.2f}"
-        before += f"{'L' if n else 'M'}{n * wide:.2f} {y}H{(n + 1) * wide - 0.6 * (n + 1 == len(each.bars)):.2f}"
+        before += f"{'L' if n else 'M'}{n * wide:.2f} {y}H{(n + 1) * wide - 0.6 * (n + 1 == len(row.bars)):.2f}"
     outline = el("path", d=before, cls="before") if before else None
-    low, high, middle = (page_number(value) for value in (each.spread.minimum, each.spread.maximum, each.spread.median))
-    words = f"{each.name} from {low} to {high} {each.unit}, median {middle}"
+    low, high, middle = (page_number(value) for value in (row.spread.minimum, row.spread.maximum, row.spread.median))
+    words = f"{row.name} from {low} to {high} {row.unit}, median {middle}"
     floor = el("line", x1=0, x2=160, y1=26.5, y2=26.5, cls="floor")
     return el("svg", bars, floor, outline, limits, cls="histogram", viewBox="-1 0 162 28", role="img", aria_label=words)
 

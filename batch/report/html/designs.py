@@ -18,32 +18,32 @@ SHADES = 4
 """Number of shades of designs that meet all requirements: deeper the farther from the border."""
 
 
-def designs(found: DesignAnswer) -> Html:
+def designs(answer: DesignAnswer) -> Html:
     """The answer of `met best`, or of a search."""
-    first, *others = [el("p", line, cls="said") for line in found.why.split("\n")]
-    words: list[Child] = [el("p", found.headline, cls="pick"), first]
-    if found.command:
-        words += [el("p", found.said, cls="said"), el("p", command(found.command), cls="command")]
-    words += [*others, *(el("p", note, cls="note") for note in found.notes)]
-    words += [table(found.stretches, "How far each may go")] if found.stretches is not None else []
-    head = el("div", el("div", words), _map(found.map) if found.map is not None else None, cls="answered")
-    about = el("p", found.about, cls="said")
-    return join([head, about, _progress(found), table(found.table, found.title)])
+    first, *others = [el("p", line, cls="said") for line in answer.why.split("\n")]
+    words: list[Child] = [el("p", answer.headline, cls="pick"), first]
+    if answer.command:
+        words += [el("p", answer.said, cls="said"), el("p", command(answer.command), cls="command")]
+    words += [*others, *(el("p", note, cls="note") for note in answer.notes)]
+    words += [table(answer.stretches, "How far each may go")] if answer.stretches is not None else []
+    head = el("div", el("div", words), _map(answer.map) if answer.map is not None else None, cls="answered")
+    about = el("p", answer.about, cls="said")
+    return join([head, about, _progress(answer), table(answer.table, answer.title)])
 
 
 WIDE, HIGH = 640, 120
 """Size of the drawing of a search's progress, in its units."""
 
 
-def _progress(found: DesignAnswer) -> Html | None:
+def _progress(answer: DesignAnswer) -> Html | None:
     """The best value so far over the cases, as steps, with a gap where there is none, or where it was tried with more
     plants than before; None where it never changed."""
-    values = [value for _, value, _ in found.progress if math.isfinite(value)]
+    values = [value for _, value, _ in answer.progress if math.isfinite(value)]
     if len(set(values)) < 2:
         return None
-    low, high, last = min(values), max(values), found.progress[-1][0]
+    low, high, last = min(values), max(values), answer.progress[-1][0]
     path, on = "", 0
-    for cases, value, tried in found.progress:
+    for cases, value, tried in answer.progress:
         if not math.isfinite(value):
             on = 0
             continue
@@ -52,40 +52,40 @@ def _progress(found: DesignAnswer) -> Html | None:
         on = tried
     floor = el("line", x1=0, x2=WIDE, y1=HIGH + 3, y2=HIGH + 3, cls="floor")
     ends = f"from {page_number(low)} to {page_number(high)}"
-    words = f"{found.table.heads[2]} over cases, {ends}, after {last:,} cases {page_number(found.progress[-1][1])}"
+    words = f"{answer.table.heads[2]} over cases, {ends}, after {last:,} cases {page_number(answer.progress[-1][1])}"
     drawn = el("svg", floor, el("path", d=path), viewBox=f"-2 -4 {WIDE + 4} {HIGH + 8}", role="img", aria_label=words)
-    caption = [el("code", found.table.heads[2]), f" {ends}, over {last:,} cases"]
+    caption = [el("code", answer.table.heads[2]), f" {ends}, over {last:,} cases"]
     return el("figure", el("p", caption, cls="under"), drawn, cls="progress")
 
 
-def _map(found: DesignMap) -> Html:
+def _map(design_map: DesignMap) -> Html:
     """A cell for each design: one that meets all requirements, deeper the farther from the border; one that does not;
     one that was not run."""
-    rows, columns = found.steps.shape
+    rows, columns = design_map.steps.shape
     side = SIDE / max(rows, columns)
-    deepest = max(1, int(found.steps.max(initial=1)))
+    deepest = max(1, int(design_map.steps.max(initial=1)))
     cells = []
     for y in range(rows):
         for x in range(columns):
-            steps = int(found.steps[y, x])
+            steps = int(design_map.steps[y, x])
             if steps < 0:
                 continue
             shade = 1 + (SHADES - 1) * (steps - 1) // max(1, deepest - 1) if steps else 0
-            at = {"x": f"{x * side:.2f}", "y": f"{(rows - 1 - y) * side:.2f}"}
+            corner = {"x": f"{x * side:.2f}", "y": f"{(rows - 1 - y) * side:.2f}"}
             size = f"{side - min(1.0, 0.1 * side):.2f}"
-            cells.append(el("rect", **at, width=size, height=size, cls=f"good{shade}" if steps else "miss"))
-    y, x = found.best
+            cells.append(el("rect", **corner, width=size, height=size, cls=f"good{shade}" if steps else "miss"))
+    y, x = design_map.best
     middle = {"cx": f"{(x + 0.5) * side:.2f}", "cy": f"{(rows - 0.5 - y) * side:.2f}"}
     cells.append(el("circle", **middle, r=f"{min(10.0, max(3.0, 0.32 * side)):.2f}", cls="best"))
     wide, high = columns * side, rows * side
-    good, there = int((found.steps > 0).sum()), int((found.steps >= 0).sum())
-    words = f"Designs over {found.x} and {found.y}: {good} of {there} meet all"
+    good, run_count = int((design_map.steps > 0).sum()), int((design_map.steps >= 0).sum())
+    words = f"Designs over {design_map.x} and {design_map.y}: {good} of {run_count} meet all"
     drawn = el("svg", cells, viewBox=f"-2 -2 {wide + 4:.2f} {high + 4:.2f}", role="img", aria_label=words)
     return el(
         "figure",
-        el("p", _side(found.y, found.y_texts, found.y_unit, "upwards"), cls="under"),
+        el("p", _side(design_map.y, design_map.y_texts, design_map.y_unit, "upwards"), cls="under"),
         drawn,
-        el("p", _side(found.x, found.x_texts, found.x_unit, "to the right"), cls="under"),
+        el("p", _side(design_map.x, design_map.x_texts, design_map.x_unit, "to the right"), cls="under"),
         el(
             "figcaption",
             el("span", el("span", cls="key good4"), "meets all, far from the border"),

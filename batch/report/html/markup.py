@@ -65,13 +65,13 @@ def prose(raw: str) -> Html:
     if isinstance(raw, Html):
         return raw
     parts = QUOTED.split(raw)
-    return Html("".join(f"<code>{text(each)}</code>" if n % 2 else text(each) for n, each in enumerate(parts)))
+    return Html("".join(f"<code>{text(part)}</code>" if n % 2 else text(part) for n, part in enumerate(parts)))
 
 
 def breaking(raw: str) -> Html:
     """A name that may break after a dot or a `_` where it is long."""
-    found = text(raw)
-    return found if len(raw) < LONG else Html(re.sub(r"([._])(?=\w)", r"\1<wbr>", found))
+    escaped = text(raw)
+    return escaped if len(raw) < LONG else Html(re.sub(r"([._])(?=\w)", r"\1<wbr>", escaped))
 
 
 def lines(children: Iterable[Child]) -> Html:

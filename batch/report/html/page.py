@@ -83,7 +83,7 @@ def _about(report: Report) -> str:
 def _links(number: int, section: ReportSection, report: Report) -> list[tuple[str, str]]:
     if len(report.sections) > 1:
         return [(f"s{number}", section.name)]
-    found = [
+    links = [
         ("designs", "" if section.designs is None else section.designs.link, section.designs is not None),
         ("evidence", "Evidence", section.evidence is not None),
         ("best", "Best cases", section.best is not None),
@@ -95,8 +95,8 @@ def _links(number: int, section: ReportSection, report: Report) -> list[tuple[st
         ("stability", "Stability", section.stability is not None),
         ("run", "What was run", True),
     ]
-    found.sort(key=lambda link: section.single and link[0] != "signals")
-    return [(f"s{number}-{key}", name) for key, name, there in found if there]
+    links.sort(key=lambda link: section.single and link[0] != "signals")
+    return [(f"s{number}-{key}", name) for key, name, is_present in links if is_present]
 
 
 def _verdict_name(report: Report) -> str:
@@ -108,8 +108,10 @@ def _verdict_name(report: Report) -> str:
 
 
 def _signals_name(section: ReportSection) -> str:
-    found = section.simulation
-    drawn = found is not None and any(structure.arm.scene is not None for structure in found.structures)
+    page_simulation = section.simulation
+    drawn = page_simulation is not None and any(
+        structure.arm.scene is not None for structure in page_simulation.structures
+    )
     return "Arm and signals" if drawn else "Signals"
 
 
@@ -127,11 +129,11 @@ def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
         out.append(el("section", el("h2", "What changed"), compared, changes.origins(report.changes), id="changed"))
     own = [verdict for verdict in report.verdicts if verdict.kind != "comparison"]
     again = "" if report.changes is not None or (first is not None and first.command) else report.again[0]
-    answers = [blocks.verdict(each, anchors, tried=tried, again="" if n else again) for n, each in enumerate(own)]
+    answers = [blocks.verdict(verdict, anchors, tried=tried, again="" if n else again) for n, verdict in enumerate(own)]
     out.append(el("section", el("h2", name, cls="" if tried else "quiet"), answers, id="verdict"))
     for number, section in enumerate(report.sections):
-        shown = section if first is None else replace(section, designs=None)
-        parts = lines(_section(number, shown, anchors, "h3" if several else "h2"))
+        shown_section = section if first is None else replace(section, designs=None)
+        parts = lines(_section(number, shown_section, anchors, "h3" if several else "h2"))
         if several:
             head = [el("h2", section.name), el("p", section.lede, cls="lede")]
             out.append(el("section", head, parts, id=f"s{number}", cls="whole", data_section=number))
@@ -151,9 +153,9 @@ def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
 
 
 def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head: str) -> list[Child]:
-    def part(key: str, name: str, *children: Child, said: str = "") -> Html:
-        told = el("p", said, cls="said") if said else None
-        return el("section", el(head, name), told, *children, id=f"s{number}-{key}", cls=key)
+    def part(key: str, name: str, *children: Child, about: str = "") -> Html:
+        paragraph = el("p", about, cls="said") if about else None
+        return el("section", el(head, name), paragraph, *children, id=f"s{number}-{key}", cls=key)
 
     out: list[Child] = []
     if section.changes:
@@ -169,17 +171,17 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
         out.append(_designs(number, section.designs, head))
     if section.signals is not None:
         run_again = section.simulation.said if section.simulation is not None else ()
-        said = [el("p", each, cls="said") for each in (*section.signals.said, *run_again)]
+        notes = [el("p", note, cls="said") for note in (*section.signals.said, *run_again)]
         arm = el("div", cls="arm", data_plot="arm") if section.simulation is not None else None
         plots = el("div", cls="signals plot", data_plot="signals")
-        drawn = [part("signals", _signals_name(section), arm, plots, said)]
+        drawn = [part("signals", _signals_name(section), arm, plots, notes)]
     else:
-        drawn = [part("signals", "Signals", said=section.no_signals)]
+        drawn = [part("signals", "Signals", about=section.no_signals)]
     out += drawn if section.single else []
     if section.evidence is not None:
         out.append(part("evidence", "Evidence", tables.evidence(section.evidence)))
     if section.best is not None:
-        out.append(part("best", section.best.title, tables.cases(section.best), said=ABOUT_BEST))
+        out.append(part("best", section.best.title, tables.cases(section.best), about=ABOUT_BEST))
     if section.worst is not None:
         out.append(part("worst", section.worst.title, tables.cases(section.worst)))
     table = blocks.metrics(section)
@@ -199,21 +201,21 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
         out.append(part("overview", "Metrics", table))
     out += [] if section.single else drawn
     if section.influences:
-        shown = [tables.influence(influence) for influence in section.influences]
-        out.append(part("influence", "Which parameters matter", shown, said=ABOUT_INFLUENCE))
+        influences = [tables.influence(influence) for influence in section.influences]
+        out.append(part("influence", "Which parameters matter", influences, about=ABOUT_INFLUENCE))
     if section.structures is not None:
         out.append(part("structures", "Structures side by side", tables.table(section.structures, "Structures")))
     if section.stability is not None:
-        found = section.stability
+        stability = section.stability
         out.append(
             part(
                 "stability",
                 "Stability of the beds",
                 el("p", ABOUT_STABILITY, cls="said"),
-                tables.beds(found),
-                [el("p", each, cls="note") for each in found.unstable],
+                tables.beds(stability),
+                [el("p", note, cls="note") for note in stability.unstable],
                 el("div", cls="stability plot", data_plot="stability"),
-                el("p", found.said, cls="said") if found.said else None,
+                el("p", stability.said, cls="said") if stability.said else None,
             )
         )
     out.append(
@@ -261,7 +263,7 @@ def _parameters(report: Report, anchors: blocks.Anchors) -> Html:
         if not section.parameters:
             continue
         count = f"{len(section.parameters):,} parameters and settings"
-        of = f" of {section.name}" if len(report.sections) > 1 else ""
+        of_section = f" of {section.name}" if len(report.sections) > 1 else ""
         search = el(
             "label",
             "Search ",
@@ -278,7 +280,7 @@ def _parameters(report: Report, anchors: blocks.Anchors) -> Html:
         out.append(
             el(
                 "details",
-                el("summary", f"{count}{of}, each with the line of the deck that wrote it"),
+                el("summary", f"{count}{of_section}, each with the line of the deck that wrote it"),
                 search,
                 tables.parameters(section.parameters, anchors),
                 el("p", role="status", cls="said found"),

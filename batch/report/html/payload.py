@@ -76,18 +76,20 @@ def _base64(values: np.ndarray) -> str:
 def exact(values: np.ndarray) -> dict[str, Any]:
     """Doubles to the bit, as base64: all of them, or the distinct ones with the index of each."""
     bits = np.ascontiguousarray(values, "<f8").ravel().view("<i8")
-    each, which = np.unique(bits, return_inverse=True)
-    if len(each) > min(0x10000, len(bits) // 2):
+    distinct, which = np.unique(bits, return_inverse=True)
+    if len(distinct) > min(0x10000, len(bits) // 2):
         return {"b": _base64(bits)}
-    return {"b": _base64(each), "n": _base64(which.ravel().astype("<u2"))}
+    return {"b": _base64(distinct), "n": _base64(which.ravel().astype("<u2"))}
 
 
 def modules_script(sections: Sequence[ReportSection]) -> str:
     """The WebAssembly modules of all sections by their digests, for the page's script, whose own digest covers them."""
-    here = [structure for section in sections if section.simulation for structure in section.simulation.structures]
-    all_ = [each for one in here for each in (one, one.before) if each is not None]
-    found = {each.told["kernel"]["module"]: base64.b64encode(each.code).decode("ascii") for each in all_}
-    return f"MET.modules = {json.dumps(found)};"
+    structures = [
+        structure for section in sections if section.simulation for structure in section.simulation.structures
+    ]
+    all_ = [version for structure in structures for version in (structure, structure.before) if version is not None]
+    modules = {version.told["kernel"]["module"]: base64.b64encode(version.code).decode("ascii") for version in all_}
+    return f"MET.modules = {json.dumps(modules)};"
 
 
 def _column(column: CaseColumn) -> dict[str, Any]:
@@ -119,54 +121,57 @@ def overview_data(overview: Overview) -> dict[str, Any]:
     """The data of a plot of cases as points, and of maps."""
     return {
         "cases": packed(overview.cases),
-        "ids": [visible(each) for each in overview.ids],
+        "ids": [visible(text) for text in overview.ids],
         "ended": packed(overview.ended),
         "columns": [_column(column) for column in overview.columns],
         "causes": {str(place): visible(cause) for place, cause in overview.causes.items()},
         "total": overview.total,
         "start": [visible(key) for key in overview.start],
-        "maps": [_map(each) for each in overview.maps],
+        "maps": [_map(case_map) for case_map in overview.maps],
     }
 
 
-def _map(each: Map) -> dict[str, Any]:
+def _map(case_map: Map) -> dict[str, Any]:
     return {
-        "x": visible(each.x),
-        "y": visible(each.y),
-        "xLevels": [visible(level) for level in each.x_levels],
-        "yLevels": [visible(level) for level in each.y_levels],
-        "xRuler": _ruler(each.x_ruler),
-        "yRuler": _ruler(each.y_ruler),
-        "counts": packed(each.counts),
-        "failed": packed(each.failed),
+        "x": visible(case_map.x),
+        "y": visible(case_map.y),
+        "xLevels": [visible(level) for level in case_map.x_levels],
+        "yLevels": [visible(level) for level in case_map.y_levels],
+        "xRuler": _ruler(case_map.x_ruler),
+        "yRuler": _ruler(case_map.y_ruler),
+        "counts": packed(case_map.counts),
+        "failed": packed(case_map.failed),
         "of": {
             visible(key): {
-                "values": packed(each.values[key]),
-                "cases": packed(each.cases[key]),
-                "missed": packed(each.missed[key]),
-                "reach": _reach(each.reaches[key]),
+                "values": packed(case_map.values[key]),
+                "cases": packed(case_map.cases[key]),
+                "missed": packed(case_map.missed[key]),
+                "reach": _reach(case_map.reaches[key]),
             }
-            for key in each.values
+            for key in case_map.values
         },
     }
 
 
-def _ruler(found: Ruler) -> dict[str, Any]:
-    return {"edges": list(found.edges), "ticks": [[[at, visible(text)] for at, text in tick] for tick in found.ticks]}
+def _ruler(ruler: Ruler) -> dict[str, Any]:
+    return {
+        "edges": list(ruler.edges),
+        "ticks": [[[position, visible(text)] for position, text in tick] for tick in ruler.ticks],
+    }
 
 
-def _reach(found: Reach | None) -> dict[str, Any] | None:
+def _reach(colours: Reach | None) -> dict[str, Any] | None:
     """The range of the colours, and the number of values beyond it, for the page's scripts."""
-    if found is None:
+    if colours is None:
         return None
     return {
-        "low": found.low,
-        "high": found.high,
-        "log": found.log,
-        "below": found.below,
-        "above": found.above,
-        "least": found.least,
-        "most": found.most,
+        "low": colours.low,
+        "high": colours.high,
+        "log": colours.log,
+        "below": colours.below,
+        "above": colours.above,
+        "least": colours.least,
+        "most": colours.most,
     }
 
 
@@ -203,49 +208,49 @@ def _signals(signals: Signals) -> dict[str, Any]:
     }
 
 
-def _history(each: History | None) -> dict[str, Any]:
+def _history(history: History | None) -> dict[str, Any]:
     """The data of a history; empty where there is none."""
-    if each is None:
+    if history is None:
         return {}
-    lines = {str(place): [packed(line) for line in values.T] for place, values in each.values.items()}
-    return {"clock": each.clock, "panels": lines}
+    lines = {str(place): [packed(line) for line in values.T] for place, values in history.values.items()}
+    return {"clock": history.clock, "panels": lines}
 
 
-def _simulation(found: PageSimulation) -> dict[str, Any]:
-    return {"structures": [_structure(structure) for structure in found.structures]}
+def _simulation(page_simulation: PageSimulation) -> dict[str, Any]:
+    return {"structures": [_structure(structure) for structure in page_simulation.structures]}
 
 
-def _structure(found: SimulatedStructure) -> dict[str, Any]:
-    told, kernel = found.told, found.told["kernel"]
-    metrics = {each["name"]: each["output"] for each in told["metrics"]}
+def _structure(structure: SimulatedStructure) -> dict[str, Any]:
+    description, kernel = structure.told, structure.told["kernel"]
+    metrics = {metric["name"]: metric["output"] for metric in description["metrics"]}
     return {
         "module": kernel["module"],
         "kernel": {
             **{name: kernel[name] for name in ("entry", "heap", "lanes", "base_hz", "record_divisor", "columns")},
             **{name: {"length": len(kernel[name])} for name in ("inputs", "cells", "outputs")},
         },
-        "ticks": told["ticks"],
-        "rows": told["rows"],
-        "failure": told["failure"],
-        "names": [visible(each["name"]) for each in told["inputs"]],
-        "sameCode": found.same_code,
-        "cases": packed(found.cases),
-        "inputs": [exact(column) for column in found.inputs.T],
-        "status": packed(found.status),
+        "ticks": description["ticks"],
+        "rows": description["rows"],
+        "failure": description["failure"],
+        "names": [visible(parameter["name"]) for parameter in description["inputs"]],
+        "sameCode": structure.same_code,
+        "cases": packed(structure.cases),
+        "inputs": [exact(column) for column in structure.inputs.T],
+        "status": packed(structure.status),
         "metrics": [
             {"name": visible(name), "output": metrics[name.removeprefix("metrics.")], "values": exact(values)}
-            for name, values in found.metrics
+            for name, values in structure.metrics
         ],
-        "panels": [list(columns) for columns in found.panels],
-        "arm": drawn_json(found.arm),
-        "before": None if found.before is None else _structure(found.before),
+        "panels": [list(columns) for columns in structure.panels],
+        "arm": drawn_json(structure.arm),
+        "before": None if structure.before is None else _structure(structure.before),
     }
 
 
-def _stability(found: Stability) -> dict[str, Any]:
+def _stability(bed_stability: Stability) -> dict[str, Any]:
     return {
-        "cases": packed(found.cases),
-        "columns": [_column(column) for column in found.columns],
+        "cases": packed(bed_stability.cases),
+        "columns": [_column(column) for column in bed_stability.columns],
         "beds": [
             {
                 "joint": visible(bed.joint),
@@ -254,6 +259,6 @@ def _stability(found: Stability) -> dict[str, Any]:
                 "limit": packed(bed.limit),
                 "unstable": packed(bed.unstable.astype(int)),
             }
-            for bed in found.beds
+            for bed in bed_stability.beds
         ],
     }

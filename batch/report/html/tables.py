@@ -22,17 +22,20 @@ SHOWN_CASES = 8
 """Number of visible rows of the best and of the worst cases; the others are folded away."""
 
 
-def table(found: TextTable, label: str, cells: Sequence[Sequence[Child]] = (), more: Sequence[str] = ()) -> Html:
+def table(text_table: TextTable, label: str, cells: Sequence[Sequence[Child]] = (), more: Sequence[str] = ()) -> Html:
     """A table of texts. cells, more: further cells of each row, and their heads."""
-    heads = [*_headings(found), *headings(more)]
+    heads = [*_headings(text_table), *headings(more)]
     rows = []
-    for number, row in enumerate(found.rows):
+    for number, row in enumerate(text_table.rows):
         own = [
             el(
                 "td",
                 text,
                 cls=" ".join(
-                    filter(None, ["right" if n in found.right else "", "bad" if (number, n) in found.marked else ""])
+                    filter(
+                        None,
+                        ["right" if n in text_table.right else "", "bad" if (number, n) in text_table.marked else ""],
+                    )
                 )
                 or None,
             )
@@ -42,19 +45,19 @@ def table(found: TextTable, label: str, cells: Sequence[Sequence[Child]] = (), m
     return rows_under(heads, rows, label)
 
 
-def _headings(found: TextTable) -> list[Html]:
+def _headings(text_table: TextTable) -> list[Html]:
     """The headings of the columns, each with its unit where one has one."""
-    units = [el("span", unit, cls="unit") if any(found.units) else None for unit in found.units]
-    names = [el("span", breaking(head)) for head in found.heads]
-    return headings(zip(names, units, strict=True), found.right)
+    units = [el("span", unit, cls="unit") if any(text_table.units) else None for unit in text_table.units]
+    names = [el("span", breaking(head)) for head in text_table.heads]
+    return headings(zip(names, units, strict=True), text_table.right)
 
 
-def cases(found: NotableCases) -> Html:
+def cases(notable: NotableCases) -> Html:
     """The best or the worst cases with the command that runs each again."""
     rows = []
-    columns = found.table
+    columns = notable.table
     for number, row in enumerate(columns.rows):
-        own: list[Html] = [el("th", case_link(found.cases[number]), scope="row", cls="right")]
+        own: list[Html] = [el("th", case_link(notable.cases[number]), scope="row", cls="right")]
         for n, text in list(enumerate(row))[1:]:
             classes = ["right"] if n in columns.right else []
             classes += ["bad"] if (number, n) in columns.marked else []
@@ -62,20 +65,22 @@ def cases(found: NotableCases) -> Html:
             classes += ["bad"] if last and text not in ("met", "done") else []
             classes += ["id"] if n == 1 else []
             own.append(el("td", el("code", text) if n == 1 else text, cls=" ".join(classes) or None))
-        own.append(el("td", command(found.commands[number]), cls="command"))
-        rows.append(el("tr", own, data_case=found.cases[number]))
+        own.append(el("td", command(notable.commands[number]), cls="command"))
+        rows.append(el("tr", own, data_case=notable.cases[number]))
     heads = [*_headings(columns), el("th", "run it again, to the same bits", scope="col", cls="command")]
-    first, folded = (rows_under(heads, part, found.title, "cases") for part in (rows[:SHOWN_CASES], rows[SHOWN_CASES:]))
+    first, folded = (
+        rows_under(heads, part, notable.title, "cases") for part in (rows[:SHOWN_CASES], rows[SHOWN_CASES:])
+    )
     left = len(rows) - SHOWN_CASES
     more = el("details", el("summary", f"{left} more of them"), folded) if left > 0 else None
-    again = el("p", el("code", found.commands[0]), " runs the first again, to the same bits.", cls="said printed")
-    return join([first, more, el("p", found.more, cls="said") if found.more else None, again])
+    again = el("p", el("code", notable.commands[0]), " runs the first again, to the same bits.", cls="said printed")
+    return join([first, more, el("p", notable.more, cls="said") if notable.more else None, again])
 
 
 EVIDENCE_HEADS = ("verdict", "missed", "of all cases", "percentile", "worst", "margin", "± step")
 
 
-def evidence(found: EvidencePart) -> Html:
+def evidence(part: EvidencePart) -> Html:
     """The table of evidence: over each row the requirement and the command that runs its worst case again, beneath each
     number its limit; notes."""
 
@@ -83,7 +88,7 @@ def evidence(found: EvidencePart) -> Html:
         return el("td", el("span", text), el("span", under, cls="under") if under else None, cls=cls)
 
     rows = []
-    for row in found.rows:
+    for row in part.rows:
         texts = row.texts
         name = [el("code", breaking(row.requirement)), el("span", row.at, cls="under") if row.at else None]
         again = el("span", command(row.command), cls="under command") if row.command else None
@@ -104,67 +109,74 @@ def evidence(found: EvidencePart) -> Html:
         head = el("tr", el("th", name, again, scope="rowgroup", colspan=len(EVIDENCE_HEADS)), cls="head")
         rows.append(el("tbody", head, el("tr", numbers)))
     heads = headings(EVIDENCE_HEADS, range(1, len(EVIDENCE_HEADS)))
-    made = scrolling(el("table", el("thead", el("tr", heads)), lines(rows), cls="judged"), "Evidence")
-    said = "Each command runs the worst case of its row again, to the same bits."
-    return join([made, [el("p", each, cls="said") for each in (said, *found.notes)]])
+    table_element = scrolling(el("table", el("thead", el("tr", heads)), lines(rows), cls="judged"), "Evidence")
+    about = "Each command runs the worst case of its row again, to the same bits."
+    return join([table_element, [el("p", note, cls="said") for note in (about, *part.notes)]])
 
 
-def influence(found: InfluencePart) -> Html:
+def influence(part: InfluencePart) -> Html:
     """The parameters that explain a metric, with a tornado; notes."""
-    head = [el("code", found.metric), ": ", found.said] if found.metric else found.said
-    if not found.rows:
+    head = [el("code", part.metric), ": ", part.said] if part.metric else part.said
+    if not part.rows:
         return el("p", head, cls="said")
-    together = any(row.together for row in found.rows)
-    ends = [value for row in found.rows for value in (row.low, row.high)]
-    low, high = min(found.mean, *ends), max(found.mean, *ends)
+    together = any(row.together for row in part.rows)
+    ends = [value for row in part.rows for value in (row.low, row.high)]
+    low, high = min(part.mean, *ends), max(part.mean, *ends)
     rows = [
         el(
             "tr",
             el("th", el("code", breaking(row.path)), scope="row"),
-            el("td", _tornado(row, found.mean, low, high)),
+            el("td", _tornado(row, part.mean, low, high)),
             el("td", row.alone, cls="right"),
             el("td", row.together, cls="right") if together else None,
             el("td", row.ends, cls="right"),
             el("td", row.rank, cls="right"),
         )
-        for row in found.rows
+        for row in part.rows
     ]
     heads = ["parameter", "", "alone", *(["with others"] if together else []), "mean, from low to high", "rank"]
-    made = rows_under(headings(heads, range(2, len(heads))), rows, f"What explains {found.metric}")
-    return join([el("h4", head), made, [el("p", note, cls="said") for note in found.notes]])
+    table_element = rows_under(headings(heads, range(2, len(heads))), rows, f"What explains {part.metric}")
+    return join([el("h4", head), table_element, [el("p", note, cls="said") for note in part.notes]])
 
 
 def _tornado(row: InfluenceRow, mean: float, low: float, high: float) -> Html:
     """Two bars from the metric's mean to its values at both ends of a parameter. low, high: ends of the axis"""
 
-    def at(value: float) -> float:
+    def x_of(value: float) -> float:
         return 160.0 * (value - low) / (high - low) if high > low else 80.0
 
     bars = [
-        el("rect", x=f"{min(at(end), at(mean)):.2f}", y=3, width=f"{abs(at(end) - at(mean)):.2f}", height=12, cls=cls)
+        el(
+            "rect",
+            x=f"{min(x_of(end), x_of(mean)):.2f}",
+            y=3,
+            width=f"{abs(x_of(end) - x_of(mean)):.2f}",
+            height=12,
+            cls=cls,
+        )
         for end, cls in ((row.low, "lowest"), (row.high, "highest"))
     ]
-    middle = el("line", x1=f"{at(mean):.2f}", x2=f"{at(mean):.2f}", y1=0, y2=18, cls="floor")
+    middle = el("line", x1=f"{x_of(mean):.2f}", x2=f"{x_of(mean):.2f}", y1=0, y2=18, cls="floor")
     words = f"{row.path}: from {row.ends}"
     return el("svg", bars, middle, cls="tornado", viewBox="-1 0 162 18", role="img", aria_label=words)
 
 
-def beds(found: Stability) -> Html:
-    several = len(found.beds) > 1
-    stable = stable_head(found.spans)
+def beds(bed_stability: Stability) -> Html:
+    several = len(bed_stability.beds) > 1
+    stable = stable_head(bed_stability.spans)
     heads = ("joint", "law", "servo", "delay", "r, together" if several else "r", stable, "margin")
     rows = tuple(
-        (bed.joint, bed.law, bed.servo, bed.delay, bed.spread, bed.stable_at, bed.margin) for bed in found.beds
+        (bed.joint, bed.law, bed.servo, bed.delay, bed.spread, bed.stable_at, bed.margin) for bed in bed_stability.beds
     )
-    marked = frozenset((n, 6) for n, bed in enumerate(found.beds) if not bed.ok)
+    marked = frozenset((n, 6) for n, bed in enumerate(bed_stability.beds) if not bed.ok)
     return table(TextTable(heads, ("",) * len(heads), rows, frozenset({3, 4, 5}), marked), "Beds")
 
 
 # Parameters
 
 
-def parameters(found: Sequence[ParameterRow], anchors: Anchors) -> Html:
-    among = any(row.among for row in found)
+def parameters(rows_of_parameters: Sequence[ParameterRow], anchors: Anchors) -> Html:
+    among = any(row.among for row in rows_of_parameters)
     heads = ["parameter", "value", "unit", "from", "written in", *(["structures"] if among else [])]
     rows = [
         el(
@@ -176,7 +188,7 @@ def parameters(found: Sequence[ParameterRow], anchors: Anchors) -> Html:
             el("td", spot_link(row.spot, anchors), _overrides(row, anchors)),
             el("td", ", ".join(row.among)) if among else None,
         )
-        for row in found
+        for row in rows_of_parameters
     ]
     return rows_under(headings(heads, right={1}), rows, "Parameters", cls="parameters")
 
@@ -184,8 +196,8 @@ def parameters(found: Sequence[ParameterRow], anchors: Anchors) -> Html:
 def _overrides(row: ParameterRow, anchors: Anchors) -> Html | None:
     if not row.overrides:
         return None
-    found = [part for override in row.overrides for part in (spot_link(override, anchors), " ")]
-    return el("span", "overrides ", found, cls="under")
+    links = [part for override in row.overrides for part in (spot_link(override, anchors), " ")]
+    return el("span", "overrides ", links, cls="under")
 
 
 # The deck
