@@ -55,23 +55,23 @@ BLOCK = 1 << 16
 """Number of values of a signal that are compared at a time: 512 KiB."""
 
 
-def diff(a: str | Path, b: str | Path, given: Tolerances | None = None, *, distributions: bool = False) -> Diff:
-    """Compare two archives. given: tolerances that take precedence over those of b's deck. distributions: compare
+def diff(a: str | Path, b: str | Path, overrides: Tolerances | None = None, *, distributions: bool = False) -> Diff:
+    """Compare two archives. overrides: tolerances that take precedence over those of b's deck. distributions: compare
     metrics as samples even where the seeds are the same. Raises Problem."""
     with ArchiveFile(a) as file_a, ArchiveFile(b) as file_b:
         for file in (file_a, file_b):
             file.need_every_row("a comparison of cases")
         pairs, only_a, only_b = matching.match_experiments(file_a, file_b)
-        allowed = given or Tolerances()
+        allowed = overrides or Tolerances()
         _check(allowed, [*file_a.groups, *file_b.groups])
         plans = [_plan(file) for file in (file_a, file_b)]
-        found = tuple(_experiment(one, two, allowed, plans[1], distributions) for one, two in pairs)
+        experiments = tuple(_experiment(group, two, allowed, plans[1], distributions) for group, two in pairs)
         return Diff(
             Path(a),
             Path(b),
             allowed,
             provenance_changes(file_a, file_b, pairs, plans),
-            found,
+            experiments,
             tuple(group.name for group in only_a),
             tuple(group.name for group in only_b),
         )
@@ -80,13 +80,13 @@ def diff(a: str | Path, b: str | Path, given: Tolerances | None = None, *, distr
 def _check(allowed: Tolerances, groups: Sequence[ArchiveGroup]) -> None:
     """Check that each tolerance of the command line names a quantity of one of the archives."""
     known: dict[str, Sequence[str]] = {}
-    shown: dict[str, None] = {}
+    known_names: dict[str, None] = {}
     for group in groups:
-        shown |= {variable.name: None for variable in (*group.role("signal"), *group.role("metric"))}
+        known_names |= {variable.name: None for variable in (*group.role("signal"), *group.role("metric"))}
         for name, units in _known(group).items():
             if name not in allowed.absolute or name not in known or not fits(allowed.absolute[name][1], known[name]):
                 known[name] = units
-    check(allowed, known, list(shown))
+    check(allowed, known, list(known_names))
 
 
 def _known(group: ArchiveGroup) -> dict[str, Sequence[str]]:
@@ -110,15 +110,15 @@ def _plan(file: ArchiveFile) -> Plan | str:
 
 
 def _experiment(
-    a: ArchiveGroup, b: ArchiveGroup, given: Tolerances, plan: Plan | str, distributions: bool
+    a: ArchiveGroup, b: ArchiveGroup, overrides: Tolerances, plan: Plan | str, distributions: bool
 ) -> ExperimentDiff:
     """Compare two groups. plan: that of b, or the reason why it cannot be read"""
     known = {} if isinstance(plan, str) else {experiment.name: experiment for experiment in plan.experiments}
-    given = given.within(_known(a)).within(_known(b))
-    allowed = given.over(of_deck(known[b.name], b) if b.name in known else Tolerances())
+    overrides = overrides.within(_known(a)).within(_known(b))
+    allowed = overrides.over(of_deck(known[b.name], b) if b.name in known else Tolerances())
     matched = matching.match_cases(a, b)
     out = ExperimentDiff(a.name, b.name, matched, allowed)
-    if isinstance(plan, str) and not given.alone:
+    if isinstance(plan, str) and not overrides.alone:
         out.notes.append("what its deck allows is not known, for the plan cannot be read")
     out.only_a = a.values("case")[matched.only_a].tolist()
     out.only_b = b.values("case")[matched.only_b].tolist()
@@ -153,12 +153,13 @@ def _last_digits(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases) -> str
     where there are none."""
     rows_a, rows_b = a.values("case")[matched.only_a], b.values("case")[matched.only_b]
     rows, in_a, in_b = np.intersect1d(rows_a, rows_b, return_indices=True)
-    there = {variable.path: variable for variable in b.role("coordinate")}
-    both = [(variable, there[variable.path]) for variable in a.role("coordinate") if variable.path in there]
-    if not len(rows) or not both or len(both) < max(len(a.role("coordinate")), len(there)):
+    coordinates = {variable.path: variable for variable in b.role("coordinate")}
+    both = [(variable, coordinates[variable.path]) for variable in a.role("coordinate") if variable.path in coordinates]
+    if not len(rows) or not both or len(both) < max(len(a.role("coordinate")), len(coordinates)):
         return ""
     columns = [
-        (one, a.values(one.name)[matched.only_a[in_a]], b.values(two.name)[matched.only_b[in_b]]) for one, two in both
+        (variable, a.values(variable.name)[matched.only_a[in_a]], b.values(two.name)[matched.only_b[in_b]])
+        for variable, two in both
     ]
     near = np.all([np.abs(x - y) <= ROUNDING * np.maximum(np.abs(x), np.abs(y)) for _, x, y in columns], axis=0)
     near &= np.any([x != y for _, x, y in columns], axis=0)
@@ -172,12 +173,12 @@ def _last_digits(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases) -> str
     return f"{some} other last digits in what is varied, {variable.path} = {text}, now {written(now, unit)}"
 
 
-def _how(scores: _Scores, matched: MatchedCases, b: ArchiveGroup, found: ExperimentDiff) -> np.ndarray:
+def _how(scores: _Scores, matched: MatchedCases, b: ArchiveGroup, experiment: ExperimentDiff) -> np.ndarray:
     """The place in VERDICTS of each matched case. A case with another ending is different."""
     out = np.where(scores.unlike, VERDICTS.index(EQUIVALENT), VERDICTS.index(IDENTICAL)).astype(np.int8)
     out[scores.beyond] = VERDICTS.index(DIFFERENT)
-    if found.ended:
-        ended = [each.case for each in found.ended]
+    if experiment.ended:
+        ended = [ending.case for ending in experiment.ended]
         out[np.isin(b.values("case")[matched.b], ended)] = VERDICTS.index(DIFFERENT)
     return out
 
@@ -197,22 +198,22 @@ def _other_noise(a: ArchiveGroup, b: ArchiveGroup) -> bool:
 def _ended(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: ExperimentDiff) -> None:
     """Cases with another ending, or an earlier one."""
     status, rows = ([group.values(name) for group in (a, b)] for name in ("status", "n_valid"))
-    here, there = status[0][matched.a], status[1][matched.b]
-    unlike = (here != there) | ((here != 0) & (rows[0][matched.a] != rows[1][matched.b]))
+    status_a, status_b = status[0][matched.a], status[1][matched.b]
+    unlike = (status_a != status_b) | ((status_a != 0) & (rows[0][matched.a] != rows[1][matched.b]))
     places = np.flatnonzero(unlike)
     if not len(places):
         return
     names = ("case", "case_id", "cause")
-    told = {name: (a.at(name, matched.a[places]), b.at(name, matched.b[places])) for name in names}
+    values_of = {name: (a.at(name, matched.a[places]), b.at(name, matched.b[places])) for name in names}
     for i, place in enumerate(places.tolist()):
         out.ended.append(
             EndingDiff(
-                int(told["case"][1][i]),
-                str(told["case_id"][1][i]),
-                int(here[place]),
-                int(there[place]),
-                str(told["cause"][0][i]),
-                str(told["cause"][1][i]),
+                int(values_of["case"][1][i]),
+                str(values_of["case_id"][1][i]),
+                int(status_a[place]),
+                int(status_b[place]),
+                str(values_of["cause"][0][i]),
+                str(values_of["cause"][1][i]),
                 int(rows[0][matched.a[place]]),
                 int(rows[1][matched.b[place]]),
             )
@@ -239,8 +240,8 @@ def _counts(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: Experi
     named = {name: f"number of {words}" for name, words in COUNTS.items() if name in a.variables} | figures
     for name, words in named.items():
         if name in b.variables:
-            here, there = a.values(name)[matched.a], b.values(name)[matched.b]
-            unlike = int(((here != there) & ((here == here) | (there == there))).sum())
+            figures_a, figures_b = a.values(name)[matched.a], b.values(name)[matched.b]
+            unlike = int(((figures_a != figures_b) & ((figures_a == figures_a) | (figures_b == figures_b))).sum())
             if unlike:
                 out.notes.append(f"the {words} is another in {unlike:,} of {matched.count:,} cases")
                 out.partial = True
@@ -265,7 +266,7 @@ class _Scores:
         self, a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, signals: Sequence[SignalDiff]
     ) -> list[RankedCase]:
         by_name = {signal.name: signal for signal in signals}
-        places = sorted(self.where, key=lambda each: (-self.score[each], each))[:WORST]
+        places = sorted(self.where, key=lambda place: (-self.score[place], place))[:WORST]
         if not places:
             return []
         case_a, case_b = a.at("case", matched.a[places]), b.at("case", matched.b[places])
@@ -306,21 +307,21 @@ def _metric(
     if len(finite):
         out.low, out.high = float(finite.min()), float(finite.max())
     out.compared = matched.count
-    found = compare(values_a[:, None], values_b[:, None], tolerance)
-    if found is None:
+    difference = compare(values_a[:, None], values_b[:, None], tolerance)
+    if difference is None:
         out.identical = out.compared
         return out
-    case = int(b.at("case", [matched.b[found.row]])[0])
-    _add(out, found, DiffPlace(case, "", float("nan"), found.before, found.after))
+    case = int(b.at("case", [matched.b[difference.row]])[0])
+    _add(out, difference, DiffPlace(case, "", float("nan"), difference.before, difference.after))
     unlike = np.flatnonzero(
         (values_a.view(np.int64) != values_b.view(np.int64)) & ~(np.isnan(values_a) & np.isnan(values_b))
     )
     scores.unlike[unlike] = True
     out.higher, out.lower = int((values_b > values_a).sum()), int((values_b < values_a).sum())
     out.identical = out.compared - len(unlike)
-    out.different = found.beyond
-    out.equivalent = len(unlike) - found.beyond
-    if found.beyond:
+    out.different = difference.beyond
+    out.equivalent = len(unlike) - difference.beyond
+    if difference.beyond:
         _rank_metric(out, values_a, values_b, tolerance, unlike, scores, b, matched)
     return out
 
@@ -346,9 +347,9 @@ def _rank_metric(
     worst = np.flatnonzero(over)[np.argsort(-score[over], kind="stable")[:WORST]]
     cases = group.at("case", matched.b[unlike[worst]])
     for i, place in enumerate(worst.tolist()):
-        at = int(unlike[place])
-        where = DiffPlace(int(cases[i]), "", float("nan"), float(a[at]), float(b[at]))
-        scores.take(at, float(score[place]), out.name, where, float(apart[place]))
+        position = int(unlike[place])
+        where = DiffPlace(int(cases[i]), "", float("nan"), float(a[position]), float(b[position]))
+        scores.take(position, float(score[place]), out.name, where, float(apart[place]))
 
 
 def _unit_of(signal: SignalDiff) -> float:
@@ -358,19 +359,19 @@ def _unit_of(signal: SignalDiff) -> float:
     return min(signal.high - signal.low, LARGEST) or max(abs(signal.high), 1e-300)
 
 
-def _add(out: SignalDiff, found: Difference, where: DiffPlace) -> None:
+def _add(out: SignalDiff, difference: Difference, where: DiffPlace) -> None:
     """Add a difference. Those beyond a tolerance replace those within, which are then not reported."""
-    beyond = bool(found.beyond)
+    beyond = bool(difference.beyond)
     if out.place is None or (beyond and not out.beyond):
-        out.largest, out.most, out.place, out.beyond = found.largest, found.most, where, beyond
+        out.largest, out.most, out.place, out.beyond = difference.largest, difference.most, where, beyond
     elif beyond == out.beyond:
-        out.largest = max(out.largest, found.largest)
-        if found.most > out.most:
-            out.most, out.place = found.most, where
-    out.squares += found.squares
-    out.values += found.values
-    out.used = max(out.used, found.used)
-    out.nan += found.nan
+        out.largest = max(out.largest, difference.largest)
+        if difference.most > out.most:
+            out.most, out.place = difference.most, where
+    out.squares += difference.squares
+    out.values += difference.values
+    out.used = max(out.used, difference.used)
+    out.nan += difference.nan
 
 
 # Signals
@@ -386,8 +387,8 @@ def _signals(
     time_a, time_b = (group.values("time") if "time" in group.variables else np.empty(0) for group in (a, b))
     rows_a, rows_b = matching.match_instants(time_a, time_b, allowed.time or 0.0)
     if len(rows_a) < max(len(time_a), len(time_b)) and len(time_a) and len(time_b):
-        of = f"of {len(time_a):,} and {len(time_b):,}"
-        about.notes.append(f"signals are compared at the {len(rows_a):,} instants that both have, {of}")
+        of_instants = f"of {len(time_a):,} and {len(time_b):,}"
+        about.notes.append(f"signals are compared at the {len(rows_a):,} instants that both have, {of_instants}")
         about.partial = True
     aligned = len(rows_a) == len(time_a) == len(time_b)
     if a.attributes.get("record_hz") == b.attributes.get("record_hz"):
@@ -442,7 +443,7 @@ def _signals(
                         places[some][which],
                         numbers[some][which],
                     )
-                    worst = sorted(worst, key=lambda each: -each[0])[:WORST]
+                    worst = sorted(worst, key=lambda entry: -entry[0])[:WORST]
             unit_of = _unit_of(out)
             for most, place, where, largest in worst:
                 scores.take(place, most / unit_of, name, where, largest)
@@ -451,13 +452,13 @@ def _signals(
 
 def _instants(a: np.ndarray, b: np.ndarray, allowed: Tolerances, cases: int) -> SignalDiff | None:
     """The recorded instants as a signal, where a bit of them differs."""
-    found = compare(a[:, None], b[:, None], SignalTolerance(absolute=allowed.time or 0.0))
-    if found is None:
+    difference = compare(a[:, None], b[:, None], SignalTolerance(absolute=allowed.time or 0.0))
+    if difference is None:
         return None
     out = SignalDiff("time", "s", False, SignalTolerance(time=allowed.time or 0.0), compared=cases)
     out.deck_unit, out.low, out.high = "s", float(a.min()), float(a.max())
-    _add(out, found, DiffPlace(0, "", float(found.before), found.before, found.after))
-    out.equivalent, out.different = (0, cases) if found.beyond else (cases, 0)
+    _add(out, difference, DiffPlace(0, "", float(difference.before), difference.before, difference.after))
+    out.equivalent, out.different = (0, cases) if difference.beyond else (cases, 0)
     return out
 
 
@@ -474,12 +475,12 @@ def _by_joint(group: ArchiveGroup, signal: Stored, allowed: Tolerances) -> dict[
     return {joint: allowed.of(part).absolute for joint, part in parts if part in allowed.absolute}
 
 
-def _absolute(group: ArchiveGroup, signal: Stored, found: SignalDiff) -> np.ndarray | None:
+def _absolute(group: ArchiveGroup, signal: Stored, signal_diff: SignalDiff) -> np.ndarray | None:
     """The allowed difference of each column, SI; None where it is the same for all."""
-    if not found.by_joint:
+    if not signal_diff.by_joint:
         return None
-    each = [found.by_joint.get(joint, found.tolerance.absolute) for joint in group.joints(signal)]
-    return np.repeat(each, len(group.components(signal)) or 1)
+    limits = [signal_diff.by_joint.get(joint, signal_diff.tolerance.absolute) for joint in group.joints(signal)]
+    return np.repeat(limits, len(group.components(signal)) or 1)
 
 
 def _cases(
@@ -499,19 +500,21 @@ def _cases(
     time = passed.times[rows]
     a = passed.values if len(rows) == len(passed.times) else passed.values[:, rows]
     differences = compare_cases(a, b, out.tolerance, passed, absolute)
-    for found, place, number in zip(differences, places.tolist(), numbers.tolist(), strict=True):
-        if found is None:
+    for difference, place, number in zip(differences, places.tolist(), numbers.tolist(), strict=True):
+        if difference is None:
             out.identical += 1
             continue
         scores.unlike[place] = True
-        where = DiffPlace(number, labels[found.column], float(time[found.row]), found.before, found.after)
-        _add(out, found, where)
-        out.first = min(out.first, float(time[found.first]))
-        if found.beyond:
+        where = DiffPlace(
+            number, labels[difference.column], float(time[difference.row]), difference.before, difference.after
+        )
+        _add(out, difference, where)
+        out.first = min(out.first, float(time[difference.first]))
+        if difference.beyond:
             out.different += 1
-            out.first_beyond = min(out.first_beyond, float(time[found.first_beyond]))
+            out.first_beyond = min(out.first_beyond, float(time[difference.first_beyond]))
             scores.beyond[place] = True
-            yield found.most, place, where, found.largest
+            yield difference.most, place, where, difference.largest
         else:
             out.equivalent += 1
 
@@ -545,11 +548,11 @@ def _incomparable(a: ArchiveGroup, b: ArchiveGroup, name: str, role: str) -> str
     for mine, other in ((a, b), (b, a)):
         if name not in other.variables or other.variables[name].role != role:
             return f"only in {mine.path}"
-    one, two = a.variables[name], b.variables[name]
-    if role == "signal" and a.joints(one) != b.joints(two):
-        return f"of {', '.join(a.joints(one)) or 'no joint'}, now of {', '.join(b.joints(two)) or 'no joint'}"
-    if (one.unit, one.units_by_joint) != (two.unit, two.units_by_joint):
-        return f"in {one.unit or 'units by joint'} and in {two.unit or 'units by joint'}"
-    if role == "signal" and a.components(one) != b.components(two):
+    stored, two = a.variables[name], b.variables[name]
+    if role == "signal" and a.joints(stored) != b.joints(two):
+        return f"of {', '.join(a.joints(stored)) or 'no joint'}, now of {', '.join(b.joints(two)) or 'no joint'}"
+    if (stored.unit, stored.units_by_joint) != (two.unit, two.units_by_joint):
+        return f"in {stored.unit or 'units by joint'} and in {two.unit or 'units by joint'}"
+    if role == "signal" and a.components(stored) != b.components(two):
         return "of other components"
     return ""

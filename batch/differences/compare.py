@@ -136,11 +136,11 @@ def compare_cases(
         tops = over if limit.ndim else np.fmax.reduce(over, axis=1, initial=0.0, keepdims=True)
         used = np.fmax.reduce(np.where(tops == 0.0, 0.0, tops / limit), axis=1, initial=0.0)
     used[nans > 0] = np.inf
-    each = np.arange(len(a))
+    every = np.arange(len(a))
     counts = beyond.sum(axis=1)
     sizes = np.where(beyond | (counts == 0)[:, None], apart, 0.0) if counts.any() else apart
     firsts, places = unlike.argmax(axis=1), sizes.argmax(axis=1)
-    places = np.where(sizes[each, places] == 0.0, firsts, places)
+    places = np.where(sizes[every, places] == 0.0, firsts, places)
     if nans.any():
         lost = np.isnan(sizes)
         places = np.where(nans > 0, lost.argmax(axis=1), places)
@@ -148,21 +148,21 @@ def compare_cases(
     with np.errstate(over="ignore"):
         squares = np.square(apart if finite.all() else np.where(finite, apart, 0.0)).sum(axis=1)
     firsts_beyond = np.where(counts > 0, beyond.argmax(axis=1) // shape[2], -1)
-    found = (
+    columns = (
         counts,
         nans,
         sizes.max(axis=1),
         places // shape[2],
         places % shape[2],
-        a[each, places],
-        b[each, places],
+        a[every, places],
+        b[every, places],
         squares,
         finite.sum(axis=1),
         firsts // shape[2],
         firsts_beyond,
         used,
     )
-    rows = zip(*(array.tolist() for array in found), strict=True)
+    rows = zip(*(array.tolist() for array in columns), strict=True)
     return [Difference(*row) if some else None for some, row in zip(unlike.any(axis=1).tolist(), rows, strict=True)]
 
 
@@ -179,9 +179,9 @@ def _outside(passed: SampledCourse, b: np.ndarray, early: float) -> np.ndarray:
     low, high = _lowest(a, first, last), -_lowest(-a, first, last)
     for column in range(a.shape[1]):
         for shift in (-early, early):
-            there = np.interp(instants + shift, passed.times, a[:, column])
-            low[:, column] = np.fmin(low[:, column], there)
-            high[:, column] = np.fmax(high[:, column], there)
+            shifted = np.interp(instants + shift, passed.times, a[:, column])
+            low[:, column] = np.fmin(low[:, column], shifted)
+            high[:, column] = np.fmax(high[:, column], shifted)
     outside = np.maximum(np.maximum(low - b, b - high), 0.0)
     return np.asarray(outside.reshape(shape[1], shape[0], shape[2]).transpose(1, 0, 2))
 

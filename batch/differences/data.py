@@ -12,38 +12,38 @@ from batch.queries.summary import finite
 SCHEMA, VERSION = "met.diff", 2
 
 
-def as_data(found: Diff) -> dict[str, Any]:
+def as_data(differences: Diff) -> dict[str, Any]:
     """The comparison as plain data; non-finite numbers are null."""
     data = {
         "schema": SCHEMA,
         "version": VERSION,
-        "a": str(found.a),
-        "b": str(found.b),
-        "verdict": found.verdict,
-        "changed": dataclasses.asdict(found.changed),
-        "only_a": list(found.only_a),
-        "only_b": list(found.only_b),
-        "experiments": [_experiment(experiment) for experiment in found.experiments],
+        "a": str(differences.a),
+        "b": str(differences.b),
+        "verdict": differences.verdict,
+        "changed": dataclasses.asdict(differences.changed),
+        "only_a": list(differences.only_a),
+        "only_b": list(differences.only_b),
+        "experiments": [_experiment(experiment) for experiment in differences.experiments],
     }
     plain: dict[str, Any] = finite(data)
     return plain
 
 
-def _experiment(found: ExperimentDiff) -> dict[str, Any]:
+def _experiment(experiment: ExperimentDiff) -> dict[str, Any]:
     return {
-        "name_a": found.name_a,
-        "name_b": found.name_b,
-        "verdict": found.verdict,
-        "cases": found.cases.count,
+        "name_a": experiment.name_a,
+        "name_b": experiment.name_b,
+        "verdict": experiment.verdict,
+        "cases": experiment.cases.count,
         "tolerances": {
-            "relative": found.tolerances.relative,
-            "time": found.tolerances.time,
-            "absolute": {name: size for name, (size, _) in found.tolerances.absolute.items()},
+            "relative": experiment.tolerances.relative,
+            "time": experiment.tolerances.time,
+            "absolute": {name: size for name, (size, _) in experiment.tolerances.absolute.items()},
         },
-        "cases_different": found.cases_different,
-        "only_a": found.only_a,
-        "only_b": found.only_b,
-        "ended": [dataclasses.asdict(each) for each in found.ended],
+        "cases_different": experiment.cases_different,
+        "only_a": experiment.only_a,
+        "only_b": experiment.only_b,
+        "ended": [dataclasses.asdict(ending) for ending in experiment.ended],
         "requirements": [
             {
                 "text": requirement.now,
@@ -55,19 +55,19 @@ def _experiment(found: ExperimentDiff) -> dict[str, Any]:
                 "other": requirement.other,
                 "chance": requirement.chance,
             }
-            for requirement in found.requirements
+            for requirement in experiment.requirements
         ],
-        "evidence": [{"a": as_row(each.before), "b": as_row(each.now)} for each in found.evidence],
-        "required_in_one": found.required_in_one,
-        "signals": [_signal(signal) for signal in found.signals],
-        "worst": [dataclasses.asdict(each) for each in found.worst],
-        "distributions": [{**dataclasses.asdict(sample), "unlike": sample.unlike} for sample in found.samples],
-        "notes": found.notes,
+        "evidence": [{"a": as_row(row.before), "b": as_row(row.now)} for row in experiment.evidence],
+        "required_in_one": experiment.required_in_one,
+        "signals": [_signal(signal) for signal in experiment.signals],
+        "worst": [dataclasses.asdict(ranked) for ranked in experiment.worst],
+        "distributions": [{**dataclasses.asdict(sample), "unlike": sample.unlike} for sample in experiment.samples],
+        "notes": experiment.notes,
     }
 
 
-def _signal(found: SignalDiff) -> dict[str, Any]:
-    kept = (
+def _signal(signal: SignalDiff) -> dict[str, Any]:
+    copied = (
         "name",
         "unit",
         "metric",
@@ -87,10 +87,10 @@ def _signal(found: SignalDiff) -> dict[str, Any]:
         "by_step",
     )
     return {
-        **{name: getattr(found, name) for name in kept},
-        "verdict": found.verdict,
-        "rms": found.rms,
-        "share": found.share,
-        "place": None if found.place is None else dataclasses.asdict(found.place),
-        "tolerance": {**dataclasses.asdict(found.tolerance), "by_joint": found.by_joint},
+        **{name: getattr(signal, name) for name in copied},
+        "verdict": signal.verdict,
+        "rms": signal.rms,
+        "share": signal.share,
+        "place": None if signal.place is None else dataclasses.asdict(signal.place),
+        "tolerance": {**dataclasses.asdict(signal.tolerance), "by_joint": signal.by_joint},
     }

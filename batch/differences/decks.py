@@ -67,24 +67,24 @@ class Decks:
 def decks(a: Mapping[str, str], b: Mapping[str, str]) -> Decks:
     """a, b: texts of the files by name, the deck itself first."""
     pairs = _pairs(a, b)
-    found, fresh, stale = [], set(), set()
+    changes, fresh, stale = [], set(), set()
     for old, new in pairs:
         before, now = a.get(old, "").splitlines(), b.get(new, "").splitlines()
         known = set(before), set(now)
         fresh |= {(new, number) for number, line in enumerate(now, 1) if line not in known[0]}
         stale |= {(old, number) for number, line in enumerate(before, 1) if line not in known[1]}
         if not old or not new:
-            found.append(
+            changes.append(
                 DeckFileChange(f"{old or new} is {'new' if new else 'gone'}: {_lines(len(before) + len(now))}")
             )
         elif a[old] != b[new] or PurePosixPath(old).name != PurePosixPath(new).name:
             name = new if old == new else f"{old}, now {new}"
             other = PurePosixPath(old).name != PurePosixPath(new).name and _share(before, now) < ALIKE
             lines = () if other else tuple(_unified(before, now))
-            found.append(
+            changes.append(
                 DeckFileChange(f"{name}: {'another deck, ' if other else ''}{_counted(a[old], b[new])}", lines)
             )
-    return Decks(tuple(found), tuple(_names(a, b)), frozenset(fresh), frozenset(stale), frozenset((*a, *b)))
+    return Decks(tuple(changes), tuple(_names(a, b)), frozenset(fresh), frozenset(stale), frozenset((*a, *b)))
 
 
 def _pairs(a: Mapping[str, str], b: Mapping[str, str]) -> list[tuple[str, str]]:
@@ -101,7 +101,7 @@ def _pairs(a: Mapping[str, str], b: Mapping[str, str]) -> list[tuple[str, str]]:
         for texts, names in ((a, left), (b, rest))
     ]
     for name in left:
-        alike = {each: _alike(name, each, lines[0][name], lines[1][each]) for each in rest if each in lines[1]}
+        alike = {other: _alike(name, other, lines[0][name], lines[1][other]) for other in rest if other in lines[1]}
         near = max(alike, key=alike.__getitem__, default="")
         if near and alike[near] >= ALIKE:
             pairs[name] = near
@@ -124,8 +124,8 @@ def _counted(before: str, after: str) -> str:
     """Say how many lines were added and removed."""
     old, now = (Counter(text.splitlines(keepends=True)) for text in (before, after))
     new, gone = (now - old).total(), (old - now).total()
-    said = f"{_lines(new)} new, {gone} gone" if new or gone else "its lines are in another order"
-    return said if before != after else "the same lines"
+    text = f"{_lines(new)} new, {gone} gone" if new or gone else "its lines are in another order"
+    return text if before != after else "the same lines"
 
 
 def _lines(count: int) -> str:
@@ -167,27 +167,27 @@ def _names(a: Mapping[str, str], b: Mapping[str, str]) -> Iterator[str]:
         before, now = old.get(key, []), new.get(key, [])
         if [text for text, _ in before] == [text for text, _ in now] or max(len(before), len(now)) > 1:
             continue
-        (text, at), kind = (now or before)[0], "new" if now else "gone"
+        (text, place), kind = (now or before)[0], "new" if now else "gone"
         if not before or not now:
-            yield f"{key} is {kind}{'' if key.endswith(OF_ARGUMENTS) else _of(text)} ({at})"
+            yield f"{key} is {kind}{'' if key.endswith(OF_ARGUMENTS) else _value_text(text)} ({place})"
         elif max(len(before[0][0]), len(text)) > LONGEST_VALUE or key.endswith(OF_ARGUMENTS):
-            yield f"{key} is another ({at})"
+            yield f"{key} is another ({place})"
         else:
-            yield f"{key}: {before[0][0] or 'nothing'} -> {text or 'nothing'} ({at})"
+            yield f"{key}: {before[0][0] or 'nothing'} -> {text or 'nothing'} ({place})"
 
 
-def _of(text: str) -> str:
+def _value_text(text: str) -> str:
     return f": {text}" if 0 < len(text) <= LONGEST_VALUE else ""
 
 
 def _written(files: Mapping[str, str]) -> dict[str, list[tuple[str, str]]]:
     """The text and place of each definition, by name: `let reach`, `#define PAIRS`, `#define ROD()`."""
-    found: dict[str, list[tuple[str, str]]] = {}
+    definitions: dict[str, list[tuple[str, str]]] = {}
     for name, text in files.items():
         if name.rstrip(">").endswith(".ic") and len(text) <= LONGEST_READ:
             for line, key, written in sorted(_of_file(name, text)):
-                found.setdefault(key, []).append((written, f"{name}:{line}"))
-    return found
+                definitions.setdefault(key, []).append((written, f"{name}:{line}"))
+    return definitions
 
 
 def _of_file(name: str, text: str) -> Iterator[tuple[int, str, str]]:
@@ -196,23 +196,23 @@ def _of_file(name: str, text: str) -> Iterator[tuple[int, str, str]]:
 
     let: list[Token] | None = None
     for line in logical_lines(Text(name, text)):
-        words = [at for at, each in enumerate(line) if each.text.strip()]
+        words = [index for index, token in enumerate(line) if token.text.strip()]
         if words and line[words[0]].text == "#":
             if len(words) > 2 and line[words[1]].text == "define":
-                at = words[2]
-                takes = OF_ARGUMENTS if line[at + 1].text == "(" else ""
-                yield line[at].line, f"#define {line[at].text}{takes}", _text(line[at + 1 :])
+                index = words[2]
+                takes = OF_ARGUMENTS if line[index + 1].text == "(" else ""
+                yield line[index].line, f"#define {line[index].text}{takes}", _text(line[index + 1 :])
             continue
-        for each in line:
-            if each.text in ("let", "param"):
+        for token in line:
+            if token.text in ("let", "param"):
                 let = []
-            elif each.text == ";" and let is not None:
-                head = [at for at, token in enumerate(let) if token.text.strip()][:2]
+            elif token.text == ";" and let is not None:
+                head = [index for index, token in enumerate(let) if token.text.strip()][:2]
                 if len(head) == 2 and let[head[1]].text == "=":
                     yield let[head[0]].line, f"let {let[head[0]].text}", _text(let[head[1] + 1 :])
                 let = None
             elif let is not None:
-                let.append(each)
+                let.append(token)
 
 
 def _text(tokens: Sequence[Any]) -> str:

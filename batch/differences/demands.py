@@ -28,29 +28,29 @@ def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases
     now = {text: text for text in met_a if text in met_b}
     for mine in known_a.values():
         alike = [
-            each.text
-            for each in known_b.values()
-            if (each.metric, each.comparison[:1]) == (mine.metric, mine.comparison[:1])
-            and each.text not in met_a
-            and each.text not in now.values()
+            requirement.text
+            for requirement in known_b.values()
+            if (requirement.metric, requirement.comparison[:1]) == (mine.metric, mine.comparison[:1])
+            and requirement.text not in met_a
+            and requirement.text not in now.values()
         ]
         if mine.text not in now and alike:
             now[mine.text] = alike[0]
-    for text, here in met_a.items():
+    for text, met_here in met_a.items():
         if text in now:
-            there = met_b[now[text]]
-            one, other = known_a.get(text), known_b.get(now[text])
-            gained, lost = int((there & ~here).sum()), int((here & ~there).sum())
+            met_there = met_b[now[text]]
+            own, other = known_a.get(text), known_b.get(now[text])
+            gained, lost = int((met_there & ~met_here).sum()), int((met_here & ~met_there).sum())
             out.requirements.append(
                 RequirementDiff(
                     text,
                     now[text],
-                    int(here.sum()),
-                    int(there.sum()),
+                    int(met_here.sum()),
+                    int(met_there.sum()),
                     gained,
                     lost,
-                    _unlike(one, other),
-                    _limits(b, one, other) if text == now[text] else ("", ""),
+                    _unlike(own, other),
+                    _limits(b, own, other) if text == now[text] else ("", ""),
                 )
             )
             if gained == lost > 0:
@@ -62,30 +62,30 @@ def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases
     for known, others, path in ((met_a, now, a.path), (met_b, now.values(), b.path)):
         for text, met in known.items():
             if text not in others:
-                said = f"require {text} is only in {path}, met by {int(met.sum()):,} of {matched.count:,}"
-                out.notes.append(said)
-                out.required_in_one.append(said)
+                note = f"require {text} is only in {path}, met by {int(met.sum()):,} of {matched.count:,}"
+                out.notes.append(note)
+                out.required_in_one.append(note)
 
 
 def _compare_step_errors(a: ArchiveGroup, b: ArchiveGroup, out: ExperimentDiff) -> None:
     """Note requirements on errors due to the step whose verdict has changed, or that only one archive has."""
     before, now = ({verdict.text: verdict for verdict in verdicts(group, figures(group))} for group in (a, b))
     for text in [*before, *(text for text in now if text not in before)]:
-        one, other = before.get(text), now.get(text)
-        if one is not None and other is not None:
-            if one.word != other.word:
-                out.notes.append(f"require {text} was {one.word} ({one.said}), now {other.word} ({other.said})")
-        elif found := one or other:
-            said = f"require {text} is only in {(b if one is None else a).path}, {found.word} ({found.said})"
-            out.notes.append(said)
-            out.required_in_one.append(said)
+        verdict, other = before.get(text), now.get(text)
+        if verdict is not None and other is not None:
+            if verdict.word != other.word:
+                out.notes.append(f"require {text} was {verdict.word} ({verdict.said}), now {other.word} ({other.said})")
+        elif only := verdict or other:
+            note = f"require {text} is only in {(b if verdict is None else a).path}, {only.word} ({only.said})"
+            out.notes.append(note)
+            out.required_in_one.append(note)
 
 
 def _compare_evidence(a: ArchiveGroup, b: ArchiveGroup, now: Mapping[str, str], out: ExperimentDiff) -> None:
     """Pair the rows of both tables of evidence. now: the text in b of each common requirement of a"""
-    one, other = (requirement_evidence([group], str(group.path), several=True) for group in (a, b))
+    rows_a, other = (requirement_evidence([group], str(group.path), several=True) for group in (a, b))
     rows = {(row.requirement, row.at): row for row in other}
-    for row in one:
+    for row in rows_a:
         text = now.get(row.requirement, row.requirement)
         if (text, row.at) in rows:
             out.evidence.append(EvidenceDiff(row, rows[text, row.at]))
@@ -100,17 +100,21 @@ def _met(group: ArchiveGroup, cases: np.ndarray) -> dict[str, np.ndarray]:
     return {text: met[:, column] for column, text in enumerate(texts)} if met.shape[1] else {}
 
 
-def _unlike(one: requirements.GroupRequirement | None, other: requirements.GroupRequirement | None) -> bool:
+def _unlike(requirement: requirements.GroupRequirement | None, other: requirements.GroupRequirement | None) -> bool:
     """True if two requirements demand something different; those without a known limit differ only by their texts."""
-    return one is not None and other is not None and (one.comparison, one.limit) != (other.comparison, other.limit)
+    return (
+        requirement is not None
+        and other is not None
+        and (requirement.comparison, requirement.limit) != (other.comparison, other.limit)
+    )
 
 
 def _limits(
-    group: ArchiveGroup, one: requirements.GroupRequirement | None, other: requirements.GroupRequirement | None
+    group: ArchiveGroup, requirement: requirements.GroupRequirement | None, other: requirements.GroupRequirement | None
 ) -> tuple[str, str]:
     """The limits of two requirements in the deck's unit, where both have the same text, as `settle < longest`."""
-    if one is None or other is None or one.limit == other.limit:
+    if requirement is None or other is None or requirement.limit == other.limit:
         return "", ""
     scale, unit = deck_unit(group.variables[other.metric])
-    before, now = (f"{text} {unit}".rstrip() for text in distinct_texts(one.limit / scale, other.limit / scale))
+    before, now = (f"{text} {unit}".rstrip() for text in distinct_texts(requirement.limit / scale, other.limit / scale))
     return before, now

@@ -59,7 +59,8 @@ def match_cases(a: ArchiveGroup, b: ArchiveGroup) -> MatchedCases:
     by_a = np.argsort(found_a, kind="stable")
     found_a, found_b = found_a[by_a], found_b[by_a]
     only_a, only_b = (
-        np.flatnonzero(~np.isin(np.arange(len(keys)), found)) for keys, found in ((keys_a, found_a), (keys_b, found_b))
+        np.flatnonzero(~np.isin(np.arange(len(keys)), matched))
+        for keys, matched in ((keys_a, found_a), (keys_b, found_b))
     )
     return MatchedCases(found_a, found_b, only_a, only_b)
 
@@ -89,10 +90,10 @@ def match_instants(a: np.ndarray, b: np.ndarray, early: float) -> tuple[np.ndarr
         return np.arange(len(a)), np.arange(len(b))
     if not len(a) or not len(b):
         return np.empty(0, np.int64), np.empty(0, np.int64)
-    there = _nearest(a, b)
-    close = np.abs(b[there] - a) <= np.maximum(early, 1e-9 * np.maximum(np.abs(a), 1e-3))
-    close &= _nearest(b, a)[there] == np.arange(len(a))
-    return np.flatnonzero(close), there[close]
+    nearest = _nearest(a, b)
+    close = np.abs(b[nearest] - a) <= np.maximum(early, 1e-9 * np.maximum(np.abs(a), 1e-3))
+    close &= _nearest(b, a)[nearest] == np.arange(len(a))
+    return np.flatnonzero(close), nearest[close]
 
 
 def _nearest(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -17,19 +17,19 @@ LEVEL = 0.05
 """Probability, over all differences of an experiment, of calling one shown that is due to chance."""
 
 
-def judge_pairs(found: ExperimentDiff) -> None:
+def judge_pairs(experiment: ExperimentDiff) -> None:
     """Give requirements and metrics of an experiment the probability that pairs differ so one-sidedly by chance.
 
     One case is no sample, and requirements of which each version has another limit are not compared.
     """
-    if found.cases.count < 2:
+    if experiment.cases.count < 2:
         return
-    alike = [i for i, each in enumerate(found.requirements) if not each.other]
-    metrics = [signal for signal in found.signals if signal.metric and not signal.why]
-    pairs = [(found.requirements[i].gained, found.requirements[i].lost) for i in alike]
+    alike = [i for i, requirement in enumerate(experiment.requirements) if not requirement.other]
+    metrics = [signal for signal in experiment.signals if signal.metric and not signal.why]
+    pairs = [(experiment.requirements[i].gained, experiment.requirements[i].lost) for i in alike]
     pairs += [(metric.higher, metric.lower) for metric in metrics]
     chances = holm([sign_test(*pair) for pair in pairs])
     for i, chance in zip(alike, chances, strict=False):
-        found.requirements[i] = replace(found.requirements[i], chance=chance)
-    for each, chance in zip(metrics, chances[len(alike) :], strict=True):
-        each.chance = chance
+        experiment.requirements[i] = replace(experiment.requirements[i], chance=chance)
+    for metric, chance in zip(metrics, chances[len(alike) :], strict=True):
+        metric.chance = chance

@@ -53,13 +53,13 @@ def provenance_changes(
         meaning=(*causes, *(meaning or (() if causes else follows))),
         follows=tuple(follows) if meaning or causes else (),
         defaults=tuple(defaults),
-        structure=tuple(one.name for one, two in pairs if _unlike(one, two, "structure_key")),
-        code=tuple(one.name for one, two in pairs if _other_code(one.attributes, two.attributes)),
-        results=tuple((one.name, name) for one, two in pairs for name in _other_results(one, two)),
+        structure=tuple(group.name for group, two in pairs if _unlike(group, two, "structure_key")),
+        code=tuple(group.name for group, two in pairs if _other_code(group.attributes, two.attributes)),
+        results=tuple((group.name, name) for group, two in pairs for name in _other_results(group, two)),
         kept=tuple(
-            f"histories of `{two.name}`: {_precision(one)}, now {_precision(two)}"
-            for one, two in pairs
-            if one.single != two.single
+            f"histories of `{two.name}`: {_precision(group)}, now {_precision(two)}"
+            for group, two in pairs
+            if group.single != two.single
         ),
     )
 
@@ -70,8 +70,8 @@ def _precision(group: ArchiveGroup) -> str:
 
 def _other_code(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
     """True if two code keys differ; False where one archive has none, or one of another kind."""
-    one, two = a.get("code_key"), b.get("code_key")
-    return comparable(one, two) and one != two
+    code_a, two = a.get("code_key"), b.get("code_key")
+    return comparable(code_a, two) and code_a != two
 
 
 def _other_results(a: ArchiveGroup, b: ArchiveGroup) -> Iterator[str]:
@@ -85,17 +85,22 @@ def _other_results(a: ArchiveGroup, b: ArchiveGroup) -> Iterator[str]:
 
 def _unlike(a: ArchiveGroup, b: ArchiveGroup, name: str) -> bool:
     """True if both groups have this attribute, with different values."""
-    one, two = a.attributes.get(name), b.attributes.get(name)
-    return one is not None and two is not None and one != two
+    value_a, two = a.attributes.get(name), b.attributes.get(name)
+    return value_a is not None and two is not None and value_a != two
 
 
 def _versions(a: ArchiveFile, b: ArchiveFile) -> list[str]:
-    one, two = a.provenance, b.provenance
+    versions_a, two = a.provenance, b.provenance
     out = []
-    for name in sorted({*one, *two}):
-        if name.startswith("version_") and one.get(name) != two.get(name):
-            out.append(f"{name.removeprefix('version_')} {one.get(name, 'unknown')}, now {two.get(name, 'unknown')}")
-    commits = [(str(each.get("git_commit", "unknown")), str(each.get("git_dirty", "unknown"))) for each in (one, two)]
+    for name in sorted({*versions_a, *two}):
+        if name.startswith("version_") and versions_a.get(name) != two.get(name):
+            out.append(
+                f"{name.removeprefix('version_')} {versions_a.get(name, 'unknown')}, now {two.get(name, 'unknown')}"
+            )
+    commits = [
+        (str(versions.get("git_commit", "unknown")), str(versions.get("git_dirty", "unknown")))
+        for versions in (versions_a, two)
+    ]
     if commits[0] != commits[1]:
         out.append("MET's commit " + ", now ".join(f"{commit[:10]}{_dirty(dirty)}" for commit, dirty in commits))
     elif commits[0][1] == "yes":
@@ -105,9 +110,9 @@ def _versions(a: ArchiveFile, b: ArchiveFile) -> list[str]:
 
 def _defines(a: ArchiveFile, b: ArchiveFile) -> Iterator[str]:
     """Differences of the `-D` options."""
-    one, two = (str(each.provenance.get("defines") or "nothing") for each in (a, b))
-    if one != two:
-        yield f"-D {one} -> {two}"
+    defines_a, two = (str(archive.provenance.get("defines") or "nothing") for archive in (a, b))
+    if defines_a != two:
+        yield f"-D {defines_a} -> {two}"
 
 
 def _dirty(dirty: str) -> str:
@@ -122,24 +127,26 @@ def _meaning(
     before, now = plans
     if isinstance(before, str) or isinstance(now, str):
         return [f"the plan cannot be read here: {why}" for why in plans if isinstance(why, str)], [], []
-    several = [(one.name, two.name) for one, two in pairs if one.name in _names(before) and two.name in _names(now)]
-    of: dict[tuple[int, str], list[str]] = {}
-    for one, two in several:
-        old, new = _experiment(before, one), _experiment(now, two)
+    several = [
+        (group.name, two.name) for group, two in pairs if group.name in _names(before) and two.name in _names(now)
+    ]
+    names_of: dict[tuple[int, str], list[str]] = {}
+    for name_a, two in several:
+        old, new = _experiment(before, name_a), _experiment(now, two)
         fresh = {
             path: quantity
             for path, quantity in new.parameters.items()
             if path not in old.parameters and quantity.origin.kind == "default"
         }
-        for each in between(old, new, ordered=False):
-            path = each.text.partition(" is new")[0]
-            kind = 2 if path in fresh and not each.follows else int(_follows(each, texts))
-            text = f"{path} is new, at its default{each.text.partition(' is new')[2].replace(':', ',', 1)}"
-            of.setdefault((kind, text if kind == 2 else each.text), []).append(two)
+        for change in between(old, new, ordered=False):
+            path = change.text.partition(" is new")[0]
+            kind = 2 if path in fresh and not change.follows else int(_follows(change, texts))
+            text = f"{path} is new, at its default{change.text.partition(' is new')[2].replace(':', ',', 1)}"
+            names_of.setdefault((kind, text if kind == 2 else change.text), []).append(two)
         for line in _tolerances(old, new):
-            of.setdefault((0, line), []).append(two)
+            names_of.setdefault((0, line), []).append(two)
     out: tuple[list[str], list[str], list[str]] = ([], [], [])
-    for (kind, line), names in of.items():
+    for (kind, line), names in names_of.items():
         whole = len(names) == len(several)
         out[kind].extend([line] if whole else [f"{name}: {line}" for name in names])
     return out
@@ -162,9 +169,9 @@ def _names(plan: Plan) -> set[str]:
 
 def _tolerances(before: Experiment, now: Experiment) -> Iterator[str]:
     """Changes of tolerances, which change no number but its verdict."""
-    old, new = ({tolerance.of: tolerance for tolerance in one.tolerances} for one in (before, now))
+    old, new = ({tolerance.of: tolerance for tolerance in experiment.tolerances} for experiment in (before, now))
     for name in dict.fromkeys([*old, *new]):
-        texts = [one[name].text if name in one else "none" for one in (old, new)]
+        texts = [side[name].text if name in side else "none" for side in (old, new)]
         if name not in old or name not in new or old[name].value != new[name].value:
             yield f"tolerances.{name}: {texts[0]} -> {texts[1]}"
 

@@ -205,15 +205,15 @@ class ExperimentDiff:
     @property
     def of_values(self) -> str:
         """The verdict on cases, their endings and values, without requirements."""
-        found = [signal.verdict for signal in self.signals]
+        verdicts = [signal.verdict for signal in self.signals]
         if self.ended or self.only_a or self.only_b:
-            found.append(DIFFERENT)
+            verdicts.append(DIFFERENT)
         if not any(signal.compared for signal in self.signals):
-            found.append(INCOMPARABLE)
-        worst = max(found, key=VERDICTS.index)
+            verdicts.append(INCOMPARABLE)
+        worst = max(verdicts, key=VERDICTS.index)
         if worst == IDENTICAL and self.partial:
             return EQUIVALENT
-        return DIFFERENT if worst == INCOMPARABLE and DIFFERENT in found else worst
+        return DIFFERENT if worst == INCOMPARABLE and DIFFERENT in verdicts else worst
 
 
 @frozen
@@ -238,9 +238,9 @@ class Diff:
     @property
     def of_values(self) -> str:
         """The verdict on everything but requirements."""
-        found = [experiment.of_values for experiment in self.experiments]
-        if not found:
+        verdicts = [experiment.of_values for experiment in self.experiments]
+        if not verdicts:
             return INCOMPARABLE
-        if DIFFERENT in found or self.only_a or self.only_b:
+        if DIFFERENT in verdicts or self.only_a or self.only_b:
             return DIFFERENT
-        return max(found, key=VERDICTS.index)
+        return max(verdicts, key=VERDICTS.index)

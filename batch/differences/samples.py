@@ -46,7 +46,7 @@ def samples(a: ArchiveGroup, b: ArchiveGroup) -> list[MetricSamples]:
     """Every metric that both have, in the order of the first."""
     from scipy.stats import ks_2samp
 
-    found = []
+    rows = []
     for variable in a.role("metric"):
         if variable.name not in b.variables or b.variables[variable.name].role != "metric":
             continue
@@ -59,9 +59,9 @@ def samples(a: ArchiveGroup, b: ArchiveGroup) -> list[MetricSamples]:
         if min(sizes) > 0:
             result: Any = ks_2samp(finite[0], finite[1], method="auto" if max(sizes) <= 10_000 else "asymp")
             distance, chance = float(result.statistic), float(result.pvalue)
-        found.append((variable, sizes, medians, lost, distance, chance))
-    corrected = holm([each[-1] for each in found])
+        rows.append((variable, sizes, medians, lost, distance, chance))
+    corrected = holm([row[-1] for row in rows])
     return [
         MetricSamples(variable.name, variable.unit, sizes, (medians[0], medians[1]), lost, distance, chance)
-        for (variable, sizes, medians, lost, distance, _), chance in zip(found, corrected, strict=True)
+        for (variable, sizes, medians, lost, distance, _), chance in zip(rows, corrected, strict=True)
     ]

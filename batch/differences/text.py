@@ -31,23 +31,23 @@ class Shortening:
         return [*lines[: len(lines) - left], *([f"{indent}and {left:,} more: {self.remedy}"] if left else [])]
 
 
-def diff_lines(found: Diff, cut: Shortening | None = None) -> list[str]:
+def diff_lines(difference: Diff, cut: Shortening | None = None) -> list[str]:
     """The whole comparison in lines, for people; a line about omitted parts says how to see them."""
     cut = cut or Shortening()
-    out = [f"a  {found.a}", f"b  {found.b}", *_changed(found, cut)]
-    for line in words.unmatched_runs(found):
+    out = [f"a  {difference.a}", f"b  {difference.b}", *_changed(difference, cut)]
+    for line in words.unmatched_runs(difference):
         out += ["", line]
-    for experiment in found.experiments:
-        out += ["", *_experiment(found, experiment, cut)]
-    return [*out, "", words.verdict(found)]
+    for experiment in difference.experiments:
+        out += ["", *_experiment(difference, experiment, cut)]
+    return [*out, "", words.verdict(difference)]
 
 
-def _changed(found: Diff, cut: Shortening) -> Iterator[str]:
-    made = words.provenance_lines(found)
+def _changed(difference: Diff, cut: Shortening) -> Iterator[str]:
+    lines_of = words.provenance_lines(difference)
     yield ""
-    if not made:
+    if not lines_of:
         yield words.SAME
-    for kind, lines in made:
+    for kind, lines in lines_of:
         short = lines if cut.every else _shortened(lines)
         for line in cut.cut(short, OF_KIND.get(kind, MOST_LINES), ""):
             yield f"  {'' if line.startswith(' ') else kind:<10} {line}"
@@ -59,14 +59,14 @@ def _shortened(lines: Sequence[str]) -> list[str]:
     out = list(lines)
     for gone, new in _counterparts(lines):
         out[gone], out[new] = _around(lines[gone], lines[new], LONGEST, len("  -"))
-    for number, each in enumerate(out):
-        before, arrow, now = each.partition(" -> ")
-        if len(each) > LONGEST + len(" ... ") * 2 and arrow and " -> " not in now:
+    for number, line in enumerate(out):
+        before, arrow, now = line.partition(" -> ")
+        if len(line) > LONGEST + len(" ... ") * 2 and arrow and " -> " not in now:
             head = before.rfind(": ") + len(": ") if ": " in before else 0
-            one, other = _around(before[head:], now, LONGEST // 2, 0)
-            out[number] = each = f"{before[:head]}{one}{arrow}{other}"
-        elif each == lines[number] and len(each) > LONGEST:
-            out[number] = f"{each[:LONGEST]} ..."
+            first, other = _around(before[head:], now, LONGEST // 2, 0)
+            out[number] = line = f"{before[:head]}{first}{arrow}{other}"
+        elif line == lines[number] and len(line) > LONGEST:
+            out[number] = f"{line[:LONGEST]} ..."
     return out
 
 
@@ -74,51 +74,51 @@ def _counterparts(lines: Sequence[str]) -> Iterator[tuple[int, int]]:
     """The numbers of the `-` and `+` lines of a deck's difference that stand for each other, in their order."""
     gone: list[int] = []
     new: list[int] = []
-    for number, each in enumerate([*lines, ""]):
-        if each.startswith("  -") and not new:
+    for number, line in enumerate([*lines, ""]):
+        if line.startswith("  -") and not new:
             gone.append(number)
-        elif each.startswith("  +"):
+        elif line.startswith("  +"):
             new.append(number)
         else:
             yield from zip(gone, new, strict=False)
-            gone, new = ([number], []) if each.startswith("  -") else ([], [])
+            gone, new = ([number], []) if line.startswith("  -") else ([], [])
 
 
-def _around(one: str, other: str, most: int, head: int) -> tuple[str, str]:
+def _around(line: str, other: str, most: int, head: int) -> tuple[str, str]:
     """Two lines, each cut to `most` characters about the first difference behind the head."""
-    both = one[head:], other[head:]
+    both = line[head:], other[head:]
     first = next((i for i, (x, y) in enumerate(zip(*both, strict=False)) if x != y), min(map(len, both)))
     begin = head + max(0, first - most // 3)
-    if max(len(one), len(other)) <= most:
-        return one, other
+    if max(len(line), len(other)) <= most:
+        return line, other
     if first + most // 3 < most - head:
         begin = head
-    made = []
-    for each in (one, other):
+    pieces = []
+    for text in (line, other):
         before = "... " if begin > head else ""
-        after = " ..." if len(each) > begin + most else ""
-        made.append(f"{each[:head]}{before}{each[begin : begin + most]}{after}")
-    return made[0], made[1]
+        after = " ..." if len(text) > begin + most else ""
+        pieces.append(f"{text[:head]}{before}{text[begin : begin + most]}{after}")
+    return pieces[0], pieces[1]
 
 
-def _experiment(found: Diff, experiment: ExperimentDiff, cut: Shortening) -> list[str]:
-    out = [words.heading(experiment), *(f"  {line}" for line in words.unmatched_cases(found, experiment))]
+def _experiment(difference: Diff, experiment: ExperimentDiff, cut: Shortening) -> list[str]:
+    out = [words.heading(experiment), *(f"  {line}" for line in words.unmatched_cases(difference, experiment))]
     out += _ended(experiment, cut)
     out += [f"  note: {note}" for note in experiment.notes]
-    out += [f"  {line}" for line in words.tolerance_lines(found, experiment)]
+    out += [f"  {line}" for line in words.tolerance_lines(difference, experiment)]
     out += [f"  {line}" for line in words.requirement_lines(experiment)]
     out += _evidence(experiment, cut)
     out += _signals(experiment.signals)
     out += _paired(experiment)
     out += _samples(experiment)
-    out += _worst(found, experiment, cut)
+    out += _worst(difference, experiment, cut)
     return out
 
 
 def _evidence(experiment: ExperimentDiff, cut: Shortening) -> list[str]:
     """Lines on requirements over a share of cases whose evidence has changed."""
-    both = [f"    {what}\n      {said}" for what, said in words.evidence_pairs(experiment)]
-    lines = [line for each in cut.cut(both, SHOWN_EVIDENCE, "    ") for line in each.split("\n")]
+    both = [f"    {what}\n      {text}" for what, text in words.evidence_pairs(experiment)]
+    lines = [line for block in cut.cut(both, SHOWN_EVIDENCE, "    ") for line in block.split("\n")]
     return [f"  {words.EVIDENCE}:", *lines] if lines else []
 
 
@@ -126,25 +126,25 @@ def _ended(experiment: ExperimentDiff, cut: Shortening) -> Iterator[str]:
     """Cases that end otherwise, in kinds."""
     for ending in words.endings(experiment):
         yield f"  {ending.text}: {ending.cases}"
-        each = [f"    #{case.case} {case.case_id[:8]}  {words.cause(case)}" for case in ending.each]
-        yield from cut.cut(each, SHOWN_ENDED, "    ")
+        cases = [f"    #{case.case} {case.case_id[:8]}  {words.cause(case)}" for case in ending.each]
+        yield from cut.cut(cases, SHOWN_ENDED, "    ")
 
 
 def _signals(signals: Sequence[SignalDiff]) -> list[str]:
     if not signals:
         return []
-    found = [words.signal_row(signal) for signal in signals]
+    rows = [words.signal_row(signal) for signal in signals]
     heads: list[str] = []
     fields: list[str] = []
     right: list[int] = []
-    for column in words.signal_columns(found):
+    for column in words.signal_columns(rows):
         right += [len(fields)] if column.kind == "number" else []
         heads.append(column.head)
         fields.append(column.field)
-        if column.unit and any(getattr(row, column.unit) for row in found):  # in a column of its own
+        if column.unit and any(getattr(row, column.unit) for row in rows):  # in a column of its own
             heads.append("")
             fields.append(column.unit)
-    return columns([heads, *([getattr(row, field) for field in fields] for row in found)], right=right)
+    return columns([heads, *([getattr(row, field) for field in fields] for row in rows)], right=right)
 
 
 def _paired(experiment: ExperimentDiff) -> list[str]:
@@ -163,13 +163,13 @@ def _samples(experiment: ExperimentDiff) -> list[str]:
     return ["", *columns(rows, right=range(1, 7)), *([f"  {note}"] if note else [])]
 
 
-def _worst(found: Diff, experiment: ExperimentDiff, cut: Shortening) -> list[str]:
+def _worst(difference: Diff, experiment: ExperimentDiff, cut: Shortening) -> list[str]:
     if not experiment.worst:
         return []
     out = []
-    for worst_case in words.worst_cases(found, experiment):
+    for worst_case in words.worst_cases(difference, experiment):
         now = f"{worst_case.now} {worst_case.unit}".rstrip()
         first = f"    #{worst_case.case} {worst_case.id}  {worst_case.what}: {worst_case.before}, now {now}"
         out.append(f"{first}\n      {'; '.join(worst_case.commands)}")
     few = cut.cut(out, SHOWN_WORST, "    ")
-    return ["", f"  {words.WORST}:", *(line for each in few for line in each.split("\n"))]
+    return ["", f"  {words.WORST}:", *(line for block in few for line in block.split("\n"))]

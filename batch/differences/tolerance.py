@@ -68,7 +68,11 @@ class Tolerances:
 
     def within(self, known: Mapping[str, Sequence[str]]) -> Tolerances:
         """The tolerances without those of a quantity with another unit here. known: as for `check`"""
-        fit = {name: each for name, each in self.absolute.items() if name not in known or fits(each[1], known[name])}
+        fit = {
+            name: size_text
+            for name, size_text in self.absolute.items()
+            if name not in known or fits(size_text[1], known[name])
+        }
         return replace(self, absolute=fit)
 
     def said(self, names: Mapping[str, str]) -> dict[str, str]:
@@ -88,14 +92,14 @@ def of_deck(experiment: Experiment, group: ArchiveGroup) -> Tolerances:
     """The tolerances of an archive's deck. group: of the archive, in which a metric may have another name"""
     metrics = {variable.path: variable.name for variable in group.role("metric")}
     signals = {recorded.name for recorded in experiment.structure.record}
-    found = {tolerance.of: tolerance for tolerance in experiment.tolerances}
+    by_name = {tolerance.of: tolerance for tolerance in experiment.tolerances}
     absolute = {}
-    for name, each in found.items():
+    for name, tolerance in by_name.items():
         if name not in OF_ALL:
             metric = name.removeprefix("metrics.")
             known = name if name in signals or metric not in metrics else metrics[metric]
-            absolute[known] = (each.value, each.text)
-    of_all = {name: found[name].value if name in found else None for name in OF_ALL}
+            absolute[known] = (tolerance.value, tolerance.text)
+    of_all = {name: by_name[name].value if name in by_name else None for name in OF_ALL}
     return Tolerances(of_all["rel"], of_all["time"], absolute)
 
 
@@ -135,13 +139,16 @@ def fits(written: str, known: Sequence[str]) -> bool:
     return not others and units.same(parse_unit(unit or "1").dimension, parse_unit(wanted or "1").dimension)
 
 
-def check(found: Tolerances, known: Mapping[str, Sequence[str]], shown: Sequence[str]) -> None:
+def check(checked: Tolerances, known: Mapping[str, Sequence[str]], known_names: Sequence[str]) -> None:
     """Check that every tolerance of the command line names a quantity, and has its unit. known: SI units by the names
     of signals, joints' parts of them and metrics, several where a signal's joints have several. Raises E360."""
-    for name, (_, written) in found.absolute.items():
+    for name, (_, written) in checked.absolute.items():
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1)
-            helps = [*(f"did you mean `{each}`?" for each in near), f"signals and metrics here: {', '.join(shown)}"]
+            helps = [
+                *(f"did you mean `{name_}`?" for name_ in near),
+                f"signals and metrics here: {', '.join(known_names)}",
+            ]
             raise _wrong(f"tolerance of `{name}`: neither archive has such a signal or metric", *helps)
         if len(known[name]) > 1:
             parts = [part for part in known if part.endswith(f".{name}")]

@@ -30,12 +30,12 @@ SMALLEST = 1e-9
 SAME = "made from the same: deck, parameters, models and versions"
 
 
-def provenance_lines(found: Diff) -> list[tuple[str, tuple[str, ...]]]:
+def provenance_lines(difference: Diff) -> list[tuple[str, tuple[str, ...]]]:
     """Differences in provenance: kind and lines of each, causes before effects. An indented line belongs to the one
     above."""
-    changed = found.changed
+    changed = difference.changed
     why = ": constants are part of it" if changed.meaning or changed.structure else ""
-    said = [
+    lines_of = [
         ("versions", changed.versions),
         ("deck", tuple(text for deck in changed.decks for text in (deck.said, *(f"  {line}" for line in deck.lines)))),
         ("changed", changed.meaning),
@@ -51,12 +51,12 @@ def provenance_lines(found: Diff) -> list[tuple[str, tuple[str, ...]]]:
         ),
         ("kept", changed.kept),
     ]
-    return [(kind, tuple(map(visible, lines))) for kind, lines in said if lines]
+    return [(kind, tuple(map(visible, lines))) for kind, lines in lines_of if lines]
 
 
-def unmatched_runs(found: Diff) -> list[str]:
+def unmatched_runs(difference: Diff) -> list[str]:
     """Runs and sweeps that only one archive has."""
-    both = ((found.only_a, found.a), (found.only_b, found.b))
+    both = ((difference.only_a, difference.a), (difference.only_b, difference.b))
     return [f"`{name}` is only in {where}" for names, where in both for name in names]
 
 
@@ -69,19 +69,19 @@ def heading(experiment: ExperimentDiff) -> str:
     return f"{' and '.join(names)}: {count:,} case{'s' if count != 1 else ''} in both, {how}"
 
 
-def unmatched_cases(found: Diff, experiment: ExperimentDiff) -> list[str]:
+def unmatched_cases(difference: Diff, experiment: ExperimentDiff) -> list[str]:
     """Cases that only one archive has."""
     return [
         f"{len(cases):,} case{'s' if len(cases) > 1 else ''} only in {where}: {ranges(cases)}"
-        for cases, where in ((experiment.only_a, found.a), (experiment.only_b, found.b))
+        for cases, where in ((experiment.only_a, difference.a), (experiment.only_b, difference.b))
         if cases
     ]
 
 
-def tolerance_lines(found: Diff, experiment: ExperimentDiff) -> list[str]:
+def tolerance_lines(difference: Diff, experiment: ExperimentDiff) -> list[str]:
     """The tolerances, and their sources."""
-    mine, every = set(found.tolerances.words()), experiment.tolerances.words()
-    both = (("the deck of b", [each for each in every if each not in mine]), ("--tol", sorted(mine & set(every))))
+    mine, every = set(difference.tolerances.words()), experiment.tolerances.words()
+    both = (("the deck of b", [word for word in every if word not in mine]), ("--tol", sorted(mine & set(every))))
     return [f"{who} allows {', '.join(what)}" for who, what in both if what]
 
 
@@ -99,24 +99,29 @@ def requirement_lines(experiment: ExperimentDiff) -> list[str]:
 def evidence_pairs(experiment: ExperimentDiff) -> list[tuple[str, str]]:
     """Requirements over a share of cases whose evidence has changed, and the change."""
     lines = []
-    for each in experiment.evidence:
-        before, now = texts_of(each.before), texts_of(each.now)
+    for change in experiment.evidence:
+        before, now = texts_of(change.before), texts_of(change.now)
         named = (("", "verdict"), ("of all cases ", "of_all"), ("margin ", "margin"), ("in sigmas ", "sigmas"))
         pairs = [(name, getattr(before, field), getattr(now, field)) for name, field in named]
-        if each.now.share is None or all(one == other for _, one, other in pairs):
+        if change.now.share is None or all(before_text == other for _, before_text, other in pairs):
             continue
-        said = [f"{name}{one}" if one == other else f"{name}{one}, now {other}" for name, one, other in pairs]
-        at = f", {each.now.at}" if each.now.at else ""
-        lines.append((f"{each.now.requirement}{at}", "; ".join(said)))
+        texts = [
+            f"{name}{before_text}" if before_text == other else f"{name}{before_text}, now {other}"
+            for name, before_text, other in pairs
+        ]
+        condition = f", {change.now.at}" if change.now.at else ""
+        lines.append((f"{change.now.requirement}{condition}", "; ".join(texts)))
     return lines
 
 
-def pairs_text(each: RequirementDiff) -> str:
+def pairs_text(requirement: RequirementDiff) -> str:
     """The end of a line: the number of cases that meet it in only one archive, where that says more than how many meet
     it in each, and whether it is more than chance, where cases were drawn."""
-    if not each.gained + each.lost or (math.isnan(each.chance) and not each.gained * each.lost):
+    if not requirement.gained + requirement.lost or (
+        math.isnan(requirement.chance) and not requirement.gained * requirement.lost
+    ):
         return ""
-    return f"; {each.gained:,} gained, {each.lost:,} lost{_chance(each.chance)}"
+    return f"; {requirement.gained:,} gained, {requirement.lost:,} lost{_chance(requirement.chance)}"
 
 
 def paired_metrics(experiment: ExperimentDiff) -> list[str]:
@@ -139,16 +144,20 @@ def _chance(chance: float) -> str:
     return f": {'shown' if chance < paired.LEVEL else 'not shown'} (p {size})"
 
 
-def requirement_text(each: RequirementDiff) -> str:
+def requirement_text(requirement: RequirementDiff) -> str:
     """A requirement, with its former text where it has changed."""
-    before, now = each.limits
-    text = each.now if each.before == each.now else f"{each.now} (before: {each.before})"
+    before, now = requirement.limits
+    text = (
+        requirement.now
+        if requirement.before == requirement.now
+        else f"{requirement.now} (before: {requirement.before})"
+    )
     return f"{text} (limit before: {before}, now: {now})" if now else text
 
 
-def met_by_text(before: int, now: int, of: int) -> str:
+def met_by_text(before: int, now: int, total: int) -> str:
     """The numbers of common cases that meet a requirement, in words."""
-    return f"met by {before:,}, now by {now:,} of {of:,}"
+    return f"met by {before:,}, now by {now:,} of {total:,}"
 
 
 @frozen
@@ -163,12 +172,12 @@ class Ending:
 def endings(experiment: ExperimentDiff) -> list[Ending]:
     """Group the cases with another ending by the change; those that fail now come first."""
     kinds: dict[str, list[EndingDiff]] = {}
-    for each in experiment.ended:
-        kinds.setdefault(_kind(each), []).append(each)
+    for ending in experiment.ended:
+        kinds.setdefault(_kind(ending), []).append(ending)
     order = sorted(kinds, key=lambda kind: not kind.startswith(("fail", "are timed", "are lost")))
     return [
         Ending(
-            f"{len(cases):,} case{'s' if len(cases) > 1 else ''} {_one(kind, len(cases))}",
+            f"{len(cases):,} case{'s' if len(cases) > 1 else ''} {_of_one(kind, len(cases))}",
             ranges(sorted(case.case for case in cases)),
             tuple(cases),
         )
@@ -176,23 +185,23 @@ def endings(experiment: ExperimentDiff) -> list[Ending]:
     ]
 
 
-def _kind(each: EndingDiff) -> str:
-    if each.before == each.after:
-        return f"{STATUS.get(each.after, 'failed')} earlier or later"
-    if each.before == 0:
-        return "fail that did not" if each.after == 1 else f"are {STATUS.get(each.after, 'failed')} that were done"
-    if each.after == 0:
-        return "are done that failed" if each.before == 1 else f"are done that were {STATUS[each.before]}"
-    return f"are {STATUS.get(each.after)} that were {STATUS.get(each.before)}"
+def _kind(ending: EndingDiff) -> str:
+    if ending.before == ending.after:
+        return f"{STATUS.get(ending.after, 'failed')} earlier or later"
+    if ending.before == 0:
+        return "fail that did not" if ending.after == 1 else f"are {STATUS.get(ending.after, 'failed')} that were done"
+    if ending.after == 0:
+        return "are done that failed" if ending.before == 1 else f"are done that were {STATUS[ending.before]}"
+    return f"are {STATUS.get(ending.after)} that were {STATUS.get(ending.before)}"
 
 
-def _one(kind: str, count: int) -> str:
+def _of_one(kind: str, count: int) -> str:
     return kind if count > 1 else kind.replace("fail that", "fails that").replace("are ", "is ").replace("were", "was")
 
 
-def cause(each: EndingDiff) -> str:
+def cause(ending: EndingDiff) -> str:
     """The cause of the ending, now or before."""
-    return f"{'' if each.after else 'before: '}{each.cause_after or each.cause_before}"
+    return f"{'' if ending.after else 'before: '}{ending.cause_after or ending.cause_before}"
 
 
 @frozen
@@ -307,21 +316,21 @@ def step_error_note(experiment: ExperimentDiff) -> str:
     names = [f"`{signal.name}`" for signal in experiment.signals if signal.within_step_error]
     if not names:
         return ""
-    one = len(names) == 1
-    said = "differs by no more than its error" if one else "differ by no more than their errors"
-    return f"{', '.join(names)} {said} by the step: with shorter steps the difference may be another"
+    single = len(names) == 1
+    verb = "differs by no more than its error" if single else "differ by no more than their errors"
+    return f"{', '.join(names)} {verb} by the step: with shorter steps the difference may be another"
 
 
 def _tolerance(signal: SignalDiff) -> str:
-    given = signal.tolerance
+    tolerance = signal.tolerance
     words = [f"{joint} {text}".lstrip() for joint, text in signal.said.items()]
     if len(words) > 1 or any(signal.said):
         words = [f"({', '.join(words)})"]
-    if given.relative:
-        words.append(f"rel {given.relative:g}")
+    if tolerance.relative:
+        words.append(f"rel {tolerance.relative:g}")
     of_size = bool(words)
-    if given.time:
-        words.append(f"time {given.time:g} s")
+    if tolerance.time:
+        words.append(f"time {tolerance.time:g} s")
     return " + ".join(words) + (_used(signal.used) if of_size else "")
 
 
@@ -361,10 +370,10 @@ DISTRIBUTION_HEADS = (
 """The heads of the table of distributions: in the terminal, and in the report."""
 
 
-def distribution(each: MetricSamples) -> Distribution:
-    chance = f"{each.probability:.2g}" + (" *" if each.unlike else "")
-    cases, medians = [f"{count:,}" for count in each.cases], [number_text(median) for median in each.medians]
-    return Distribution(each.name, (cases[0], cases[1]), (medians[0], medians[1]), f"{each.distance:.3g}", chance)
+def distribution(metric: MetricSamples) -> Distribution:
+    chance = f"{metric.probability:.2g}" + (" *" if metric.unlike else "")
+    cases, medians = [f"{count:,}" for count in metric.cases], [number_text(median) for median in metric.medians]
+    return Distribution(metric.name, (cases[0], cases[1]), (medians[0], medians[1]), f"{metric.distance:.3g}", chance)
 
 
 def star_note(experiment: ExperimentDiff) -> str:
@@ -396,24 +405,24 @@ class WorstCase:
     commands: tuple[str, str]
 
 
-def worst_cases(found: Diff, experiment: ExperimentDiff) -> list[WorstCase]:
+def worst_cases(difference: Diff, experiment: ExperimentDiff) -> list[WorstCase]:
     """The cases that differ most, the first ones first."""
     out = []
-    for each in experiment.worst:
-        where = f" of {each.place.label}" if each.place.label else ""
-        when = f" at {each.place.time:g} s" if each.place.time == each.place.time else ""
-        before, now = distinct_texts(each.place.before / each.deck_scale, each.place.after / each.deck_scale)
-        what, commands = f"{each.signal}{where}{when}", replay_commands(found, experiment, each)
-        out.append(WorstCase(each.case_b, each.case_id[:8], what, before, now, each.deck_unit, commands))
+    for ranked in experiment.worst:
+        where = f" of {ranked.place.label}" if ranked.place.label else ""
+        when = f" at {ranked.place.time:g} s" if ranked.place.time == ranked.place.time else ""
+        before, now = distinct_texts(ranked.place.before / ranked.deck_scale, ranked.place.after / ranked.deck_scale)
+        what, commands = f"{ranked.signal}{where}{when}", replay_commands(difference, experiment, ranked)
+        out.append(WorstCase(ranked.case_b, ranked.case_id[:8], what, before, now, ranked.deck_unit, commands))
     return out
 
 
-def replay_commands(found: Diff, experiment: ExperimentDiff, each: RankedCase) -> tuple[str, str]:
+def replay_commands(difference: Diff, experiment: ExperimentDiff, ranked: RankedCase) -> tuple[str, str]:
     """The commands that run a case of both archives again."""
-    several = len(found.experiments) + len(found.only_a) + len(found.only_b) > 1
+    several = len(difference.experiments) + len(difference.only_a) + len(difference.only_b) > 1
     return (
-        _again(found.a, experiment.name_a if several else "", each.case_a),
-        _again(found.b, experiment.name_b if several else "", each.case_b),
+        _again(difference.a, experiment.name_a if several else "", ranked.case_a),
+        _again(difference.b, experiment.name_b if several else "", ranked.case_b),
     )
 
 
@@ -434,19 +443,19 @@ MOST_REQUIREMENTS = 3
 """Largest number of requirements that the verdict names."""
 
 
-def verdict(found: Diff) -> str:
+def verdict(difference: Diff) -> str:
     """The verdict in a sentence: on values, and first on changed requirements."""
-    others = [text for experiment in found.experiments for text in _other_requirements(experiment)]
+    others = [text for experiment in difference.experiments for text in _other_requirements(experiment)]
     if not others:
-        return _of_values(found)
+        return _of_values(difference)
     left = len(others) - MOST_REQUIREMENTS
-    said = ", ".join([*others[:MOST_REQUIREMENTS], *([f"and {left:,} more"] if left > 0 else [])])
-    return f"{DIFFERENT}; requirements differ: {said}; values: {_of_values(found)}"
+    requirements_text = ", ".join([*others[:MOST_REQUIREMENTS], *([f"and {left:,} more"] if left > 0 else [])])
+    return f"{DIFFERENT}; requirements differ: {requirements_text}; values: {_of_values(difference)}"
 
 
 def _other_requirements(experiment: ExperimentDiff) -> list[str]:
     """The changed requirements: `settle < 10 s -> settle < 1 s (30 of 36 cases no longer meet it)`."""
-    out, of = [], f" of {experiment.cases.count:,}"
+    out, of_all = [], f" of {experiment.cases.count:,}"
     for requirement in experiment.requirements:
         if requirement.other:
             before, now = requirement.limits
@@ -454,7 +463,7 @@ def _other_requirements(experiment: ExperimentDiff) -> list[str]:
                 f"{requirement.now}, limit {before} -> {now}" if now else f"{requirement.before} -> {requirement.now}"
             )
             moved = [
-                f"{count:,}{of} cases {text}"
+                f"{count:,}{of_all} cases {text}"
                 for count, text in ((requirement.lost, "no longer meet it"), (requirement.gained, "meet it now"))
                 if count
             ]
@@ -462,39 +471,39 @@ def _other_requirements(experiment: ExperimentDiff) -> list[str]:
     return [*out, *(text.removeprefix("require ") for text in experiment.required_in_one)]
 
 
-def _of_values(found: Diff) -> str:
+def _of_values(difference: Diff) -> str:
     """The verdict on everything but requirements."""
-    of_values = found.of_values
-    said = {
+    of_values = difference.of_values
+    text = {
         IDENTICAL: "identical, to the bit",
         EQUIVALENT: "equivalent: bits differ, and no value by more than its tolerance",
         DIFFERENT: "different",
         INCOMPARABLE: "incomparable",
     }[of_values]
     if of_values == EQUIVALENT and not any(
-        signal.equivalent for experiment in found.experiments for signal in experiment.signals
+        signal.equivalent for experiment in difference.experiments for signal in experiment.signals
     ):
         return "equivalent: identical, to the bit, in what both have"
-    signals = [signal for experiment in found.experiments for signal in experiment.signals]
+    signals = [signal for experiment in difference.experiments for signal in experiment.signals]
     lost = sum(signal.verdict == INCOMPARABLE for signal in signals)
     if of_values == INCOMPARABLE and lost < len(signals):
         return f"incomparable: {lost} of {len(signals)} signals and metrics; no other is different"
-    given = any(experiment.tolerances.given for experiment in found.experiments)
+    has_tolerances = any(experiment.tolerances.given for experiment in difference.experiments)
     of_size = of_values == EQUIVALENT or any(signal.different for signal in signals)
-    if of_values == DIFFERENT and (others := _beyond_any_tolerance(found)):
-        said += f": {'; '.join([*others, *(['values differ'] if of_size else [])])}"
-    if of_size and not given:
-        said += "; no tolerance was given"
-    return said
+    if of_values == DIFFERENT and (others := _beyond_any_tolerance(difference)):
+        text += f": {'; '.join([*others, *(['values differ'] if of_size else [])])}"
+    if of_size and not has_tolerances:
+        text += "; no tolerance was given"
+    return text
 
 
-def _beyond_any_tolerance(found: Diff) -> list[str]:
+def _beyond_any_tolerance(difference: Diff) -> list[str]:
     """Name the differences that are not of values: runs and cases that one archive has alone, and how cases end."""
-    out = unmatched_runs(found)
-    several = len(found.experiments) > 1
-    for experiment in found.experiments:
-        of = f" of `{experiment.name_b}`" if several else ""
-        out += [f"{text}{of}" for text in unmatched_cases(found, experiment)]
-        out += [f"{kind.text}{of}: {kind.cases}" for kind in endings(experiment)]
-        out += [f"{experiment.last_digits}{of}"] if experiment.last_digits else []
+    out = unmatched_runs(difference)
+    several = len(difference.experiments) > 1
+    for experiment in difference.experiments:
+        of_run = f" of `{experiment.name_b}`" if several else ""
+        out += [f"{text}{of_run}" for text in unmatched_cases(difference, experiment)]
+        out += [f"{kind.text}{of_run}: {kind.cases}" for kind in endings(experiment)]
+        out += [f"{experiment.last_digits}{of_run}"] if experiment.last_digits else []
     return out
