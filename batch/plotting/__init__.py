@@ -56,7 +56,7 @@ def plot(
     from batch.archive.read import ArchiveFile
     from batch.plotting.sheet import sheet
 
-    names, cases, over = ([each] if isinstance(each, str) else each for each in (names, cases, over))
+    names, cases, over = ([words] if isinstance(words, str) else words for words in (names, cases, over))
     on = sheet(size, dpi)
     with contextlib.ExitStack() as files:
         archive = files.enter_context(ArchiveFile(Path(path)))
@@ -82,8 +82,8 @@ def draw(
     from batch.plotting import histories, metrics
     from batch.plotting import output as place
 
-    for each in (archive, *([against] if against is not None else [])):
-        each.need_every_row("a picture of all cases")
+    for open_archive in (archive, *([against] if against is not None else [])):
+        open_archive.need_every_row("a picture of all cases")
     from batch.plotting.against import beside
     from batch.plotting.requests import plot_request
     from batch.plotting.sheet import PictureSheet
@@ -101,11 +101,11 @@ def draw(
         matplotlib.rcdefaults()  # a matplotlibrc in the working folder, which might start TeX, is ignored
         matplotlib.rcParams.update(sheet.style)
         if wanted.histories:
-            found = None if against is None else beside(archive, [group], against)[0]
-            figure = histories.Histories(archive, group, wanted.signals, cases, sheet, found).draw()
+            other_group = None if against is None else beside(archive, [group], against)[0]
+            figure = histories.Histories(archive, group, wanted.signals, cases, sheet, other_group).draw()
         else:
             theirs = [None] * len(pool.groups) if against is None else beside(archive, pool.groups, against)
-            others = {number: each for number, each in enumerate(theirs) if each is not None}
+            others = {number: group_ for number, group_ in enumerate(theirs) if group_ is not None}
             figure = metrics.draw(archive, pool, wanted.metrics, over, sheet, others, against)
         place.save(figure, target)
     return target

@@ -30,9 +30,9 @@ class OtherGroup:
     def __init__(self, drawn: ArchiveGroup, group: ArchiveGroup, names: tuple[str, str]) -> None:
         self.drawn, self.group = drawn, group
         self.own, self.name = names
-        found = matching.match_cases(drawn, group)
+        matched = matching.match_cases(drawn, group)
         self.places = np.full(drawn.count, -1)
-        self.places[found.a] = found.b
+        self.places[matched.a] = matched.b
 
     @cached_property
     def time(self) -> np.ndarray:
@@ -40,9 +40,9 @@ class OtherGroup:
 
     def recorded(self, positions: Sequence[int]) -> dict[int, int]:
         """The position of each drawn case in the other archive, by its position here, where its history was kept."""
-        kept = set(self.group.recorded_positions.tolist())
-        found = {position: int(self.places[position]) for position in positions}
-        return {position: place for position, place in found.items() if place in kept}
+        recorded = set(self.group.recorded_positions.tolist())
+        places = {position: int(self.places[position]) for position in positions}
+        return {position: place for position, place in places.items() if place in recorded}
 
     def columns(self, panel: Panel) -> list[int]:
         """The other archive's column for each line of a panel, as `Panel.columns`; -1 where it has none. Raises Problem
@@ -84,9 +84,9 @@ def other_unit(name: str, mine: str, theirs: str, beside: OtherGroup) -> Problem
     return Problem(error("E393", message, help=helps))
 
 
-def not_in_other(name: str, beside: OtherGroup, there: Sequence[str]) -> Problem:
-    """The problem that a quantity to be drawn is not in the other archive. there: the existing ones"""
-    helps = f"in {beside.name}: {', '.join(there)}" if there else _differ(beside.drawn.path, beside.group.path)
+def not_in_other(name: str, beside: OtherGroup, existing: Sequence[str]) -> Problem:
+    """The problem that a quantity to be drawn is not in the other archive. existing: those that it has"""
+    helps = f"in {beside.name}: {', '.join(existing)}" if existing else _differ(beside.drawn.path, beside.group.path)
     return Problem(error("E393", f"no `{name}` in {beside.name} to draw against", help=helps))
 
 
@@ -95,22 +95,22 @@ def beside(archive: ArchiveFile, groups: Sequence[ArchiveGroup], other: ArchiveF
     have nothing in common."""
     names = file_names(archive.path, other.path)
     pairs = {id(mine): theirs for mine, theirs in matching.match_experiments(archive, other)[0]}
-    found = [OtherGroup(group, pairs[id(group)], names) if id(group) in pairs else None for group in groups]
-    if not any(found):
-        asked = groups[0].sweep or groups[0].name
-        message = f"no run or sweep `{asked}` in {names[1]} to draw against"
+    other_groups = [OtherGroup(group, pairs[id(group)], names) if id(group) in pairs else None for group in groups]
+    if not any(other_groups):
+        run_name = groups[0].sweep or groups[0].name
+        message = f"no run or sweep `{run_name}` in {names[1]} to draw against"
         raise Problem(error("E393", message, help=f"in it: {', '.join(by_run(other.groups))}"))
-    if not any((each.places >= 0).any() for each in found if each is not None):
+    if not any((other_group.places >= 0).any() for other_group in other_groups if other_group is not None):
         message = f"no case of `{groups[0].sweep or groups[0].name}` is in both {names[0]} and {names[1]}"
         helps = ("cases are the same where what is varied has the same values", _differ(archive.path, other.path))
         raise Problem(error("E393", message, help=helps))
-    return found
+    return other_groups
 
 
 def file_names(a: Path, b: Path) -> tuple[str, str]:
     """The names of two archives in a picture: those of the files, with folders where these are the same."""
-    one, other = (a.name, b.name) if a.name != b.name else (str(a), str(b))
-    return _labelling(one), _labelling(other)
+    name_a, other = (a.name, b.name) if a.name != b.name else (str(a), str(b))
+    return _labelling(name_a), _labelling(other)
 
 
 def _labelling(name: str) -> str:

@@ -43,7 +43,7 @@ def arm_picture(
     position = group.recorded_position(case) if case else int(group.recorded_positions[0])
     time, channels = _recorded(group, position)
     scene = _scene(archive, group, position, tuple(channels))
-    shown = _instants(instants, time, case_text(group, position, varied=False))
+    rows = _instants(instants, time, case_text(group, position, varied=False))
     numbers = _outputs(archive, group, position, scene, channels, time)
     fitted = np.unique(np.linspace(0, len(time) - 1, FITTED).astype(int))
     everything = [solid for row in fitted for solid in solids(scene, numbers[row])]
@@ -57,19 +57,19 @@ def arm_picture(
     floor = min(0.0, lowest) if not scene.moves else None
     if floor is not None:
         _floor(axes, scene, view, floor)
-        _shadow(axes, solids(scene, numbers[shown[-1]]), view, floor)
+        _shadow(axes, solids(scene, numbers[rows[-1]]), view, floor)
     tip = numbers[:, -3:] @ upright(scene).T
     path = view.see(tip)
     axes.plot(path[:, 0], path[:, 1], color=PATH, linewidth=1.3, zorder=25)
-    for number, row in enumerate(shown):
-        pale = PALE * (1.0 - number / (len(shown) - 1)) + 0.12 * (number < len(shown) - 1) if len(shown) > 1 else 0.0
+    for number, row in enumerate(rows):
+        pale = PALE * (1.0 - number / (len(rows) - 1)) + 0.12 * (number < len(rows) - 1) if len(rows) > 1 else 0.0
         _draw(axes, solids(scene, numbers[row]), view, pale, 3 + number)
         x, y = path[row, :2]
         axes.plot([x], [y], "o", color=PAPER, markeredgecolor=PATH, markersize=4, zorder=30)
     top = 0.9 * height if not sheet.paper else height
     axes.set(xlim=(-FIELD * width / height, FIELD * width / height), ylim=(-FIELD * top / height, FIELD * top / height))
     axes.set_aspect("equal", adjustable="datalim")
-    times = ", ".join(number_text(float(time[row])) for row in shown)
+    times = ", ".join(number_text(float(time[row])) for row in rows)
     below = f"{case_text(group, position)} · at {times} s · grid {number_text(_step(scene.reach))} m"
     layout.title(figure, archive, group.name, below, sheet)
     return figure
@@ -91,7 +91,7 @@ def _recorded(group: ArchiveGroup, position: int) -> tuple[np.ndarray, dict[str,
 def _scene(archive: ArchiveFile, group: ArchiveGroup, position: int, recorded: Sequence[str]) -> ArmScene:
     plan = archive.plan(as_written=True)
     with reading(group.path):
-        experiment = next(each for each in plan.experiments if each.name == group.name)
+        experiment = next(experiment_ for experiment_ in plan.experiments if experiment_.name == group.name)
         scene = arm_scene(experiment, recorded)
     missing = lacking(scene, recorded)
     if missing:
@@ -102,17 +102,17 @@ def _scene(archive: ArchiveFile, group: ArchiveGroup, position: int, recorded: S
     return scene
 
 
-def _instants(asked: Sequence[float], time: np.ndarray, case: str) -> list[int]:
+def _instants(instants: Sequence[float], time: np.ndarray, case: str) -> list[int]:
     """The rows to draw, in their order. Raises Problem E399."""
     if len(time) == 0:
         raise Problem(error("E399", f"{case} has no instant: it failed at once", help="`met show` says why"))
     first, last = float(time[0]), float(time[-1])
-    for instant in asked:
+    for instant in instants:
         if not first <= instant <= last:
             rows = f"its rows are from {number_text(first)} s to {number_text(last)} s"
             message = f"{case} has no instant {number_text(instant)} s: {rows}"
             raise Problem(error("E399", message, help='`--at` takes an instant of these, `--at "1 s"`'))
-    wanted = np.asarray(asked) if asked else np.linspace(first, last, SHOWN)
+    wanted = np.asarray(instants) if instants else np.linspace(first, last, SHOWN)
     return sorted({int(np.argmin(np.abs(time - instant))) for instant in wanted})
 
 
@@ -131,16 +131,16 @@ def _outputs(
         q = channels[f"{joint}.q"]
         values |= {f"low:{joint}": min(0.0, float(q.min())), f"high:{joint}": max(0.0, float(q.max()))}
     with reading(group.path):
-        given = {name: np.broadcast_to(np.asarray(values[name]), time.shape) for name in scene.formulas.inputs}
-    found = scene.formulas.replay(given)
-    return np.stack([np.broadcast_to(np.asarray(x, np.float64), time.shape) for x in found], axis=-1)
+        inputs = {name: np.broadcast_to(np.asarray(values[name]), time.shape) for name in scene.formulas.inputs}
+    outputs = scene.formulas.replay(inputs)
+    return np.stack([np.broadcast_to(np.asarray(x, np.float64), time.shape) for x in outputs], axis=-1)
 
 
-def _draw(axes: Any, found: Sequence[PicturedSolid], view: Viewpoint, pale: float, order: int) -> None:
+def _draw(axes: Any, pictured: Sequence[PicturedSolid], view: Viewpoint, pale: float, order: int) -> None:
     from matplotlib.collections import PolyCollection
 
-    listed = [(facet, _colour(solid)) for solid in found for facet in facets(solid, view)]
-    listed.sort(key=lambda each: -each[0].far)
+    listed = [(facet, _colour(solid)) for solid in pictured for facet in facets(solid, view)]
+    listed.sort(key=lambda facet_and_colour: -facet_and_colour[0].far)
     fills = [_mixed(colour, facet.light, pale) for facet, colour in listed]
     edges = [_mixed(colour, EDGE, pale) if facet.edge else "none" for facet, colour in listed]
     corners = [facet.corners for facet, _ in listed]
@@ -155,7 +155,7 @@ def _colour(solid: PicturedSolid) -> str:
 
 def _mixed(colour: str, light: float, pale: float) -> tuple[float, float, float]:
     r, g, b = (
-        (1.0 - pale) * min(1.0, light * int(colour[at : at + 2], 16) / 255.0) + pale for at in (1, 3, 5)
+        (1.0 - pale) * min(1.0, light * int(colour[digit : digit + 2], 16) / 255.0) + pale for digit in (1, 3, 5)
     )  # towards white paper
     return (r, g, b)
 
@@ -163,7 +163,7 @@ def _mixed(colour: str, light: float, pale: float) -> tuple[float, float, float]
 def _step(reach: float) -> float:
     """The spacing of the grid, m: 1, 2 or 5 times a power of ten, about a quarter of the reach."""
     power = 10.0 ** math.floor(math.log10(reach / 4.0))
-    return power * min((1.0, 2.0, 5.0, 10.0), key=lambda each: abs(each * power - reach / 4.0))
+    return power * min((1.0, 2.0, 5.0, 10.0), key=lambda multiple: abs(multiple * power - reach / 4.0))
 
 
 def _floor(axes: Any, scene: ArmScene, view: Viewpoint, height: float) -> None:
@@ -172,18 +172,18 @@ def _floor(axes: Any, scene: ArmScene, view: Viewpoint, height: float) -> None:
     step = _step(scene.reach)
     count = math.ceil(1.3 * scene.reach / step)
     far, ends = count * step, np.arange(-count, count + 1) * step
-    lines = [[(at, -far, height), (at, far, height)] for at in ends]
-    lines += [[(-far, at, height), (far, at, height)] for at in ends]
+    lines = [[(position, -far, height), (position, far, height)] for position in ends]
+    lines += [[(-far, position, height), (far, position, height)] for position in ends]
     seen = view.see(np.array(lines))
     lines_seen = [line[:, :2] for line in seen if np.all(line[:, 2] > 0.0)]
     axes.add_collection(LineCollection(lines_seen, colors=LIGHT, linewidths=0.8, zorder=0))
 
 
-def _shadow(axes: Any, found: Sequence[PicturedSolid], view: Viewpoint, height: float) -> None:
+def _shadow(axes: Any, pictured: Sequence[PicturedSolid], view: Viewpoint, height: float) -> None:
     from matplotlib.collections import PolyCollection
 
     flat = []
-    for solid in found:
+    for solid in pictured:
         ends = solid.ends * [1.0, 1.0, 0.0] + [0.0, 0.0, height]
         flat += facets(PicturedSolid("pill", "", -1, ends, solid.axes, solid.radius), view)[:1]
-    axes.add_collection(PolyCollection([each.corners for each in flat], facecolors=SHADOW, linewidths=0.0, zorder=1))
+    axes.add_collection(PolyCollection([facet.corners for facet in flat], facecolors=SHADOW, linewidths=0.0, zorder=1))

@@ -42,9 +42,9 @@ class CellValues:
 
 
 def cell_values(
-    shown: np.ndarray,
+    shown_values: np.ndarray,
     worse: str,
-    each: MapMetric,
+    metric: MapMetric,
     cells: np.ndarray,
     count: int,
     striped: list[tuple[np.ndarray, str]],
@@ -53,12 +53,12 @@ def cell_values(
 ) -> CellValues:
     """The case that is shown in each cell. cells: the cell of each case, -1 for none; differs: True where changes are
     shown"""
-    chosen = cell_cases(np.abs(shown) if differs else shown, cells, count, "<" if differs else worse)
-    values = np.where(chosen >= 0, shown[chosen], np.nan)
+    chosen = cell_cases(np.abs(shown_values) if differs else shown_values, cells, count, "<" if differs else worse)
+    values = np.where(chosen >= 0, shown_values[chosen], np.nan)
     return CellValues(
         values,
         any_in(cells >= 0, cells, count),
-        any_in(each.failed, cells, count),
+        any_in(metric.failed, cells, count),
         tuple((any_in(marked, cells, count), hatch) for marked, hatch in striped),
     )
 
@@ -70,27 +70,27 @@ def any_in(cases: np.ndarray, cells: np.ndarray, count: int) -> np.ndarray:
     return out
 
 
-def draw(ax: Any, found: CellValues, x: MapSide, y: MapSide, colours: Any, norm: Any, sheet: PictureSheet) -> Any:
+def draw(ax: Any, drawn: CellValues, x: MapSide, y: MapSide, colours: Any, norm: Any, sheet: PictureSheet) -> Any:
     """Draw colours, greys, stripes and signs. Returns the mappable for a colour bar."""
     shape = (len(y.levels.texts), len(x.levels.texts))
-    values = found.values
+    values = drawn.values
     finite = np.isfinite(values)
     fine = len(values) > FINE
     plain = np.ma.masked_invalid(values).reshape(shape)
     edges = {} if fine else {"edgecolors": "face", "linewidth": 0.5}
     mapped = ax.pcolormesh(*np.meshgrid(x.edges, y.edges), plain, cmap=colours, norm=norm, rasterized=fine, **edges)
     infinite = np.isinf(values)
-    failed = found.failed & np.isnan(values)
-    lacking = found.there & np.isnan(values) & ~failed
+    failed = drawn.failed & np.isnan(values)
+    lacking = drawn.there & np.isnan(values) & ~failed
     for which, grey in ((infinite, INFINITE), (failed, FAILED), (lacking, LACKING)):
         _fill(ax, x, y, which, facecolors=grey, edgecolors=grey, linewidth=0.5)
     light = np.ones(len(values), bool)
     light[finite] = _lightness(colours(norm(values[finite]))) > 0.5
-    for wanted, hatch in found.striped:
+    for wanted, hatch in drawn.striped:
         for tone, among in (("white", ~light), (INK, light)):
             _fill(ax, x, y, wanted & among, facecolors="none", edgecolors=tone, linewidth=0.0, hatch=hatch)
     size, room = _sign(ax, shape)
-    for which, text in ((found.failed, "x"), (np.isposinf(values), "∞"), (np.isneginf(values), "−∞")):
+    for which, text in ((drawn.failed, "x"), (np.isposinf(values), "∞"), (np.isneginf(values), "−∞")):
         _signs(ax, x, y, which.reshape(shape), room, text, size)
     return mapped
 
@@ -139,9 +139,9 @@ def _spaced(which: np.ndarray, room: tuple[int, int]) -> np.ndarray:
     blocks = (up // room[0]) * (which.shape[1] // room[1] + 1) + across // room[1]
     far = np.hypot(up % room[0] - (room[0] - 1) / 2, across % room[1] - (room[1] - 1) / 2)
     order = np.lexsort((far, blocks))
-    kept = order[np.unique(blocks[order], return_index=True)[1]]
+    nearest = order[np.unique(blocks[order], return_index=True)[1]]
     out = np.zeros(which.shape, bool)
-    out[up[kept], across[kept]] = True
+    out[up[nearest], across[nearest]] = True
     return out
 
 

@@ -34,8 +34,8 @@ def draw(ax: Any, marks: Sequence[LimitMark], time: np.ndarray, sheet: PictureSh
     instants = [mark for mark in dict.fromkeys(marks) if mark.time and len(time) and time[0] < mark.value < time[-1]]
     for mark in instants:
         ax.axvline(mark.value, **DOTS)
-    for value, found in texts.items():
-        _along(ax, value, ", ".join(found), sheet, columns)
+    for value, names in texts.items():
+        _along(ax, value, ", ".join(names), sheet, columns)
     for mark in instants:
         late = mark.value > time[0] + 0.6 * (time[-1] - time[0])
         text = f"{mark.text} " if late else f" {mark.text}"
@@ -64,9 +64,9 @@ def _along(ax: Any, value: float, text: str, sheet: PictureSheet, columns: int) 
     drawn = [line.get_xydata() for line in ax.lines if line.get_label() != DOTS["label"] and len(line.get_xdata())]
     points = (np.concatenate(drawn) if drawn else np.zeros((0, 2))) - (left, low)
     across, up = points[:, 0] / (right - left), points[:, 1] / (high - low)
-    at = (value - low) / (high - low)
+    height = (value - low) / (high - low)
     best: tuple[int, float, str] | None = None
-    for side, (bottom, top) in (("bottom", (at, at + tall)), ("top", (at - tall, at))):
+    for side, (bottom, top) in (("bottom", (height, height + tall)), ("top", (height - tall, height))):
         for place in PLACES if bottom >= 0.0 and top <= 1.02 else ():
             begins = place - wide * place
             covered = (across > begins - 0.01) & (across < begins + wide + 0.01) & (up > bottom) & (up < top)

@@ -60,20 +60,22 @@ class Histories:
         self.archive, self.group, self.sheet, self.other = archive, group, sheet, other
         panels(group)  # refuses an archive without histories
         self.units = DeckUnits(archive, group)
-        found = [self.units.panel(panel) for panel in panels(group, signals)]
+        own_panels = [self.units.panel(panel) for panel in panels(group, signals)]
         chosen = [group.recorded_position(case) for case in cases]
         self.positions: list[int] = chosen or group.recorded_positions.tolist()
         self.single, self.fan = len(self.positions) == 1, len(self.positions) > OVERLAID
         self.time = group.values("time")
         self.joints = joints_of(group)
-        self.commands = command_curves(group, found, self.positions, apart=not self.single and not self.fan)
+        self.commands = command_curves(group, own_panels, self.positions, apart=not self.single and not self.fan)
         if not signals:  # a command that is drawn with its signal needs no panel of its own
             drawn = {(command.variable, command.column) for command in self.commands.values()}
-            found = [panel for panel in found if not drawn.issuperset((panel.variable, c) for c in panel.columns)]
-        self.panels, self.left = layout.as_many_as_fit(found, bool(signals), "signals")
+            own_panels = [
+                panel for panel in own_panels if not drawn.issuperset((panel.variable, c) for c in panel.columns)
+            ]
+        self.panels, self.left = layout.as_many_as_fit(own_panels, bool(signals), "signals")
         self.pairs, self.theirs = self._against(bool(signals))
 
-    def _against(self, asked: bool) -> tuple[dict[int, int], dict[int, list[int]]]:
+    def _against(self, named: bool) -> tuple[dict[int, int], dict[int, list[int]]]:
         """The other archive's position of each case, and its lines of each panel."""
         other = self.other
         if other is None:
@@ -88,8 +90,10 @@ class Histories:
             raise Problem(error("E393", message, help=f"`met show {quoted(other.group.path)}` lists its cases"))
         columns = {number: other.columns(panel) for number, panel in enumerate(self.panels)}
         for number, places in columns.items():
-            if asked and max(places) < 0:
-                raise not_in_other(self.panels[number].name, other, [each.name for each in other.group.role("signal")])
+            if named and max(places) < 0:
+                raise not_in_other(
+                    self.panels[number].name, other, [signal.name for signal in other.group.role("signal")]
+                )
         return pairs, columns
 
     def draw(self) -> Any:
@@ -173,8 +177,8 @@ class Histories:
         """The limits of a panel's lines, each once."""
         if self.units.experiment is None:
             return []
-        found = (limits_of(self.units.experiment, cell.panel, line) for line in cell.lines)
-        return list(dict.fromkeys(mark for marks in found for mark in marks))
+        marks = (limits_of(self.units.experiment, cell.panel, line) for line in cell.lines)
+        return list(dict.fromkeys(mark for marks in marks for mark in marks))
 
     def _joint_colour(self, panel: Panel, line: int) -> str:
         """The colour of a joint, which is the same in all panels, even for a signal of one joint

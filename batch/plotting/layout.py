@@ -55,11 +55,13 @@ def figure(
         width = TALL_INCHES[0] * columns + 1.6 if tall else 8.6 if columns == 1 else 3.6 * columns + 2.2
         panel = TALL_INCHES[1] if tall else PANEL_INCHES
         height = panel * max(sum(heights), 1.0 if tall else 1.5) + 1.0
-    made = Figure(figsize=(width, height), layout=engine)
-    axes = made.subplots(len(heights), columns, sharex=True, sharey=share_y, squeeze=False, height_ratios=list(heights))
+    picture = Figure(figsize=(width, height), layout=engine)
+    axes = picture.subplots(
+        len(heights), columns, sharex=True, sharey=share_y, squeeze=False, height_ratios=list(heights)
+    )
     if sheet.paper:  # its own choice of ticks expects shorter numbers
         axes[0][0].locator_params(axis="x", nbins=max(2, int((width / columns - BESIDE_ON_PAPER) / TICK_INCHES)))
-    return made, [list(row) for row in axes]
+    return picture, [list(row) for row in axes]
 
 
 DRAWABLE = 1e300
@@ -74,15 +76,15 @@ def drawable(values: np.ndarray) -> np.ndarray:
     return np.where(np.abs(values) > DRAWABLE, np.copysign(np.inf, values), values)
 
 
-def as_many_as_fit(found: Sequence[T], asked: bool, what: str) -> tuple[Sequence[T], str]:
-    """The panels that fit into a picture, and a remark on the others. asked: True where they were named. Raises Problem
+def as_many_as_fit(panels: Sequence[T], named: bool, what: str) -> tuple[Sequence[T], str]:
+    """The panels that fit into a picture, and a remark on the others. named: True where they were named. Raises Problem
     E391."""
-    if len(found) <= MOST_PANELS:
-        return found, ""
-    if asked:
-        message = f"{len(found):,} {what} in one picture: {MOST_PANELS} at most"
+    if len(panels) <= MOST_PANELS:
+        return panels, ""
+    if named:
+        message = f"{len(panels):,} {what} in one picture: {MOST_PANELS} at most"
         raise Problem(error("E391", message, help="draw several pictures, each with a name of its own: `-o FILE.png`"))
-    return found[:MOST_PANELS], f"{MOST_PANELS} of {len(found):,} {what}, others by name"
+    return panels[:MOST_PANELS], f"{MOST_PANELS} of {len(panels):,} {what}, others by name"
 
 
 def letters(sheet: PictureSheet, inches: float) -> int:
@@ -112,24 +114,24 @@ def two_lines(label: str, most: int = 16) -> str:
 
 
 def legend(
-    figure: Any, found: Mapping[str, Any], sheet: PictureSheet, title: str | None = None, *, below: bool = False
+    figure: Any, handles: Mapping[str, Any], sheet: PictureSheet, title: str | None = None, *, below: bool = False
 ) -> None:
     """One for the whole picture, handles by their texts: right of the panels; under them on a narrow sheet, and where
     that is asked for."""
-    if not found:
+    if not handles:
         return
     style: dict[str, Any] = {"fontsize": sheet.small, "alignment": "left", "title_fontsize": sheet.small}
     if sheet.narrow or below:
-        longest = max(len(text) for text in found)
+        longest = max(len(text) for text in handles)
         columns = max(1, int(figure.get_figwidth() * 72 / ((longest * LETTER + 4.0) * sheet.small)))
-        columns = min(columns, len(found))
+        columns = min(columns, len(handles))
         title = textwrap.fill(title.replace("\n", " "), letters(sheet, figure.get_figwidth() - 0.2)) if title else None
-        _grow(figure, sheet, -(-len(found) // columns) + (title.count("\n") + 1 if title else 0) + 0.5)
+        _grow(figure, sheet, -(-len(handles) // columns) + (title.count("\n") + 1 if title else 0) + 0.5)
         style |= {"loc": "outside lower left", "ncols": columns, "columnspacing": 1.2}
         style |= {"handlelength": 1.6, "borderaxespad": 0.2}
     else:
         style |= {"loc": "outside right upper"}
-    figure.legend(found.values(), found.keys(), title=title, **style)
+    figure.legend(handles.values(), handles.keys(), title=title, **style)
 
 
 def legend_label(text: str) -> str | None:
@@ -159,6 +161,6 @@ def title(figure: Any, archive: ArchiveFile, name: str, below: str, sheet: Pictu
     lines = textwrap.wrap(below, letters(sheet, figure.get_figwidth() - 0.3)) if below else []
     spare = "\n" * len(lines)
     figure.suptitle(f"{line}{spare}", x=0.012, ha="left", fontsize=12, fontweight="bold", linespacing=1.5)
-    for number, each in enumerate(lines):
-        at = 1.0 - (0.42 + 0.2 * number) / figure.get_figheight()
-        figure.text(0.012, at, each, fontsize=sheet.small, color=FAINT, ha="left", va="center")
+    for number, title_line in enumerate(lines):
+        height = 1.0 - (0.42 + 0.2 * number) / figure.get_figheight()
+        figure.text(0.012, height, title_line, fontsize=sheet.small, color=FAINT, ha="left", va="center")

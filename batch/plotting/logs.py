@@ -34,14 +34,14 @@ def panels(
 ) -> list[MeasuredPanel]:
     """The channels of a log, at instants at which there is a computed number. courses: by what computed them, those of
     channels; units: SI, by channel"""
-    found = []
+    drawable_panels = []
     for channel, (instants, measured) in log.signals.items():
-        ways = {name: each[channel] for name, each in courses.items() if channel in each}
+        ways = {name: course[channel] for name, course in courses.items() if channel in course}
         if ways:
             pair = Pair.of(instants, measured, next(iter(ways.values())))
-            computed = {name: each.at(pair.instants) for name, each in ways.items()}
-            found.append(MeasuredPanel(channel, units[channel], pair.instants, pair.measured, computed))
-    return found
+            computed = {name: channel_.at(pair.instants) for name, channel_ in ways.items()}
+            drawable_panels.append(MeasuredPanel(channel, units[channel], pair.instants, pair.measured, computed))
+    return drawable_panels
 
 
 def draw(title: str, panels: Sequence[MeasuredPanel], output: Path) -> None:
@@ -52,12 +52,12 @@ def draw(title: str, panels: Sequence[MeasuredPanel], output: Path) -> None:
 
     style: Any = STYLE
     with matplotlib.rc_context(style):
-        shown = panels[:MOST_CHANNELS]
-        figure = Figure(figsize=(11.0, 1.5 * len(shown) + 0.9), dpi=144, layout="constrained")
-        more = f", {len(panels) - len(shown)} more channels are not drawn" if len(panels) > len(shown) else ""
+        drawn = panels[:MOST_CHANNELS]
+        figure = Figure(figsize=(11.0, 1.5 * len(drawn) + 0.9), dpi=144, layout="constrained")
+        more = f", {len(panels) - len(drawn)} more channels are not drawn" if len(panels) > len(drawn) else ""
         figure.suptitle(f"{title}{more}", fontsize=10.0)
-        axes = figure.subplots(len(shown), 2, sharex=True, squeeze=False)
-        for panel, (left, right) in zip(shown, axes, strict=True):
+        axes = figure.subplots(len(drawn), 2, sharex=True, squeeze=False)
+        for panel, (left, right) in zip(drawn, axes, strict=True):
             left.plot(panel.instants, panel.measured, color=FAINT, linewidth=2.6, label="measured")
             right.axhline(0.0, color=FAINT, linewidth=0.8)
             colours = COLOURS[: len(panel.computed)][::-1]
@@ -68,6 +68,6 @@ def draw(title: str, panels: Sequence[MeasuredPanel], output: Path) -> None:
             right.set_title("measured - computed", loc="left", fontsize=8.5)
             left.set_ylabel("" if panel.unit == "1" else panel.unit, fontsize=9.0)
         axes[0, 0].legend(loc="upper right", fontsize=8.0)
-        for each in axes[-1]:
-            each.set_xlabel("time, s", fontsize=9.0)
+        for ax in axes[-1]:
+            ax.set_xlabel("time, s", fontsize=9.0)
         places.save(figure, output)

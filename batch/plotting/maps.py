@@ -62,9 +62,9 @@ def plan(x: CaseColumn, y: CaseColumn, third: CaseColumn | None, other: tuple[st
         x, y = y, x
     across, up = sides.side(x), sides.side(y)
     cells = cells_of(across.levels, up.levels)
-    there = cells[cells >= 0]
-    filled = len(distinct(there)) > FULL * len(across.levels.texts) * len(up.levels.texts)
-    apart = there if third is None else there * 1000 + column_levels(third.values).places[cells >= 0]
+    occupied = cells[cells >= 0]
+    filled = len(distinct(occupied)) > FULL * len(across.levels.texts) * len(up.levels.texts)
+    apart = occupied if third is None else occupied * 1000 + column_levels(third.values).places[cells >= 0]
     several = int(np.unique(apart, return_counts=True)[1].max(initial=0))
     if not filled:
         across, up = sides.line(x), sides.line(y)
@@ -72,10 +72,10 @@ def plan(x: CaseColumn, y: CaseColumn, third: CaseColumn | None, other: tuple[st
 
 
 def draw(
-    sheet: PictureSheet, found: MapLayout, metrics: Sequence[MapMetric], third: CaseColumn | None
+    sheet: PictureSheet, map_layout: MapLayout, metrics: Sequence[MapMetric], third: CaseColumn | None
 ) -> tuple[Any, list[list[Any]]]:
     """The figure and its axes; its heading is left to the caller."""
-    every = np.ones(len(found.cells), bool)
+    every = np.ones(len(map_layout.cells), bool)
     if third is None:
         wide = int(sheet.width / WIDEST) if sheet.width else 2 if len(metrics) < 5 else 3
         columns = max(1, min(len(metrics), wide))
@@ -84,9 +84,9 @@ def draw(
         flat = [ax for row in axes for ax in row]
         for ax in flat[len(metrics) :]:
             ax.set_visible(False)
-        for ax, each in zip(flat, metrics, strict=False):
-            layout.head(ax, _about(each, found), sheet, columns)
-            _maps(figure, [ax], each, found, [every], sheet)
+        for ax, metric in zip(flat, metrics, strict=False):
+            layout.head(ax, _about(metric, map_layout), sheet, columns)
+            _maps(figure, [ax], metric, map_layout, [every], sheet)
     else:
         named = sides.side(third).levels
         columns = len(named.texts)
@@ -94,43 +94,45 @@ def draw(
         for index, ax in enumerate(axes[0]):
             value = f"{named.texts[index]} {third.unit}".rstrip()
             layout.head(ax, value if third.words else f"{third.label} = {value}", sheet, columns)
-        for row, each in zip(axes, metrics, strict=True):
-            _maps(figure, row, each, found, [named.places == index for index in range(columns)], sheet)
-    _sides(axes, found, sheet)
-    layout.legend(figure, _marks(metrics, found), sheet, below=True)
+        for row, metric in zip(axes, metrics, strict=True):
+            _maps(figure, row, metric, map_layout, [named.places == index for index in range(columns)], sheet)
+    _sides(axes, map_layout, sheet)
+    layout.legend(figure, _marks(metrics, map_layout), sheet, below=True)
     return figure, axes
 
 
-def description(found: MapLayout, metrics: Sequence[MapMetric], third: CaseColumn | None) -> str:
+def description(map_layout: MapLayout, metrics: Sequence[MapMetric], third: CaseColumn | None) -> str:
     """A description of the cells or points, and for a third parameter the requirement."""
-    if not found.filled:
+    if not map_layout.filled:
         text = "a point a case"
-    elif found.several == 1:
+    elif map_layout.several == 1:
         text = "a cell a case"
     else:
-        text = f"up to {found.several:,} cases in a cell, which shows {_stands(metrics, found)}"
-    required = [metric.about.rpartition(" · ")[2] for metric in metrics if metric.column.limits and found.other is None]
+        text = f"up to {map_layout.several:,} cases in a cell, which shows {_stands(metrics, map_layout)}"
+    required = [
+        metric.about.rpartition(" · ")[2] for metric in metrics if metric.column.limits and map_layout.other is None
+    ]
     return "; ".join([text, *(required if third is not None else [])])
 
 
-def _stands(metrics: Sequence[MapMetric], found: MapLayout) -> str:
-    if found.other is not None:
+def _stands(metrics: Sequence[MapMetric], map_layout: MapLayout) -> str:
+    if map_layout.other is not None:
         return "the one that differs most"
     judged = {bool(metric.column.limits) for metric in metrics}
     worst, middle = "the worst by what is required", "the middle one"
     return worst if judged == {True} else middle if judged == {False} else f"{worst}, or {middle} where nothing is"
 
 
-def _about(each: MapMetric, found: MapLayout) -> str:
-    if found.other is not None:
-        return each.column.about or each.column.label
-    return " · ".join(part for part in (each.about, _lost(each)) if part)
+def _about(metric: MapMetric, map_layout: MapLayout) -> str:
+    if map_layout.other is not None:
+        return metric.column.about or metric.column.label
+    return " · ".join(part for part in (metric.about, _lost(metric)) if part)
 
 
-def _lost(each: MapMetric) -> str:
+def _lost(metric: MapMetric) -> str:
     """The number of cases without a finite number, in words."""
-    infinite, failed = int(np.isinf(each.values).sum()), int(each.failed.sum())
-    lacking = int((np.isnan(each.values) & ~each.failed).sum())
+    infinite, failed = int(np.isinf(metric.values).sum()), int(metric.failed.sum())
+    lacking = int((np.isnan(metric.values) & ~metric.failed).sum())
     named = ((infinite, "infinite in {:,}"), (failed, "failed: {:,}"), (lacking, "no value in {:,}"))
     return ", ".join(text.format(count) for count, text in named if count)
 
@@ -138,8 +140,8 @@ def _lost(each: MapMetric) -> str:
 # Colours
 
 
-def _shown(each: MapMetric, found: MapLayout) -> np.ndarray:
-    return each.values if found.other is None else each.difference
+def _values(metric: MapMetric, map_layout: MapLayout) -> np.ndarray:
+    return metric.values if map_layout.other is None else metric.difference
 
 
 @frozen
@@ -150,11 +152,11 @@ class ColourScale:
     reach: Reach | None
 
 
-def _tones(each: MapMetric, found: MapLayout, values: np.ndarray) -> ColourScale:
+def _tones(metric: MapMetric, map_layout: MapLayout, values: np.ndarray) -> ColourScale:
     from matplotlib.colors import LogNorm, Normalize
 
-    limits = [limit.value for limit in each.column.limits] if found.other is None else []
-    far = reach(values, limits, parting=found.other is not None)
+    limits = [limit.value for limit in metric.column.limits] if map_layout.other is None else []
+    far = reach(values, limits, parting=map_layout.other is not None)
     if far is None:
         return ColourScale(Normalize(0.0, 1.0), None)
     if far.low == far.high:
@@ -163,10 +165,10 @@ def _tones(each: MapMetric, found: MapLayout, values: np.ndarray) -> ColourScale
     return ColourScale((LogNorm if far.log else Normalize)(far.low, far.high), far)
 
 
-def _colours(found: MapLayout) -> Any:
+def _colours(map_layout: MapLayout) -> Any:
     import matplotlib
 
-    if found.other is not None:
+    if map_layout.other is not None:
         return matplotlib.colormaps[PARTING]
     return matplotlib.colormaps[RISING].with_extremes(under=BELOW, over=ABOVE)
 
@@ -175,8 +177,8 @@ def _bar(
     figure: Any,
     mapped: Any,
     axes: Sequence[Any],
-    each: MapMetric,
-    found: MapLayout,
+    metric: MapMetric,
+    map_layout: MapLayout,
     sheet: PictureSheet,
     tones: ColourScale,
 ) -> None:
@@ -187,15 +189,15 @@ def _bar(
     ends = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
     extend = ends[far.below > 0, far.above > 0]
     bar = figure.colorbar(mapped, ax=list(axes), pad=0.02, aspect=16, extend=extend, extendfrac=0.05)
-    label = each.label
-    if found.other is not None:
-        unit = f"  ({each.column.unit})" if each.column.unit else ""
-        label = f"{each.column.label}: {found.other[0]} − {found.other[1]}{unit}"
+    label = metric.label
+    if map_layout.other is not None:
+        unit = f"  ({metric.column.unit})" if metric.column.unit else ""
+        label = f"{metric.column.label}: {map_layout.other[0]} − {map_layout.other[1]}{unit}"
     lines = [layout.two_lines(label, 26), *(text for text in reversed(far.said) if text)]
     bar.set_label("\n".join(lines), fontsize=sheet.small)
     bar.outline.set_visible(False)
-    if found.other is None:
-        for limit in each.column.limits:
+    if map_layout.other is None:
+        for limit in metric.column.limits:
             if mapped.norm.vmin <= limit.value <= mapped.norm.vmax:
                 bar.ax.axhline(limit.value, color="white", linewidth=2.4)
                 bar.ax.axhline(limit.value, color=INK, linewidth=1.0)
@@ -207,67 +209,72 @@ def _bar(
 def _maps(
     figure: Any,
     axes: Sequence[Any],
-    each: MapMetric,
-    found: MapLayout,
+    metric: MapMetric,
+    map_layout: MapLayout,
     parts: Sequence[np.ndarray],
     sheet: PictureSheet,
 ) -> None:
     """A map for each of some parts of the cases, in the same colours."""
-    shown, count = _shown(each, found), found.shape[0] * found.shape[1]
-    striped = _striped(each, found)
-    if found.filled:
+    values, count = _values(metric, map_layout), map_layout.shape[0] * map_layout.shape[1]
+    striped = _striped(metric, map_layout)
+    if map_layout.filled:
         picked = [
             cells.cell_values(
-                shown,
-                each.worse,
-                each,
-                np.where(here, found.cells, -1),
+                values,
+                metric.worse,
+                metric,
+                np.where(part, map_layout.cells, -1),
                 count,
                 striped,
-                differs=found.other is not None,
+                differs=map_layout.other is not None,
             )
-            for here in parts
+            for part in parts
         ]
-        tones = _tones(each, found, np.concatenate([one.values for one in picked]))
+        tones = _tones(metric, map_layout, np.concatenate([cell_values.values for cell_values in picked]))
     else:
-        tones = _tones(each, found, shown)
+        tones = _tones(metric, map_layout, values)
     mapped = None
-    for number, (ax, here) in enumerate(zip(axes, parts, strict=True)):
+    for number, (ax, part) in enumerate(zip(axes, parts, strict=True)):
         ax.grid(False)
-        if found.other is not None:
+        if map_layout.other is not None:
             ax.set_facecolor(NOWHERE)
-        for name, one in (("x", found.x), ("y", found.y)):
-            if one.scale == "log":
+        for name, side in (("x", map_layout.x), ("y", map_layout.y)):
+            if side.scale == "log":
                 getattr(ax, f"set_{name}scale")("log")
-            getattr(ax, f"set_{name}lim")(one.edges[0], one.edges[-1])
-        if found.filled:
-            mapped = cells.draw(ax, picked[number], found.x, found.y, _colours(found), tones.norm, sheet)
+            getattr(ax, f"set_{name}lim")(side.edges[0], side.edges[-1])
+        if map_layout.filled:
+            mapped = cells.draw(ax, picked[number], map_layout.x, map_layout.y, _colours(map_layout), tones.norm, sheet)
         else:
-            mapped = _points(ax, each, found, here, tones.norm)
-    _bar(figure, mapped, axes, each, found, sheet, tones)
+            mapped = _points(ax, metric, map_layout, part, tones.norm)
+    _bar(figure, mapped, axes, metric, map_layout, sheet, tones)
 
 
-def _striped(each: MapMetric, found: MapLayout) -> list[tuple[np.ndarray, str]]:
-    if found.other is None or each.theirs_missed is None:
-        return [(each.missed, STRIPES)]
-    both = each.both
-    return [(both & each.missed & ~each.theirs_missed, STRIPES), (both & ~each.missed & each.theirs_missed, DOTTED)]
+def _striped(metric: MapMetric, map_layout: MapLayout) -> list[tuple[np.ndarray, str]]:
+    if map_layout.other is None or metric.theirs_missed is None:
+        return [(metric.missed, STRIPES)]
+    both = metric.both
+    return [
+        (both & metric.missed & ~metric.theirs_missed, STRIPES),
+        (both & ~metric.missed & metric.theirs_missed, DOTTED),
+    ]
 
 
-def _points(ax: Any, each: MapMetric, found: MapLayout, here: np.ndarray, norm: Any) -> Any:
-    shown = _shown(each, found)
-    x, y = found.x.of_cases(), found.y.of_cases()
-    finite = here & np.isfinite(shown)
-    size = 22.0 if here.sum() < 400 else 8.0
-    style: dict[str, Any] = {"s": size, "rasterized": int(here.sum()) > RASTERED}
-    mapped = ax.scatter(x[finite], y[finite], c=shown[finite], cmap=_colours(found), norm=norm, linewidths=0, **style)
-    for marked, hatch in _striped(each, found):
+def _points(ax: Any, metric: MapMetric, map_layout: MapLayout, part: np.ndarray, norm: Any) -> Any:
+    values = _values(metric, map_layout)
+    x, y = map_layout.x.of_cases(), map_layout.y.of_cases()
+    finite = part & np.isfinite(values)
+    size = 22.0 if part.sum() < 400 else 8.0
+    style: dict[str, Any] = {"s": size, "rasterized": int(part.sum()) > RASTERED}
+    mapped = ax.scatter(
+        x[finite], y[finite], c=values[finite], cmap=_colours(map_layout), norm=norm, linewidths=0, **style
+    )
+    for marked, hatch in _striped(metric, map_layout):
         rings = finite & marked
         ax.scatter(x[rings], y[rings], marker=RINGS[hatch], facecolors="none", edgecolors=INK, linewidths=0.8, **style)
     for marked, marker in (
-        (here & np.isnan(shown), "x"),
-        (here & np.isposinf(shown), infinity()),
-        (here & np.isneginf(shown), infinity("−∞")),
+        (part & np.isnan(values), "x"),
+        (part & np.isposinf(values), infinity()),
+        (part & np.isneginf(values), infinity("−∞")),
     ):
         if marked.any():
             ax.scatter(x[marked], y[marked], marker=marker, color=FAINT, linewidths=0.8, **style)
@@ -277,22 +284,22 @@ def _points(ax: Any, each: MapMetric, found: MapLayout, here: np.ndarray, norm: 
 # Texts
 
 
-def _sides(axes: Sequence[Sequence[Any]], found: MapLayout, sheet: PictureSheet) -> None:
+def _sides(axes: Sequence[Sequence[Any]], map_layout: MapLayout, sheet: PictureSheet) -> None:
     """Write values and names of the parameters, on the left and below all."""
     width, height = axes[0][0].figure.get_size_inches()
     across = max(0.6, width / len(axes[0]) - (0.9 if sheet.paper else 1.5))
     up = max(0.5, height / len(axes) - 0.6)
-    sides.write(axes[0][0].xaxis, found.x, across, sheet, upright=False, cells=found.filled)
-    sides.write(axes[0][0].yaxis, found.y, up, sheet, upright=True, cells=found.filled)
+    sides.write(axes[0][0].xaxis, map_layout.x, across, sheet, upright=False, cells=map_layout.filled)
+    sides.write(axes[0][0].yaxis, map_layout.y, up, sheet, upright=True, cells=map_layout.filled)
     for number, row in enumerate(axes):
         for column, ax in enumerate(row):
             last = all(not later[column].get_visible() for later in axes[number + 1 :])
-            ax.set_xlabel(found.x.label if last else "")
+            ax.set_xlabel(map_layout.x.label if last else "")
             ax.tick_params(labelbottom=last, labelleft=column == 0, top=False, right=False)
-            ax.set_ylabel(layout.two_lines(found.y.label, 22) if column == 0 else "")
+            ax.set_ylabel(layout.two_lines(map_layout.y.label, 22) if column == 0 else "")
 
 
-def _marks(metrics: Sequence[MapMetric], found: MapLayout) -> dict[str, Any]:
+def _marks(metrics: Sequence[MapMetric], map_layout: MapLayout) -> dict[str, Any]:
     """Legend entries of the stripes, greys and signs that are there."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -307,29 +314,35 @@ def _marks(metrics: Sequence[MapMetric], found: MapLayout) -> dict[str, Any]:
 
     def signed(tone: str, marker: Any, **style: Any) -> Any:
         sign = dot(marker, **style)
-        return (Patch(facecolor=tone), sign) if found.filled else sign
+        return (Patch(facecolor=tone), sign) if map_layout.filled else sign
 
-    stripes = [marked for metric in metrics for marked in _striped(metric, found)]
-    texts = ["misses what is required"] if found.other is None else [f"missed in {name} alone" for name in found.other]
+    stripes = [marked for metric in metrics for marked in _striped(metric, map_layout)]
+    texts = (
+        ["misses what is required"]
+        if map_layout.other is None
+        else [f"missed in {name} alone" for name in map_layout.other]
+    )
     for hatch, text in zip((STRIPES, DOTTED), texts, strict=False):
         if any(marked.any() for marked, which in stripes if which == hatch):
-            out[text] = patch(hatch) if found.filled else dot(RINGS[hatch], markerfacecolor="none", markersize=5)
-    shown = [_shown(metric, found) for metric in metrics]
-    if any(np.isinf(each).any() for each in shown):
-        down = not any(np.isposinf(each).any() for each in shown)
+            out[text] = patch(hatch) if map_layout.filled else dot(RINGS[hatch], markerfacecolor="none", markersize=5)
+    values_of = [_values(metric, map_layout) for metric in metrics]
+    if any(np.isinf(values).any() for values in values_of):
+        down = not any(np.isposinf(values).any() for values in values_of)
         out["infinite"] = signed(cells.INFINITE, infinity("−∞" if down else "∞"), markersize=9, markeredgewidth=0.0)
     if any(metric.failed.any() for metric in metrics):
         out["failed"] = signed(cells.FAILED, "x", markersize=4.5)
     both = metrics[0].both if metrics else True
-    empty = len(distinct(found.cells[both & (found.cells >= 0)])) < np.prod(found.shape)
-    if found.filled and any(_lacking(values, each) for values, each in zip(shown, metrics, strict=True)):
+    empty = len(distinct(map_layout.cells[both & (map_layout.cells >= 0)])) < np.prod(map_layout.shape)
+    if map_layout.filled and any(_lacking(values, metric) for values, metric in zip(values_of, metrics, strict=True)):
         out["no value"] = Patch(facecolor=cells.LACKING)
-    if found.filled and empty:
-        tone = "white" if found.other is None else NOWHERE
-        out["no case" if found.other is None else "not in both"] = Patch(facecolor=tone, edgecolor=FAINT, linewidth=0.6)
+    if map_layout.filled and empty:
+        tone = "white" if map_layout.other is None else NOWHERE
+        out["no case" if map_layout.other is None else "not in both"] = Patch(
+            facecolor=tone, edgecolor=FAINT, linewidth=0.6
+        )
     return out
 
 
-def _lacking(shown: np.ndarray, each: MapMetric) -> bool:
+def _lacking(values: np.ndarray, metric: MapMetric) -> bool:
     """True if a case that exists and did not fail has no value."""
-    return bool(np.isnan(shown[each.both & ~each.failed]).any())
+    return bool(np.isnan(values[metric.both & ~metric.failed]).any())

@@ -71,7 +71,7 @@ def map_metrics(pool: Pool, names: Sequence[str], others: Mapping[int, OtherGrou
             out.append(
                 MapMetric(column, drawable(column.values), pool.missed(column), failed, theirs, theirs_missed, both)
             )
-    return sorted(out, key=lambda each: _place(names, each.column.key.partition(":")[2]))
+    return sorted(out, key=lambda metric: _place(names, metric.column.key.partition(":")[2]))
 
 
 def _place(names: Sequence[str], name: str) -> int:
@@ -83,38 +83,38 @@ def _both(pool: Pool, others: Mapping[int, OtherGroup]) -> np.ndarray | bool:
         return True
     out = np.zeros(pool.count, bool)
     for number, other in others.items():
-        here = pool.group_of == number
-        out[here] = other.places[pool.position_of[here]] >= 0
+        in_group = pool.group_of == number
+        out[in_group] = other.places[pool.position_of[in_group]] >= 0
     return out
 
 
 def _theirs(
-    pool: Pool, name: str, others: Mapping[int, OtherGroup], asked: bool
+    pool: Pool, name: str, others: Mapping[int, OtherGroup], named: bool
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """The metric of each case in the other archive, in the own unit, and True where it misses its requirement there."""
     if not others:
         return None, None
-    out, missed, found = np.full(pool.count, np.nan), np.zeros(pool.count, bool), False
+    out, missed, any_group = np.full(pool.count, np.nan), np.zeros(pool.count, bool), False
     for number, other in others.items():
         variable = other.group.variables.get(name)
         mine = pool.groups[number].variables.get(name)
         if mine is None:
             continue
         if variable is None or variable.role != "metric":
-            if asked:
-                raise not_in_other(name, other, [each.name for each in other.group.role("metric")])
+            if named:
+                raise not_in_other(name, other, [metric.name for metric in other.group.role("metric")])
             continue
         if variable.unit != mine.unit:
             raise other_unit(name, mine.unit, variable.unit, other)
-        found = True
-        here = np.flatnonzero(pool.group_of == number)
-        places = other.places[pool.position_of[here]]
-        here, places = here[places >= 0], places[places >= 0]
-        out[here] = drawable(other.group.values(name)[places] / deck_unit(mine)[0])
+        any_group = True
+        places_here = np.flatnonzero(pool.group_of == number)
+        places = other.places[pool.position_of[places_here]]
+        places_here, places = places_here[places >= 0], places[places >= 0]
+        out[places_here] = drawable(other.group.values(name)[places] / deck_unit(mine)[0])
         columns = [
             group_requirement.place
             for group_requirement in requirements.group_requirements(other.group)
             if group_requirement.metric == name
         ]
-        missed[here] = (requirements.outcomes(other.group)[places][:, columns] == 0).any(axis=1)
-    return (out, missed) if found else (None, None)
+        missed[places_here] = (requirements.outcomes(other.group)[places][:, columns] == 0).any(axis=1)
+    return (out, missed) if any_group else (None, None)

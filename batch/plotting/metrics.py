@@ -29,7 +29,7 @@ def draw(
 ) -> Any:
     """The figure. names: of metrics, all for none; parameters: what they are drawn over, none: as is best. others: by
     number of a group of the pool that of the other archive. Raises Problem E327, E390, E393."""
-    found = map_axes(archive, pool, parameters)
+    axes_columns = map_axes(archive, pool, parameters)
     if not pool.metrics():
         helps = "`--histories all` keeps histories; a `metric` in the deck gives a number a case"
         message = f"nothing to draw in `{pool.name}`: it has neither histories nor metrics"
@@ -40,20 +40,24 @@ def draw(
     metrics, left = layout.as_many_as_fit(map_metrics(pool, names, others), bool(names), "metrics")
     files = file_names(archive.path, other.path) if other is not None else None
     count = f"{pool.count:,} cases"
-    matched = sum(int((each.places >= 0).sum()) for each in others.values())
+    matched = sum(int((other_group.places >= 0).sum()) for other_group in others.values())
     if files is not None and matched < pool.count:
         count += f", {matched:,} of them also in {files[1]}"
-    if len(found) < 2:
-        by = colour_column(pool, found) if found else None
-        figure = _points(pool, metrics, found[0] if found else None, by, sheet, files)
-        drawn = {each.key for each in (*found, by) if each is not None}
-        besides = [each.label for each in pool.varied() if each.key not in drawn and is_independent(each, found[0])]
+    if len(axes_columns) < 2:
+        by = colour_column(pool, axes_columns) if axes_columns else None
+        figure = _points(pool, metrics, axes_columns[0] if axes_columns else None, by, sheet, files)
+        drawn = {column.key for column in (*axes_columns, by) if column is not None}
+        besides = [
+            column.label
+            for column in pool.varied()
+            if column.key not in drawn and is_independent(column, axes_columns[0])
+        ]
         below = f"{count}; {' and '.join(besides)} varied too" if besides else count
     else:
         if files is not None:
             metrics = [metric for metric in metrics if metric.theirs is not None]
-        third = found[2] if len(found) > 2 else None
-        planned = maps.plan(found[0], found[1], third, files)
+        third = axes_columns[2] if len(axes_columns) > 2 else None
+        planned = maps.plan(axes_columns[0], axes_columns[1], third, files)
         figure, _ = maps.draw(sheet, planned, metrics, third)
         below = f"{count}: {maps.description(planned, metrics, third)}"
     below = f"{below}; {left}" if left else below
@@ -73,11 +77,11 @@ def _points(
     x = x or CaseColumn("case", "case", "", "case", pool.cases.astype(np.float64))
     figure, axes = layout.figure(sheet, 1, [1.0] * len(metrics))
     mapped = None
-    for each, [ax] in zip(metrics, axes, strict=True):
-        mapped = points.scatter(ax, each, x, by, sheet)
-        text = " · ".join(part for part in (each.about, points.edge_words(each.values)) if part)
+    for metric, [ax] in zip(metrics, axes, strict=True):
+        mapped = points.scatter(ax, metric, x, by, sheet)
+        text = " · ".join(part for part in (metric.about, points.edge_words(metric.values)) if part)
         layout.head(ax, text, sheet, 1)
-        ax.set_ylabel(layout.two_lines(each.label))
+        ax.set_ylabel(layout.two_lines(metric.label))
         points.varied_axis(ax, x, sheet)
     axes[-1][0].set_xlabel(f"{x.label}  ({x.unit})" if x.unit else x.label)
     if mapped is not None and by is not None:

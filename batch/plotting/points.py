@@ -44,32 +44,32 @@ class Set:
     joined: bool
 
 
-def scatter(ax: Any, each: MapMetric, x: CaseColumn, by: CaseColumn | None, sheet: PictureSheet) -> Any:
+def scatter(ax: Any, metric: MapMetric, x: CaseColumn, by: CaseColumn | None, sheet: PictureSheet) -> Any:
     """Draw one metric over x, by the levels of another column. Returns the mappable for a colour bar, if one is
     needed."""
-    finite = np.isfinite(each.values)
-    drawn = _apart(x.values, np.where(finite, each.values, np.nan))
+    finite = np.isfinite(metric.values)
+    drawn = _apart(x.values, np.where(finite, metric.values, np.nan))
     size = MARKER / marker_scale(len(x.values)) ** 2
     style: dict[str, Any] = {"s": size, "linewidths": 0, "rasterized": len(drawn) > RASTERED}
     mapped = None
     sets = _sets(x, by)
-    if by is not None and not any(one.text for one in sets):
+    if by is not None and not any(set_.text for set_ in sets):
         mapped = _scale(by)
     if not sets and by is not None:
         style |= {"cmap": "viridis", "norm": _scale(by).norm}
-        mapped = ax.scatter(x.values[drawn], each.values[drawn], c=by.values[drawn], **style)
-    for one in sets:
-        here = drawn[np.isin(drawn, one.places)] if len(sets) > 1 else drawn
-        if one.joined:
-            order = one.places[np.argsort(x.values[one.places])]
-            y = np.where(np.isfinite(each.values[order]), each.values[order], np.nan)
-            ax.plot(x.values[order], y, color=one.colour, linewidth=1.0)
-        ax.scatter(x.values[here], each.values[here], color=one.colour, label=layout.legend_label(one.text), **style)
-    if each.theirs is not None:
-        _theirs(ax, each, x, sets, by)
-        _edge(ax, np.where(each.both, each.theirs, 0.0), x.values, 4.0 * max(12.0, size), hollow=True)
-    _edge(ax, each.values, x.values, size)
-    _limits(ax, each)
+        mapped = ax.scatter(x.values[drawn], metric.values[drawn], c=by.values[drawn], **style)
+    for set_ in sets:
+        own = drawn[np.isin(drawn, set_.places)] if len(sets) > 1 else drawn
+        if set_.joined:
+            order = set_.places[np.argsort(x.values[set_.places])]
+            y = np.where(np.isfinite(metric.values[order]), metric.values[order], np.nan)
+            ax.plot(x.values[order], y, color=set_.colour, linewidth=1.0)
+        ax.scatter(x.values[own], metric.values[own], color=set_.colour, label=layout.legend_label(set_.text), **style)
+    if metric.theirs is not None:
+        _theirs(ax, metric, x, sets, by)
+        _edge(ax, np.where(metric.both, metric.theirs, 0.0), x.values, 4.0 * max(12.0, size), hollow=True)
+    _edge(ax, metric.values, x.values, size)
+    _limits(ax, metric)
     _reach(ax, x.values)
     return mapped
 
@@ -79,18 +79,18 @@ def _sets(x: CaseColumn, by: CaseColumn | None) -> list[Set]:
     if by is None:
         every = np.arange(len(x.values))
         return [Set(every, COLOURS[0], "", x.role == "parameter" and len(levels(x.values)) == len(every) < 200)]
-    found = column_levels(by.values, by.words)
-    count = len(found.texts)
-    if found.stretches or (count > NAMED and not _curves(x, by)):
+    levels_ = column_levels(by.values, by.words)
+    count = len(levels_.texts)
+    if levels_.stretches or (count > NAMED and not _curves(x, by)):
         return []
     joined = _curves(x, by)
     sets = []
-    for index, text in enumerate(found.texts):
+    for index, text in enumerate(levels_.texts):
         colour = COLOURS[index % len(COLOURS)] if by.words else sequence(index, count)
         if count > NAMED:
-            colour = _scale(by).to_rgba(found.values[index])
+            colour = _scale(by).to_rgba(levels_.values[index])
         named = text if by.words else f"{by.label} = {text} {by.unit}".rstrip()
-        sets.append(Set(np.flatnonzero(found.places == index), colour, named if count <= NAMED else "", joined))
+        sets.append(Set(np.flatnonzero(levels_.places == index), colour, named if count <= NAMED else "", joined))
     return sets
 
 
@@ -112,31 +112,31 @@ def _curves(x: CaseColumn, by: CaseColumn) -> bool:
     return pairs == len(x.values)
 
 
-def _theirs(ax: Any, each: MapMetric, x: CaseColumn, sets: list[Set], by: CaseColumn | None) -> None:
+def _theirs(ax: Any, metric: MapMetric, x: CaseColumn, sets: list[Set], by: CaseColumn | None) -> None:
     """Draw the other archive's cases: hollow, under the own ones, with wide pale curves."""
-    assert each.theirs is not None
-    y = np.where(np.isfinite(each.theirs), each.theirs, np.nan)
+    assert metric.theirs is not None
+    y = np.where(np.isfinite(metric.theirs), metric.theirs, np.nan)
     drawn = _apart(x.values, y)
     size = 2.6 * MARKER / marker_scale(len(x.values)) ** 2
-    for one in sets or [Set(drawn, FAINT, "", False)]:
-        here = drawn[np.isin(drawn, one.places)]
-        if one.joined:
-            order = one.places[np.argsort(x.values[one.places])]
+    for set_ in sets or [Set(drawn, FAINT, "", False)]:
+        own = drawn[np.isin(drawn, set_.places)]
+        if set_.joined:
+            order = set_.places[np.argsort(x.values[set_.places])]
             ax.plot(
                 x.values[order],
                 y[order],
-                color=one.colour,
+                color=set_.colour,
                 linewidth=1.0 + BEHIND,
                 alpha=PALE,
                 zorder=0.8,
                 solid_capstyle="butt",
             )
         ax.scatter(
-            x.values[here],
-            y[here],
+            x.values[own],
+            y[own],
             s=size,
             facecolors="none",
-            edgecolors=[one.colour],
+            edgecolors=[set_.colour],
             linewidths=0.7,
             zorder=0.9,
             rasterized=len(drawn) > RASTERED,
@@ -158,20 +158,20 @@ def _edge(ax: Any, values: np.ndarray, x: np.ndarray, size: float, *, hollow: bo
 
     size = max(12.0, size)
     style = {"facecolors": "none", "edgecolors": INK, "zorder": 3.9} if hollow else {"color": INK, "zorder": 4}
-    for there, marker, at in (
+    for marked, marker, edge in (
         (np.isposinf(values), "^", 1.0),
         (np.isneginf(values), "v", 0.0),
         (np.isnan(values), "x", 1.0),
     ):
-        where = x[there & np.isfinite(x)]
+        where = x[marked & np.isfinite(x)]
         if len(where):
             where = where[_apart(where, np.zeros(len(where)))]
             tone = {"color": INK, "zorder": 3.9} if hollow and marker == "x" else style  # a cross has no face
-            inside = (1.0 - 2.0 * at) * (0.5 * size**0.5 + 1.0) / 72
+            inside = (1.0 - 2.0 * edge) * (0.5 * size**0.5 + 1.0) / 72
             place = ax.get_xaxis_transform() + ScaledTranslation(0.0, inside, ax.figure.dpi_scale_trans)
             ax.scatter(
                 where,
-                np.full(len(where), at),
+                np.full(len(where), edge),
                 marker=marker,
                 s=size,
                 linewidths=0.8,
@@ -184,17 +184,17 @@ def _edge(ax: Any, values: np.ndarray, x: np.ndarray, size: float, *, hollow: bo
 def edge_words(values: np.ndarray) -> str:
     """The meaning of the marks on the edges, in words."""
     parts = []
-    for there, text in ((np.isinf(values), "infinite in {} (▲)"), (np.isnan(values), "no value in {} (×)")):
-        if there.any():
-            parts.append(text.format(f"{int(there.sum()):,}"))
+    for marked, text in ((np.isinf(values), "infinite in {} (▲)"), (np.isnan(values), "no value in {} (×)")):
+        if marked.any():
+            parts.append(text.format(f"{int(marked.sum()):,}"))
     return ", ".join(parts)
 
 
-def _limits(ax: Any, each: MapMetric) -> None:
+def _limits(ax: Any, metric: MapMetric) -> None:
     """Draw lines at the limits that lie near enough to the points."""
-    shown = each.values if each.theirs is None else np.concatenate([each.values, each.theirs])
-    finite = shown[np.isfinite(shown)]
-    for limit in each.column.limits:
+    values = metric.values if metric.theirs is None else np.concatenate([metric.values, metric.theirs])
+    finite = values[np.isfinite(values)]
+    for limit in metric.column.limits:
         low, high = (finite.min(), finite.max()) if len(finite) else (limit.value, limit.value)
         if low == high or low - (high - low) <= limit.value <= high + (high - low):
             ax.axhline(limit.value, color=INK, linewidth=0.9, linestyle=(0, (1, 1.5)), label="limit", zorder=1.5)
@@ -210,12 +210,12 @@ def _apart(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     others."""
     if len(x) <= MANY:
         return np.arange(len(x))
-    there = np.flatnonzero(np.isfinite(y) & np.isfinite(x))[::-1]
-    dots = np.zeros(len(there), np.int64)
+    drawable = np.flatnonzero(np.isfinite(y) & np.isfinite(x))[::-1]
+    dots = np.zeros(len(drawable), np.int64)
     for values, count in ((x, DOTS[0]), (y, DOTS[1])):
-        low, high = values[there].min(initial=np.inf), values[there].max(initial=-np.inf)
-        dots = dots * (count + 1) + (count * (values[there] - low) / ((high - low) or 1.0)).astype(np.int64)
-    return np.sort(there[np.unique(dots, return_index=True)[1]])
+        low, high = values[drawable].min(initial=np.inf), values[drawable].max(initial=-np.inf)
+        dots = dots * (count + 1) + (count * (values[drawable] - low) / ((high - low) or 1.0)).astype(np.int64)
+    return np.sort(drawable[np.unique(dots, return_index=True)[1]])
 
 
 def legend_of(known: Mapping[str, Any], other: tuple[str, str] | None) -> dict[str, Any]:
@@ -237,9 +237,9 @@ def legend_of(known: Mapping[str, Any], other: tuple[str, str] | None) -> dict[s
 def bar(figure: Any, mapped: Any, axes: list[Any], by: CaseColumn, sheet: PictureSheet) -> None:
     drawn = figure.colorbar(mapped, ax=axes, pad=0.01, aspect=18 * len(axes))
     if is_log(by):
-        found = line(by)
+        side = line(by)
         height = BAR * figure.get_figheight()
-        write_log(drawn.ax.yaxis, replace(found, edges=levels(by.values)[[0, -1]]), height, sheet, upright=True)
+        write_log(drawn.ax.yaxis, replace(side, edges=levels(by.values)[[0, -1]]), height, sheet, upright=True)
     drawn.set_label(f"{by.label}  ({by.unit})" if by.unit else by.label, fontsize=sheet.small)
     drawn.outline.set_visible(False)
 
@@ -248,11 +248,11 @@ def varied_axis(ax: Any, x: CaseColumn, sheet: PictureSheet) -> None:
     """Set up the axis of a varied parameter: a choice's words at their places, whole numbers of cases, orders of
     magnitude."""
     if is_log(x):
-        found, wide = line(x), ax.figure.get_figwidth()
+        side, wide = line(x), ax.figure.get_figwidth()
         ax.set_xscale("log")
-        ax.set_xlim(found.edges[0], found.edges[-1])
+        ax.set_xlim(side.edges[0], side.edges[-1])
         inches = wide - layout.BESIDE_ON_PAPER if sheet.narrow else PANEL * wide
-        write_log(ax.xaxis, found, inches, sheet)
+        write_log(ax.xaxis, side, inches, sheet)
     if x.words:
         ax.set_xticks(range(len(x.words)), x.words)
         ax.set_xlim(-0.5, len(x.words) - 0.5)

@@ -40,9 +40,9 @@ def solids(scene: ArmScene, numbers: np.ndarray) -> list[PicturedSolid]:
     """The arm at an instant. numbers: the outputs of the scene's formulas there."""
     up, limb = upright(scene), scene.limb
     count = POSE_NUMBERS * len(scene.bodies)
-    poses, given = numbers[:count].reshape(-1, POSE_NUMBERS), numbers[count:-3].reshape(-1, SHAPE_NUMBERS)
+    poses, shape_numbers = numbers[:count].reshape(-1, POSE_NUMBERS), numbers[count:-3].reshape(-1, SHAPE_NUMBERS)
     out = []
-    for shape, (*middle_and_axis, x, y, z) in zip(scene.shapes, given, strict=True):
+    for shape, (*middle_and_axis, x, y, z) in zip(scene.shapes, shape_numbers, strict=True):
         R, p = up @ poses[shape.body][:9].reshape(3, 3), up @ poses[shape.body][9:]
         middle, axis = p + R @ np.array(middle_and_axis[:3]), R @ np.array(middle_and_axis[3:])
         length, radius, kind = float(np.linalg.norm(axis)), limb, "pill"
@@ -87,11 +87,11 @@ class Viewpoint:
         return np.stack([(v @ self.right) / far, (v @ self.up) / far, far], axis=-1)
 
 
-def viewpoint(found: Sequence[PicturedSolid], aspect: float) -> Viewpoint:
+def viewpoint(pictured: Sequence[PicturedSolid], aspect: float) -> Viewpoint:
     """The direction from which the spread of these solids is seen best, from higher where it is flat; at such a
     distance that all are seen in a picture of this ratio of width to height."""
-    points = np.concatenate([solid.ends for solid in found])
-    radii = np.repeat([solid.radius for solid in found], 2)
+    points = np.concatenate([solid.ends for solid in pictured])
+    radii = np.repeat([solid.radius for solid in pictured], 2)
     spread = np.cov(points.T, bias=True)
     across = float(spread[0, 0] + spread[1, 1])
     elevation = HIGH if spread[2, 2] < FLAT * across else LOW

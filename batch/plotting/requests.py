@@ -77,16 +77,22 @@ def _is_signal(group: ArchiveGroup, name: str) -> bool:
 def _unknown(group: ArchiveGroup, name: str, metrics: Sequence[str]) -> Problem:
     """The problem that a name is neither a metric nor a signal; for signals, that of `panels`."""
     signals = [v.name for v in group.role("signal")]
-    here = f"metrics here: {', '.join(dict.fromkeys(metrics))}"
+    metrics_text = f"metrics here: {', '.join(dict.fromkeys(metrics))}"
     if signals and metrics:
-        helps = [*did_you_mean(name, [*signals, *metrics]), f"signals here: {', '.join(signals)}", here]
+        helps = [*did_you_mean(name, [*signals, *metrics]), f"signals here: {', '.join(signals)}", metrics_text]
         return Problem(error("E324", f"no signal or metric `{name}` in `{group.name}`", help=helps))
     try:
         panels(group, [name])
     except Problem as problem:
-        [told] = problem.diagnostics
+        [diagnostic] = problem.diagnostics
         meant = did_you_mean(name, metrics) if not signals else ()
-        return Problem(error(told.code, told.message, help=[*meant, *told.help, *([here] if metrics else [])]))
+        return Problem(
+            error(
+                diagnostic.code,
+                diagnostic.message,
+                help=[*meant, *diagnostic.help, *([metrics_text] if metrics else [])],
+            )
+        )
     raise AssertionError(name)
 
 
@@ -111,18 +117,18 @@ def map_axes(archive: ArchiveFile, pool: Pool, names: Sequence[str]) -> tuple[Ca
         if name not in known:
             raise _not_varied(archive, pool, name, list(known))
         if name in names[:place]:
-            raise Problem(error("E390", f"`{name}` twice in `--over`", help=_here(list(known))))
-    found = tuple(known[name] for name in names)
-    count = len(levels(found[2].values)) if len(found) > 2 else 0
+            raise Problem(error("E390", f"`{name}` twice in `--over`", help=_varied_text(list(known))))
+    columns = tuple(known[name] for name in names)
+    count = len(levels(columns[2].values)) if len(columns) > 2 else 0
     if count > MOST_BESIDE:
         message = f"`{names[2]}` has {count:,} values: a map for each of them is more than {MOST_BESIDE}"
         shorter = f"`--over {names[0]},{names[1]}` shows in each cell the worst case or the middle one"
         raise Problem(error("E390", message, help=("as the third take what has few values", shorter)))
-    return found
+    return columns
 
 
 def _not_varied(archive: ArchiveFile, pool: Pool, name: str, known: Sequence[str]) -> Problem:
-    helps = [*did_you_mean(name, known), _here(known)]
+    helps = [*did_you_mean(name, known), _varied_text(known)]
     for column in pool.columns:
         if column.label == name and column.role != "metric":
             value = column.values[np.isfinite(column.values)][:1]
@@ -131,7 +137,9 @@ def _not_varied(archive: ArchiveFile, pool: Pool, name: str, known: Sequence[str
             return Problem(error("E390", message, help=helps))
         if column.label == name:
             message = f"`{name}` is a metric: it is drawn over what is varied"
-            return Problem(error("E390", message, help=[f"`met plot {quoted(archive.path)} {name}`", _here(known)]))
+            return Problem(
+                error("E390", message, help=[f"`met plot {quoted(archive.path)} {name}`", _varied_text(known)])
+            )
     if pool.count == 1:
         return Problem(error("E390", f"`{pool.name}` is one case: nothing is varied in it", help=()))
     message = (
@@ -151,7 +159,7 @@ def _is_parameter(archive: ArchiveFile, pool: Pool, name: str) -> bool:
     return any(name in experiment.parameters for experiment in experiments if experiment.name in names)
 
 
-def _here(known: Sequence[str]) -> str:
+def _varied_text(known: Sequence[str]) -> str:
     return f"varied here: {', '.join(known)}" if known else "nothing is varied here"
 
 
@@ -159,12 +167,12 @@ def colour_column(pool: Pool, drawn: Sequence[CaseColumn]) -> CaseColumn | None:
     """The column that colours points over one parameter: the varied one with most values that is not in step with
     it."""
     for column in pool.varied():
-        if all(column is not each for each in drawn) and is_independent(column, drawn[0]):
+        if all(column is not drawn_column for drawn_column in drawn) and is_independent(column, drawn[0]):
             return column
     return None
 
 
 def is_independent(column: CaseColumn, other: CaseColumn) -> bool:
     """True if a column does not always rise, or fall, where another one rises."""
-    ranks, others = (np.searchsorted(levels(each.values), each.values) for each in (column, other))
+    ranks, others = (np.searchsorted(levels(ranked.values), ranked.values) for ranked in (column, other))
     return not (np.array_equal(ranks, others) or np.array_equal(ranks, others.max(initial=0) - others))

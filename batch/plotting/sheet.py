@@ -98,11 +98,11 @@ def sheet(size: str = "", dpi: int | None = None) -> PictureSheet:
         raise Problem(error("E392", message, help="`--dpi 600`"))
     if not size:
         return PictureSheet(dpi=dpi)
-    found = _SIZE.fullmatch(size)
+    match_ = _SIZE.fullmatch(size)
     helps = "as `--size 8.5cm`, a column's width, or `--size 8.5x6cm`; in cm, mm or in"
-    if found is None:
+    if match_ is None:
         raise Problem(error("E392", f"size `{size}` cannot be read", help=helps))
-    width, height, unit = found.groups()
+    width, height, unit = match_.groups()
     sides = [float(side) * INCHES[unit] for side in (width, height) if side is not None]
     if not all(LEAST_CM <= side / INCHES["cm"] <= MOST_CM for side in sides):
         message = f"size `{size}`: sides are from {LEAST_CM:g} cm to {MOST_CM:g} cm"

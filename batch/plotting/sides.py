@@ -63,26 +63,26 @@ class MapSide:
 
 def side(column: CaseColumn) -> MapSide:
     """The side of a map of cells."""
-    found = column_levels(column.values, column.words, MOST_CELLS)
-    if found.scale == "place":
-        edges = np.arange(len(found.texts) + 1) - 0.5
+    own_levels = column_levels(column.values, column.words, MOST_CELLS)
+    if own_levels.scale == "place":
+        edges = np.arange(len(own_levels.texts) + 1) - 0.5
     else:
-        edges = found.values if found.stretches else edges_of(found.values, found.scale)
-    return MapSide(column, found, edges, found.scale)
+        edges = own_levels.values if own_levels.stretches else edges_of(own_levels.values, own_levels.scale)
+    return MapSide(column, own_levels, edges, own_levels.scale)
 
 
 def line(column: CaseColumn) -> MapSide:
     """The side of points, which lie at their values; words at their places."""
-    found = column_levels(column.values, column.words)
+    own_levels = column_levels(column.values, column.words)
     if column.words:
         return side(column)
     values = levels(column.values)
     if not len(values):
-        return MapSide(column, found, np.array([0.0, 1.0]), "linear")
+        return MapSide(column, own_levels, np.array([0.0, 1.0]), "linear")
     log = is_log(column)
     ends = np.log(values[[0, -1]]) if log else values[[0, -1]]
     ends = ends + BEYOND * (float(ends[1] - ends[0]) or abs(float(ends[0])) or 1.0) * np.array([-1.0, 1.0])
-    return MapSide(column, found, np.exp(ends) if log else ends, "log" if log else "linear")
+    return MapSide(column, own_levels, np.exp(ends) if log else ends, "log" if log else "linear")
 
 
 def is_log(column: CaseColumn) -> bool:
@@ -90,33 +90,37 @@ def is_log(column: CaseColumn) -> bool:
     return column.role == "parameter" and grids.is_log(levels(column.values))
 
 
-def write(axis: Any, found: MapSide, inches: float, sheet: PictureSheet, *, upright: bool, cells: bool = True) -> None:
+def write(
+    axis: Any, map_side: MapSide, inches: float, sheet: PictureSheet, *, upright: bool, cells: bool = True
+) -> None:
     """Write the values that fit on an axis of this length; if there are many, or for points, round numbers between
     them."""
     from matplotlib.ticker import NullLocator
 
     axis.set_minor_locator(NullLocator())
-    texts = [text.partition(" … ")[0] for text in found.levels.texts]
+    texts = [text.partition(" … ")[0] for text in map_side.levels.texts]
     room = max(2, int(inches / (1.9 * sheet.normal / 72 if upright else _wide(texts, sheet) + APART)))
     every = -(-len(texts) // room)
-    whole = cells and every == 1 and max(map(len, texts)) <= SHORT and not found.levels.stretches
-    if found.scale == "log" and not whole:
-        write_log(axis, found, inches, sheet, upright=upright)
-    elif found.scale == "place" or whole:
-        axis.set_ticks(found.at[::every], texts[::every])
+    whole = cells and every == 1 and max(map(len, texts)) <= SHORT and not map_side.levels.stretches
+    if map_side.scale == "log" and not whole:
+        write_log(axis, map_side, inches, sheet, upright=upright)
+    elif map_side.scale == "place" or whole:
+        axis.set_ticks(map_side.at[::every], texts[::every])
 
 
-def write_log(axis: Any, found: MapSide, inches: float, sheet: PictureSheet, *, upright: bool = False) -> None:
+def write_log(axis: Any, map_side: MapSide, inches: float, sheet: PictureSheet, *, upright: bool = False) -> None:
     """Write on a logarithmic axis of this length the values, if they are few and short, else as many round numbers as
     fit."""
     from matplotlib.ticker import NullLocator
 
     axis.set_minor_locator(NullLocator())
-    low, high = float(found.edges[0]), float(found.edges[-1])
+    low, high = float(map_side.edges[0]), float(map_side.edges[-1])
     tries = [round_numbers(low, high, steps) for steps in ROUND]
-    if max(map(len, found.levels.texts)) <= SHORT and not found.levels.stretches:
-        tries.insert(0, found.levels.values.tolist())
-    values = next((each for each in tries if _apart(each, low, high, inches, sheet, upright=upright)), tries[-1])
+    if max(map(len, map_side.levels.texts)) <= SHORT and not map_side.levels.stretches:
+        tries.insert(0, map_side.levels.values.tolist())
+    values = next(
+        (numbers for numbers in tries if _apart(numbers, low, high, inches, sheet, upright=upright)), tries[-1]
+    )
     while not _apart(values, low, high, inches, sheet, upright=upright):
         values = values[::2]
     if len(values) < 2:  # less than a factor of 2.5: the axis is nearly linear
@@ -140,7 +144,7 @@ def _apart(
     places = [inches * math.log(x / low) / math.log(high / low) for x in values]
     sizes = [1.5 * sheet.normal / 72 if upright else _wide([number_text(x)], sheet) + APART for x in values]
     between = zip(pairwise(places), pairwise(sizes), strict=True)
-    return all(b - a >= (one + other) / 2 for (a, b), (one, other) in between)
+    return all(b - a >= (own_width + other) / 2 for (a, b), (own_width, other) in between)
 
 
 def _wide(texts: Sequence[str], sheet: PictureSheet) -> float:
