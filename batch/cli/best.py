@@ -127,7 +127,7 @@ def best(
                 raise Problem(error("E395", message, help="a `tune` chooses values that are"))
             deck = None
             if (diff or write) and searched.ok:
-                deck = chosen_deck(file, searched.values, output, experiment=searched.name, of=searched.of)
+                deck = chosen_deck(file, searched.values, output, experiment=searched.name, among=searched.of)
             tell(form, finite(searched.data), searched.lines, deck, asked=diff or write, write=write)
             return YES if searched.ok else NO
         designs = Designs(pool, over, choose)
@@ -144,7 +144,7 @@ def best(
         deck = None
         if (diff or write) and answer.best is not None and answer.advised:
             of = f"{designs.count:,} designs"
-            deck = chosen_deck(file, answer.values(answer.best), output, experiment=answer.name, of=of)
+            deck = chosen_deck(file, answer.values(answer.best), output, experiment=answer.name, among=of)
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
         data = answer.as_data() if form == "json" else {}
         tell(form, data, answer.lines(width), deck, asked=diff or write, write=write)

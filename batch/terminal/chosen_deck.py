@@ -75,12 +75,12 @@ class FittedValue:
 
 
 def chosen_deck(
-    file: ArchiveFile, values: Sequence[WrittenValue], output: str | None, *, experiment: str, of: str
+    file: ArchiveFile, values: Sequence[WrittenValue], output: str | None, *, experiment: str, among: str
 ) -> ChosenDeck:
     """The deck of an archive with these values in it.
 
     output      a file for a copy; None: the deck itself
-    experiment  the sweep or tuning that chose them;  of: among what, in words, `400 designs`
+    experiment  the sweep or tuning that chose them;  among: among what, in words, `400 designs`
 
     Raises Problem E397 where a value cannot be written, E398 where the deck is not the archive's, or is not to be
     written to.
@@ -98,21 +98,21 @@ def chosen_deck(
         newline = _newline_as_archived(file.deck, before)
     elif target.exists():
         raise _other(f"`{target}` is there already", "name a file that is not: it would be lost")
-    name = "".join(each if each.isprintable() and each != "\\" else "?" for each in file.path.name)
-    made = with_values(
+    name = "".join(letter if letter.isprintable() and letter != "\\" else "?" for letter in file.path.name)
+    with_chosen = with_values(
         before,
         values,
         name=file.deck.strip("<>"),
         folder=target.parent,
         experiment=experiment,
         defines=plan.defines,
-        remark=f"of {of}: {experiment}, {name}",
+        remark=f"of {among}: {experiment}, {name}",
     )
-    known = set(made.sources.values())
+    known = set(with_chosen.sources.values())
     changed = [name for name, text in sources.items() if text not in known and not _is_there(name, text)]
     if changed:
         raise _other(f"{changed[0]} is not what it was when the archive was made", "run the sweep again")
-    return ChosenDeck(target, output is None, before, made.text, made.run, made.others, newline)
+    return ChosenDeck(target, output is None, before, with_chosen.text, with_chosen.run, with_chosen.others, newline)
 
 
 def fitted_deck(
@@ -152,13 +152,13 @@ def fitted_deck(
 
     for fitted in values:
         remark = fitted.remark
-        made = written(fitted.value, remark)
-        for lost in [each for each in remarks if each not in made.text]:  # that of a value on the same line
+        changed = written(fitted.value, remark)
+        for lost in [remark_ for remark_ in remarks if remark_ not in changed.text]:  # that of a value on the same line
             remark = f"{lost}, {fitted.interval}"
-            made = written(fitted.value, remark)
-        after = made.text
-        remarks = [each for each in (*remarks, remark) if each in after]
-        others |= dict.fromkeys(made.others)
+            changed = written(fitted.value, remark)
+        after = changed.text
+        remarks = [remark_ for remark_ in (*remarks, remark) if remark_ in after]
+        others |= dict.fromkeys(changed.others)
     return ChosenDeck(target, output is None, before, after, experiment, tuple(others), newline)
 
 
@@ -177,11 +177,11 @@ def _newline_as_archived(deck: str, archived: str) -> str:
         raise _other(f"{deck} comes with MET, and is not written to", copy)
     if not Path(deck).is_file():
         raise _other(f"there is no `{deck}` here, of which the archive is", f"go to its folder; or {copy}")
-    found = file_at(deck)
-    text = Files().text(found)
+    deck_file = file_at(deck)
+    text = Files().text(deck_file)
     if text != archived:
         raise _other(f"`{deck}` is not what it was when the archive was made", f"run the sweep again; or {copy}")
-    data = read_regular(found.path, MOST_BYTES)
+    data = read_regular(deck_file.path, MOST_BYTES)
     for newline in ("\n", "\r\n"):
         if archived.replace("\n", newline).encode() == data:
             return newline

@@ -12,27 +12,27 @@ if TYPE_CHECKING:
     from met.trace.recording import Recording
 
 
-def program(asked: DumpRequest) -> Iterator[str]:
+def program(request: DumpRequest) -> Iterator[str]:
     """The listing of a program: control, then each straight piece by operations; `%n` is the result of number n."""
     from met.backends.reference.listing import lines
 
-    for experiment, recording in _recorded(asked):
+    for experiment, recording in _recorded(request):
         yield f"program of {experiment.name}: base rate {recording.program.base_hz:g} Hz"
         yield from lines(recording)
 
 
-def kernel(asked: DumpRequest) -> Iterator[str]:
+def kernel(request: DumpRequest) -> Iterator[str]:
     """The code of the program as MET writes it for this machine."""
     from met import backends
 
-    for _, recording in _recorded(asked):
+    for _, recording in _recorded(request):
         yield backends.find().emit(recording)
 
 
-def _recorded(asked: DumpRequest) -> Iterator[tuple[Experiment, Recording]]:
+def _recorded(request: DumpRequest) -> Iterator[tuple[Experiment, Recording]]:
     """Record each run of the plan; returns it with its program."""
     from met.program.build import build
     from met.trace.recorder import record
 
-    for experiment in asked.plan().experiments:
+    for experiment in request.plan().experiments:
         yield experiment, record(build(experiment))

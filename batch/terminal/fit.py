@@ -65,15 +65,15 @@ def rounded(si: float, half: float, unit: str) -> WrittenValue:
 def written_values(question: FitQuestion, answer: FitAnswer) -> list[FittedValue]:
     """The fitted values, rounded to a hundredth of their intervals, to be written into the deck."""
     logs = ", ".join(Path(run.file).name for run in question.runs)
-    found = []
+    values = []
     for place, path in enumerate(question.paths):
         if path.startswith(DELAY):
             continue
         unit, half = question.units[place], float(answer.fit.factor * answer.fit.deviation[place])
         value = dataclasses.replace(rounded(float(answer.fit.values[place]), half / 10.0, unit), path=path)
         interval = f"{path} +- {_short(half, unit)}" if math.isfinite(half) else ""
-        found.append(FittedValue(value, f"by a fit to {logs}", interval))
-    return found
+        values.append(FittedValue(value, f"by a fit to {logs}", interval))
+    return values
 
 
 def written_motion(promise: Promise) -> list[FittedValue]:
@@ -81,29 +81,29 @@ def written_motion(promise: Promise) -> list[FittedValue]:
     return [FittedValue(value, f"of {promise.sweep.cases.count:,}: {promise.motion.file}") for value in promise.values]
 
 
-def identifiable_lines(question: FitQuestion, found: Known, promised: Sequence[Promise]) -> Iterator[str]:
+def identifiable_lines(question: FitQuestion, known: Known, promised: Sequence[Promise]) -> Iterator[str]:
     """Lines about the numbers that the logs can tell before anything is fitted, and with a log of other motions."""
     rows = [["", "deck", "standard error", "by itself", ""]]
     for place, path in enumerate(question.paths):
         unit = question.units[place]
-        errors = [_short(each, unit) for each in (found.deviation[place], found.alone[place])]
-        rows.append([f"  {path}", _deck_value(question, place), *errors, WORDS[found.verdict[place]]])
+        errors = [_short(deviation, unit) for deviation in (known.deviation[place], known.alone[place])]
+        rows.append([f"  {path}", _deck_value(question, place), *errors, WORDS[known.verdict[place]]])
     yield from columns(rows, right=(1, 2, 3))
     yield ""
-    condition = "infinite" if math.isinf(found.condition) else f"{found.condition:.3g}"
+    condition = "infinite" if math.isinf(known.condition) else f"{known.condition:.3g}"
     many = len(question.paths)
-    yield f"{found.rank} of {many} combinations of these can be known from the logs; condition {condition}"
-    yield from _together(question, found)
+    yield f"{known.rank} of {many} combinations of these can be known from the logs; condition {condition}"
+    yield from _together(question, known)
     if promised:
         yield ""
-        rows = [["standard errors with a log of", *(each.motion.file for each in promised)]]
+        rows = [["standard errors with a log of", *(promise.motion.file for promise in promised)]]
         for place, path in enumerate(question.paths):
-            errors = [_short(each.known.deviation[place], question.units[place]) for each in promised]
+            errors = [_short(promise.known.deviation[place], question.units[place]) for promise in promised]
             rows.append([f"  {path}", *errors])
         yield from columns(rows, right=tuple(range(1, len(promised) + 1)))
         yield ""
-        for each in promised:
-            yield from _choice_lines(each)
+        for promise in promised:
+            yield from _choice_lines(promise)
     yield "The errors are those of the logs' noise alone: what the model lacks adds to them."
 
 
@@ -116,17 +116,17 @@ def _choice_lines(promise: Promise) -> Iterator[str]:
     if promise.judged < cases:
         judged, others = f"{promise.judged:,} of {judged}", ": the others fail, leave limits or miss requirements"
     yield f"{promise.motion.file} is the best of {judged}{others}"
-    given = promise.motion.given
-    words = [f"-D {quoted(define)}" for define in given.defines]
-    words += [setting_option(setting) for setting in (*given.settings, *settings)]
-    yield f"its motion: {' '.join(['met run', quoted(given.deck.file), given.name, *words])}"
+    run = promise.motion.given
+    words = [f"-D {quoted(define)}" for define in run.defines]
+    words += [setting_option(setting) for setting in (*run.settings, *settings)]
+    yield f"its motion: {' '.join(['met run', quoted(run.deck.file), run.name, *words])}"
     yield ""
 
 
 def fit_lines(question: FitQuestion, answer: FitAnswer) -> Iterator[str]:
     """The fitted numbers, what they are worth, and what is left of the logs, in lines."""
     fit = answer.fit
-    logs, numbers = ", ".join(each.file for each in question.runs), f"{len(fit.residuals):,} numbers"
+    logs, numbers = ", ".join(run.file for run in question.runs), f"{len(fit.residuals):,} numbers"
     yield f"{question.runs[0].given.name}, fitted to {numbers} of {logs}"
     yield ""
     rows = [["", "deck", "fitted", "95 %", ""]]
@@ -145,13 +145,13 @@ def fit_lines(question: FitQuestion, answer: FitAnswer) -> Iterator[str]:
     yield from columns(rows, right=(1, 2))
     yield from _together(question, answer.known)
     pairs = sorted(correlated(fit.covariance, question.paths, answer.known), key=lambda pair: -abs(pair[2]))
-    for one, other, share in pairs[:SHOWN]:
-        yield f"  note: the errors of {one} and {other} are correlated by {share:.2f}"
+    for path_a, other, share in pairs[:SHOWN]:
+        yield f"  note: the errors of {path_a} and {other} are correlated by {share:.2f}"
     if len(pairs) > SHOWN:
         yield f"  note: so are those of {len(pairs) - SHOWN} more pairs, by 0.9 at least"
     if fit.outliers:
         yield f"  note: {fit.outliers:,} numbers are far from all others, and left out"
-    if any(each.thinned for each in question.runs):
+    if any(run.thinned for run in question.runs):
         yield "  note: the logs are longer than what is fitted: instants are left out at even distances"
     if not fit.converged:
         yield f"  doubt: after {fit.steps} steps, the fit was still moving: these are not yet its numbers"
@@ -178,8 +178,10 @@ def sweep_lines(question: FitQuestion, answer: FitAnswer, count: int = 200) -> I
     if not free:
         return
     if pairs := correlated(answer.fit.covariance, question.paths, answer.known, DRAWN_APART):
-        one, other, share = pairs[0]
-        yield f"no sweep: the errors of {one} and {other} are correlated by {share:.2f}, and a sweep draws them apart"
+        path_a, other, share = pairs[0]
+        yield (
+            f"no sweep: the errors of {path_a} and {other} are correlated by {share:.2f}, and a sweep draws them apart"
+        )
         return
     yield "What is known of the arm, as a sweep of the deck:"
     yield ""
@@ -232,30 +234,30 @@ def as_data(question: FitQuestion, answer: FitAnswer) -> dict[str, Any]:
     return plain
 
 
-def identifiable_data(question: FitQuestion, found: Known, promised: Sequence[Promise]) -> dict[str, Any]:
+def identifiable_data(question: FitQuestion, known: Known, promised: Sequence[Promise]) -> dict[str, Any]:
     """Plain data; a number that is not finite is null. SI"""
     parameters = [
         {"path": path, "deck": float(start), "deviation": float(whole), "alone": float(alone), "known": verdict}
         for path, start, whole, alone, verdict in zip(
-            question.paths, question.start, found.deviation, found.alone, found.verdict, strict=True
+            question.paths, question.start, known.deviation, known.alone, known.verdict, strict=True
         )
     ]
     data: dict[str, Any] = {
         "parameters": parameters,
-        "rank": found.rank,
-        "condition": found.condition,
-        "motions": {each.motion.file: each.known.deviation.tolist() for each in promised},
+        "rank": known.rank,
+        "condition": known.condition,
+        "motions": {promise.motion.file: promise.known.deviation.tolist() for promise in promised},
         "chosen": [
             {
-                "motion": each.motion.file,
-                "cases": each.sweep.cases.count,
-                "judged": each.judged,
-                "set": [value.setting for value in each.values],
+                "motion": promise.motion.file,
+                "cases": promise.sweep.cases.count,
+                "judged": promise.judged,
+                "set": [value.setting for value in promise.values],
             }
-            for each in promised
-            if each.values
+            for promise in promised
+            if promise.values
         ],
-        "together": _as_paths(question, found),
+        "together": _as_paths(question, known),
     }
     plain: dict[str, Any] = finite(data)
     return plain
@@ -273,13 +275,13 @@ def _comparisons(runs: Sequence[Any], pairs: Any) -> list[dict[str, Any]]:
     ]
 
 
-def _as_paths(question: FitQuestion, found: Known) -> list[dict[str, float]]:
-    return [{question.paths[place]: part for place, part in each.items()} for each in found.together]
+def _as_paths(question: FitQuestion, known: Known) -> list[dict[str, float]]:
+    return [{question.paths[place]: part for place, part in change.items()} for change in known.together]
 
 
-def _together(question: FitQuestion, found: Known) -> Iterator[str]:
-    for change in found.together[:SHOWN]:
-        largest = sorted(change, key=lambda place: -abs(change[place] / found.size[place]))[:MOST_PARTS]
+def _together(question: FitQuestion, known: Known) -> Iterator[str]:
+    for change in known.together[:SHOWN]:
+        largest = sorted(change, key=lambda place: -abs(change[place] / known.size[place]))[:MOST_PARTS]
         parts = [
             f"{question.paths[place]} by {WrittenValue('', float(f'{change[place]:.3g}'), question.units[place]).text}"
             for place in sorted(largest)
@@ -287,17 +289,17 @@ def _together(question: FitQuestion, found: Known) -> Iterator[str]:
         more = f" and {len(change) - MOST_PARTS} more" if len(change) > MOST_PARTS else ""
         yield f"  doubt: a change of all of these leaves no mark in the logs: {', '.join(parts)}{more}"
         if len(change) == 2:
-            (one, part), (other, by) = change.items()
+            (own_place, part), (other, by) = change.items()
             factor = f"{'+' if part * by < 0.0 else '-'} {abs(part / by):.3g}"
-            own, its = question.si_units[one], question.si_units[other]
+            own, its = question.si_units[own_place], question.si_units[other]
             unit = "" if own == its else f" {own} per {its}"
-            yield f"         only {question.paths[one]} {factor}{unit} * {question.paths[other]} is known"
-    if len(found.together) > SHOWN:
-        yield f"  doubt: {len(found.together) - SHOWN} more such changes leave no mark: estimate fewer numbers"
+            yield f"         only {question.paths[own_place]} {factor}{unit} * {question.paths[other]} is known"
+    if len(known.together) > SHOWN:
+        yield f"  doubt: {len(known.together) - SHOWN} more such changes leave no mark: estimate fewer numbers"
 
 
 def _residual_lines(title: str, before: Comparison, after: Comparison, doubts: Sequence[str]) -> Iterator[str]:
-    earlier = {each.channel: each for each in before.residuals}
+    earlier = {residual.channel: residual for residual in before.residuals}
     rows = [[title, "before", "after", "", "of spread", "", "what is left follows"]]
     for residual in after.residuals:
         was = earlier.get(residual.channel)
@@ -325,19 +327,23 @@ def _doubts(before: Comparison, after: Comparison) -> list[str]:
         residual.channel for residual in after.residuals if residual.rms > REMOVED * sizes.get(residual.channel, 0.0)
     }
     left -= {residual.channel for residual in after.residuals if residual.white}
-    found = {doubt.rpartition(": ")[0]: doubt for doubt in doubt_lines(after)}
+    doubts = {doubt.rpartition(": ")[0]: doubt for doubt in doubt_lines(after)}
     for doubt in doubt_lines(before):
         named = set(re.findall("`([^`]+)`", doubt)) & sizes.keys() or set(sizes)
         if named & left:
-            found.setdefault(doubt.rpartition(": ")[0], doubt)
-    return list(found.values())
+            doubts.setdefault(doubt.rpartition(": ")[0], doubt)
+    return list(doubts.values())
 
 
 def _late_doubt(run: LoggedRun, path: str, delay: float, after: Comparison) -> list[str]:
     """A doubt about a log that is late by as much in most channels after a fit. path, delay: of its delay, and the
     fitted one, s"""
     first = [residual.explained[0] for residual in after.residuals if residual.explained]
-    sizes = [each.size for each in first if each.means == "a delay" and each.size is not None]
+    sizes = [
+        first_residual.size
+        for first_residual in first
+        if first_residual.means == "a delay" and first_residual.size is not None
+    ]
     if 2 * len(sizes) <= len(after.residuals) or min(sizes) * max(sizes) <= 0.0:
         return []
     if max(map(abs, sizes)) > MOST_UNLIKE * min(map(abs, sizes)):
@@ -350,7 +356,7 @@ def _late_doubt(run: LoggedRun, path: str, delay: float, after: Comparison) -> l
 
 def _all_doubts(question: FitQuestion, answer: FitAnswer) -> list[list[str]]:
     """The reasons to doubt each log that is fitted, as lines."""
-    delays, found = dict(zip(question.paths, answer.fit.values.tolist(), strict=True)), []
+    delays, doubts_of_logs = dict(zip(question.paths, answer.fit.values.tolist(), strict=True)), []
     for run, before, after in zip(question.runs, answer.before, answer.after, strict=True):
         path, doubts = DELAY + run.file, _doubts(before, after)
         left = [
@@ -361,8 +367,8 @@ def _all_doubts(question: FitQuestion, answer: FitAnswer) -> list[list[str]]:
         if 2 * len(left) > len(after.residuals) and not doubts and np.median(left) > MOST_LEFT:
             words = f"the fit leaves {np.median(left):.2g} of what was measured in most channels"
             doubts.append(f"  doubt: {words}: is the log of this run, and of an arm like this?")
-        found.append([*doubts, *_late_doubt(run, path, delays.get(path, 0.0), after)])
-    return found
+        doubts_of_logs.append([*doubts, *_late_doubt(run, path, delays.get(path, 0.0), after)])
+    return doubts_of_logs
 
 
 def is_certain(question: FitQuestion, answer: FitAnswer) -> bool:

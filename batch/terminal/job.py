@@ -44,9 +44,9 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
         say(f"met: {path} is in the hands of another run: nothing was done here", err=True)
         return 1
     try:
-        asked = read_json(tasks_file)
-        dealt = [[Task(*each) for each in tasks] for tasks in asked["shares"]]
-        timeout = asked["timeout"]
+        order = read_json(tasks_file)
+        dealt = [[Task(*task) for task in tasks] for tasks in order["shares"]]
+        timeout = order["timeout"]
         sections = folder.sections()
         for task in itertools.chain(*dealt):
             if not (
@@ -91,17 +91,17 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
 
 def cores() -> int:
     """The number of cores that the queue gives a job; one where it gives no number."""
-    said = os.environ.get("SLURM_CPUS_PER_TASK", "")
-    return max(1, int(said)) if said.isdecimal() else 1
+    setting = os.environ.get("SLURM_CPUS_PER_TASK", "")
+    return max(1, int(setting)) if setting.isdecimal() else 1
 
 
-def _left(wanted: Sequence[Task], there: Sequence[Task]) -> list[tuple[int, int]]:
+def _left(wanted: Sequence[Task], done: Sequence[Task]) -> list[tuple[int, int]]:
     """Stretches of the wanted tasks without a shard, judged by names: contents are checked when all is merged."""
     out = []
     for task in wanted:
         inside = [
             Task(t.section, max(t.first, task.first) - task.first, min(t.last, task.last) - task.first)
-            for t in there
+            for t in done
             if t.first < task.last and t.last > task.first
         ]
         out += [(task.first + first, task.first + last) for first, last in uncovered(inside, task.cases)]

@@ -17,55 +17,57 @@ LEAST_SHARE = 0.05
 """Share of a mode from which on a participant is named."""
 
 
-def linear_lines(found: Linearized, cases: int = 1) -> Iterator[str]:
+def linear_lines(linearized: Linearized, cases: int = 1) -> Iterator[str]:
     """The answers in lines. cases: the number of the experiment's cases, of which this is one"""
-    case = f", case #{found.case} of {cases}" if cases > 1 else ""
-    states = count(len(found.states), "state")
-    yield f"{found.experiment}{case}: linear {found.where}, a period of {_time(found.seconds)}, {states}"
-    for name in found.held:
-        yield f"  {name} {'is locked' if name in found.locked else 'sticks, and is held'}"
-    for each in found.creeping:
-        yield f"  {each.name} creeps at {abs(each.rate):.3g} {each.unit}: the answer holds for moves slower than that"
-    for path in found.at_limit:
+    case = f", case #{linearized.case} of {cases}" if cases > 1 else ""
+    states = count(len(linearized.states), "state")
+    yield f"{linearized.experiment}{case}: linear {linearized.where}, a period of {_time(linearized.seconds)}, {states}"
+    for name in linearized.held:
+        yield f"  {name} {'is locked' if name in linearized.locked else 'sticks, and is held'}"
+    for state in linearized.creeping:
+        yield (
+            f"  {state.name} creeps at {abs(state.rate):.3g} {state.unit}: the answer holds for moves slower than that"
+        )
+    for path in linearized.at_limit:
         yield f"  at its limit: {path}"
     yield ""
     yield "poles of the program"
-    yield from _table([("z", *_HEAD)], [(_complex(pole.z), *_row(found, pole)) for pole in found.poles])
-    natural = found.natural
+    yield from _table([("z", *_HEAD)], [(_complex(pole.z), *_row(linearized, pole)) for pole in linearized.poles])
+    natural = linearized.natural
     if natural:
         yield ""
         yield "natural modes, while computers hold what they hold"
-        yield from _table([_HEAD], [_row(found, each) for each in natural])
-    for loop in found.loops:
+        yield from _table([_HEAD], [_row(linearized, pole) for pole in natural])
+    for loop in linearized.loops:
         yield ""
-        yield from _loop_lines(loop, found)
+        yield from _loop_lines(loop, linearized)
 
 
 _HEAD = ("Hz", "damping", "by e in", "who takes part")
 
 
-def _row(found: Linearized, pole: Pole) -> tuple[str, ...]:
+def _row(linearized: Linearized, pole: Pole) -> tuple[str, ...]:
     if math.isinf(pole.hz):
-        return "-", "-", "at once", _parts(found, pole)
-    stays = pole.stays(found.seconds)
+        return "-", "-", "at once", _parts(linearized, pole)
+    stays = pole.stays(linearized.seconds)
     way = " grows" if pole.s.real > 0.0 and not stays else ""
     return (
-        f"{0.0 if stays and pole.hz * found.seconds < 1e-6 else pole.hz:.4g}",
+        f"{0.0 if stays and pole.hz * linearized.seconds < 1e-6 else pole.hz:.4g}",
         "-" if stays else f"{pole.damping:.3f}",
         "stays" if stays else _time(pole.seconds) + way,
-        _parts(found, pole),
+        _parts(linearized, pole),
     )
 
 
-def _parts(found: Linearized, pole: Pole) -> str:
+def _parts(linearized: Linearized, pole: Pole) -> str:
     """Joints by their shares, each with its state of the largest share."""
-    told: list[str] = []
-    for joint, share in found.by_joint(pole):
-        if share < LEAST_SHARE and told:
+    parts: list[str] = []
+    for joint, share in linearized.by_joint(pole):
+        if share < LEAST_SHARE and parts:
             break
-        state = next(name for name, _ in pole.shares if found.joints[name] == joint)
-        told.append(f"{joint} {100.0 * share:.0f} % ({_of_joint(state, joint)})")
-    return ", ".join(told)
+        state = next(name for name, _ in pole.shares if linearized.joints[name] == joint)
+        parts.append(f"{joint} {100.0 * share:.0f} % ({_of_joint(state, joint)})")
+    return ", ".join(parts)
 
 
 def _of_joint(state: str, joint: str) -> str:
@@ -97,20 +99,25 @@ def _loop_lines(loop: OpenLoop, answers: Linearized) -> Iterator[str]:
         yield "  unstable as it is: a pole above grows" + (f", while at its limit: {limits}" if limits else "")
         return
     down, up = loop.gains
-    most = no_limit(loop) if up is None else f"{up:.4g} times{_at(loop.margins, 'at_gain_up')}"
-    least = "" if down is None else f"; down to {down:.4g} times{_at(loop.margins, 'at_gain_down')}"
+    most = no_limit(loop) if up is None else f"{up:.4g} times{_at_frequency(loop.margins, 'at_gain_up')}"
+    least = "" if down is None else f"; down to {down:.4g} times{_at_frequency(loop.margins, 'at_gain_down')}"
     rows = [("gain", f"{most}{least}")]
-    found = loop.margins
-    if found is not None:
-        if found.phase is None:
+    margins = loop.margins
+    if margins is not None:
+        if margins.phase is None:
             rows.append(("phase", "no limit: the loop's gain is below 1 everywhere"))
         else:
-            rows.append(("phase", f"{math.degrees(found.phase):.4g} deg{_at(found, 'at_phase')}"))
-        if found.delay is not None:
-            rows.append(("delay", f"{_time(found.delay)}, {found.delay / period:.3g} periods{_at(found, 'at_delay')}"))
-        low, high = found.disk_gain
-        both = f"{low:.3g} to {high:.3g} times the gain and {math.degrees(found.disk_phase):.3g} deg at once"
-        rows.append(("disk", f"{found.disk:.4g}: {both}{_at(found, 'at_disk')}"))
+            rows.append(("phase", f"{math.degrees(margins.phase):.4g} deg{_at_frequency(margins, 'at_phase')}"))
+        if margins.delay is not None:
+            rows.append(
+                (
+                    "delay",
+                    f"{_time(margins.delay)}, {margins.delay / period:.3g} periods{_at_frequency(margins, 'at_delay')}",
+                )
+            )
+        low, high = margins.disk_gain
+        both = f"{low:.3g} to {high:.3g} times the gain and {math.degrees(margins.disk_phase):.3g} deg at once"
+        rows.append(("disk", f"{margins.disk:.4g}: {both}{_at_frequency(margins, 'at_disk')}"))
     elif not several:
         rows.append(("phase", f"none is told: the law ticks {loop.ticks} times a period, which is no loop of one rate"))
     yield from columns(rows)
@@ -121,8 +128,8 @@ def no_limit(loop: OpenLoop) -> str:
     return "no limit" if loop.searched is None else f"more than {loop.searched:,.0f} times"
 
 
-def _at(found: LoopMargins | None, name: str) -> str:
-    w = None if found is None else getattr(found, name)
+def _at_frequency(margins: LoopMargins | None, name: str) -> str:
+    w = None if margins is None else getattr(margins, name)
     return "" if w is None else f", at {w / (2.0 * math.pi):.4g} Hz"
 
 
@@ -134,42 +141,42 @@ def _complex(z: complex) -> str:
     return f"{z.real:.6f}" if z.imag == 0.0 else f"{z.real:.6f} ± {z.imag:.6f}i"
 
 
-def as_data(found: Linearized) -> dict[str, Any]:
+def as_data(linearized: Linearized) -> dict[str, Any]:
     """The answers for programs."""
 
-    def pole(each: Pole) -> dict[str, Any]:
+    def pole(pole_: Pole) -> dict[str, Any]:
         return {
-            "z": [each.z.real, each.z.imag],
-            "s": [each.s.real, each.s.imag] if math.isfinite(each.s.real) else None,
-            "hz": each.hz if math.isfinite(each.hz) else None,
-            "damping": each.damping,
-            "shares": dict(each.shares),
+            "z": [pole_.z.real, pole_.z.imag],
+            "s": [pole_.s.real, pole_.s.imag] if math.isfinite(pole_.s.real) else None,
+            "hz": pole_.hz if math.isfinite(pole_.hz) else None,
+            "damping": pole_.damping,
+            "shares": dict(pole_.shares),
         }
 
-    def loop(each: OpenLoop) -> dict[str, Any]:
-        found = each.margins
-        told: dict[str, Any] = {"opened": list(each.paths), "stable": each.stable, "returns": each.returns}
-        told |= {"gain_down": each.gains[0], "gain_up": each.gains[1], "gain_searched_to": each.searched}
-        if found is not None:
-            told |= {"phase": found.phase, "delay": found.delay, "disk": found.disk}
-            told |= {name: getattr(found, name) for name in ("at_gain_up", "at_gain_down", "at_phase", "at_delay")}
-            told["at_disk"] = found.at_disk
-        return told
+    def loop(loop_: OpenLoop) -> dict[str, Any]:
+        margins = loop_.margins
+        answer: dict[str, Any] = {"opened": list(loop_.paths), "stable": loop_.stable, "returns": loop_.returns}
+        answer |= {"gain_down": loop_.gains[0], "gain_up": loop_.gains[1], "gain_searched_to": loop_.searched}
+        if margins is not None:
+            answer |= {"phase": margins.phase, "delay": margins.delay, "disk": margins.disk}
+            answer |= {name: getattr(margins, name) for name in ("at_gain_up", "at_gain_down", "at_phase", "at_delay")}
+            answer["at_disk"] = margins.at_disk
+        return answer
 
     return {
-        "experiment": found.experiment,
-        "case": found.case,
-        "time": found.time,
-        "stands": found.stands,
-        "period": found.seconds,
-        "states": list(found.states),
-        "inputs": list(found.inputs),
-        "outputs": list(found.outputs),
-        "held": list(found.held),
-        "locked": list(found.locked),
-        "creeping": [{"name": each.name, "rate": each.rate} for each in found.creeping],
-        "at_limit": list(found.at_limit),
-        "poles": [pole(each) for each in found.poles],
-        "natural": [pole(each) for each in found.natural],
-        "loops": [loop(each) for each in found.loops],
+        "experiment": linearized.experiment,
+        "case": linearized.case,
+        "time": linearized.time,
+        "stands": linearized.stands,
+        "period": linearized.seconds,
+        "states": list(linearized.states),
+        "inputs": list(linearized.inputs),
+        "outputs": list(linearized.outputs),
+        "held": list(linearized.held),
+        "locked": list(linearized.locked),
+        "creeping": [{"name": state.name, "rate": state.rate} for state in linearized.creeping],
+        "at_limit": list(linearized.at_limit),
+        "poles": [pole(pole_) for pole_ in linearized.poles],
+        "natural": [pole(pole_) for pole_ in linearized.natural],
+        "loops": [loop(loop_) for loop_ in linearized.loops],
     }

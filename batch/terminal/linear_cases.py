@@ -20,8 +20,8 @@ Answer = Linearized | str
 
 def answered(question: LinearQuestion) -> list[Answer]:
     """The answers of all cases. Raises Problem where the question itself is wrong."""
-    found = question.of_cases(range(question.experiment.cases.count))
-    return [_why_not(each) if isinstance(each, Problem) else each for each in found]
+    answers = question.of_cases(range(question.experiment.cases.count))
+    return [_why_not(answer) if isinstance(answer, Problem) else answer for answer in answers]
 
 
 def _why_not(refused: Problem) -> str:
@@ -29,9 +29,9 @@ def _why_not(refused: Problem) -> str:
     return message.partition(": ")[2] or message
 
 
-def case_lines(question: LinearQuestion, found: Sequence[Answer]) -> Iterator[str]:
+def case_lines(question: LinearQuestion, answers: Sequence[Answer]) -> Iterator[str]:
     """The rows in lines: a table for each opened loop; without loops, the least damped pole of each case."""
-    name, cases = question.experiment.name, count(len(found), "case")
+    name, cases = question.experiment.name, count(len(answers), "case")
     where = "where it stands still" if question.stands else f"at t = {question.at:.6g} s"
     yield f"{name}: linear {where}, {cases}"
     several = [(path,) for path in question.opened] + ([question.opened] if len(question.opened) > 1 else [])
@@ -39,17 +39,17 @@ def case_lines(question: LinearQuestion, found: Sequence[Answer]) -> Iterator[st
         yield ""
         yield f"loop of {paths[0]}" if len(paths) == 1 else f"loops of {', '.join(paths)}, all at once"
         head = ("gain", "phase", "delay", "disk") if len(paths) == 1 else ("gain",)
-        yield from _table(question, found, head, partial(_of_loop, number_of))
-        loops = {n: each.loops[number_of] for n, each in enumerate(found) if isinstance(each, Linearized)}
+        yield from _table(question, answers, head, partial(_of_loop, number_of))
+        loops = {n: answer.loops[number_of] for n, answer in enumerate(answers) if isinstance(answer, Linearized)}
         yield from _tightest(loops)
     if not several:
         yield ""
         yield "least damped pole that swings"
-        yield from _table(question, found, ("damping", "Hz", "joint"), _swing)
-    reasons = {case: each for case, each in enumerate(found) if isinstance(each, str)}
+        yield from _table(question, answers, ("damping", "Hz", "joint"), _swing)
+    reasons = {case: answer for case, answer in enumerate(answers) if isinstance(answer, str)}
     if reasons:
         yield ""
-        yield f"no answer in {count(len(reasons), 'case')} of {len(found):,}"
+        yield f"no answer in {count(len(reasons), 'case')} of {len(answers):,}"
         listed = list(reasons.items())[:MOST_ROWS]
         yield from columns([(f"#{question.experiment.cases.table[case]}", why) for case, why in listed])
         if len(reasons) > len(listed):
@@ -58,25 +58,28 @@ def case_lines(question: LinearQuestion, found: Sequence[Answer]) -> Iterator[st
 
 def _table(
     question: LinearQuestion,
-    found: Sequence[Answer],
+    answers: Sequence[Answer],
     head: tuple[str, ...],
     cells: Callable[[Linearized], tuple[str, ...]],
 ) -> Iterator[str]:
     varied = question.experiment.cases.coordinates
-    heads = [f"{each.path} ({each.unit})" if each.unit not in ("", "1") else each.path for each in varied]
+    heads = [
+        f"{coordinate.path} ({coordinate.unit})" if coordinate.unit not in ("", "1") else coordinate.path
+        for coordinate in varied
+    ]
     rows = [("case", *heads, *head)]
-    for case, each in enumerate(found[:MOST_ROWS]):
-        values = (number(float(one.values[case]) / one.scale) for one in varied)
-        told = cells(each) if isinstance(each, Linearized) else ("no answer",)
-        rows.append((f"#{question.experiment.cases.table[case]}", *values, *told))
+    for case, answer in enumerate(answers[:MOST_ROWS]):
+        values = (number(float(coordinate.values[case]) / coordinate.scale) for coordinate in varied)
+        cell_texts = cells(answer) if isinstance(answer, Linearized) else ("no answer",)
+        rows.append((f"#{question.experiment.cases.table[case]}", *values, *cell_texts))
     yield from columns(rows, right=range(1, 1 + len(varied)))
-    if len(found) > MOST_ROWS:
-        yield f"  and {len(found) - MOST_ROWS} more: `--format json` has them all"
+    if len(answers) > MOST_ROWS:
+        yield f"  and {len(answers) - MOST_ROWS} more: `--format json` has them all"
 
 
-def _of_loop(place: int, found: Linearized) -> tuple[str, ...]:
+def _of_loop(place: int, linearized: Linearized) -> tuple[str, ...]:
     """The cells of a case's loop at this place among the requested ones."""
-    loop = found.loops[place]
+    loop = linearized.loops[place]
     if not loop.returns:
         return ("nothing comes back",)
     if not loop.stable:
@@ -102,24 +105,24 @@ def _tightest(loops: dict[int, OpenLoop]) -> Iterator[str]:
         if loop.returns and loop.stable and loop.gains[1] is not None
     }
     margins = {case: loop.margins for case, loop in loops.items() if loop.margins is not None and loop.returns}
-    phases = {case: each.phase for case, each in margins.items() if each.phase is not None}
-    told = []
+    phases = {case: loop_margins.phase for case, loop_margins in margins.items() if loop_margins.phase is not None}
+    tightest = []
     if gains:
-        case = min(gains, key=lambda one: gains[one] or math.inf)
-        told.append(f"gain {gains[case]:.4g} times in #{case}")
+        case = min(gains, key=lambda case_number: gains[case_number] or math.inf)
+        tightest.append(f"gain {gains[case]:.4g} times in #{case}")
     if phases:
-        case = min(phases, key=lambda one: phases[one] or math.inf)
-        told.append(f"phase {math.degrees(phases[case] or 0.0):.4g} deg in #{case}")
+        case = min(phases, key=lambda case_number: phases[case_number] or math.inf)
+        tightest.append(f"phase {math.degrees(phases[case] or 0.0):.4g} deg in #{case}")
     if margins:
-        case = min(margins, key=lambda one: margins[one].disk)
-        told.append(f"disk {margins[case].disk:.4g} in #{case}")
-    if told and len(loops) > 1:
-        yield f"  tightest: {', '.join(told)}"
+        case = min(margins, key=lambda case_number: margins[case_number].disk)
+        tightest.append(f"disk {margins[case].disk:.4g} in #{case}")
+    if tightest and len(loops) > 1:
+        yield f"  tightest: {', '.join(tightest)}"
 
 
-def _swing(found: Linearized) -> tuple[str, ...]:
-    swings = [pole for pole in found.poles if pole.z.imag > 0.0]
+def _swing(linearized: Linearized) -> tuple[str, ...]:
+    swings = [pole for pole in linearized.poles if pole.z.imag > 0.0]
     if not swings:
         return ("none swings",)
     worst = min(swings, key=lambda pole: pole.damping)
-    return f"{worst.damping:.3f}", f"{worst.hz:.4g}", found.by_joint(worst)[0][0]
+    return f"{worst.damping:.3f}", f"{worst.hz:.4g}", linearized.by_joint(worst)[0][0]

@@ -12,48 +12,48 @@ from met.plan import Experiment
 EVENTS = "friction events"
 
 
-def profile_lines(found: RunProfile, experiment: Experiment) -> Iterator[str]:
+def profile_lines(profile: RunProfile, experiment: Experiment) -> Iterator[str]:
     """The profile in lines."""
     schedule = experiment.structure.schedule
     yield (
-        f"{found.experiment}: {count(found.joints, 'joint')}, {count(found.cases, 'case')}, "
+        f"{profile.experiment}: {count(profile.joints, 'joint')}, {count(profile.cases, 'case')}, "
         f"{experiment.structure.integrator}, steps of {1e3 * schedule.step:g} ms"
     )
     yield ""
-    yield from columns(list(_table(found)), right=(1, 2, 3, 4, 5))
+    yield from columns(list(_table(profile)), right=(1, 2, 3, 4, 5))
     yield ""
-    rates = found.flops / found.ns
+    rates = profile.flops / profile.ns
     yield (
-        f"  {rates:.1f} Gflop/s, {_percent(found.share_of_peak)} of the {found.peak * 1e-9:.1f} Gflop/s that this core "
-        f"does at most; a fused multiply-add counts as two"
+        f"  {rates:.1f} Gflop/s, {_percent(profile.share_of_peak)} of the {profile.peak * 1e-9:.1f} Gflop/s that "
+        f"this core does at most; a fused multiply-add counts as two"
     )
-    yield f"  {_events(found.parts)}"
+    yield f"  {_events(profile.parts)}"
     yield ""
-    yield from columns(list(_kernel(found)))
-    if found.inputs:
+    yield from columns(list(_kernel(profile)))
+    if profile.inputs:
         yield ""
-        yield from columns(list(_inputs(found)), right=(1, 2, 3, 4))
+        yield from columns(list(_inputs(profile)), right=(1, 2, 3, 4))
         yield ""
         yield "  sets: parameters that follow; once: operations that depend on it and are done before the first step;"
         yield "  kept: numbers that these leave in a case's memory; taken by: operations of a step that take one"
 
 
-def _table(found: RunProfile) -> Iterator[tuple[str, ...]]:
+def _table(profile: RunProfile) -> Iterator[tuple[str, ...]]:
     """A row for each kind of work, with its parts under it; rare work in one row."""
     yield "a step of a case", "times", "operations", "flops", "ns", "share"
-    steady = [part for part in found.parts if not part.event]
+    steady = [part for part in profile.parts if not part.event]
     for work, group in groupby(steady, key=lambda part: part.work):
         parts = list(group)
-        yield _row(work, parts, found.ns)
+        yield _row(work, parts, profile.ns)
         if len(parts) > 1:
             for part in parts:
                 if part.part:
-                    yield _row(f"  {part.part}", [part], found.ns, times=False)
-    events = [part for part in found.parts if part.event and part.calls > 0.0]
+                    yield _row(f"  {part.part}", [part], profile.ns, times=False)
+    events = [part for part in profile.parts if part.event and part.calls > 0.0]
     if events:
-        yield _row(EVENTS, events, found.ns, times=False)
-    yield _row("all parts, each alone", found.parts, found.ns, times=False)
-    yield "the whole run", "", "", "", _number(found.ns), "100 %"
+        yield _row(EVENTS, events, profile.ns, times=False)
+    yield _row("all parts, each alone", profile.parts, profile.ns, times=False)
+    yield "the whole run", "", "", "", _number(profile.ns), "100 %"
 
 
 def _row(name: str, parts: Sequence[WorkCost], whole: float, *, times: bool = True) -> tuple[str, ...]:
@@ -76,20 +76,23 @@ def _events(parts: Sequence[WorkCost]) -> str:
     return f"friction events of a block: {_number(decided)} decisions at rest and {_number(split)} splits a step"
 
 
-def _kernel(found: RunProfile) -> Iterator[tuple[str, str]]:
-    yield "timed", f"{found.steps:,} steps of {count(found.blocks, 'block')} on one core, best of several"
-    yield "block", f"{found.lanes} cases, {found.vector} of them in a register ({found.cpu})"
-    yield "code", f"{size(found.code_bytes)} in {count(found.pieces, 'piece')}"
-    verb = "found in the cache in" if found.cached else "compiled in"
-    yield "made", f"recorded in {_seconds(found.recording_s)}, {verb} {_seconds(found.compiling_s)}"
-    yield "folded", f"{count(found.constants, 'parameter')} that no case varies"
+def _kernel(profile: RunProfile) -> Iterator[tuple[str, str]]:
+    yield "timed", f"{profile.steps:,} steps of {count(profile.blocks, 'block')} on one core, best of several"
+    yield "block", f"{profile.lanes} cases, {profile.vector} of them in a register ({profile.cpu})"
+    yield "code", f"{size(profile.code_bytes)} in {count(profile.pieces, 'piece')}"
+    verb = "found in the cache in" if profile.cached else "compiled in"
+    yield "made", f"recorded in {_seconds(profile.recording_s)}, {verb} {_seconds(profile.compiling_s)}"
+    yield "folded", f"{count(profile.constants, 'parameter')} that no case varies"
 
 
-def _inputs(found: RunProfile) -> Iterator[tuple[str, ...]]:
+def _inputs(profile: RunProfile) -> Iterator[tuple[str, ...]]:
     """Lines about varied parameters: the work done before the first step, and the work left to each step."""
     yield "varied", "sets", "once", "kept", "taken by"
-    for each in found.inputs:
-        yield each.path, *(f"{number:,}" for number in (each.sets, each.hoisted, each.kept, each.read_by))
+    for parameter in profile.inputs:
+        yield (
+            parameter.path,
+            *(f"{number:,}" for number in (parameter.sets, parameter.hoisted, parameter.kept, parameter.read_by)),
+        )
 
 
 def _percent(share: float) -> str:

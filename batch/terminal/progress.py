@@ -51,7 +51,7 @@ class Bar:
             return
         elapsed = now - self._began
         self._next = now + (BAR_SECONDS if self._live else min(max(LINE_SECONDS, 0.2 * elapsed), SELDOM))
-        said = status(
+        text = status(
             self._name,
             done,
             self._cases,
@@ -64,9 +64,9 @@ class Bar:
         )
         if self._live:
             width = shutil.get_terminal_size().columns
-            self.stream.write(f"\r{said[: width - 1]}\x1b[K")
+            self.stream.write(f"\r{text[: width - 1]}\x1b[K")
         else:
-            self.stream.write(said + "\n")
+            self.stream.write(text + "\n")
         self.stream.flush()
         self._drawn = True
 

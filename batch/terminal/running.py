@@ -119,7 +119,7 @@ def run_and_tell(
             return ok
         say("\n".join(result_lines(campaign, result, exported, performed)))
         if result.warned and not quiet:
-            _complain(Problem(result.warned, {each.name: each.text for each in campaign.plan.sources}), json)
+            _complain(Problem(result.warned, {source_.name: source_.text for source_ in campaign.plan.sources}), json)
         for line in compared:
             say(line)
         if missing and target is not None:
@@ -302,8 +302,8 @@ def submit_and_tell(
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
     done = submit(campaign, jobs=jobs, options=options, timeout=timeout, fresh=fresh, say=say)
     archive = str(campaign.output)
-    told = "is whole" if done is None else f"is submitted: `met status {quoted(archive)}` says how far it is"
-    with kept(f"{archive} {told}"):
+    state = "is whole" if done is None else f"is submitted: `met status {quoted(archive)}` says how far it is"
+    with kept(f"{archive} {state}"):
         if json:
             about = {} if done is None else dataclasses.asdict(done)
             print(json_module.dumps({"archive": archive, "whole": done is None, **about}, indent=1), flush=True)
@@ -355,11 +355,11 @@ def _compared(again: Replay | None, unlike: Sequence[str], output: Path) -> list
     """Lines that compare a replay with its archive."""
     if again is None:
         return []
-    there, cases = in_both(again.archive, output)
-    if not there:
+    with_row, cases = in_both(again.archive, output)
+    if not with_row:
         return [f"{again.archive} keeps a summary, without a row of {'it' if cases == 1 else 'them'} to compare with"]
     if not unlike:
-        return [f"the same bits as in {again.archive}" + f", which has rows of {there:,}" * (there < cases)]
+        return [f"the same bits as in {again.archive}" + f", which has rows of {with_row:,}" * (with_row < cases)]
     return [f"not the same as in {again.archive}:", *(f"  {line}" for line in unlike)]
 
 

@@ -80,29 +80,29 @@ def show(
     there are none unless `signals` are asked for.
     """
     out = [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
-    out += [f"  {line(each)}" for each in settings_lines(archive)]
-    shown = cases_named(archive, experiments, case)
+    out += [f"  {line(setting)}" for setting in settings_lines(archive)]
+    chosen = cases_named(archive, experiments, case)
     check_asked(archive, by, some)
-    ordering.check([group for group, _ in shown], by)
+    ordering.check([group for group, _ in chosen], by)
     if not experiments and case is None and not signals:
         out += [row for table in structures(archive) for row in ("", *table)]
-        counts = Counter(group.sweep for group, _ in shown if group.sweep)
-        hidden = [group.name for group, _ in shown if counts[group.sweep] > MOST_GROUPS and not all_cases]
+        counts = Counter(group.sweep for group, _ in chosen if group.sweep)
+        hidden = [group.name for group, _ in chosen if counts[group.sweep] > MOST_GROUPS and not all_cases]
         if hidden and by is None:
             remedy = f"`met show {quoted(archive.path)} --run {hidden[0]}`"
             out += ["", f"one structure in full: {remedy}; the cases of all: `--all-cases`"]
-            shown = [each for each in shown if each[0].name not in hidden]
+            chosen = [pair for pair in chosen if pair[0].name not in hidden]
     if by is not None:
-        for pool in pools([group for group, _ in shown]):
+        for pool in pools([group for group, _ in chosen]):
             order = ordering.order_of(pool.groups, by)
             if len(pool.groups) > 1 and order is not None:
                 most = None if all_cases else cases.SHOWN_CASES
                 among = None if some.everything else some.places(pool)
-                said = [] if among is None else [some.words(len(among), pool.count)]
+                selection = [] if among is None else [some.words(len(among), pool.count)]
                 table = cases.table_across(pool, order, most, among=among) if among is None or len(among) else []
-                out += ["", f"{pool.name}, {order.title}", *said, *table]
-                shown = [each for each in shown if signals or each[0] not in pool.groups]
-    for group, position in shown:
+                out += ["", f"{pool.name}, {order.title}", *selection, *table]
+                chosen = [pair for pair in chosen if signals or pair[0] not in pool.groups]
+    for group, position in chosen:
         out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, by, some, width), ""]
         if signals or position is not None or group.count == 1:
             out += signal_lines(archive, group, signals, position)
@@ -121,8 +121,8 @@ def show_evidence(archive: ArchiveFile, experiments: Sequence[str] = (), *, widt
     for name, groups in by_run(groups_named(archive, tuple(experiments))).items():
         cases = sum(group.run for group in groups)
         answer = SearchAnswer.of(groups[0])
-        of = "" if answer is None else f"its answer, {count(len(answer.found.cases), 'case')} of "
-        title = f"{name}: {of}{count(cases, 'case')}"
+        of_answer = "" if answer is None else f"its answer, {count(len(answer.found.cases), 'case')} of "
+        title = f"{name}: {of_answer}{count(cases, 'case')}"
         out += ["", title, *evidence_table_lines(_evidence(archive, groups), width)]
     return "\n".join(map(line, out)).rstrip() + "\n"
 
@@ -190,27 +190,27 @@ def as_json(
     from batch.queries import summary as outcomes
 
     groups = []
-    shown = cases_named(archive, experiments, case)
+    chosen = cases_named(archive, experiments, case)
     check_asked(archive, by, some)
-    ordering.check([group for group, _ in shown], by)
-    for group, position in shown:
+    ordering.check([group for group, _ in chosen], by)
+    for group, position in chosen:
         if position is None:
             among = None if some.everything else _positions(archive, group, some)
             most = None if all_cases else cases.SHOWN_CASES
             answer = search_result(archive, group)
-            said: dict[str, Any] = {
+            details: dict[str, Any] = {
                 **({} if answer is None else {"answer": outcomes.finite(answer.data)}),
                 "case_table": cases.rows_json(group, most, by=by, among=among),
                 "evidence": outcomes.finite([evidence_data(row) for row in _evidence(archive, [group])]),
             }
         else:
             [about] = cases.rows_json(group, positions=[position])
-            said = {"case": {**about, "parameters": outcomes.finite(cases.parameters(archive, group, position))}}
+            details = {"case": {**about, "parameters": outcomes.finite(cases.parameters(archive, group, position))}}
         variables = [{"name": v.name, "role": v.role, "dims": v.dims, "unit": v.unit} for v in group.variables.values()]
         groups.append(
             {
                 **outcomes.as_json(summary_of(group, position)),
-                **said,
+                **details,
                 "attributes": outcomes.finite(group.attributes),
                 "variables": variables,
             }
@@ -236,8 +236,8 @@ def heading(group: ArchiveGroup, width: int) -> list[str]:
     else:
         lines = textwrap.wrap(text, width - indent)
     out = [f"{group.name}  {lines[0]}".rstrip(), *(" " * indent + rest for rest in lines[1:])]
-    for each in group.allowed:
-        out += textwrap.wrap(f"allowed: {each}", max(NARROWEST, width), initial_indent="  ", subsequent_indent="    ")
+    for code in group.allowed:
+        out += textwrap.wrap(f"allowed: {code}", max(NARROWEST, width), initial_indent="  ", subsequent_indent="    ")
     for variable in group.role("choice"):
         out.append(f"  {variable.path} = {group.at(variable.name, [0])[0]}")
     if group.summary is not None:
@@ -270,8 +270,10 @@ def verdict(summary: Summary, width: int) -> list[str]:
     out = [_counts(summary)]
     out += failure_lines((*summary.failures, *summary.doubts), width)
     if summary.limited:
-        of = "" if summary.cases == 1 else f" in {summary.limited:,} of {summary.cases:,} cases"
-        out.append(f"  note: the load motor of a bed was at its limit{of}: the run is not what the joint would do")
+        cases_text = "" if summary.cases == 1 else f" in {summary.limited:,} of {summary.cases:,} cases"
+        out.append(
+            f"  note: the load motor of a bed was at its limit{cases_text}: the run is not what the joint would do"
+        )
         out.append("  what gives it more: `i_max` and `kt_load` of the bed; what asks less: the arm, or its command")
     out += [f"  {text}" for text in reached_texts(summary.limits, summary.cases)]
     if summary.metrics:
@@ -279,7 +281,7 @@ def verdict(summary: Summary, width: int) -> list[str]:
     if summary.verified is not None:
         out += textwrap.wrap(about(summary.verified), width, initial_indent="  ", subsequent_indent="    ")
     texts = [requirement.text for requirement in summary.requirements if not requirement.evidence]
-    wide = max(map(len, (*texts, *(each.text for each in summary.step_errors))), default=0)
+    wide = max(map(len, (*texts, *(step_error.text for step_error in summary.step_errors))), default=0)
     if summary.answer is not None:
         out += textwrap.wrap(f"{summary.answer.headline}.", width, initial_indent="  ", subsequent_indent="    ")
     for r in summary.requirements:
@@ -291,12 +293,12 @@ def verdict(summary: Summary, width: int) -> list[str]:
             continue
         if summary.cases == 1:
             why = "its metric has no value here" if r.no_value else "the case failed"
-            said = "met" if r.met else "missed" if r.missed else f"not known: {why}"
+            outcome = "met" if r.met else "missed" if r.missed else f"not known: {why}"
         else:
-            said = f"met by {r.met:,} of {summary.cases:,} ({100 * r.met / summary.cases:.3g} %)"
-            said += f", not known of {r.unknown:,}" if r.unknown else ""
-            said += f" (its metric has no value in {r.no_value:,})" if r.no_value else ""
-        out.append(f"  require {r.text:<{wide}}  {said}")
+            outcome = f"met by {r.met:,} of {summary.cases:,} ({100 * r.met / summary.cases:.3g} %)"
+            outcome += f", not known of {r.unknown:,}" if r.unknown else ""
+            outcome += f" (its metric has no value in {r.no_value:,})" if r.no_value else ""
+        out.append(f"  require {r.text:<{wide}}  {outcome}")
     for step_error in summary.step_errors:
         out.append(f"  require {step_error.text:<{wide}}  {step_error.word}: {step_error.said}")
     verdicts = [row for r in summary.requirements for row in r.evidence if row.lower is not None]
@@ -311,8 +313,8 @@ def warning_lines(summary: Summary, width: int) -> list[str]:
     """Lines of the warnings due to errors by the step, with remedies."""
     out = []
     for warning in summary.warnings:
-        said = [f"warning[{warning.code}]: {warning.message}", *(f"  help: {text}" for text in warning.help)]
-        for text in said:
+        texts = [f"warning[{warning.code}]: {warning.message}", *(f"  help: {text}" for text in warning.help)]
+        for text in texts:
             out += textwrap.wrap(text, width, initial_indent="  ", subsequent_indent="      ")
     return out
 
@@ -342,11 +344,11 @@ def _metric_table(summary: Summary) -> list[str]:
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     out = []
     for row in rows[1:] if single else rows:
-        shown = (" " if single else "  ").join(
+        cells = (" " if single else "  ").join(
             f"{text:{'<' if text.startswith('± ') else '>'}{wide}}"
             for text, wide in zip(row[1:-2], widths[1:-2], strict=True)
         )
-        out.append(f"  {row[0]:<{widths[0]}}  {shown} {row[-2]:<{widths[-2]}}  {row[-1]}".rstrip())
+        out.append(f"  {row[0]:<{widths[0]}}  {cells} {row[-2]:<{widths[-2]}}  {row[-1]}".rstrip())
     return out
 
 

@@ -43,8 +43,10 @@ def announcement(campaign: Campaign, verbose: bool = False, *, notes: bool = Fal
         out += _part_lines(part, verbose)
         out += [f"  note: {note}" for note in part.experiment.notes] if notes else []
     if campaign.keep.failed:
-        each = max(part.experiment.structure.history_bytes // (2 if part.single else 1) for part in campaign.parts)
-        out.append(f"and those of cases that fail: {size_text(each)} a case more")
+        bytes_of_case = max(
+            part.experiment.structure.history_bytes // (2 if part.single else 1) for part in campaign.parts
+        )
+        out.append(f"and those of cases that fail: {size_text(bytes_of_case)} a case more")
     out += [f"note: {note}" for note in campaign.notes]
     return out
 
@@ -64,8 +66,8 @@ def _part_lines(part: CampaignPart, verbose: bool) -> list[str]:
         count = whole = part.most
     cases = f"{count:,} case{'s' if count != 1 else ''}" + (f" of {whole:,}" if count < whole else "")
     if count == 1 and whole > 1:
-        of = f"`{experiment.sweep}`" if experiment.sweep else f"{whole:,}"
-        cases = f"case #{experiment.cases.table[part.rows[0]]} of {of}"
+        whole_text = f"`{experiment.sweep}`" if experiment.sweep else f"{whole:,}"
+        cases = f"case #{experiment.cases.table[part.rows[0]]} of {whole_text}"
     early = part.open_ended and count == whole
     if early:
         cases = f"at most {cases}"
@@ -84,9 +86,9 @@ def _part_lines(part: CampaignPart, verbose: bool) -> list[str]:
     if part.searches and part.keeps_best:
         out.append(f"  histories of its answer: {recorded}")
     elif part.recorded:
-        each = size_text(experiment.structure.history_bytes // (2 if part.single else 1))
-        of = "" if part.all_recorded else f" of {part.recorded:,} cases" + (" at most" if part.later else "")
-        out.append(f"  histories{of}: {recorded}; {schedule.rows:,} rows, {each} a case")
+        size = size_text(experiment.structure.history_bytes // (2 if part.single else 1))
+        whole_text = "" if part.all_recorded else f" of {part.recorded:,} cases" + (" at most" if part.later else "")
+        out.append(f"  histories{whole_text}: {recorded}; {schedule.rows:,} rows, {size} a case")
     else:
         out.append("  histories: none" + (f" (would be {recorded})" if recorded else ""))
     for coordinate in experiment.cases.coordinates if verbose else ():
@@ -190,8 +192,8 @@ def result_lines(campaign: Campaign, result: RunResult, exported: Exported | Non
         out.append(f"         met run {quoted(path)}{name} --case '{first}'")
     if not result.ok:
         judged = [  # cases that a tuning tried on its way may fail and miss requirements
-            each if answer is None or not answer.tunes else replace(each, failed=0, requirements=())
-            for each, answer in zip(summaries, answers, strict=True)
+            summary if answer is None or not answer.tunes else replace(summary, failed=0, requirements=())
+            for summary, answer in zip(summaries, answers, strict=True)
         ]
         tuned = [
             f"`{answer.name}` found nothing that {'it may advise' if answer.data['stability'] else 'meets all'}"
@@ -204,8 +206,8 @@ def result_lines(campaign: Campaign, result: RunResult, exported: Exported | Non
 
 def _may_be_verified(campaign: Campaign, summary: Summary) -> bool:
     """True where the step's error is not known, and verification was not declined."""
-    there = summary.metrics and summary.failed < summary.cases
-    return bool(there) and summary.verified is None and campaign.verify != "none"
+    has_metrics = summary.metrics and summary.failed < summary.cases
+    return bool(has_metrics) and summary.verified is None and campaign.verify != "none"
 
 
 def _why_not(summaries: tuple[Summary, ...]) -> str:
@@ -214,7 +216,7 @@ def _why_not(summaries: tuple[Summary, ...]) -> str:
     parts = [f"{failed:,} case{'s' if failed != 1 else ''} failed"] if failed else []
     if missed:
         parts.append("not met everywhere: " + ", ".join(dict.fromkeys(r.text for r in missed)))
-    if untrue := [each.text for summary in summaries for each in summary.untrue]:
+    if untrue := [step_error.text for summary in summaries for step_error in summary.untrue]:
         parts.append("not met, or not known: " + ", ".join(dict.fromkeys(untrue)))
     return "; ".join(parts)
 
