@@ -53,7 +53,7 @@ class BedProgress:
 
 def timings(executor: OnBeds) -> dict[str, Timing]:
     """The timing of each joint's bed, over all cases; none where the beds are in lock-step and have no time."""
-    found = {}
+    timing_of = {}
     for joint in executor.ports:
         cases = executor.known.of(joint)
         if cases and not executor.lock_step:
@@ -61,8 +61,8 @@ def timings(executor: OnBeds) -> dict[str, Timing]:
             drifts = [timing(rows, hz).drift for hz, rows in cases]
             known = [drift for drift in drifts if math.isfinite(drift)]
             drift = float(np.median(known)) if known else math.nan
-            found[joint] = replace(timing(np.concatenate([rows for _, rows in cases]), math.nan), drift=drift)
-    return found
+            timing_of[joint] = replace(timing(np.concatenate([rows for _, rows in cases]), math.nan), drift=drift)
+    return timing_of
 
 
 WORST = 0.01
@@ -72,24 +72,28 @@ WORST = 0.01
 def timing_lines(executor: OnBeds) -> list[str]:
     """Lines about the loop's timing, with a warning where it was bad."""
     lines = []
-    for joint, found in timings(executor).items():
-        late = found.woken + found.computed + found.waited
-        parts = [("late by", found.lateness), ("answered in", found.trip), ("computed in", found.computing)]
-        spreads = "; ".join(f"{what} {duration(each.median)}, p99 {duration(each.high)}" for what, each in parts)
-        lines.append(f"{joint}: {found.exchanges:,} exchanges; {spreads}")
+    for joint, times in timings(executor).items():
+        late = times.woken + times.computed + times.waited
+        parts = [
+            ("late by", times.lateness),
+            ("answered in", times.trip),
+            ("computed in", times.computing),
+        ]
+        spreads = "; ".join(f"{what} {duration(spread.median)}, p99 {duration(spread.high)}" for what, spread in parts)
+        lines.append(f"{joint}: {times.exchanges:,} exchanges; {spreads}")
         lines.append(
-            f"  a period late: {late:,} (woken too late {found.woken:,}, computing {found.computed:,}, waiting "
-            f"{found.waited:,}); unanswered: {found.unanswered:,}; the bed's clock: {off(found.drift)}"
+            f"  a period late: {late:,} (woken too late {times.woken:,}, computing {times.computed:,}, waiting "
+            f"{times.waited:,}); unanswered: {times.unanswered:,}; the bed's clock: {off(times.drift)}"
         )
-        if abs(found.drift) > WORST:
+        if abs(times.drift) > WORST:
             hz = executor.known.of(joint)[-1][0]
             lines.append(
-                f"  warning: the bed says that it ticks at {hz:g} Hz, and ticks at {(1.0 + found.drift) * hz:.4g} Hz: "
+                f"  warning: the bed says that it ticks at {hz:g} Hz, and ticks at {(1.0 + times.drift) * hz:.4g} Hz: "
                 "its deadman and slew limits are not what it says; mend its timer, or its configuration"
             )
-        if found.unanswered > WORST * found.exchanges:
+        if times.unanswered > WORST * times.exchanges:
             lines.append(
-                f"  warning: {100.0 * found.unanswered / found.exchanges:.3g} % of the exchanges had no answer, and "
+                f"  warning: {100.0 * times.unanswered / times.exchanges:.3g} % of the exchanges had no answer, and "
                 "commands were held longer than was computed: `met bed jitter` and `met bed probe` say more of the line"
             )
     for joint in executor.ports if executor.lock_step else ():
@@ -102,7 +106,7 @@ def timing_lines(executor: OnBeds) -> list[str]:
 def sidecar_entries(executor: OnBeds) -> Mapping[str, Any]:
     """The entries for the file beside the archive: the beds, and the loop's timing, s."""
     executor.know_all()
-    kept = timings(executor)
+    timing_of = timings(executor)
     return {
         "beds": [
             {
@@ -112,26 +116,31 @@ def sidecar_entries(executor: OnBeds) -> Mapping[str, Any]:
                 "lock_step": executor.lock_step,
                 "beds": executor.known.beds[joint],
                 **({"bench": executor.benches[joint]} if executor.benches[joint] else {}),
-                "timing": _figures(kept[joint]) if joint in kept else None,
+                "timing": _figures(timing_of[joint]) if joint in timing_of else None,
             }
             for joint, port in executor.ports.items()
         ]
     }
 
 
-def _figures(found: Timing) -> dict[str, Any]:
-    spreads = {"lateness": found.lateness, "trip": found.trip, "computing": found.computing}
+def _figures(times: Timing) -> dict[str, Any]:
+    spreads = {"lateness": times.lateness, "trip": times.trip, "computing": times.computing}
     return {
-        "exchanges": found.exchanges,
-        **{name: _spread(each) for name, each in spreads.items()},
-        "woken_late": found.woken,
-        "computed_late": found.computed,
-        "answered_late": found.waited,
-        "unanswered": found.unanswered,
-        "clock": found.drift if math.isfinite(found.drift) else None,
+        "exchanges": times.exchanges,
+        **{name: _spread(spread) for name, spread in spreads.items()},
+        "woken_late": times.woken,
+        "computed_late": times.computed,
+        "answered_late": times.waited,
+        "unanswered": times.unanswered,
+        "clock": times.drift if math.isfinite(times.drift) else None,
     }
 
 
-def _spread(found: TimeSpread) -> dict[str, float | None]:
-    values = {"median": found.median, "p99": found.high, "p99.9": found.highest, "largest": found.largest}
+def _spread(time_spread: TimeSpread) -> dict[str, float | None]:
+    values = {
+        "median": time_spread.median,
+        "p99": time_spread.high,
+        "p99.9": time_spread.highest,
+        "largest": time_spread.largest,
+    }
     return {name: round(value, 9) if math.isfinite(value) else None for name, value in values.items()}

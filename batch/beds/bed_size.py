@@ -62,15 +62,18 @@ def joint_of(experiment: Experiment, name: str | None, texts: Mapping[str, str] 
     on = [use.joint for use in experiment.structure.substitutions]
     if name is None:
         if len(on) > 1:
-            which = "one at a time: " + " or ".join(f"`--joint {each}`" for each in on)
+            which = "one at a time: " + " or ".join(f"`--joint {joint_name}`" for joint_name in on)
             raise Problem(error("E440", f"`{experiment.name}` has {len(on)} joints on beds: which?", help=which))
         return on[0]
     servos = [use.joint for use in experiment.structure.servos]
     use = servo_of(experiment, name)
     if use is None:
-        there = any(joint.name == name for joint in experiment.structure.joints)
-        message = f"joint `{name}` of `{experiment.name}` has no servo" if there else f"no joint `{name}`"
-        helps = (*(() if there else did_you_mean(name, servos)), f"joints that have a servo: {', '.join(servos)}")
+        in_experiment = any(joint.name == name for joint in experiment.structure.joints)
+        message = f"joint `{name}` of `{experiment.name}` has no servo" if in_experiment else f"no joint `{name}`"
+        helps = (
+            *(() if in_experiment else did_you_mean(name, servos)),
+            f"joints that have a servo: {', '.join(servos)}",
+        )
         raise Problem(error("E440", message, help=helps))
     wrong = not_for_a_bed(experiment, use)
     if wrong is not None:
@@ -97,15 +100,15 @@ def bed_size(
     assert use is not None
     exchanges = pace(experiment.structure.schedule.base_hz / use.divisor)
     candidates = _candidates(named, listed)
-    benches = {} if named else {name: _bench(each, listed) for name, each in listed.benches.items()}
-    everyone = [*candidates, *(each for two in benches.values() for each in two)]
+    benches = {} if named else {name: _bench(bench, listed) for name, bench in listed.benches.items()}
+    everyone = [*candidates, *(candidate for two in benches.values() for candidate in two)]
     figures = gather(shaft_work(experiment, joint, rows, progress), everyone)
     if figures is None:
         message = f"no case of `{experiment.name}` came to its first instant: there is nothing to size a bed by"
         raise Problem(error("E443", message, help="`met run` says why its cases fail"))
     bedded = on_bed(experiment, joint, delay=exchanges.late(False))
     lightest, heaviest = figures.ratio
-    ends = sorted({row_at(experiment.cases.table, one.case) or 0 for one in figures.ratio})
+    ends = sorted({row_at(experiment.cases.table, extreme.case) or 0 for extreme in figures.ratio})
     return BedSize(
         experiment=experiment,
         bedded=bedded,
@@ -125,7 +128,7 @@ def _candidates(named: Mapping[str, MotorPart], listed: PartsList) -> list[Candi
     if not named:
         return [Candidate(role, MotorFigures(motor)) for role in ("drive", "load") for motor in listed.motors.values()]
     beside = named["drive"].figure("inertia") if "drive" in named else None
-    return [Candidate(role, MotorFigures(each), beside) for role, each in named.items()]
+    return [Candidate(role, MotorFigures(part), beside) for role, part in named.items()]
 
 
 def _bench(bench: Bench, listed: PartsList) -> tuple[Candidate, Candidate]:

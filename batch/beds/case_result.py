@@ -48,8 +48,8 @@ def read_rates(recorded: records.Records, beds: int) -> np.ndarray:
     rates = rows["rate"].copy()
     answered = (rows["flags"] & ANSWERED) != 0
     for bed in range(beds):
-        at = np.maximum.accumulate(np.where(answered[:, bed], np.arange(len(rows)), 0))
-        rates[:, bed] = rates[at, bed]
+        last_answered = np.maximum.accumulate(np.where(answered[:, bed], np.arange(len(rows)), 0))
+        rates[:, bed] = rates[last_answered, bed]
     return rates[::repeats]
 
 

@@ -30,11 +30,11 @@ class ChosenBed:
 
 def on_beds(plan: Plan, names: Sequence[str] | None) -> list[Experiment]:
     """The experiments of a plan, all or those of these names, that have motors on beds. Raises Problem E310, E333."""
-    found = [each for each in experiments_named(plan, names) if each.structure.substitutions]
-    if not found:
+    experiments = [experiment for experiment in experiments_named(plan, names) if experiment.structure.substitutions]
+    if not experiments:
         helps = ["a run says so: `substitute JOINT { }`", "name the run or sweep that does, if it is another one"]
         raise Problem(error("E333", "no joint is on a bed here", help=helps))
-    return found
+    return experiments
 
 
 def chosen_bed(
@@ -48,19 +48,19 @@ def chosen_bed(
     quiet: bool = False,
 ) -> ChosenBed:
     """The bed of `PORT`, or of `JOINT=PORT` with a deck, whose first case is used. Raises Problem."""
-    found = _chosen_bed(
+    bed = _chosen_bed(
         word,
         None
         if source is None
         else read_plan(source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=quiet),
         names,
     )
-    if kind_of(found.port).replays:
+    if kind_of(bed.port).replays:
         helps = "give the line that it was made on; `met bed run --port FILE` replays it"
-        raise Problem(error("E428", f"{found.port} is a transcript, and no bed that could be asked", help=helps))
-    if found.experiment is not None:
-        check_model(found.port, found.experiment, found.joint)
-    return found
+        raise Problem(error("E428", f"{bed.port} is a transcript, and no bed that could be asked", help=helps))
+    if bed.experiment is not None:
+        check_model(bed.port, bed.experiment, bed.joint)
+    return bed
 
 
 def _chosen_bed(word: str, plan: Plan | None, names: tuple[str, ...]) -> ChosenBed:
@@ -74,8 +74,8 @@ def _chosen_bed(word: str, plan: Plan | None, names: tuple[str, ...]) -> ChosenB
     if joint:
         raise on_none(word, joint, joints)
     if len(joints) > 1:
-        each = " or ".join(f"`--port {joint}={word}`" for joint in joints)
-        raise Problem(error("E418", f"port `{word}`: of which joint?", help=f"say {each}"))
+        joint_ports = " or ".join(f"`--port {joint}={word}`" for joint in joints)
+        raise Problem(error("E418", f"port `{word}`: of which joint?", help=f"say {joint_ports}"))
     return ChosenBed(port, experiment, joints[0])
 
 
@@ -87,5 +87,5 @@ def split(word: str) -> tuple[str, str]:
 
 def on_none(word: str, joint: str, joints: Sequence[str]) -> Problem:
     """The error for a port of a joint that is not on a bed."""
-    on = ", ".join(f"`{each}`" for each in joints)
+    on = ", ".join(f"`{joint_}`" for joint_ in joints)
     return Problem(error("E418", f"port `{word}`: joint `{joint}` is on no bed here", help=f"on a bed here: {on}"))

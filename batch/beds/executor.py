@@ -119,15 +119,15 @@ class OnBeds:
             return []
         task = self._waiting.popleft()
         section = self._sections[task.section]
-        found = []
+        endings = []
         for self._done, row in enumerate(section.rows[task.first : task.last]):
-            found.append(self._case(section, int(row)))
+            endings.append(self._case(section, int(row)))
         self._done = 0
-        results = [each for each, _ in found]
+        results = [result for result, _ in endings]
         history = np.stack([result.rows for result in results]) if section.recorded else None
         if history is not None and section.single:
             history = history.astype(np.float32)
-        fates = {place: (FAILED, why) for place, (_, why) in enumerate(found) if why}
+        fates = {place: (FAILED, why) for place, (_, why) in enumerate(endings) if why}
         computed = shard.Shard(
             section.key(task.first, task.last),
             engine.with_linear(section.prepared, np.stack([result.outputs for result in results])),
@@ -167,23 +167,23 @@ class OnBeds:
             if not _recorded(path):
                 path.unlink(missing_ok=True)
                 self._drive(section, row, path, ended_file)
-            found = case_result(path, section.prepared, row)
+            result = case_result(path, section.prepared, row)
         except records.UnsoundRecords as reason:
             message = f"the file of records of case #{row} {reason}"
             raise Problem(error("E413", message, help=f"remove {path}")) from None
         except OSError as reason:
             message = f"the records of case #{row}, {reason.filename or path}: {reason.strerror or reason}"
             raise Problem(error("E413", message, help="is the disk full? who may write there?")) from None
-        self.known.add(section.experiment, row, found.head, found.exchanges)
-        why = "" if found.whole else "the host was gone"
+        self.known.add(section.experiment, row, result.head, result.exchanges)
+        why = "" if result.whole else "the host was gone"
         with contextlib.suppress(OSError, ValueError, LookupError, TypeError):
             why = str(read_json(ended_file)["why"]) or why
         if not why:
-            return found, ""
+            return result, ""
         ticks = section.prepared.experiment.structure.schedule
-        at = float(found.outputs[2]) / ticks.base_hz
-        self._say(f"case #{section.prepared.experiment.cases.table[row]}, t = {at:g} s: {why}")
-        return found, f"t = {at:g} s: {why}"
+        time = float(result.outputs[2]) / ticks.base_hz
+        self._say(f"case #{section.prepared.experiment.cases.table[row]}, t = {time:g} s: {why}")
+        return result, f"t = {time:g} s: {why}"
 
     def _drive(self, section: CampaignSection, row: int, path: Path, ended_file: Path) -> None:
         """Drive a case in a process of its own. Raises Problem, OSError, and KeyboardInterrupt once that process has
@@ -200,7 +200,7 @@ class OnBeds:
             }
         )
         begun = [name for name in transcripts.values() if not Path(name).exists()]
-        asked = CaseRequest(
+        request = CaseRequest(
             plan=plan,
             row=row,
             ports=dict(ports.by_joint),
@@ -217,7 +217,7 @@ class OnBeds:
         self.driving = Driving(path, exchange_hz, schedule.ticks / schedule.base_hz)
         ended: dict[str, Any] | None = None
         try:
-            for line in talk("hw.driving.case", asked, self._say, until="began", idle=self._tell):
+            for line in talk("hw.driving.case", request, self._say, until="began", idle=self._tell):
                 if "about" in line:
                     bed = f"bed `{line['about']['name']}`, firmware {line['about']['firmware']}"
                     self._greeted(line["bed"], bed, line.get("unseen", ""))

@@ -40,15 +40,17 @@ def filter_range(
     alone = len(experiment.structure.substitutions) == 1
     path = f"{joint}.bed.f_cut"
 
-    def tightest(one: Experiment) -> Margin:
-        cases = margins(one, rows, span=ratio if alone else None, reach=margin)
-        return min((each for case in cases for each in case if each.joint == joint), key=lambda each: each.room)
+    def tightest(variant: Experiment) -> Margin:
+        cases = margins(variant, rows, span=ratio if alone else None, reach=margin)
+        return min(
+            (margin_ for case in cases for margin_ in case if margin_.joint == joint), key=lambda margin_: margin_.room
+        )
 
     own = tightest(experiment)
     value = experiment.parameters[path].value
     tried = []
     for f_cut in np.geomspace(0.01 * own.rate_hz, 0.5 * own.rate_hz, TRIED).tolist():
         parameters = {**experiment.parameters, path: Quantity(f_cut, "Hz", Origin("default"))}
-        one = tightest(replace(experiment, parameters=parameters))
-        tried.append((f_cut, one.stable and one.room >= margin))
+        tightest_margin = tightest(replace(experiment, parameters=parameters))
+        tried.append((f_cut, tightest_margin.stable and tightest_margin.room >= margin))
     return FilterRange(own, float(value) if isinstance(value, float | int) else float("nan"), tuple(tried))

@@ -135,17 +135,17 @@ def identify_and_tell(
     )
     records.unlink(missing_ok=True)  # of an attempt that found nothing: there is no deck
     about, ended = _driven(request, say)
-    found = _fitted(records, about, ended, sheet)
-    check(found, about)
-    estimates = widened(found.parameters, kt_load_error / 100.0)
+    fit = _fitted(records, about, ended, sheet)
+    check(fit, about)
+    estimates = widened(fit.parameters, kt_load_error / 100.0)
     origin = origin_of(about, ended, estimates)
     with new_file(deck) as file:
         file.write(included(deck, which.experiment, which.joint, estimates, origin).encode())
     with kept(f"{deck} is whole"):
         if form == "json":
-            visible.say(json.dumps(as_data(found, estimates, sheet, deck, records), indent=2))
+            visible.say(json.dumps(as_data(fit, estimates, sheet, deck, records), indent=2))
             return
-        for line in table_lines(found, estimates, sheet):
+        for line in table_lines(fit, estimates, sheet):
             say(line)
         say(f"{deck} is a deck to include; what was told and read is in {records}")
 
@@ -175,16 +175,16 @@ def _check_output(deck: Path, records: Path) -> None:
     check_place(deck, code="E305")
 
 
-def check(found: FitResult, about: About) -> None:
+def check(fit: FitResult, about: About) -> None:
     """Raise Problem E423 where the bed does not behave like the model."""
-    left = float((found.residual**2).mean() ** 0.5)
-    worst = int(found.residual.argmax())
-    if not found.settled:
+    left = float((fit.residual**2).mean() ** 0.5)
+    worst = int(fit.residual.argmax())
+    if not fit.settled:
         message = f"bed `{about.name}`: no parameters were settled on in the time that the search is given"
         raise Problem(error("E423", message, help="begin nearer: the servo's motor in the deck is where it begins"))
-    if not left < UNEXPLAINED * found.rate:
+    if not left < UNEXPLAINED * fit.rate:
         message = (
-            f"bed `{about.name}` does not do what a motor bed does: {left:.3g} of {found.rate:.3g} rad/s, rms, "
+            f"bed `{about.name}` does not do what a motor bed does: {left:.3g} of {fit.rate:.3g} rad/s, rms, "
             f"are left unexplained, most in move {worst + 1}"
         )
         helps = (
@@ -194,49 +194,62 @@ def check(found: FitResult, about: About) -> None:
         raise Problem(error("E423", message, help=helps))
 
 
-def widened(found: Mapping[str, Estimate], kt_load_error: float) -> dict[str, Estimate]:
+def widened(parameters: Mapping[str, Estimate], kt_load_error: float) -> dict[str, Estimate]:
     """The estimates, with the error of a given torque constant added to their intervals. kt_load_error: half of its own
     95 % interval, as a share"""
     from hw.identify.fit import Estimate
 
-    if found["kt_load"].found or not kt_load_error:
-        return dict(found)
+    if parameters["kt_load"].found or not kt_load_error:
+        return dict(parameters)
     out = {}
-    for name, each in found.items():
-        half = math.log(each.high / each.value)
-        if (each.found and name in MEASURED_BY) or name == "kt_load":
+    for name, estimate in parameters.items():
+        half = math.log(estimate.high / estimate.value)
+        if (estimate.found and name in MEASURED_BY) or name == "kt_load":
             half = math.hypot(half, math.log1p(kt_load_error))
-        out[name] = Estimate(each.value, each.value * math.exp(-half), each.value * math.exp(half), each.found)
+        out[name] = Estimate(
+            estimate.value, estimate.value * math.exp(-half), estimate.value * math.exp(half), estimate.found
+        )
     return out
 
 
-def table_lines(found: FitResult, estimates: Mapping[str, Estimate], sheet: DataSheet) -> list[str]:
+def table_lines(fit: FitResult, estimates: Mapping[str, Estimate], sheet: DataSheet) -> list[str]:
     """The lines of the result for people."""
     rows = [["", "found", "95 % interval", "", "data sheet", "off by"]]
     for name, unit in UNITS.items():
-        each, believed = estimates[name], sheet.values[name]
-        share = f"{100.0 * math.log(each.high / each.value):.2g} %"
+        estimate, believed = estimates[name], sheet.values[name]
+        share = f"{100.0 * math.log(estimate.high / estimate.value):.2g} %"
         off = "given"
-        if each.found:
-            off = f"{math.log(each.value / believed) / math.log(each.high / each.value):+.3g}"
-        interval = f"{digits(each, each.low)} to {digits(each, each.high)}" if each.high > each.low else ""
-        rows.append(
-            [name, f"{digits(each, each.value)} {unit}", interval, share if interval else "", f"{believed:.6g}", off]
+        if estimate.found:
+            off = f"{math.log(estimate.value / believed) / math.log(estimate.high / estimate.value):+.3g}"
+        interval = (
+            f"{digits(estimate, estimate.low)} to {digits(estimate, estimate.high)}"
+            if estimate.high > estimate.low
+            else ""
         )
-    left = float((found.residual**2).mean() ** 0.5)
+        rows.append(
+            [
+                name,
+                f"{digits(estimate, estimate.value)} {unit}",
+                interval,
+                share if interval else "",
+                f"{believed:.6g}",
+                off,
+            ]
+        )
+    left = float((fit.residual**2).mean() ** 0.5)
     out = columns(rows, right=(3, 4, 5))
     out.append("`off by`: found less the data sheet's, in halves of the interval")
-    out += [f"given, not found: {reason}" for reason in reasons(found)]
+    out += [f"given, not found: {reason}" for reason in reasons(fit)]
     out.append(
-        f"left unexplained: {left:.3g} of {found.rate:.3g} rad/s, rms; misalignment {found.ripple[0]:.2g} N m once a "
-        f"turn and {found.ripple[1]:.2g} N m twice, rms; at its largest torque {found.limited:.0%} of the time"
+        f"left unexplained: {left:.3g} of {fit.rate:.3g} rad/s, rms; misalignment {fit.ripple[0]:.2g} N m once a "
+        f"turn and {fit.ripple[1]:.2g} N m twice, rms; at its largest torque {fit.limited:.0%} of the time"
     )
     return out
 
 
-def reasons(found: FitResult) -> list[str]:
+def reasons(fit: FitResult) -> list[str]:
     """The reasons, in words, why parameters were not found."""
-    missing = [name for name, each in found.parameters.items() if not each.found]
+    missing = [name for name, estimate in fit.parameters.items() if not estimate.found]
     out = []
     if "kt_load" in missing:
         out.append(
@@ -247,18 +260,18 @@ def reasons(found: FitResult) -> list[str]:
     if rest:
         out.append(
             f"{' and '.join(rest)}, which the moves do not tell: the drive was at its largest torque "
-            f"{found.limited:.0%} of the time (`--voltage` more); what is found holds for what is "
+            f"{fit.limited:.0%} of the time (`--voltage` more); what is found holds for what is "
             "given"
         )
     return out
 
 
-def digits(each: Estimate, value: float) -> str:
+def digits(estimate: Estimate, value: float) -> str:
     """A number to two digits of half its interval; to six digits where it was given."""
-    half = each.high - each.value
+    half = estimate.high - estimate.value
     if half <= 0.0:
         return f"{value:.6g}"
-    after = max(1, math.floor(math.log10(each.value)) - math.floor(math.log10(half)) + 2)
+    after = max(1, math.floor(math.log10(estimate.value)) - math.floor(math.log10(half)) + 2)
     return f"{value:#.{after}g}".removesuffix(".")
 
 
@@ -284,7 +297,7 @@ def included(
 
     head = re.sub(r"\W", "_", joint)
     [use] = (substitution for substitution in experiment.structure.substitutions if substitution.joint == joint)
-    [servo] = (each for each in experiment.structure.servos if each.joint == joint)
+    [servo] = (servo_ for servo_ in experiment.structure.servos if servo_.joint == joint)
     bed = [*(f"{name} = {head}_{name}" for name in UNITS), *_believed(experiment, use)]
     scale = _scale_of(experiment, joint)
     times = {name: "" if (by := scale.of(UNITS[name])) == 1.0 else f" * {by:.12g}" for name in OF_SERVO}
@@ -294,7 +307,7 @@ def included(
         [
             f"substitute {joint} {{",
             f"    bed = {use.bed}(",
-            *_packed([f"{each}," for each in bed[:-1]] + bed[-1:], 8),
+            *_packed([f"{argument}," for argument in bed[:-1]] + bed[-1:], 8),
             "    );",
             f"    law = {use.law};",
             *([f"    scale {{ {scales} }}"] if use.scaled else []),
@@ -315,37 +328,41 @@ def included(
     ]
     wide = max(map(len, UNITS))
     for name, unit in UNITS.items():
-        each = estimates[name]
-        remark = f"{digits(each, each.low)} to {digits(each, each.high)}" if each.high > each.low else ""
-        if not each.found:
+        estimate = estimates[name]
+        remark = (
+            f"{digits(estimate, estimate.low)} to {digits(estimate, estimate.high)}"
+            if estimate.high > estimate.low
+            else ""
+        )
+        if not estimate.found:
             remark = f"given, not found; {remark}".removesuffix("; ")
-        said = f"{digits(each, each.value)} {unit};"
-        lines.append(f"let {head}_{name:<{wide}} = {said:<26} // {remark}")
+        assigned = f"{digits(estimate, estimate.value)} {unit};"
+        lines.append(f"let {head}_{name:<{wide}} = {assigned:<26} // {remark}")
     return formatted(str(deck), "\n".join(lines) + "\n")
 
 
 def _scale_of(experiment: Experiment, joint: str) -> BedScale:
     """The scales of a joint's bed in the first case."""
-    found = scale_of(experiment, joint, np.array([0]))
-    return BedScale(*(float(of_cases(each)[0]) for each in (found.torque, found.rate, found.voltage)))
+    scale = scale_of(experiment, joint, np.array([0]))
+    return BedScale(*(float(of_cases(quantity)[0]) for quantity in (scale.torque, scale.rate, scale.voltage)))
 
 
 def _believed(experiment: Experiment, use: Substitution) -> list[str]:
     """The other parameters of the bed that the deck writes."""
-    said = {
-        path.rpartition(".")[2]: each
-        for path, each in experiment.parameters.items()
-        if path.startswith(f"{use.joint}.bed.") and ".scale." not in path and each.origin.kind == "deck"
+    quantities = {
+        path.rpartition(".")[2]: quantity
+        for path, quantity in experiment.parameters.items()
+        if path.startswith(f"{use.joint}.bed.") and ".scale." not in path and quantity.origin.kind == "deck"
     }
     own = [
-        f"{name} = {written(each.value, each.unit)}"
-        for name, each in said.items()
-        if name not in UNITS and not each.origin.note and isinstance(each.value, float)
+        f"{name} = {written(quantity.value, quantity.unit)}"
+        for name, quantity in quantities.items()
+        if name not in UNITS and not quantity.origin.note and isinstance(quantity.value, float)
     ]
     faults = [
         f"faults = {word}"
         for word, values in models.find("bed", use.bed).presets.items()
-        if values and all(name in said and said[name].origin.note for name in values)
+        if values and all(name in quantities and quantities[name].origin.note for name in values)
     ]
     return own + faults
 
@@ -361,7 +378,7 @@ def _packed(words: Iterable[str], indent: int) -> list[str]:
 
 
 def as_data(
-    found: FitResult, estimates: Mapping[str, Estimate], sheet: DataSheet, deck: Path, records: Path
+    fit: FitResult, estimates: Mapping[str, Estimate], sheet: DataSheet, deck: Path, records: Path
 ) -> dict[str, Any]:
     """The result for programs, SI."""
     return {
@@ -369,20 +386,20 @@ def as_data(
         "records": str(records),
         "parameters": {
             name: {
-                "value": each.value,
-                "low": each.low,
-                "high": each.high,
-                "found": each.found,
+                "value": estimate.value,
+                "low": estimate.low,
+                "high": estimate.high,
+                "found": estimate.found,
                 "unit": UNITS[name],
                 "data_sheet": sheet.values[name],
             }
             for name in UNITS
-            for each in [estimates[name]]
+            for estimate in [estimates[name]]
         },
-        "residual": float((found.residual**2).mean() ** 0.5),
-        "rate": found.rate,
-        "misalignment": list(found.ripple),
-        "limited": found.limited,
+        "residual": float((fit.residual**2).mean() ** 0.5),
+        "rate": fit.rate,
+        "misalignment": list(fit.ripple),
+        "limited": fit.limited,
     }
 
 
@@ -390,7 +407,7 @@ def _driven(request: MovesRequest, say: Callable[[str], None]) -> tuple[About, d
     """Lead the bed through the moves. Returns its description and the record of the moves. Raises Problem, and
     KeyboardInterrupt once the bed is stopped."""
     about: About | None = None
-    found = dict[str, Any]()
+    record = dict[str, Any]()
     for line in talk("hw.identify.driving", request, lambda words: say(f"  {words}"), until="ended"):
         if "about" in line:
             about, most = _about(line["about"]), line["peaks"]
@@ -398,9 +415,9 @@ def _driven(request: MovesRequest, say: Callable[[str], None]) -> tuple[About, d
                 f"bed `{about.name}`, firmware {about.firmware}: moves up to {most['voltage']:.3g} V, "
                 f"{most['current']:.3g} A and {most['rate']:.3g} rad/s, a minute or so"
             )
-        found = line.get("ended", found)
+        record = line.get("ended", record)
     assert about is not None
-    return about, found
+    return about, record
 
 
 def _about(data: Mapping[str, Any]) -> About:

@@ -42,24 +42,24 @@ def measured(
     simulated = bed.simulated
     plan = "" if simulated is None else plan_file.dumps(Plan("", (simulated,)))
     question = JitterRequest(bed.port, rate, seconds, joints, baud, plan, bed.joint)
-    said = list[str]()
-    about, kept = dict[str, Any](), dict[str, Any]()
-    for line in talk("hw.driving.jitter", question, said.append, until="kept", goes_on=True):
+    heard = list[str]()
+    about, measurement = dict[str, Any](), dict[str, Any]()
+    for line in talk("hw.driving.jitter", question, heard.append, until="kept", goes_on=True):
         about = line.get("about", about)
-        kept = line.get("kept", kept)
-    timing = kept["timing"]
+        measurement = line.get("kept", measurement)
+    timing = measurement["timing"]
     return {
         "port": bed.port,
         **about,
         "rate_hz": rate,
         "joints": joints,
-        "seconds": kept["seconds"],
+        "seconds": measurement["seconds"],
         "exchanges": timing["exchanges"],
         **{name: _spread(timing[name]) for name, _ in _SPREADS},
         "misses": {name: timing[name] for name in ("woken", "computed", "waited", "unanswered")},
-        "stops": kept["stops"],
+        "stops": measurement["stops"],
         "clock": timing["drift"] if math.isfinite(timing["drift"]) else None,
-    }, said
+    }, heard
 
 
 def jitter_and_tell(
@@ -78,20 +78,20 @@ def jitter_and_tell(
 ) -> bool:
     """Run `met bed jitter`. Returns True where no run would have been stopped. Raises Problem."""
     bed = chosen_bed(word, source, names, quiet=quiet, **options)
-    data, said = measured(bed, baud, rate, duration, joints)
+    data, warnings = measured(bed, baud, rate, duration, joints)
     if form == "json":
-        say(json.dumps({**data, "warnings": said}, indent=2))
+        say(json.dumps({**data, "warnings": warnings}, indent=2))
     elif not quiet:
-        say("\n".join([*lines(data), *(f"  {each}" for each in said)]))
+        say("\n".join([*lines(data), *(f"  {warning}" for warning in warnings)]))
     return not data["stops"]
 
 
 def lines(data: Mapping[str, Any]) -> list[str]:
     """The figures for people, line by line."""
     misses = data["misses"]
-    each = "" if data["joints"] == 1 else f" in {data['joints']} each period"
+    each_period = "" if data["joints"] == 1 else f" in {data['joints']} each period"
     out = [
-        f"bed `{data['name']}` at {data['port']}, not armed: {data['exchanges']:,} exchanges{each} at "
+        f"bed `{data['name']}` at {data['port']}, not armed: {data['exchanges']:,} exchanges{each_period} at "
         f"{data['rate_hz']:g} Hz in {data['seconds']:.3g} s"
     ]
     for name, words in _SPREADS:
@@ -113,17 +113,17 @@ def lines(data: Mapping[str, Any]) -> list[str]:
 
 def histogram(stretches: Sequence[Mapping[str, Any]]) -> list[str]:
     """A bar for each bin from the first to the last non-empty one. A bin with any count has a visible bar."""
-    full = [at for at, each in enumerate(stretches) if each["count"]]
+    full = [number for number, bin_ in enumerate(stretches) if bin_["count"]]
     if not full:
         return ["  (none)"]
-    shown = stretches[full[0] : full[-1] + 1]
-    most = max(each["count"] for each in shown)
+    shown_bins = stretches[full[0] : full[-1] + 1]
+    most = max(bin_["count"] for bin_ in shown_bins)
     rows = []
-    for each in shown:
-        eighths = max(round(8 * WIDTH * each["count"] / most), 1) if each["count"] else 0
+    for bin_ in shown_bins:
+        eighths = max(round(8 * WIDTH * bin_["count"] / most), 1) if bin_["count"] else 0
         whole, rest = divmod(eighths, 8)
-        upto = f">= {duration(each['from'])}" if each["to"] is None else f"< {duration(each['to'])}"
-        rows.append([upto, f"{each['count']:,}", "█" * whole + " ▏▎▍▌▋▊▉"[rest].strip()])
+        upto = f">= {duration(bin_['from'])}" if bin_["to"] is None else f"< {duration(bin_['to'])}"
+        rows.append([upto, f"{bin_['count']:,}", "█" * whole + " ▏▎▍▌▋▊▉"[rest].strip()])
     return columns(rows, right=(0, 1))
 
 
@@ -147,11 +147,12 @@ def off(share: float) -> str:
     return f"{ppm:+,.0f} ppm" if abs(ppm) >= 100.0 else f"{ppm:+.3g} ppm"
 
 
-def _spread(found: Mapping[str, Any]) -> dict[str, Any]:
+def _spread(spread: Mapping[str, Any]) -> dict[str, Any]:
     edges = [0.0, *EDGES, None]
     return {
-        **{name: found[name] if math.isfinite(found[name]) else None for name, _ in _FIGURES},
+        **{name: spread[name] if math.isfinite(spread[name]) else None for name, _ in _FIGURES},
         "histogram": [
-            {"from": edges[at], "to": edges[at + 1], "count": count} for at, count in enumerate(found["counts"])
+            {"from": edges[number], "to": edges[number + 1], "count": count}
+            for number, count in enumerate(spread["counts"])
         ],
     }

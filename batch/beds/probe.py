@@ -124,12 +124,12 @@ def lines(result: ProbeResult) -> list[str]:
     for fault in Fault:
         if fault in sample.faults:
             out.append(f"  fault: {refusals.words(fault)}")
-            out += [f"    = help: {each}" for each in refusals.remedies(fault)]
+            out += [f"    = help: {remedy}" for remedy in refusals.remedies(fault)]
     for what, remedy in refusals.interlocked(sample.interlock):
         out += [f"  interlock: {what}", f"    = help: {remedy}"]
     for warning in result.warnings:
         out.append(f"  warning: {warning.message}")
-        out += [f"    = help: {each}" for each in warning.help]
+        out += [f"    = help: {help_}" for help_ in warning.help]
     return out
 
 
@@ -139,7 +139,7 @@ def data(result: ProbeResult) -> dict[str, Any]:
     return {
         "port": result.port,
         **{name: value for name, value in asdict(about).items() if name not in ("capabilities", "scales")},
-        "capabilities": [str(each.name).lower() for each in Capability if each in about.capabilities],
+        "capabilities": [str(capability.name).lower() for capability in Capability if capability in about.capabilities],
         "scales": {name: value if math.isfinite(value) else None for name, value in asdict(about.scales).items()},
         "state": sample.state.name.lower(),
         "sensors": {name: value for name, value, _ in _read(sample)},
@@ -174,9 +174,9 @@ def capabilities(about: About) -> list[str]:
         Capability.COASTS: "a shaft that coasts when it is stopped",
     }
     return [
-        words.get(each, str(each.name).lower().replace("_", " "))
-        for each in Capability
-        if each in about.capabilities and each != Capability.ARMATURE
+        words.get(capability, str(capability.name).lower().replace("_", " "))
+        for capability in Capability
+        if capability in about.capabilities and capability != Capability.ARMATURE
     ]
 
 
@@ -213,7 +213,7 @@ def _scales(about: About) -> list[tuple[float, str]]:
         (Capability.DRIVE_CURRENT, s.drive_current, "A of the drive"),
         (Capability.ACCELEROMETER, s.acceleration, "rad/s^2"),
     )
-    return result + [(value, unit) for each, value, unit in others if each in has]
+    return result + [(value, unit) for capability, value, unit in others if capability in has]
 
 
 def _read(sample: BedSample) -> list[tuple[str, float, str]]:
@@ -224,24 +224,24 @@ def _line(result: ProbeResult) -> list[Sequence[str]]:
     """Rows about the line, and about the rates for which it is fast enough."""
     if not result.trips and not result.needed and not result.lost:
         return [["line", "none: the bed is in this process"]]
-    said = []
+    parts = []
     if result.needed and not result.remarks:
         bytes_ = exchanged(result.about.capabilities)
-        said.append(f"{result.baud} baud: {bytes_} bytes an exchange take {1e3 * result.needed:.3g} ms")
+        parts.append(f"{result.baud} baud: {bytes_} bytes an exchange take {1e3 * result.needed:.3g} ms")
     if result.trips:
         median, longest = statistics.median(result.trips), max(result.trips)
-        said.append(
+        parts.append(
             f"answered in {1e3 * median:.3g} ms, at most {1e3 * longest:.3g} ms, {ASKED} times asked"
             + (f", {result.lost} times without an answer" if result.lost else "")
         )
     elif result.lost:
-        said.append(f"{result.lost} times asked, and never an answer")
+        parts.append(f"{result.lost} times asked, and never an answer")
     if not math.isfinite(result.fastest):
-        return [["line", "; ".join(said)], ["rates", "all: the bed waits for the computer"]]
+        return [["line", "; ".join(parts)], ["rates", "all: the bed waits for the computer"]]
     words = [f"{hz:g} Hz {'yes' if hz <= result.fastest else 'no'}" for hz in RATES]
     if not result.fastest:
-        return [["line", "; ".join(said)], ["rates", f"{', '.join(words)}: exchanges without an answer stop a bed"]]
+        return [["line", "; ".join(parts)], ["rates", f"{', '.join(words)}: exchanges without an answer stop a bed"]]
     rates = (
         f"{', '.join(words)}; up to {result.fastest:.3g} Hz, where an exchange takes {LONGEST_SHARE:.0%} of a period"
     )
-    return [["line", "; ".join(said)], ["rates", rates]]
+    return [["line", "; ".join(parts)], ["rates", rates]]

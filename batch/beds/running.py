@@ -30,34 +30,36 @@ from met.outputs import quoted
 from met.plan import Experiment, Plan
 
 
-def ports_of(given: Sequence[str], experiments: Sequence[Experiment]) -> dict[str, str]:
+def ports_of(words: Sequence[str], experiments: Sequence[Experiment]) -> dict[str, str]:
     """The port of each joint on a bed, from words `PORT` or `JOINT=PORT`. Raises Problem E418."""
     joints = list(
-        dict.fromkeys(substitution.joint for one in experiments for substitution in one.structure.substitutions)
+        dict.fromkeys(
+            substitution.joint for experiment in experiments for substitution in experiment.structure.substitutions
+        )
     )
-    found: dict[str, str] = {}
-    for word in given:
+    port_of: dict[str, str] = {}
+    for word in words:
         joint, port = split(word)
         if joint and joint not in joints:
             raise on_none(word, joint, joints)
         if not joint and len(joints) == 1:
             joint = joints[0]
         if not joint:
-            own = " ".join(f"--port {each}=..." for each in joints)
+            own = " ".join(f"--port {joint_}=..." for joint_ in joints)
             raise Problem(error("E418", f"port `{word}`: of which joint?", help=f"each has its own: `{own}`"))
-        if joint in found:
+        if joint in port_of:
             raise Problem(error("E418", f"joint `{joint}` has two ports", help="leave one of the two out"))
-        found[joint] = port
-    lines = [os.path.realpath(port) for port in found.values() if not kind_of(port).simulated]
+        port_of[joint] = port
+    lines = [os.path.realpath(port) for port in port_of.values() if not kind_of(port).simulated]
     if len(set(lines)) < len(lines):
-        one, other = [joint for joint, port in found.items() if lines.count(os.path.realpath(port)) > 1][:2]
-        message = f"joints `{one}` and `{other}` have one port: {found[one]}"
+        first, other = [joint for joint, port in port_of.items() if lines.count(os.path.realpath(port)) > 1][:2]
+        message = f"joints `{first}` and `{other}` have one port: {port_of[first]}"
         raise Problem(error("E418", message, help="each has a bed of its own, and its own line"))
-    missing = [joint for joint in joints if joint not in found]
+    missing = [joint for joint in joints if joint not in port_of]
     if missing:
         kinds = f"`--port JOINT=PORT`: {ports_in_words()}"
         raise Problem(error("E418", f"no port for the bed of joint `{missing[0]}`", help=kinds))
-    return found
+    return port_of
 
 
 def campaign_of(
@@ -77,31 +79,31 @@ def campaign_of(
             check_model(by_joint[use.joint], experiment, use.joint)
     steps = {in_lock_step(port, lock_step) for port in by_joint.values()}
     if len(steps) > 1:
-        one = "give all beds ports of one kind"
-        raise Problem(error("E414", "some of the beds have a time of their own, and some have none", help=one))
+        helps = "give all beds ports of one kind"
+        raise Problem(error("E414", "some of the beds have a time of their own, and some have none", help=helps))
     [stepped] = steps
-    late = max(pace_of(each).late(stepped) for each in experiments)
-    found = prepare(plan, output=output, experiments=names, cases=cases, histories="all", wires=Wires(late))
-    for part in found.parts:
+    late = max(pace_of(experiment).late(stepped) for experiment in experiments)
+    campaign = prepare(plan, output=output, experiments=names, cases=cases, histories="all", wires=Wires(late))
+    for part in campaign.parts:
         for row in part.rows.tolist():
             check(part.experiment, row, stepped)
-    return found, by_joint, stepped
+    return campaign, by_joint, stepped
 
 
 def check_margins(campaign: Campaign, *, force: bool) -> list[str]:
     """Lines about the laws' stability, before a bed is armed. Raises Problem E419 where a law has no margin."""
-    said = []
+    lines = []
     for part in campaign.parts:
-        for each in zip(*margins(part.experiment, part.rows.tolist()), strict=True):
-            bad = next((one for one in each if not one.stable), None)
+        for cases_of_joint in zip(*margins(part.experiment, part.rows.tolist()), strict=True):
+            bad = next((margin for margin in cases_of_joint if not margin.stable), None)
             if bad is not None and not force:
                 helps = f"`met margin` says what would be; {remedy(bad)}", "`--force` arms it all the same"
                 raise Problem(error("E419", f"case #{bad.case}, {in_words(bad)}: it would not be stable", help=helps))
-            worst = min(each, key=lambda one: one.room)
-            several = len({in_words(one) for one in each}) > 1
-            among = f" (case #{worst.case}, the least margin of {len(each)} cases)" if several else ""
-            said.append(in_words(worst) + among)
-    return list(dict.fromkeys(said))
+            worst = min(cases_of_joint, key=lambda margin: margin.room)
+            several = len({in_words(margin) for margin in cases_of_joint}) > 1
+            among = f" (case #{worst.case}, the least margin of {len(cases_of_joint)} cases)" if several else ""
+            lines.append(in_words(worst) + among)
+    return list(dict.fromkeys(lines))
 
 
 def run_and_tell(
@@ -164,9 +166,9 @@ def beds_before(archive: Path) -> tuple[dict[str, str], dict[str, Any]]:
     beside it. Raises Problem E302."""
     path = sidecar_path(archive)
     try:
-        beds = {str(each["joint"]): each for each in read_json(path).get("beds", ())}
-        ports = {joint: str(each["port"]) for joint, each in beds.items()}
-        return ports, {joint: each.get("bench", {}) for joint, each in beds.items()}
+        beds = {str(bed["joint"]): bed for bed in read_json(path).get("beds", ())}
+        ports = {joint: str(bed["port"]) for joint, bed in beds.items()}
+        return ports, {joint: bed.get("bench", {}) for joint, bed in beds.items()}
     except (OSError, ValueError, LookupError, TypeError, AttributeError) as reason:
         helps = "`--fresh` drives it again"
         raise Problem(error("E302", f"{path} is damaged: on which beds it was is not known", help=helps)) from reason

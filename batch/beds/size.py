@@ -52,22 +52,22 @@ def size_and_tell(
         plan, rows = _of_archive(source, names)
     else:
         plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=silent)
-    asked = experiments_named(plan, names or None) if joint is not None else _on_beds(plan, names)
-    texts = {each.name: each.text for each in plan.sources}
-    joints = [joint_of(each, joint, texts) for each in asked]
-    bar, found = None if silent else Bar(), []
-    for each, of in zip(asked, joints, strict=True):
-        wanted = rows.get(each.name)
+    experiments = experiments_named(plan, names or None) if joint is not None else _on_beds(plan, names)
+    texts = {source_.name: source_.text for source_ in plan.sources}
+    joints = [joint_of(experiment, joint, texts) for experiment in experiments]
+    bar, sizes = None if silent else Bar(), []
+    for experiment, joint_ in zip(experiments, joints, strict=True):
+        wanted = rows.get(experiment.name)
         if bar is not None:
-            bar.begin(each.name, each.cases.count if wanted is None else len(wanted))
-        found.append(bed_size(each, of, margin, named, listed, wanted, None if bar is None else bar.advance))
+            bar.begin(experiment.name, experiment.cases.count if wanted is None else len(wanted))
+        sizes.append(bed_size(experiment, joint_, margin, named, listed, wanted, None if bar is None else bar.advance))
         if bar is not None:
             bar.end()
     if form == "json":
-        visible.say(json.dumps([as_data(each) for each in found], indent=1))
+        visible.say(json.dumps([as_data(size) for size in sizes], indent=1))
     else:
-        say("\n\n".join("\n".join(size_lines(each, named=bool(named), curves=verbose)) for each in found))
-    return not named or all(verdict.fits for each in found for verdict in each.verdicts)
+        say("\n\n".join("\n".join(size_lines(size, named=bool(named), curves=verbose)) for size in sizes))
+    return not named or all(verdict.fits for size in sizes for verdict in size.verdicts)
 
 
 def _of_archive(source: str, names: Sequence[str]) -> tuple[Plan, dict[str, np.ndarray]]:
@@ -107,8 +107,8 @@ def as_data(size: BedSize) -> dict[str, Any]:
             for role, motor in (("drive", figures.drive), ("load", figures.load))
         },
         "both": _figures(figures.both, size.margin),
-        "arm_inertia": [_extreme(one) for one in figures.arm],
-        "r": [_extreme(one) for one in figures.ratio],
+        "arm_inertia": [_extreme(extreme) for extreme in figures.arm],
+        "r": [_extreme(extreme) for extreme in figures.ratio],
         "rotor_inertia": list(figures.rotor),
         "shaft_inertia": list(figures.shaft),
         "exchanges_hz": size.exchanges.hz,
@@ -125,7 +125,7 @@ def as_data(size: BedSize) -> dict[str, Any]:
             "filters": [{"f_cut": f_cut, "stable": stable} for f_cut, stable in size.filter.tried],
         },
         "parts": [_verdict_as_data(verdict) for verdict in size.verdicts],
-        "benches": {name: [_verdict_as_data(each) for each in two] for name, two in size.benches.items()},
+        "benches": {name: [_verdict_as_data(verdict) for verdict in two] for name, two in size.benches.items()},
         "notes": list(size.notes),
     }
 
@@ -155,12 +155,12 @@ def _verdict_as_data(verdict: PartVerdict) -> dict[str, Any]:
 
 
 def _figures(figures: Mapping[str, Extreme], margin: float) -> dict[str, Any]:
-    return {name: {**_extreme(one), "order": margin * one.value} for name, one in figures.items()}
+    return {name: {**_extreme(extreme), "order": margin * extreme.value} for name, extreme in figures.items()}
 
 
-def _extreme(one: Extreme) -> dict[str, Any]:
+def _extreme(extreme: Extreme) -> dict[str, Any]:
     """An extreme as data, without empty fields."""
-    return {name: value for name, value in asdict(one).items() if value is not None}
+    return {name: value for name, value in asdict(extreme).items() if value is not None}
 
 
 def _curve(motor: MotorFigures) -> dict[str, list[float]]:

@@ -40,11 +40,13 @@ def size_lines(size: BedSize, *, named: bool, curves: bool = False) -> Iterator[
     for role, motor in zip(ROLES, (figures.drive, figures.load), strict=True):
         yield ""
         rows = [[f"{role} motor", "at most", f"order, x {size.margin:g}", "where"]]
-        for name, one in motor.found.items():
-            least = size.margin * one.value
+        for name, extreme in motor.found.items():
+            least = size.margin * extreme.value
             also = f" = {_digits(RPM * least)} rpm" if name == "rate" else ""
             unit = UNITS[name]
-            rows.append([WORDS[name], _with(one.value, unit), _with(least, unit) + also, _where(name, one, several)])
+            rows.append(
+                [WORDS[name], _with(extreme.value, unit), _with(least, unit) + also, _where(name, extreme, several)]
+            )
         yield from columns(rows, right=(1,))
         if curves:
             yield from _curves(motor)
@@ -93,16 +95,16 @@ def _rest(size: BedSize, several: bool) -> Iterator[Sequence[str]]:
 def _filter(size: BedSize) -> str:
     """The cut-offs at which the loop is stable, in words."""
     tried, good = [f_cut for f_cut, _ in size.filter.tried], size.filter.good
-    here = f"{size.filter.f_cut:g} Hz here; " if math.isfinite(size.filter.f_cut) else ""
+    cut_off = f"{size.filter.f_cut:g} Hz here; " if math.isfinite(size.filter.f_cut) else ""
     ends = f"{_digits(tried[0])} to {_digits(tried[-1])} Hz"
     margin = f"with a margin of {size.margin:g} of r"
     if len(good) == len(tried):
-        return f"{here}stable {margin} at all of {ends}"
+        return f"{cut_off}stable {margin} at all of {ends}"
     if not good:
-        return f"{here}stable {margin} at none of {ends}"
+        return f"{cut_off}stable {margin} at none of {ends}"
     words = " to ".join(dict.fromkeys(_digits(end) for end in (good[0], good[-1]))) + " Hz"
     whole = good == tuple(tried[tried.index(good[0]) : tried.index(good[-1]) + 1])
-    return f"{here}stable {margin} at {words}{'' if whole else ', not all of them'}, of {ends} that were tried"
+    return f"{cut_off}stable {margin} at {words}{'' if whole else ', not all of them'}, of {ends} that were tried"
 
 
 def _named(size: BedSize, several: bool) -> Iterator[str]:
@@ -130,11 +132,11 @@ def _listed(size: BedSize) -> Iterator[str]:
     rows = [["part", "", "fits", "what binds"]]
     for role in ROLES:
         of_role = [verdict for verdict in size.verdicts if verdict.role == role]
-        for number, each in enumerate(sorted(of_role, key=lambda each: (not each.fits, _order(each)))):
-            rows.append([role if number == 0 else "", each.part.name, _fits(each), _binding(each)])
+        for number, verdict in enumerate(sorted(of_role, key=lambda verdict: (not verdict.fits, _order(verdict)))):
+            rows.append([role if number == 0 else "", verdict.part.name, _fits(verdict), _binding(verdict)])
     for name, two in size.benches.items():
-        worst = max(two, key=lambda each: (not each.fits, _share(each)))
-        names = " with ".join(dict.fromkeys(each.part.name for each in two))
+        worst = max(two, key=lambda verdict: (not verdict.fits, _share(verdict)))
+        names = " with ".join(dict.fromkeys(verdict.part.name for verdict in two))
         rows.append([f"bench {name}", names, _fits(worst), f"{worst.role}, {_binding(worst)}"])
     yield from columns(rows)
 
@@ -170,28 +172,28 @@ def _check(check: PartCheck) -> str:
     return f"{check.what}: {_digits(check.asked)} of {_with(check.has, check.unit)}, {100.0 * check.share:.0f} %"
 
 
-def _where(name: str, one: Extreme, several: bool) -> str:
+def _where(name: str, extreme: Extreme, several: bool) -> str:
     """The place of an extreme in words, `#3, 0.16 s, at 8.77 rad/s`: case, instant and operating point."""
-    if one.value == 0.0:
+    if extreme.value == 0.0:
         return "never"
-    place = _place(one, several)
-    if one.torque is None or one.rate is None:
+    place = _place(extreme, several)
+    if extreme.torque is None or extreme.rate is None:
         return place
-    at = {
-        "torque_peak": f"at {_with(abs(one.rate), 'rad/s')}",
-        "current_peak": f"at {_with(abs(one.rate), 'rad/s')}",
-        "rate": f"at {_with(abs(one.torque), 'N*m')}",
-    }.get(name, f"at {_with(abs(one.torque), 'N*m')} and {_with(abs(one.rate), 'rad/s')}")
-    return f"{place}, {at}"
+    point = {
+        "torque_peak": f"at {_with(abs(extreme.rate), 'rad/s')}",
+        "current_peak": f"at {_with(abs(extreme.rate), 'rad/s')}",
+        "rate": f"at {_with(abs(extreme.torque), 'N*m')}",
+    }.get(name, f"at {_with(abs(extreme.torque), 'N*m')} and {_with(abs(extreme.rate), 'rad/s')}")
+    return f"{place}, {point}"
 
 
-def _place(one: Extreme, several: bool) -> str:
-    case, time = f"#{one.case}" if several else "", "" if one.time is None else f"{one.time:.6g} s"
-    return ", ".join(each for each in (case, time) if each)
+def _place(extreme: Extreme, several: bool) -> str:
+    case, time = f"#{extreme.case}" if several else "", "" if extreme.time is None else f"{extreme.time:.6g} s"
+    return ", ".join(part for part in (case, time) if part)
 
 
-def _in(one: Extreme, several: bool) -> str:
-    place = _place(one, several)
+def _in(extreme: Extreme, several: bool) -> str:
+    place = _place(extreme, several)
     return f", {place}" if place else ""
 
 

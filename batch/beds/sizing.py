@@ -73,15 +73,17 @@ class Largest:
         most = float(np.nanmax(values))
         # the first instant with the value but for rounding, so that a constant rate is reported where it is reached
         row, k = np.unravel_index(int(np.argmax(values >= most - ROUNDING * abs(most))), values.shape)
-        at = (float(work.time[k]), None, None) if torque is None else _at(work, torque, int(row), int(k))
-        self._keep(name, Extreme(most, int(work.case[row]), *at))
+        instant = (
+            (float(work.time[k]), None, None) if torque is None else _operating_point(work, torque, int(row), int(k))
+        )
+        self._keep(name, Extreme(most, int(work.case[row]), *instant))
 
-    def _keep(self, name: str, one: Extreme) -> None:
-        if name not in self.found or one.value > self.found[name].value + ROUNDING * abs(self.found[name].value):
-            self.found[name] = one
+    def _keep(self, name: str, extreme: Extreme) -> None:
+        if name not in self.found or extreme.value > self.found[name].value + ROUNDING * abs(self.found[name].value):
+            self.found[name] = extreme
 
 
-def _at(work: ShaftWork, torque: np.ndarray, row: int, k: int) -> tuple[float, float, float]:
+def _operating_point(work: ShaftWork, torque: np.ndarray, row: int, k: int) -> tuple[float, float, float]:
     return float(work.time[k]), float(torque[row, k]), float(work.rate[row, k])
 
 
@@ -114,8 +116,8 @@ def hottest(torque: np.ndarray, time: np.ndarray, constant: float) -> np.ndarray
     course = lfilter([share], [1.0, share - 1.0], squares, axis=1)
     after = step * np.arange(1, squares.shape[1] + 1) / constant
     begin = course[:, -1] / -math.expm1(-after[-1])
-    found: np.ndarray = np.sqrt((course + begin[:, None] * np.exp(-after)).max(1))
-    return found
+    steady: np.ndarray = np.sqrt((course + begin[:, None] * np.exp(-after)).max(1))
+    return steady
 
 
 class MotorFigures:
@@ -151,8 +153,8 @@ class MotorFigures:
             keep.of_instants("current_peak", np.abs(current), work, torque)
         if voltage is not None:
             keep.of_instants("voltage", np.abs(voltage), work, torque)
-        for name, here in (("driving", power >= 0.0), ("braking", power <= 0.0)):
-            points = np.stack([np.abs(work.rate)[here], np.abs(torque)[here]], 1)
+        for name, in_quadrants in (("driving", power >= 0.0), ("braking", power <= 0.0)):
+            points = np.stack([np.abs(work.rate)[in_quadrants], np.abs(torque)[in_quadrants]], 1)
             self._corners[name] = corners(np.concatenate([self._corners[name], points]))
 
     def _of_part(
@@ -260,18 +262,18 @@ def gather(blocks: Iterable[ShaftWork], candidates: Sequence[Candidate] = ()) ->
         cases, instants = cases + len(work.case), len(work.time)
         failed, limited = failed + int(work.failed.sum()), limited + int((work.limited > 0).sum())
         at_most += int((np.abs(work.drive) >= work.strongest[:, None]).any(1).sum())
-    found = rest.found
-    if "arm+" not in found or "torque_peak" not in drive.found:
+    figures = rest.found
+    if "arm+" not in figures or "torque_peak" not in drive.found:
         return None
 
     def least_and_most(name: str) -> tuple[Extreme, Extreme]:
-        least = found[f"{name}-"]
-        return Extreme(-least.value, least.case, least.time), found[f"{name}+"]
+        least = figures[f"{name}-"]
+        return Extreme(-least.value, least.case, least.time), figures[f"{name}+"]
 
     return BedFigures(
         drive=drive,
         load=load,
-        both={name: found[name] for name in ("returned_peak", "returned_energy")},
+        both={name: figures[name] for name in ("returned_peak", "returned_energy")},
         arm=least_and_most("arm"),
         ratio=least_and_most("ratio"),
         rotor=(min(ends["rotor"]), max(ends["rotor"])),
@@ -324,7 +326,7 @@ class PartVerdict:
     @property
     def binds(self) -> PartCheck | None:
         """The check with the least room."""
-        return max(self.checks, key=lambda each: each.share, default=None)
+        return max(self.checks, key=lambda check: check.share, default=None)
 
     @property
     def fits(self) -> bool | None:
@@ -336,14 +338,14 @@ class PartVerdict:
 
 def judge_part(candidate: Candidate, margin: float) -> PartVerdict:
     """Compare a part with its required figures times the margin."""
-    asked, part, checks = candidate.figures.found, candidate.part, []
+    figures, part, checks = candidate.figures.found, candidate.part, []
     for what, name, own in CHECKS:
         has = part.figure(own)
-        if has is not None and name in asked:
-            checks.append(PartCheck(what, UNITS[name], margin * asked[name].value, has, asked[name]))
-    made = {check.what for check in checks}
-    missing = [name for name in ("torque, continuous", "rate") if name not in made]
-    if not made & {"torque, peak", "current, peak", "voltage"}:
+        if has is not None and name in figures:
+            checks.append(PartCheck(what, UNITS[name], margin * figures[name].value, has, figures[name]))
+    checked = {check.what for check in checks}
+    missing = [name for name in ("torque, continuous", "rate") if name not in checked]
+    if not checked & {"torque, peak", "current, peak", "voltage"}:
         missing.insert(1, "torque, peak")
     if candidate.role == "load" and part.figure("inertia") is None:
         missing.append("inertia of its rotor")
