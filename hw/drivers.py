@@ -61,12 +61,12 @@ def in_lock_step(name: str, requested: bool) -> bool:
     return kind_of(name).lock_step(name, requested)
 
 
-def same_bed(one: str, other: str) -> bool:
+def same_bed(port: str, other: str) -> bool:
     """True where work at one port may go on at the other: serial lines may get another name, while simulated beds and
     transcripts are distinguished by name."""
-    kinds = kind_of(one), kind_of(other)
+    kinds = kind_of(port), kind_of(other)
     if any(kind.simulated or kind.replays for kind in kinds):
-        return one == other
+        return port == other
     return kinds[0] is kinds[1]
 
 
@@ -102,15 +102,15 @@ def ports_in_words() -> str:
 
 def _of_others(scheme: str | None) -> tuple[PortKind, ...]:
     """The kinds of port that other packages offer, of this scheme or, with None, all. Raises Problem E215."""
-    found: dict[str, PortKind] = {}
+    kinds_by_scheme: dict[str, PortKind] = {}
     for point in offered(ENTRY_POINTS):
         if scheme not in (None, point.name):
             continue
         kind = _loaded(point)
-        if kind.scheme in found or any(own.scheme == kind.scheme for own in PORTS):
+        if kind.scheme in kinds_by_scheme or any(own.scheme == kind.scheme for own in PORTS):
             raise _refused(point, f"offers port `{kind.scheme}`, which exists already", "give the port another scheme")
-        found[kind.scheme] = kind
-    return tuple(found.values())
+        kinds_by_scheme[kind.scheme] = kind
+    return tuple(kinds_by_scheme.values())
 
 
 def _loaded(point: EntryPoint) -> PortKind:

@@ -95,12 +95,12 @@ class PartsList:
 
 def parts_list(more: str | os.PathLike[str] | None = None) -> PartsList:
     """The motors that are shipped, and those of a file of one's own, which go before. Raises Problem E441, OSError."""
-    found = [_File(SHIPPED).parts(), *([] if more is None else [_File(more).parts()])]
-    own_first = [*reversed(found)]
-    motors = {name: each for one in found for name, each in one.motors.items()}
-    names = dict.fromkeys(name for one in own_first for name in one.motors)
-    benches = {name: each for one in found for name, each in one.benches.items()}
-    others = {name: each for one in found for name, each in one.others.items()}
+    lists = [_File(SHIPPED).parts(), *([] if more is None else [_File(more).parts()])]
+    own_first = [*reversed(lists)]
+    motors = {name: motor for parts in lists for name, motor in parts.motors.items()}
+    names = dict.fromkeys(name for parts in own_first for name in parts.motors)
+    benches = {name: bench for parts in lists for name, bench in parts.benches.items()}
+    others = {name: other for parts in lists for name, other in parts.others.items()}
     return PartsList({name: motors[name] for name in names}, benches, others)
 
 
@@ -126,37 +126,37 @@ class _File(TomlFile):
             motors[motor.name] = motor
         benches: dict[str, Bench] = {}
         for number, table in enumerate(self._several("bench")):
-            found = {key: self._text("bench", number, table, key) for key in _BENCH}
+            words = {key: self._text("bench", number, table, key) for key in _BENCH}
             self._only(_BENCH, "bench", number, table)
             for role in _BENCH[1:]:
-                if found[role] not in motors:
-                    message = f"bench `{found['name']}`: there is no motor `{found[role]}` in this file"
+                if words[role] not in motors:
+                    message = f"bench `{words['name']}`: there is no motor `{words[role]}` in this file"
                     raise self.wrong(message, f"its motors: {', '.join(motors)}", "bench", role, number)
-            benches[found["name"]] = Bench(**found)
+            benches[words["name"]] = Bench(**words)
         return PartsList(motors, benches, self._others())
 
     def _others(self) -> dict[str, BenchPart]:
-        found: dict[str, BenchPart] = {}
+        parts: dict[str, BenchPart] = {}
         for number, table in enumerate(self._several("part")):
             self._only(_PART, "part", number, table)
             words = {key: self._text("part", number, table, key) for key in _PART if key in table}
             for key, why in (("name", "a name of its own"), ("kind", "what it is for"), ("source", "where it is from")):
                 if not words.get(key):
                     raise self.wrong(f"part number {number + 1} has no `{key}`", why, "part", number=number)
-            if words["name"] in found:
+            if words["name"] in parts:
                 raise self.wrong(
                     f"part `{words['name']}` is there twice", "give each a name of its own", "part", number=number
                 )
-            found[words["name"]] = BenchPart(**words)
-        return found
+            parts[words["name"]] = BenchPart(**words)
+        return parts
 
     def _several(self, kind: str) -> list[dict[str, Any]]:
-        found = self.tables.get(kind, [])
-        if not isinstance(found, list) or not all(isinstance(each, dict) for each in found):
+        tables = self.tables.get(kind, [])
+        if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
             raise self.wrong(f"`{kind}` is no list of tables", f"write `[[{kind}]]` above each", key=kind)
-        if len(found) > MOST_MOTORS:
-            raise self.wrong(f"it has {len(found)} tables `[[{kind}]]`", f"{MOST_MOTORS} are the most", kind)
-        return found
+        if len(tables) > MOST_MOTORS:
+            raise self.wrong(f"it has {len(tables)} tables `[[{kind}]]`", f"{MOST_MOTORS} are the most", kind)
+        return tables
 
     def _motor(self, number: int, table: dict[str, Any]) -> MotorPart:
         self._only((*_WORDS, *FIGURES), "motor", number, table)
@@ -174,11 +174,11 @@ class _File(TomlFile):
                 raise self.wrong(f"a {kind} has no `{key}`", helps, kind, key, number)
 
     def _text(self, kind: str, number: int, table: dict[str, Any], key: str) -> str:
-        found = table.get(key)
-        if not isinstance(found, str) or not found.isprintable():
+        text = table.get(key)
+        if not isinstance(text, str) or not text.isprintable():
             message = f"`{key}` of {kind} number {number + 1} is no text in a line"
             raise self.wrong(message, f'`{key} = "..."`', kind, key, number)
-        return found
+        return text
 
     def _figure(self, number: int, table: dict[str, Any], key: str) -> float:
         """A quantity above zero, SI."""

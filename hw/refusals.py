@@ -95,7 +95,7 @@ def remedies(faults: Fault) -> list[str]:
 
 def interlocked(reasons: InterlockReason | None) -> list[tuple[str, str]]:
     """The reasons of an interlock in words, each with its remedy."""
-    return [_REASONS[each] for each in InterlockReason if reasons is not None and each in reasons]
+    return [_REASONS[reason] for reason in InterlockReason if reasons is not None and reason in reasons]
 
 
 def refused(about: About, what: str, sample: BedSample) -> Problem:
@@ -106,15 +106,15 @@ def refused(about: About, what: str, sample: BedSample) -> Problem:
     if not sample.greeted:
         why, helps = "it was reset since it was greeted", ["look at its supply, then begin anew"]
     elif sample.state == BedState.STOPPED and latched and what != "clear":
-        why = f"it stopped itself: {'; '.join([words(latched), *(each for each, _ in locked)])}"
-        helps = [*remedies(latched & ~Fault.INTERLOCK), *(each for _, each in locked)]
+        why = f"it stopped itself: {'; '.join([words(latched), *(lock for lock, _ in locked)])}"
+        helps = [*remedies(latched & ~Fault.INTERLOCK), *(remedy for _, remedy in locked)]
     elif abs(sample.rate) > slow:
         why = f"its shaft turns at {sample.rate:.3g} rad/s, and {slow:.3g} rad/s is the most for that"
         helps = ["wait until it has come to rest; a shaft that does not is driven by something"]
     elif sample.state == BedState.ARMED:
         why, helps = "it is armed", ["stop it first"]
     elif locked:
-        why, helps = "; ".join(each for each, _ in locked), [each for _, each in locked]
+        why, helps = "; ".join(lock for lock, _ in locked), [remedy for _, remedy in locked]
     elif Fault.HEAT in latched:
         why, helps = "the load motor has not cooled down to half of its I2t", ["wait, or switch its amplifier off"]
     else:
@@ -154,13 +154,13 @@ def other_version(version: int) -> Problem:
 def no_greeting(name: str, sent: bytes, came: bytes) -> Problem:
     """The error for a bed that does not answer HELLO: the question, and the bytes that came in place of an answer."""
     message = f"nobody answers HELLO on {name}"
-    asked, decoder = set(sent.split(b"\0")) - {b""}, Decoder()
-    ours = sum(frame in asked for frame in came.split(b"\0"))
+    questions, decoder = set(sent.split(b"\0")) - {b""}, Decoder()
+    ours = sum(frame in questions for frame in came.split(b"\0"))
     frames = len(decoder.feed(came)) - ours
     if not came:
         helps = ["is the bed switched on, and this the line that it is on?", "does it expect this baud rate?"]
     elif ours:
-        message += f": what comes back is what was sent, {ours} of {len(asked)} frames"
+        message += f": what comes back is what was sent, {ours} of {len(questions)} frames"
         helps = ["take away a loop-back plug, or a bridge between its two wires", "switch a modem's echo off"]
     elif frames:
         message += f": {frames} frame{'s' * (frames > 1)} came, and no answer among them"
@@ -171,16 +171,16 @@ def no_greeting(name: str, sent: bytes, came: bytes) -> Problem:
     return Problem(error("E402", message, help=helps))
 
 
-def silent(name: str, asked: str) -> Problem:
+def silent(name: str, question: str) -> Problem:
     """The error for a question without an answer: one that was repeated, or a STEP, which is sent once."""
-    message = f"bed `{name}` does not answer {asked}"
+    message = f"bed `{name}` does not answer {question}"
     return Problem(error("E402", message, help="it was there before: look at its supply and at the line"))
 
 
 def no_command(about: About, what: str, value: float, unit: str, most: float) -> Problem:
     """The error for a voltage or a current that is beyond a limit, and so is not sent."""
-    said = "no finite number" if value - value != 0.0 else f"beyond the limit of {most:.6g} {unit}"
-    message = f"{what} of {value:.6g} {unit} for bed `{about.name}` is {said}; the bed was stopped"
+    reason = "no finite number" if value - value != 0.0 else f"beyond the limit of {most:.6g} {unit}"
+    message = f"{what} of {value:.6g} {unit} for bed `{about.name}` is {reason}; the bed was stopped"
     return Problem(error("E408", message, help="the simulation diverges, or asks more than the bed may give"))
 
 

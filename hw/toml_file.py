@@ -23,16 +23,16 @@ def quantity(value: Any, unit: str, *, signed: bool = False) -> float:
     match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
     if match is None:
         raise ValueError
-    of = parse_unit(match[2])
+    unit_ = parse_unit(match[2])
     try:
-        found = float(of.to_si(float(match[1]), match[1]))
+        number = float(unit_.to_si(float(match[1]), match[1]))
     except OverflowError as reason:
         raise ValueError from reason
-    if not units.same(of.dimension, parse_unit(unit).dimension) or not math.isfinite(found):
+    if not units.same(unit_.dimension, parse_unit(unit).dimension) or not math.isfinite(number):
         raise ValueError
-    if found <= 0.0 and not signed:
+    if number <= 0.0 and not signed:
         raise ValueError
-    return found
+    return number
 
 
 class TomlFile:
@@ -53,8 +53,8 @@ class TomlFile:
         except (tomllib.TOMLDecodeError, RecursionError) as reason:
             line = re.search(r"at line (\d+), column (\d+)", str(reason))
             message = re.sub(r" \(at .*\)$", "", str(reason))
-            at = None if line is None else Place(self.name, int(line[1]), int(line[2]), 1)
-            wrong = error(code, f"{self.name} is no TOML: {message}", at, help=about)
+            place = None if line is None else Place(self.name, int(line[1]), int(line[2]), 1)
+            wrong = error(code, f"{self.name} is no TOML: {message}", place, help=about)
             raise Problem(wrong, {self.name: self.text}) from reason
 
     def wrong(
@@ -65,14 +65,14 @@ class TomlFile:
 
     def place(self, table: str = "", key: str = "", number: int = 0) -> Place:
         """The line of `[table]`, or of the `[[table]]` of this number from 0 on; or that of a key behind it."""
-        lines, at = self.text.split("\n"), 0
+        lines, row = self.text.split("\n"), 0
         head = re.compile(rf"\s*\[{{1,2}}\s*{re.escape(table)}\s*\]")
         heads = [line for line, text in enumerate(lines) if table and head.match(text)]
         if number < len(heads):
-            at = heads[number]
+            row = heads[number]
         if key:
             named = re.compile(rf"\s*\[*\s*{re.escape(key)}\b")
-            at = next((line for line in range(at, len(lines)) if named.match(lines[line])), at)
-        text = lines[at]
+            row = next((line for line in range(row, len(lines)) if named.match(lines[line])), row)
+        text = lines[row]
         column = len(text) - len(text.lstrip()) + 1
-        return Place(self.name, at + 1, column, max(1, len(text.rstrip()) - column + 1))
+        return Place(self.name, row + 1, column, max(1, len(text.rstrip()) - column + 1))

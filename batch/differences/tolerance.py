@@ -146,7 +146,7 @@ def check(checked: Tolerances, known: Mapping[str, Sequence[str]], known_names: 
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1)
             helps = [
-                *(f"did you mean `{name_}`?" for name_ in near),
+                *(f"did you mean `{near_name}`?" for near_name in near),
                 f"signals and metrics here: {', '.join(known_names)}",
             ]
             raise _wrong(f"tolerance of `{name}`: neither archive has such a signal or metric", *helps)

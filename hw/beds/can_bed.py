@@ -104,16 +104,16 @@ class CanBed(BedDriver):
 
     def _greet(self, line: CanLine) -> About:
         self._talk = talk = Talk(line, self._drives)
-        for each in self._drives:
-            each.forget_answers()
+        for drive_ in self._drives:
+            drive_.forget_answers()
         bench, by_rate = self._bench, self._kind == "rate"
         if by_rate and not self._drives[0].takes_rates:
-            known = ", ".join(name for name, each in DIALECTS.items() if each.takes_rates)
+            known = ", ".join(name for name, dialect in DIALECTS.items() if dialect.takes_rates)
             message = f"{self._drives[0].words} of bed `{bench.name}` is told no rate"
             raise Problem(error("E438", message, help=f"dialects that are told rates: {known}"))
         self._drives[0].rates = by_rate
         facts = [drive.greet(talk) for drive in self._drives]
-        sides = [Side(drive, each) for drive, each in zip(self._drives, facts, strict=True)]
+        sides = [Side(drive, drive_facts) for drive, drive_facts in zip(self._drives, facts, strict=True)]
         self._sides = (sides[0], sides[1])
         drive, load = self._sides
         figures = drive.drive.entry.figures
@@ -135,10 +135,10 @@ class CanBed(BedDriver):
         capabilities = Capability.ENCODER | (Capability.ARMATURE if by_voltage else Capability(0))
         if not facts[0].braking:
             capabilities |= Capability.COASTS
-        said = "\n".join(
+        versions = "\n".join(
             f"{d.dialect} {d.node} {f.hardware} {f.firmware}" for d, f in zip(self._drives, facts, strict=True)
         )
-        firmware = hashlib.sha256(said.encode()).hexdigest()[:16]
+        firmware = hashlib.sha256(versions.encode()).hexdigest()[:16]
         deadman = max(f.watchdog for f in facts)
         about = About(bench.name, 0, firmware, 0, capabilities, hz, deadman, scales, limits, self._kind)
         if not greeting.DEADMAN[0] <= about.deadman <= greeting.DEADMAN[1] or min(f.watchdog for f in facts) < 0.002:
@@ -189,11 +189,11 @@ class CanBed(BedDriver):
 
     def _exchanged(self) -> list[CanFrame]:
         """Frames like those of an exchange, both ways."""
-        asked = [() if drive.answers_commands else drive.asked() for drive in self._drives]
+        questions = [() if drive.answers_commands else drive.asked() for drive in self._drives]
         return [
             frame
-            for each, asks in zip(self._drives, asked, strict=True)
-            for frame in (*each.told(0.0), *asks, *each.answers())
+            for drive, asks in zip(self._drives, questions, strict=True)
+            for frame in (*drive.told(0.0), *asks, *drive.answers())
         ]
 
     def line_time(self, about: About) -> float:
@@ -201,8 +201,8 @@ class CanBed(BedDriver):
 
     def _remarks(self) -> tuple[tuple[str, str], ...]:
         bus, cut = self._bench.bus, self._bench.shaft["filter"]
-        each, where = ("lines", "there") if bus["interface"] == SERIAL else ("frames", "on the bus at most")
-        most = f"{len(self._exchanged())} {each} an exchange, {1e3 * self._on_bus():.3g} ms {where}"
+        unit, where = ("lines", "there") if bus["interface"] == SERIAL else ("frames", "on the bus at most")
+        most = f"{len(self._exchanged())} {unit} an exchange, {1e3 * self._on_bus():.3g} ms {where}"
         filter = f"{cut:g} Hz here, the deck's f_cut" if cut else "none here: the deck's f_cut is the drive's"
         sides = [(side.drive.entry.role, side.words) for side in self._sides]
         if loop := self._sides[0].facts.rate_loop:
@@ -224,8 +224,8 @@ class CanBed(BedDriver):
         own = self._sides[0].facts.rate_loop
         if own is None or self._believed is None:
             return ()
-        found = can_deck.loop_warning(self._drives[0].words, *own, self._believed)
-        return () if found is None else (found,)
+        loop_warning = can_deck.loop_warning(self._drives[0].words, *own, self._believed)
+        return () if loop_warning is None else (loop_warning,)
 
     # What a bed does
 
@@ -233,8 +233,8 @@ class CanBed(BedDriver):
         about = self._there()
         tighter = greeting.tighter(about, limits)
         if self._kind == "rate" and "rate" in limits:  # its command is a rate, too
-            told = greeting.counts(limits["rate"], about.scales.voltage)
-            tighter["voltage"] = min(told, tighter.get("voltage", told))
+            most_counts = greeting.counts(limits["rate"], about.scales.voltage)
+            tighter["voltage"] = min(most_counts, tighter.get("voltage", most_counts))
         if self._state != BedState.DISARMED:
             raise self._refused("take tighter limits")
         self._in_force = replace(
@@ -330,10 +330,12 @@ class CanBed(BedDriver):
 
     def account(self) -> tuple[str, ...]:
         why = (f"it stopped itself: {self._why}",) if self._why else ()
-        said = [drive.power is not None for drive in self._drives]
-        if not any(said):
+        known = [drive.power is not None for drive in self._drives]
+        if not any(known):
             return (*why, "neither drive says its power: what went back to the supply is not known")
-        whose = "the drives" if all(said) else f"the {self._drives[said.index(True)].entry.role}, which alone says it,"
+        whose = (
+            "the drives" if all(known) else f"the {self._drives[known.index(True)].entry.role}, which alone says it,"
+        )
         return (*why, f"{whose} gave {self.returned:.3g} J back to the supply")
 
     def rest(self, time: float) -> BedSample:
@@ -386,8 +388,8 @@ class CanBed(BedDriver):
             owed.append(tuple(drive.owed))
             drive.reading = None
         some_even, all_even = not all(owed), not any(owed)
-        asked = [d for d in self._drives if some_even and not (commands and d.answers_commands)]
-        talk.send([*commands, *dict.fromkeys(frame for d in asked for frame in d.asked())])  # one SYNC is to both
+        drives = [d for d in self._drives if some_even and not (commands and d.answers_commands)]
+        talk.send([*commands, *dict.fromkeys(frame for d in drives for frame in d.asked())])  # one SYNC is to both
         if not some_even:
             self._settle(min(self.patience, self.period))
             return False
@@ -424,9 +426,9 @@ class CanBed(BedDriver):
         return agree(self._sides, self._readings(), self._acceleration)
 
     def _readings(self) -> tuple[DriveReading, DriveReading]:
-        one, other = (drive.reading for drive in self._drives)
-        assert one is not None and other is not None
-        return one, other
+        first, other = (drive.reading for drive in self._drives)
+        assert first is not None and other is not None
+        return first, other
 
     def _ask_both(self, about: About, agreed: bool = True) -> None:
         """Ask both drives again and again until both have answered, and agree. Raises Problem E402 where one does not
@@ -453,8 +455,8 @@ class CanBed(BedDriver):
         """Keep the last answers of both drives: angle, rate, and the rate after the filter."""
         side = self._sides[0]
         before, time = side.rate, side.time
-        for each, reading in zip(self._sides, self._readings(), strict=True):
-            each.follow(reading)
+        for motor_side, reading in zip(self._sides, self._readings(), strict=True):
+            motor_side.follow(reading)
         cut, passed = self._bench.shaft["filter"], side.time - time
         if cut and passed > 0.0:
             filter = butterworth.over(cut, passed)
@@ -506,8 +508,8 @@ class CanBed(BedDriver):
             torque = self._kt / self._resistance * (sent - self._kt * self._sides[0].rate)
         return min(max(torque, -self._most), self._most)
 
-    def _hold(self, volts: int, amperes: int, at: float) -> None:
-        self._volts, self._amperes, self._told_at = volts, amperes, at
+    def _hold(self, volts: int, amperes: int, time: float) -> None:
+        self._volts, self._amperes, self._told_at = volts, amperes, time
 
     def _warm(self, now: float) -> None:
         """Update the load's heat, A^2 s, from the command so far, and stop where it is too much; sum up the energy that

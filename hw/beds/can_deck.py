@@ -35,15 +35,15 @@ def check_deck(path: str, experiment: Experiment, joint: str) -> None:
         (bench.filter_at, bench.shaft["filter"], "Hz", "f_cut", "the bench filters the rate at", "`filter`"),
         (bench.load_kt_at, bench.load.figures["kt"], "N*m/A", "kt_load", "the bench's load gives", "`kt` of `[load]`"),
     )
-    for at, here, unit, name, words, key in held:
+    for place, held_value, unit, name, words, key in held:
         believed = experiment.parameters[f"{joint}.bed.{name}"]
-        if at is None or believed.value == here:
+        if place is None or believed.value == held_value:
             continue
         says = f"{believed.value:g} {unit}" if isinstance(believed.value, float) else "varied by a sweep"
         also = [] if believed.origin.place is None else [Label(believed.origin.place, "the deck's")]
-        message = f"{words} {here:g} {unit}, and the `{name}` of joint `{joint}` is {says}"
-        helps = (f"in the deck: `bed = ...({name} = {here:g} {unit})`", f"or another {key} in the bench's file")
-        raise Problem(error("E444", message, at, also=also, help=helps), {path: bench.text})
+        message = f"{words} {held_value:g} {unit}, and the `{name}` of joint `{joint}` is {says}"
+        helps = (f"in the deck: `bed = ...({name} = {held_value:g} {unit})`", f"or another {key} in the bench's file")
+        raise Problem(error("E444", message, place, also=also, help=helps), {path: bench.text})
 
 
 def _check_told(path: str, bench: TwoDrives, use: Substitution) -> None:
@@ -52,8 +52,8 @@ def _check_told(path: str, bench: TwoDrives, use: Substitution) -> None:
     dialect = DIALECTS.get(bench.drive.dialect)
     if sends != "rate" or dialect is None or dialect.takes_rates:
         return
-    other = [name for name, each in models.find_own("bed").items() if each.drive != "rate"]
-    known = ", ".join(name for name, each in DIALECTS.items() if each.takes_rates)
+    other = [name for name, model in models.find_own("bed").items() if model.drive != "rate"]
+    known = ", ".join(name for name, dialect in DIALECTS.items() if dialect.takes_rates)
     message = (
         f"a drive of dialect `{bench.drive.dialect}` is told no rate, and `{use.bed}` of joint `{use.joint}` sends one"
     )
@@ -66,12 +66,12 @@ def warnings(bench: TwoDrives, path: str, opening: Opening) -> tuple[Diagnostic,
     """Warnings about permissible differences of the bench from the deck: E444."""
     if opening.experiment is None:
         return ()
-    found = []
+    diagnostics = []
     if bench.filter_at is None:
         cut = opening.bed_values()["f_cut"]
         message = f"the bench has no filter: the deck's `f_cut`, {cut:g} Hz, has to be that of the drive's own rate"
         remedy = (f'else `filter = "{cut:g} Hz"` in `[shaft]` of {path}',)
-        found.append(Diagnostic("E444", message, help=remedy, severity="warning"))
+        diagnostics.append(Diagnostic("E444", message, help=remedy, severity="warning"))
     most, believed = bench.drive.figures["torque_max"], believed_torque(opening)
     if most < (1.0 - 1e-9) * believed and bench.torque_at is not None:
         message = (
@@ -83,8 +83,8 @@ def warnings(bench: TwoDrives, path: str, opening: Opening) -> tuple[Diagnostic,
             WEAKER,
             "a larger `torque_max` of `[drive]`, if drive and shaft bear it, or a smaller `tau_max` in the deck",
         )
-        found.append(Diagnostic("E444", message, Label(bench.torque_at), also, helps, "warning"))
-    return tuple(found)
+        diagnostics.append(Diagnostic("E444", message, Label(bench.torque_at), also, helps, "warning"))
+    return tuple(diagnostics)
 
 
 def believed_torque(opening: Opening) -> float:

@@ -254,6 +254,6 @@ PORT = PortKind(
     doc="The deck's bed, emulated in this process, in lock-step.",
     open=_opened_port,
     simulated=True,
-    needs=tuple(each for each in SIMULATION_PARAMETERS if each.name == "i_max"),
+    needs=tuple(parameter for parameter in SIMULATION_PARAMETERS if parameter.name == "i_max"),
     lock_step=lambda name, requested: True,
 )

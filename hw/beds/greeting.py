@@ -26,30 +26,30 @@ _UNITS = {
 }
 
 
-def about(found: messages.HelloAnswer) -> About:
+def about(hello: messages.HelloAnswer) -> About:
     """The description of a bed from its answer to HELLO. Raises Problem E404 where MET cannot drive such a bed."""
-    name = found.name.rstrip(b"\0").decode("latin-1").encode("unicode_escape").decode()
-    capabilities = Capability(found.capabilities & _KNOWN)
-    wrong = [*_scales(found.scales, capabilities), *_limits(found.limits, found.scales)]
-    if not name or name.encode() != found.name.rstrip(b"\0"):
+    name = hello.name.rstrip(b"\0").decode("latin-1").encode("unicode_escape").decode()
+    capabilities = Capability(hello.capabilities & _KNOWN)
+    wrong = [*_scales(hello.scales, capabilities), *_limits(hello.limits, hello.scales)]
+    if not name or name.encode() != hello.name.rstrip(b"\0"):
         wrong.append("its name is not printable ASCII")
-    if not (math.isfinite(found.tick_hz) and found.tick_hz > 0.0):
-        wrong.append(f"its ticks come at {found.tick_hz:g} Hz")
-    if not DEADMAN[0] <= found.deadman <= DEADMAN[1]:
-        wrong.append(f"its deadman is {found.deadman * 1e3:g} ms, which is not 10 to 20 ms")
+    if not (math.isfinite(hello.tick_hz) and hello.tick_hz > 0.0):
+        wrong.append(f"its ticks come at {hello.tick_hz:g} Hz")
+    if not DEADMAN[0] <= hello.deadman <= DEADMAN[1]:
+        wrong.append(f"its deadman is {hello.deadman * 1e3:g} ms, which is not 10 to 20 ms")
     if wrong:
         helps = "correct the configuration in its firmware"
-        raise Problem([error("E404", f"bed `{name}` cannot be driven: {each}", help=helps) for each in wrong])
+        raise Problem([error("E404", f"bed `{name}` cannot be driven: {reason}", help=helps) for reason in wrong])
     return About(
         name,
-        found.version,
-        found.firmware.hex(),
-        found.session,
+        hello.version,
+        hello.firmware.hex(),
+        hello.session,
         capabilities,
-        found.tick_hz,
-        found.deadman,
-        found.scales,
-        found.limits,
+        hello.tick_hz,
+        hello.deadman,
+        hello.scales,
+        hello.limits,
     )
 
 
@@ -59,9 +59,16 @@ _SENSORS = dict(zip(("angle", "drive_current", "acceleration"), messages.SENSORS
 
 def in_force(about: About) -> messages.LimitsAnswer:
     """The bed's own limits in counts, slews in counts a tick."""
-    s, of = about.scales, about.limits
-    voltage, current, rate = counts(of.voltage, s.voltage), counts(of.current, s.current), counts(of.rate, s.rate)
-    slews = counts(of.voltage_slew / about.tick_hz, s.voltage), counts(of.current_slew / about.tick_hz, s.current)
+    s, limits = about.scales, about.limits
+    voltage, current, rate = (
+        counts(limits.voltage, s.voltage),
+        counts(limits.current, s.current),
+        counts(limits.rate, s.rate),
+    )
+    slews = (
+        counts(limits.voltage_slew / about.tick_hz, s.voltage),
+        counts(limits.current_slew / about.tick_hz, s.current),
+    )
     return messages.LimitsAnswer(voltage, current, rate, *slews)
 
 
@@ -69,29 +76,29 @@ def tighter(about: About, limits: Mapping[str, float]) -> dict[str, int]:
     """Limits that are asked for in SI as whole counts, slews in counts a tick; both by their names in `LIMIT_NAMES`.
     Raises Problem E408 for a number that is no limit, KeyError for another name."""
     s, hz = about.scales, about.tick_hz
-    of = dict(zip(LIMIT_NAMES, (s.voltage, s.current, s.rate, s.voltage * hz, s.current * hz), strict=True))
+    scale_of = dict(zip(LIMIT_NAMES, (s.voltage, s.current, s.rate, s.voltage * hz, s.current * hz), strict=True))
     for name, value in limits.items():
         if not 0.0 <= value < math.inf:
             message = f"a limit of {_words(name)} of {value:g} {_UNITS[name]} for bed `{about.name}`"
             raise Problem(error("E408", message, help="a limit is a number from 0 on"))
-    return {name: counts(value, of[name]) for name, value in limits.items()}
+    return {name: counts(value, scale_of[name]) for name, value in limits.items()}
 
 
 def commanded(value: float, scale: float, most: int) -> int | None:
     """A command as whole counts, the nearest ones; None where it is no finite number, or beyond the limit in force."""
-    of = value / scale
-    if of - of != 0.0:
+    exact = value / scale
+    if exact - exact != 0.0:
         return None
-    nearest = round(of)
+    nearest = round(exact)
     return nearest if -most <= nearest <= most else None
 
 
 def ticks(about: About, period: float) -> int:
     """The number of ticks that a bed in lock-step makes in a period, s. Raises Problem E405 where it is not whole."""
-    found = period * about.tick_hz
-    whole = round(found)
-    if not 1 <= whole <= 255 or abs(found - whole) > 1e-6 * whole:
-        message = f"a period of {period * 1e3:.6g} ms is {found:.6g} ticks of bed `{about.name}`"
+    exact = period * about.tick_hz
+    whole = round(exact)
+    if not 1 <= whole <= 255 or abs(exact - whole) > 1e-6 * whole:
+        message = f"a period of {period * 1e3:.6g} ms is {exact:.6g} ticks of bed `{about.name}`"
         helps = f"its ticks come at {about.tick_hz:g} Hz: take a whole number of them, 1 to 255"
         raise Problem(error("E405", message, help=helps))
     return whole

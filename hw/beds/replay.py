@@ -63,10 +63,10 @@ class _ReplayedLine:
         return self._records[self._at - 1].time if self._at else 0.0
 
     def send(self, frame: bytes) -> None:
-        at = self._at
+        position = self._at
         record = self._next(SENT)
         if record is None or record.data != frame:
-            self._at = at
+            self._at = position
             raise self._other(f"{self._words(frame)} is asked")
 
     def receive(self, until: float) -> bytes:
@@ -97,9 +97,9 @@ class _ReplayedLine:
         for payload in self._decoder.feed(data):
             if payload[0] == messages.SampleAnswer.kind:
                 self._tick = int.from_bytes(payload[5:9], "little")
-            found = messages.bed_answer(payload, 0)
-            if found is not None and isinstance(found[1], messages.HelloAnswer):
-                self._scales = found[1].scales
+            numbered = messages.bed_answer(payload, 0)
+            if numbered is not None and isinstance(numbered[1], messages.HelloAnswer):
+                self._scales = numbered[1].scales
 
     def _other(self, question: str) -> Problem:
         """The error for a question that was not asked then: E407, or E401 where the transcript ends, as that of a
@@ -115,16 +115,16 @@ class _ReplayedLine:
 
     def _words(self, frame: bytes) -> str:
         payload = unframed(frame[:-1])
-        found = None if payload is None else messages.host_message(payload)
-        if found is None:
+        numbered = None if payload is None else messages.host_message(payload)
+        if numbered is None:
             return "no message"
-        number, message = found
+        number, message = numbered
         name = message.word
         if isinstance(message, messages.DriveMessage | messages.StepMessage) and self._scales is not None:
             voltage, current = message.voltage * self._scales.voltage, message.current * self._scales.current
             return f"{name} {number} of {voltage:.9g} V and {current:.9g} A"
-        said = ", ".join(f"{key} {value}" for key, value in message.__dict__.items())
-        return f"{name} {number}" + (f" ({said})" if said else "")
+        fields = ", ".join(f"{key} {value}" for key, value in message.__dict__.items())
+        return f"{name} {number}" + (f" ({fields})" if fields else "")
 
 
 _KINDS = {OPENED: "a line that was opened", RECEIVED: "an answer", LOST: "a line that was lost"}

@@ -73,7 +73,7 @@ PORT = PortKind(
 
 def exchanged(capabilities: Capability) -> int:
     """The number of bytes of an exchange, both ways together."""
-    return _LEAST_BYTES + _SENSOR_BYTES * sum(each in capabilities for each in messages.READINGS)
+    return _LEAST_BYTES + _SENSOR_BYTES * sum(reading in capabilities for reading in messages.READINGS)
 
 
 def needed(capabilities: Capability, baud: int) -> float:

@@ -94,18 +94,18 @@ class WireBed(BedDriver):
         assert line is not None
         self._line = heard = TappedLine(line)
         try:
-            found = self._ask_again(messages.HelloMessage(), HelloAnswer, _BOOT)
+            hello = self._ask_again(messages.HelloMessage(), HelloAnswer, _BOOT)
         finally:
             self._line = line
-        if found is None:
+        if hello is None:
             raise refusals.no_greeting(self._name, bytes(heard.sent), bytes(heard.came))
-        about = greeting.about(found)
+        about = greeting.about(hello)
         scales: Mapping[Capability, tuple[str, float]] = {
             Capability.ENCODER: ("angle", about.scales.angle),
             Capability.DRIVE_CURRENT: ("drive_current", about.scales.drive_current),
             Capability.ACCELEROMETER: ("acceleration", about.scales.acceleration),
         }
-        self._sensors = tuple(scales[each] for each in messages.SENSORS if each in about.capabilities)
+        self._sensors = tuple(scales[name] for name in messages.SENSORS if name in about.capabilities)
         self._has_interlock = Capability.INTERLOCK in about.capabilities
         self._in_force = greeting.in_force(about)
         steps = Capability.LOCK_STEP in about.capabilities and math.isfinite(self.period)
@@ -115,11 +115,11 @@ class WireBed(BedDriver):
     def limit(self, limits: Mapping[str, float]) -> None:
         about = self._there()
         for name, most in greeting.tighter(about, limits).items():
-            found = self._ask(messages.LimitMessage(LIMIT_NAMES.index(name), most), LimitsAnswer)
-            if getattr(found, name) > most:
+            limits_answer = self._ask(messages.LimitMessage(LIMIT_NAMES.index(name), most), LimitsAnswer)
+            if getattr(limits_answer, name) > most:
                 message = f"bed `{about.name}` does not take a tighter limit of {name.replace('_', ' ')}"
                 raise Problem(error("E406", message, help="limits are set before it is armed"))
-            self._in_force = found
+            self._in_force = limits_answer
 
     def arm(self) -> BedSample:
         about = self._there()
@@ -141,10 +141,10 @@ class WireBed(BedDriver):
         command = (
             messages.StepMessage(volts, amperes, self._step) if self._step else messages.DriveMessage(volts, amperes)
         )
-        found = self._answer(command, SampleAnswer, self.patience)
-        if found is None:
+        answer = self._answer(command, SampleAnswer, self.patience)
+        if answer is None:
             return None
-        sample = self._sample(found)
+        sample = self._sample(answer)
         if self._foreign < _FOREIGN:
             return sample
         self.stop()
@@ -163,8 +163,8 @@ class WireBed(BedDriver):
 
     def look(self) -> BedSample | None:
         self._there()
-        found = self._answer(messages.ReadMessage(), SampleAnswer, self.patience)
-        return None if found is None else self._sample(found)
+        answer = self._answer(messages.ReadMessage(), SampleAnswer, self.patience)
+        return None if answer is None else self._sample(answer)
 
     def clear(self) -> BedSample:
         about = self._there()
@@ -184,10 +184,10 @@ class WireBed(BedDriver):
         sample = None if left else self.read()
         while left:
             ticks = min(left, 255)
-            found = self._answer(messages.StepMessage(0, 0, ticks), SampleAnswer, _WAITS[-1] + ticks * _SIMULATED)
-            if found is None:
+            answer = self._answer(messages.StepMessage(0, 0, ticks), SampleAnswer, _WAITS[-1] + ticks * _SIMULATED)
+            if answer is None:
                 raise refusals.silent(about.name, "STEP")
-            sample, left = self._sample(found), left - ticks
+            sample, left = self._sample(answer), left - ticks
         assert sample is not None
         return sample
 
@@ -206,13 +206,13 @@ class WireBed(BedDriver):
             return self.confirmed
         for _ in range(2):  # a transcript that cannot be written is in the way once
             try:
-                found = self._ask_again(messages.StopMessage(), SampleAnswer, _STOP)
-                if found is not None and found.status & messages.STATE == BedState.ARMED:
+                answer = self._ask_again(messages.StopMessage(), SampleAnswer, _STOP)
+                if answer is not None and answer.status & messages.STATE == BedState.ARMED:
                     # another's number is ahead of this host's, whose frames are old then: a greeting disarms, whatever
                     # its number
                     self._ask_again(messages.HelloMessage(), HelloAnswer, _STOP)
-                    found = self._ask_again(messages.StopMessage(), SampleAnswer, _STOP)
-                self.confirmed = found is not None and found.status & messages.STATE != BedState.ARMED
+                    answer = self._ask_again(messages.StopMessage(), SampleAnswer, _STOP)
+                self.confirmed = answer is not None and answer.status & messages.STATE != BedState.ARMED
                 break
             except Problem:
                 self.confirmed = False  # the line is dead: the bed's deadman stops it
@@ -232,16 +232,16 @@ class WireBed(BedDriver):
         return self._about
 
     def _ask(self, message: HostMessage, kind: type[T], waits: Sequence[float] = _WAITS) -> T:
-        found = self._ask_again(message, kind, waits)
-        if found is None:
+        answer = self._ask_again(message, kind, waits)
+        if answer is None:
             raise refusals.silent(self._there().name, message.word)
-        return found
+        return answer
 
     def _ask_again(self, message: HostMessage, kind: type[T], waits: Sequence[float]) -> T | None:
         for wait in waits:
-            found = self._answer(message, kind, wait)
-            if found is not None:
-                return found
+            answer = self._answer(message, kind, wait)
+            if answer is not None:
+                return answer
         return None
 
     def _answer(self, message: HostMessage, kind: type[T], wait: float) -> T | None:
@@ -258,30 +258,30 @@ class WireBed(BedDriver):
                 return None
             nonsense += len(data)
             for payload in self._decoder.feed(data):
-                found = messages.bed_answer(payload, len(self._sensors) + self._has_interlock)
-                if found is None or found[0] != number:
-                    self._foreign += found is not None and (number - found[0]) % messages.NUMBERS >= self._asked
+                numbered = messages.bed_answer(payload, len(self._sensors) + self._has_interlock)
+                if numbered is None or numbered[0] != number:
+                    self._foreign += numbered is not None and (number - numbered[0]) % messages.NUMBERS >= self._asked
                     continue
-                if isinstance(found[1], kind):
-                    return found[1]
-                if isinstance(found[1], OtherVersionAnswer) and kind is HelloAnswer:
-                    raise refusals.other_version(found[1].version)
+                if isinstance(numbered[1], kind):
+                    return numbered[1]
+                if isinstance(numbered[1], OtherVersionAnswer) and kind is HelloAnswer:
+                    raise refusals.other_version(numbered[1].version)
         return None
 
-    def _sample(self, found: SampleAnswer) -> BedSample:
-        status, scale = found.status, self._there().scales.rate
+    def _sample(self, answer: SampleAnswer) -> BedSample:
+        status, scale = answer.status, self._there().scales.rate
         read = dict[str, float]()
-        for (name, of), counts in zip(self._sensors, found.others, strict=not self._has_interlock):
-            read[name] = (self._unwrapped(counts) if name == "angle" else counts) * of
+        for (name, scale_), counts in zip(self._sensors, answer.others, strict=not self._has_interlock):
+            read[name] = (self._unwrapped(counts) if name == "angle" else counts) * scale_
         return BedSample(
             BedState(status & messages.STATE),
             bool(status & _GREETED),
             Fault(status & _FAULTS),
             bool(status & _REFUSED),
-            found.tick,
-            found.rate * scale,
+            answer.tick,
+            answer.rate * scale,
             **read,
-            interlock=InterlockReason(found.others[-1] & _REASONS) if self._has_interlock else None,
+            interlock=InterlockReason(answer.others[-1] & _REASONS) if self._has_interlock else None,
         )
 
     def _unwrapped(self, counts: int) -> int:

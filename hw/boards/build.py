@@ -183,10 +183,10 @@ def build(
         compiler,
         version,
         *words,
-        *(each for pair in sorted(texts.items()) for each in pair),
-        *(each for path in [*files, *read] for each in (path.name, path.read_text(encoding="utf-8"))),
+        *(word for pair in sorted(texts.items()) for word in pair),
+        *(word for path in [*files, *read] for word in (path.name, path.read_text(encoding="utf-8"))),
     )
-    return _kept(name, _PRODUCTS[kind], lambda folder: _compile(kind, compiler, words, files, texts, folder))
+    return _cached(name, _PRODUCTS[kind], lambda folder: _compile(kind, compiler, words, files, texts, folder))
 
 
 def firmware_hash(files: Sequence[Path], texts: Mapping[str, str]) -> bytes:
@@ -239,8 +239,8 @@ def counted(config: Config) -> tuple[dict[str, int], Limits, float]:
     (ticks), heat, continuous. Raises Uncountable where one is out of range.
     """
     s, limits, hz = config.scales, config.limits, config.tick_hz
-    given = {**_fields(s, "scale of "), **_fields(limits, "limit of "), "tick rate": hz}
-    for what, value in given.items():
+    fields = {**_fields(s, "scale of "), **_fields(limits, "limit of "), "tick rate": hz}
+    for what, value in fields.items():
         _check_above_0(what, value)
     counts = {
         "voltage": _whole(limits.voltage / s.voltage),
@@ -287,8 +287,8 @@ _STEPS = {
 """The parameter of a deck's bed that sets each scale; the scales that are not here are set by `converter_current`."""
 
 
-def _fields(of: Scales | Limits, what: str) -> dict[str, float]:
-    return {what + name.replace("_", " "): getattr(of, name) for name in type(of).__dataclass_fields__}
+def _fields(numbers: Scales | Limits, what: str) -> dict[str, float]:
+    return {what + name.replace("_", " "): getattr(numbers, name) for name in type(numbers).__dataclass_fields__}
 
 
 def _check_above_0(what: str, value: float, *, or_0: bool = False) -> None:
@@ -317,7 +317,7 @@ def guard(config: Config) -> dict[str, int]:
     unit = shaft.inertia * config.tick_hz * s.rate  # N m, of a torque that changes the rate by a count in a tick
     per = 1.0 / max(unit, 1e-300)
     armature = shaft.kt / shaft.resistance
-    found = {
+    products_of = {
         "voltage": armature * s.voltage * per,
         "back_emf": armature * shaft.kt * s.rate * per,
         "most": shaft.tau_max * per,
@@ -325,16 +325,16 @@ def guard(config: Config) -> dict[str, int]:
         "viscous": shaft.f_v * s.rate * per,
         "friction": FRICTION * shaft.f_c * per,
     }
-    highest = found["voltage"] * limits["voltage"] + found["back_emf"] * limits["rate"]
-    found["most"] = min(found["most"], highest)  # a torque that no voltage reaches takes no room
-    load, viscous = found["current"] * limits["current"], found["viscous"] * limits["rate"]
+    highest = products_of["voltage"] * limits["voltage"] + products_of["back_emf"] * limits["rate"]
+    products_of["most"] = min(products_of["most"], highest)  # a torque that no voltage reaches takes no room
+    load, viscous = products_of["current"] * limits["current"], products_of["viscous"] * limits["rate"]
     products = (
         highest,
-        256.0 * found["most"],
+        256.0 * products_of["most"],
         256.0 * load,
-        found["friction"],
+        products_of["friction"],
         # the certain change in a tick, summed while a rate is awaited
-        (found["most"] + load + viscous) * (lag + 2.0),
+        (products_of["most"] + load + viscous) * (lag + 2.0),
     )
     if not all(product <= _ROOM // 8 for product in products):
         raise Uncountable(
@@ -344,7 +344,7 @@ def guard(config: Config) -> dict[str, int]:
     bits = min(GUARD_BITS, math.floor(math.log2(_ROOM // 8 / max(products))))
     return {
         "bits": bits,
-        **{name: round(value * 2.0**bits) for name, value in found.items()},
+        **{name: round(value * 2.0**bits) for name, value in products_of.items()},
         "tolerance": tolerance,
         "change": max(16, math.ceil(CHANGE * limits["rate"])),
         "lag": math.ceil(lag),
@@ -356,8 +356,8 @@ _PERIOD = re.compile(r"\bplant_period\s*=\s*([^;]*?)\s*;")
 
 def _check_period(config: Config, plant_c: str) -> None:
     """Raise ValueError where the plant's period is not a tick."""
-    found = _PERIOD.search(plant_c)
-    word = "" if found is None else found[1]
+    match_ = _PERIOD.search(plant_c)
+    word = "" if match_ is None else match_[1]
     macro = re.search(rf"#\s*define\s+{re.escape(word)}\s+(\S+)", plant_c) if word.isidentifier() else None
     word = word if macro is None else macro[1]
     try:
@@ -421,19 +421,19 @@ def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
         "    .announced = {",
         *(f"        {_double(value)}, /* {value!r} */" for value in announced),
         "    },",
-        f"    .limits = {{{', '.join(str(counts[each]) for each in in_force)}}},",
-        *(f"    .{each} = {counts[each]}," for each in ("arming_rate", "load_trip", "drive_trip")),
+        f"    .limits = {{{', '.join(str(counts[name]) for name in in_force)}}},",
+        *(f"    .{name} = {counts[name]}," for name in ("arming_rate", "load_trip", "drive_trip")),
         f"    .deadman = {counts['deadman']}u,",
         f"    .heat = {{.most = {counts['heat']}, .continuous = {counts['continuous']}}},",
         "    .tachometer = {",
-        *(f"        .{each} = {value}{'u' if each in ('bits', 'lag') else ''}," for each, value in g.items()),
+        *(f"        .{name} = {value}{'u' if name in ('bits', 'lag') else ''}," for name, value in g.items()),
         "    },",
         f"    .plant = {'&board_plant' if Capability.SIMULATED in capabilities else '0'},",
         *([] if lock is None else ["    .interlock = &board_interlock,"]),
         "};",
     ]
     if plant:
-        scales = ", ".join(f".{each} = {getattr(s, each)!r}" for each in ("voltage", "current", "rate", "angle"))
+        scales = ", ".join(f".{name} = {getattr(s, name)!r}" for name in ("voltage", "current", "rate", "angle"))
         lines += ["", f"const board_scales board_scale = {{{scales}}};"]
     return "\n".join(lines) + "\n"
 
@@ -443,14 +443,14 @@ def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
 
 def _sources(kind: Kind, *, plant: bool) -> list[Path]:
     folders = ["core", *(["plant"] if plant else []), *(["bare", kind] if kind in _CROSS else [])]
-    found = [path for folder in folders for path in sorted((FIRMWARE / folder).glob("*.c"))]
+    paths = [path for folder in folders for path in sorted((FIRMWARE / folder).glob("*.c"))]
     if kind == "pico":
-        found.remove(FIRMWARE / "pico" / ("port.c" if plant else "simulated.c"))
+        paths.remove(FIRMWARE / "pico" / ("port.c" if plant else "simulated.c"))
     if plant and kind not in _CROSS:
-        found.append(FIRMWARE / "host" / "port_host.c")
+        paths.append(FIRMWARE / "host" / "port_host.c")
     if kind == "host":
-        found.append(FIRMWARE / "host" / "bed_host.c")
-    return found
+        paths.append(FIRMWARE / "host" / "bed_host.c")
+    return paths
 
 
 def _compiler(kind: Kind) -> str:
@@ -465,12 +465,12 @@ def _compiler(kind: Kind) -> str:
             )
         return CROSS_COMPILER
     wanted = [os.environ["CC"]] if os.environ.get("CC") else ["gcc", "clang"]
-    for each in wanted:
-        if shutil.which(each) is not None:
-            return each
+    for name in wanted:
+        if shutil.which(name) is not None:
+            return name
     if os.environ.get("CC"):
-        said = f"there is no C compiler `{wanted[0]}`, which $CC names, to build the firmware with"
-        raise Problem(error("E410", said, help="name one that is there, or unset CC"))
+        message = f"there is no C compiler `{wanted[0]}`, which $CC names, to build the firmware with"
+        raise Problem(error("E410", message, help="name one that is there, or unset CC"))
     raise Problem(
         error(
             "E410",
@@ -485,10 +485,10 @@ def _compile(
 ) -> None:
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
-    include = [f"-I{FIRMWARE / each}" for each in (".", "core", "plant", *(["pico"] if kind == "pico" else []))]
+    include = [f"-I{FIRMWARE / name}" for name in (".", "core", "plant", *(["pico"] if kind == "pico" else []))]
     ends = [f"-T{FIRMWARE / _CROSS[kind]}", "-lgcc"] if kind in _CROSS else []
-    made = [str(folder / name) for name in sorted(texts)]
-    command = [compiler, *words, *include, *map(str, files), *made, "-o", str(folder / _PRODUCTS[kind]), *ends]
+    written = [str(folder / name) for name in sorted(texts)]
+    command = [compiler, *words, *include, *map(str, files), *written, "-o", str(folder / _PRODUCTS[kind]), *ends]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
         first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip()[:200])
@@ -514,7 +514,7 @@ def _fused() -> tuple[str, ...]:
 # What was built before.
 
 
-def _kept(name: str, product: str, make: Callable[[Path], None]) -> Path:
+def _cached(name: str, product: str, make: Callable[[Path], None]) -> Path:
     """A product by the hash of what makes it; made, and kept, where it is not there as it was made.
 
     Folders are made under another name and renamed, so that any number of processes may share them. Where the cache
@@ -524,46 +524,46 @@ def _kept(name: str, product: str, make: Callable[[Path], None]) -> Path:
     try:
         if root is None:
             raise OSError
-        found = root / name[:32] / product
-        if _is_sound(found, name):
+        product_file = root / name[:32] / product
+        if _is_sound(product_file, name):
             with contextlib.suppress(OSError):
-                os.utime(found.parent)
-            return found
-        made = Path(tempfile.mkdtemp(dir=root, prefix=".new-"))
+                os.utime(product_file.parent)
+            return product_file
+        new_folder = Path(tempfile.mkdtemp(dir=root, prefix=".new-"))
     except OSError:
-        made = Path(tempfile.mkdtemp(prefix="met-firmware-"))
-        atexit.register(shutil.rmtree, made, ignore_errors=True)
-        make(made)
-        return made / product
+        new_folder = Path(tempfile.mkdtemp(prefix="met-firmware-"))
+        atexit.register(shutil.rmtree, new_folder, ignore_errors=True)
+        make(new_folder)
+        return new_folder / product
     try:
-        make(made)
-        (made / _SUM).write_bytes(cache.digest_of(name, (made / product).read_bytes()))
-        for each in (made / product, made / _SUM):  # whatever the umask lets others do
+        make(new_folder)
+        (new_folder / _SUM).write_bytes(cache.digest_of(name, (new_folder / product).read_bytes()))
+        for path in (new_folder / product, new_folder / _SUM):  # whatever the umask lets others do
             with contextlib.suppress(OSError):  # a file system without permissions
-                each.chmod(0o700)
+                path.chmod(0o700)
         with contextlib.suppress(OSError):  # another process was faster
-            made.rename(found.parent)
+            new_folder.rename(product_file.parent)
     finally:
-        shutil.rmtree(made, ignore_errors=True)
-    _trim(root, keep=found.parent)
-    return found
+        shutil.rmtree(new_folder, ignore_errors=True)
+    _trim(root, keep=product_file.parent)
+    return product_file
 
 
 _SUM = "sum"
 """Name of the file beside a product with its checksum."""
 
 
-def _is_sound(found: Path, name: str) -> bool:
+def _is_sound(product_file: Path, name: str) -> bool:
     """True where a product is there as it was made; a damaged one is removed."""
-    if not found.parent.exists():
+    if not product_file.parent.exists():
         return False
-    data, checksum = cache.read(found), cache.read(found.with_name(_SUM))
+    data, checksum = cache.read(product_file), cache.read(product_file.with_name(_SUM))
     if data is not None and checksum == cache.digest_of(name, data) and cache.within("firmware", name[:32]):
         return True
     # away under a name of its own, for another process may be at it too
-    leaving = Path(tempfile.mkdtemp(dir=found.parents[1], prefix=".old-"))
+    leaving = Path(tempfile.mkdtemp(dir=product_file.parents[1], prefix=".old-"))
     try:
-        found.parent.rename(leaving / "was")
+        product_file.parent.rename(leaving / "was")
     except FileNotFoundError:
         pass
     finally:
@@ -575,7 +575,7 @@ def _trim(root: Path, keep: Path) -> None:
     """Remove the folders longest unused while all together are larger than `LIMIT` bytes."""
     with contextlib.suppress(OSError):
         folders = [
-            (path.stat().st_mtime, sum(each.stat().st_size for each in path.iterdir()), path)
+            (path.stat().st_mtime, sum(file.stat().st_size for file in path.iterdir()), path)
             for path in root.iterdir()
             if not path.name.startswith(".")
         ]

@@ -57,7 +57,7 @@ def interlock_counts(
     compared = lock.f_cut is not None and Capability.ENCODER in capabilities
     delay = math.sqrt(2.0) / (2.0 * math.pi * lock.f_cut) if lock.f_cut is not None else 0.0
     squared = scales.drive_current**2
-    found: dict[str, float] = {
+    exact_counts: dict[str, float] = {
         "settle": math.ceil(lock.settle * tick_hz),
         "hold": math.ceil(lock.hold * tick_hz),
         "slow": slow,
@@ -78,11 +78,11 @@ def interlock_counts(
         "longest": math.ceil(LATE * 1e6 / tick_hz),
         "stand": STAND,
     }
-    for name, value in found.items():
+    for name, value in exact_counts.items():
         most_allowed = 2**60 if name in ("heat", "continuous") else 2**31 - 1
         if not -most_allowed <= value <= most_allowed or (value < 0 and not name.startswith("angle")):
             raise ValueError(f"the interlock's {name.replace('_', ' ')} is {value:.10g}, which is out of range")
-    counts: dict[str, int | str] = {name: int(value) for name, value in found.items()}
+    counts: dict[str, int | str] = {name: int(value) for name, value in exact_counts.items()}
     heat, continuous = counts.pop("heat"), counts.pop("continuous")
     counts["drive_heat"] = f"{{.most = {heat}, .continuous = {continuous}}}"
     counts["needs_key"] = "true" if lock.key else "false"

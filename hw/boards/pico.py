@@ -37,14 +37,14 @@ def flash_of(elf: Path) -> bytes:
     size, count = struct.unpack_from("<HH", data, 42)
     flash = bytearray()
     for k in range(count):
-        kind, at, _, physical, filed = struct.unpack_from("<5I", data, offset + k * size)
+        kind, start, _, physical, filed = struct.unpack_from("<5I", data, offset + k * size)
         if kind != 1 or not filed:
             continue
         begin = physical - FLASH
         if not 0 <= begin <= FLASH_BYTES - filed:
             raise ValueError(f"a segment at {physical:#x} lies outside of the flash")
         flash.extend(b"\xff" * (begin + filed - len(flash)))
-        flash[begin : begin + filed] = data[at : at + filed]
+        flash[begin : begin + filed] = data[start : start + filed]
     flash.extend(b"\xff" * (-len(flash) % 4))
     struct.pack_into("<I", flash, BOOT2 - 4, boot2_crc(bytes(flash[: BOOT2 - 4])))
     body = bytes(flash[BOOT2 + HEAD :])
@@ -65,7 +65,7 @@ def boot2_crc(data: bytes) -> int:
 
 def uf2(flash: bytes) -> bytes:
     """A UF2 file that fills the flash with these bytes, from its beginning."""
-    blocks = [flash[at : at + _PAYLOAD].ljust(_PAYLOAD, b"\xff") for at in range(0, len(flash), _PAYLOAD)]
+    blocks = [flash[start : start + _PAYLOAD].ljust(_PAYLOAD, b"\xff") for start in range(0, len(flash), _PAYLOAD)]
     out = bytearray()
     for k, block in enumerate(blocks):
         out += struct.pack("<8I", *_MAGIC, _HAS_FAMILY, FLASH + k * _PAYLOAD, _PAYLOAD, k, len(blocks), _FAMILY)

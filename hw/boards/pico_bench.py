@@ -118,13 +118,13 @@ def pico_bench(path: str | os.PathLike[str] | None = None) -> PicoBench:
     file = _File(SHIPPED if path is None else path)
     figures = file.figures()
     try:
-        found = _bench(figures)
-        config_c(found.config, plant=False)
+        bench = _bench(figures)
+        config_c(bench.config, plant=False)
     except Uncountable as reason:
         raise file.wrong(f"the bench cannot be counted: {reason}", "take numbers that a bed may have") from None
     except ValueError as reason:
         raise file.wrong(str(reason), "take numbers that a bed may have") from None
-    return found
+    return bench
 
 
 def wiring_c(wiring: Mapping[str, int]) -> str:
@@ -140,68 +140,68 @@ def lock_step_wiring(tick_hz: float) -> dict[str, int]:
     return {"reload": round(CLOCK / tick_hz) - 1, "watchdog": 0}
 
 
-def _bench(of: Mapping[str, Any]) -> PicoBench:
-    tick_hz: float = of["bed.tick"]
+def _bench(figures: Mapping[str, Any]) -> PicoBench:
+    tick_hz: float = figures["bed.tick"]
     if not 200.0 <= tick_hz <= 4000.0:
         raise ValueError(f"a tick of {tick_hz:g} Hz is not 200 Hz to 4 kHz")
     for full, limit in (("drive.voltage_full", "drive.voltage_limit"), ("load.current_full", "load.current_limit")):
-        if of[limit] > of[full] * (STEPS - 1) / STEPS:
+        if figures[limit] > figures[full] * (STEPS - 1) / STEPS:
             raise ValueError(f"`{limit}` is more than the amplifier holds at 4095 of 4096 steps, `{full}`")
-    encoder = 2.0 * math.pi / of["shaft.encoder"]
-    tachometer = of.get("shaft.rate_range")
+    encoder = 2.0 * math.pi / figures["shaft.encoder"]
+    tachometer = figures.get("shaft.rate_range")
     ticks = 0 if tachometer else min(32, max(1, round(RATE_SECONDS * tick_hz)))
     rate = 2.0 * tachometer / STEPS if tachometer else encoder * tick_hz / ticks
-    load_step, load_count = 2.0 * of["load.current_range"] / STEPS, of["load.current_full"] / STEPS
+    load_step, load_count = 2.0 * figures["load.current_range"] / STEPS, figures["load.current_full"] / STEPS
     scales = Scales(
-        voltage=of["drive.voltage_full"] / STEPS,
+        voltage=figures["drive.voltage_full"] / STEPS,
         current=load_count,
         rate=rate,
         angle=encoder,
-        drive_current=2.0 * of["drive.current_range"] / STEPS,
+        drive_current=2.0 * figures["drive.current_range"] / STEPS,
         acceleration=1.0,
     )
     limits = Limits(
-        voltage=of["drive.voltage_limit"],
-        current=of["load.current_limit"],
-        rate=of["shaft.rate_limit"],
-        arming_rate=of["shaft.rate_arming"],
-        voltage_slew=of["drive.voltage_slew"],
-        current_slew=of["load.current_slew"],
-        heat=of["load.heat"],
+        voltage=figures["drive.voltage_limit"],
+        current=figures["load.current_limit"],
+        rate=figures["shaft.rate_limit"],
+        arming_rate=figures["shaft.rate_arming"],
+        voltage_slew=figures["drive.voltage_slew"],
+        current_slew=figures["load.current_slew"],
+        heat=figures["load.heat"],
     )
-    if tachometer and of["shaft.rate_limit"] > 0.95 * tachometer:
+    if tachometer and figures["shaft.rate_limit"] > 0.95 * tachometer:
         raise ValueError("`shaft.rate_limit` is beyond 95 % of `shaft.rate_range`, so that no reading could pass it")
     shaft = Shaft(
-        **{name: of[f"drive.{name}"] for name in ("kt", "resistance", "tau_max")},
-        kt_load=of["load.kt"],
-        **{name: of[f"shaft.{name}"] for name in ("inertia", "f_c", "f_v", "f_cut")},
+        **{name: figures[f"drive.{name}"] for name in ("kt", "resistance", "tau_max")},
+        kt_load=figures["load.kt"],
+        **{name: figures[f"shaft.{name}"] for name in ("inertia", "f_c", "f_v", "f_cut")},
     )
-    angle = (of["shaft.angle_least"], of["shaft.angle_most"]) if "shaft.angle_most" in of else None
+    angle = (figures["shaft.angle_least"], figures["shaft.angle_most"]) if "shaft.angle_most" in figures else None
     if angle is not None and angle[0] >= angle[1]:
         raise ValueError("`shaft.angle_least` is not below `shaft.angle_most`")
     span = 0.064
     lock = Interlock(
-        key=of["interlock.key"],
-        settle=of["interlock.settle"],
-        hold=of["interlock.hold"],
-        drive_heat=of["drive.heat"],
-        drive_continuous=of["drive.current_continuous"],
-        warmest=_warmest(of),
-        bus=_bus(of),
+        key=figures["interlock.key"],
+        settle=figures["interlock.settle"],
+        hold=figures["interlock.hold"],
+        drive_heat=figures["drive.heat"],
+        drive_continuous=figures["drive.current_continuous"],
+        warmest=_warmest(figures),
+        bus=_bus(figures),
         angle=angle,
-        f_cut=of["shaft.f_cut"] if tachometer else None,
+        f_cut=figures["shaft.f_cut"] if tachometer else None,
         angle_floor=FLOOR_COUNTS * encoder + FLOOR_STEPS * rate * span,
-        load_off=of["interlock.load_off"],
-        load_time=of["interlock.load_time"],
+        load_off=figures["interlock.load_off"],
+        load_time=figures["interlock.load_time"],
     )
     config = Config(
-        name=of["bed.name"],
+        name=figures["bed.name"],
         tick_hz=tick_hz,
-        deadman=of["bed.deadman"],
+        deadman=figures["bed.deadman"],
         scales=scales,
         limits=limits,
-        continuous_current=of["load.current_continuous"],
-        drive_current=of["drive.current_limit"],
+        continuous_current=figures["load.current_continuous"],
+        drive_current=figures["drive.current_limit"],
         shaft=shaft,
         capabilities=Capability.ENCODER | Capability.DRIVE_CURRENT | Capability.WATCHDOG,
         interlock=lock,
@@ -211,17 +211,17 @@ def _bench(of: Mapping[str, Any]) -> PicoBench:
         **lock_step_wiring(tick_hz),
         "watchdog": round(WATCHDOG_TICKS * 1e6 / tick_hz),
         "rate_ticks": ticks,
-        "rate_zero": of["converter.rate_zero"],
-        "rate_sign": -1 if of["converter.rate_reversed"] else 1,
-        "drive_zero": of["converter.drive_zero"],
-        "drive_sign": -1 if of["converter.drive_reversed"] else 1,
-        "load_zero": of["converter.load_zero"],
-        "load_counts": ratio.numerator * (-1 if of["converter.load_reversed"] else 1),
+        "rate_zero": figures["converter.rate_zero"],
+        "rate_sign": -1 if figures["converter.rate_reversed"] else 1,
+        "drive_zero": figures["converter.drive_zero"],
+        "drive_sign": -1 if figures["converter.drive_reversed"] else 1,
+        "load_zero": figures["converter.load_zero"],
+        "load_counts": ratio.numerator * (-1 if figures["converter.load_reversed"] else 1),
         "load_steps": ratio.denominator,
         "reference": STEPS // 2,
         "reference_off": 40,
-        "has_temperature": int("interlock.thermistor" in of),
-        "has_bus": int("interlock.bus_full" in of),
+        "has_temperature": int("interlock.thermistor" in figures),
+        "has_bus": int("interlock.bus_full" in figures),
     }
     return PicoBench(config, wiring)
 
@@ -230,23 +230,27 @@ HIGHEST = 4079
 """Step of the converter above which a wire is off (hw/firmware/pico/port.c)."""
 
 
-def _warmest(of: Mapping[str, Any]) -> int:
+def _warmest(figures: Mapping[str, Any]) -> int:
     """Steps, counted down from `HIGHEST`, of the thermistor at its warmest: R = R25 exp(B (1/T - 1/298.15 K))."""
-    if "interlock.thermistor" not in of:
+    if "interlock.thermistor" not in figures:
         return STEPS
-    kelvin = of["interlock.warmest"] + 273.15
-    hot = of["interlock.thermistor"] * math.exp(of["interlock.thermistor_beta"] * (1.0 / kelvin - 1.0 / 298.15))
-    steps = math.ceil((STEPS - 1) * hot / (hot + of["interlock.thermistor_pull_up"]))
+    kelvin = figures["interlock.warmest"] + 273.15
+    hot = figures["interlock.thermistor"] * math.exp(
+        figures["interlock.thermistor_beta"] * (1.0 / kelvin - 1.0 / 298.15)
+    )
+    steps = math.ceil((STEPS - 1) * hot / (hot + figures["interlock.thermistor_pull_up"]))
     if not 32 <= steps <= HIGHEST - 32:
-        warmest = of["interlock.warmest"]
+        warmest = figures["interlock.warmest"]
         raise ValueError(f"at {warmest} degC the thermistor reads {steps} of 4095: take another resistor")
     return HIGHEST - steps
 
 
-def _bus(of: Mapping[str, Any]) -> tuple[int, int]:
-    if "interlock.bus_full" not in of:
+def _bus(figures: Mapping[str, Any]) -> tuple[int, int]:
+    if "interlock.bus_full" not in figures:
         return 0, STEPS
-    least, most = (of[f"interlock.bus_{each}"] / of["interlock.bus_full"] * (STEPS - 1) for each in ("least", "most"))
+    least, most = (
+        figures[f"interlock.bus_{end}"] / figures["interlock.bus_full"] * (STEPS - 1) for end in ("least", "most")
+    )
     if not 0.0 <= least < most <= STEPS - 1:
         raise ValueError("`bus_least` is not below `bus_most`, or that not below `bus_full`")
     return math.ceil(least), math.floor(most)
@@ -262,27 +266,27 @@ class _File(TomlFile):
         """All figures in SI, by `table.key`."""
         for table, keys in self.tables.items():
             if table not in _SCHEMA or not isinstance(keys, dict):
-                helps = [*did_you_mean(table, _SCHEMA), f"a bench has {', '.join(f'[{each}]' for each in _SCHEMA)}"]
+                helps = [*did_you_mean(table, _SCHEMA), f"a bench has {', '.join(f'[{name}]' for name in _SCHEMA)}"]
                 raise self.wrong(f"a bench has no `{table}`", helps, key=table)
             for key in keys:
                 if key not in _SCHEMA[table]:
                     helps = [*did_you_mean(key, _SCHEMA[table]), f"it has {', '.join(_SCHEMA[table])}"]
                     raise self.wrong(f"[{table}] has no `{key}`", helps, table=table, key=key)
-        found = {}
+        figures = {}
         for table, schema in _SCHEMA.items():
-            given = self.tables.get(table, {})
+            entries = self.tables.get(table, {})
             for key, kind in schema.items():
-                if key in given:
-                    found[f"{table}.{key}"] = self._figure(table, key, kind, given[key])
+                if key in entries:
+                    figures[f"{table}.{key}"] = self._figure(table, key, kind, entries[key])
                 elif (table, key) not in _OPTIONAL:
                     raise self.wrong(f"[{table}] has no `{key}`", _BEGIN, table=table)
         for table, *keys in _TOGETHER:
-            there = [key for key in keys if f"{table}.{key}" in found]
-            if there and len(there) < len(keys):
-                missing = next(key for key in keys if key not in there)
-                message = f"[{table}] has `{there[0]}` and no `{missing}`"
-                raise self.wrong(message, f"give {', '.join(keys)}, or none of them", table=table, key=there[0])
-        return found
+            present = [key for key in keys if f"{table}.{key}" in figures]
+            if present and len(present) < len(keys):
+                missing = next(key for key in keys if key not in present)
+                message = f"[{table}] has `{present[0]}` and no `{missing}`"
+                raise self.wrong(message, f"give {', '.join(keys)}, or none of them", table=table, key=present[0])
+        return figures
 
     def _figure(self, table: str, key: str, kind: str, value: Any) -> Any:
         good = {
@@ -290,12 +294,12 @@ class _File(TomlFile):
             _FLAG: lambda: isinstance(value, bool),
             _WHOLE: lambda: isinstance(value, int) and not isinstance(value, bool) and 0 < value < 10**6,
         }
-        shown = {_TEXT: '"my bench"', _FLAG: "true", _WHOLE: "2000"}
+        example = {_TEXT: '"my bench"', _FLAG: "true", _WHOLE: "2000"}
         if kind in good:
             if not good[kind]():
                 what = {_TEXT: "text of 1 to 16 letters", _FLAG: "true or false", _WHOLE: "whole number above zero"}
                 message = f"`{key}` is no {what[kind]}: {value!r}"
-                raise self.wrong(message, f"write `{key} = {shown[kind]}`", table=table, key=key)
+                raise self.wrong(message, f"write `{key} = {example[kind]}`", table=table, key=key)
             return value
         try:
             return quantity(value, kind, signed=key.startswith("angle"))

@@ -15,8 +15,8 @@ from hw.drives.odrive_ascii import OdriveAsciiDrive
 from hw.drives.robstride import RobstrideDrive
 
 DIALECTS: Mapping[str, type[CanDrive]] = {
-    each.dialect: each
-    for each in (OdriveDrive, DamiaoDrive, MoteusDrive, Cia402Drive, RobstrideDrive, OdriveAsciiDrive)
+    drive.dialect: drive
+    for drive in (OdriveDrive, DamiaoDrive, MoteusDrive, Cia402Drive, RobstrideDrive, OdriveAsciiDrive)
 }
 
 REFUSED: Mapping[str, Sequence[str]] = {

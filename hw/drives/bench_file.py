@@ -110,14 +110,17 @@ class TwoDrives:
     def identity(self) -> dict[str, str]:
         """All that tells this bench from another, in words by the names in the file. The place of its bus or lines is
         none of it: an adapter may get another name."""
-        found = {"name": self.name, "bus.interface": str(self.bus["interface"])}
+        words = {"name": self.name, "bus.interface": str(self.bus["interface"])}
         for table, figures in (("shaft", self.shaft), ("supply", self.supply)):
-            found |= _in_words(table, figures)
-        for each in (self.drive, self.load):
-            found |= {f"{each.role}.dialect": each.dialect, f"{each.role}.node": str(each.node)}
-            found |= {f"{each.role}.reversed": "true" if each.sense < 0 else "false", f"{each.role}.model": each.model}
-            found |= _in_words(each.role, each.figures)
-        return found
+            words |= _in_words(table, figures)
+        for drive in (self.drive, self.load):
+            words |= {f"{drive.role}.dialect": drive.dialect, f"{drive.role}.node": str(drive.node)}
+            words |= {
+                f"{drive.role}.reversed": "true" if drive.sense < 0 else "false",
+                f"{drive.role}.model": drive.model,
+            }
+            words |= _in_words(drive.role, drive.figures)
+        return words
 
 
 def _in_words(table: str, figures: Mapping[str, float]) -> dict[str, str]:
@@ -174,14 +177,14 @@ class _BenchFile(TomlFile):
         )
 
     def _bus(self) -> dict[str, Any]:
-        found = self.tables["bus"]
+        figures = self.tables["bus"]
         for key in ("interface", "channel"):
-            if key not in found:
+            if key not in figures:
                 raise self.wrong(
                     f"`[bus]` has no `{key}`", 'such as `interface = "socketcan"`, `channel = "can0"`', "bus"
                 )
-        adapter = found["interface"] == FDCANUSB
-        for key, value in found.items():
+        adapter = figures["interface"] == FDCANUSB
+        for key, value in figures.items():
             if adapter and key not in ("interface", "channel", *SPEEDS):
                 helps = (*did_you_mean(key, SPEEDS), f"it has channel, {', '.join(SPEEDS)}")
                 raise self.wrong(f"an fdcanusb has no `{key}`", helps, "bus", key)
@@ -189,19 +192,19 @@ class _BenchFile(TomlFile):
                 raise self.wrong(f"`{key}` is no number of bits a second", f"`{key} = 1000000`", "bus", key)
             if not isinstance(value, str | int | float | bool):
                 raise self.wrong(f"`{key}` is no word and no number", "python-can's documentation has them", "bus", key)
-        return dict(found)
+        return dict(figures)
 
     def _lines(self, drive: DriveEntry, load: DriveEntry) -> dict[str, Any]:
         """`[bus]` of drives on serial lines, with their ports."""
-        found = self.tables["bus"]
-        for key in found:
+        figures = self.tables["bus"]
+        for key in figures:
             if key not in ("interface", "baud"):
                 helps = "`baud` of UARTs, and nothing of USB; each drive has its `port`"
                 raise self.wrong(f"serial lines have no `{key}`", helps, "bus", key)
-        baud = found.get("baud")
+        baud = figures.get("baud")
         if baud is not None and (type(baud) is not int or not 0 < baud <= FASTEST):
             raise self.wrong("`baud` is no number of bits a second", "`baud = 921600`", "bus", "baud")
-        ports = {each.node: each.port for each in (drive, load)}
+        ports = {drive.node: drive.port for drive in (drive, load)}
         return {"interface": SERIAL, "channel": ", ".join(ports.values()), "baud": baud, "ports": ports}
 
     def _port(self, role: str, dialect: str) -> str:
@@ -252,17 +255,17 @@ class _BenchFile(TomlFile):
         if value is None and default is not None:
             return default
         try:
-            found = quantity(value, unit)
-            if key == "watchdog" and found > LONGEST_WATCHDOG:
+            figure = quantity(value, unit)
+            if key == "watchdog" and figure > LONGEST_WATCHDOG:
                 raise self.wrong(f"`watchdog` of `[{table}]` is more than a second", "10 to 20 ms", table, key)
-            return found
+            return figure
         except ValueError:
             message = f"`{key}` of `[{table}]` is no quantity above zero in {unit}"
             raise self.wrong(message, f'write `{key} = "1.5 {unit}"`', table, key) from None
 
     def _word(self, table: str, key: str, default: str | None) -> str:
-        found, known = self.tables[table].get(key, default), _WORDS[table][key]
-        if not isinstance(found, str) or not found.isprintable() or (known and found and found not in known):
+        word, known = self.tables[table].get(key, default), _WORDS[table][key]
+        if not isinstance(word, str) or not word.isprintable() or (known and word and word not in known):
             helps = f"one of: {', '.join(known)}" if known else f'`{key} = "..."`'
             raise self.wrong(f"`{key}` of `[{table}]` is missing, or is none that there is", helps, table, key)
-        return found
+        return word

@@ -80,7 +80,7 @@ class SetpointChecks:
         master, in words; "" where that is not sure."""
         what, self.asked = self.asked, ""
         right = (self._settings.get(what, 0.0),) if what not in self._commands[:1] else self._told
-        if any(abs(value - each) <= self._apart + SAME * abs(each) for each in right):
+        if any(abs(value - expected) <= self._apart + SAME * abs(expected) for expected in right):
             return ""
         again = time - self._odd.get(what, -math.inf) <= AGAIN
         self._odd[what], self._doubted, self._doubts = time, what, DOUBTS

@@ -129,7 +129,7 @@ class Cia402Drive(CanDrive):
         most = 1e-3 * self._rated * self._most(talk)
         rate = _TURN / 60.0 * self._read(talk, SPEED, "<I")
         steps, turns = self._read(talk, STEPS, "<I"), self._read(talk, TURNS, "<I")
-        if not all(each > 0.0 for each in (self._rated, most, rate, steps, turns)):
+        if not all(figure > 0.0 for figure in (self._rated, most, rate, steps, turns)):
             raise self.wrong("a limit or a unit of its is 0", "objects 6072h, 6076h, 6080h and 608Fh")
         if rate > MOST_RATE * self._rate_unit:
             helps = "set object 60A9h to thousandths of a turn a minute, 0xFDB44700"
@@ -159,14 +159,16 @@ class Cia402Drive(CanDrive):
 
     def _prepare_checks(self, talk: Talk) -> None:
         """Find which objects it can be asked for in a run: what it is told, and what nobody then changes."""
-        told, other = (TARGET_RATE, TARGET_TORQUE) if self.rates else (TARGET_TORQUE, TARGET_RATE)
+        commanded, other = (TARGET_RATE, TARGET_TORQUE) if self.rates else (TARGET_TORQUE, TARGET_RATE)
         self._objects = {
             _words(which): (which, layout)
-            for which, layout in (told, other, LARGEST)
+            for which, layout in (commanded, other, LARGEST)
             if self._sdo(talk, _upload(which), _words(which), may_lack=True)
         }
-        kept = {name: self._read(talk, *each) for name, each in self._objects.items() if each is not told}
-        self._checks.begin([_words(told[0])] if _words(told[0]) in self._objects else (), kept)
+        unchanged = {
+            name: self._read(talk, *object_) for name, object_ in self._objects.items() if object_ is not commanded
+        }
+        self._checks.begin([_words(commanded[0])] if _words(commanded[0]) in self._objects else (), unchanged)
 
     def renew(self, talk: Talk) -> None:
         self._most(talk)
@@ -192,8 +194,8 @@ class Cia402Drive(CanDrive):
             self._write(talk, (parameters, 1), "<I", 0x80000000 | cob + self.node)
             self._write(talk, (parameters, 2), "<B", kind)
             self._write(talk, (mapping, 0), "<B", 0)
-            for n, each in enumerate(objects, 1):
-                self._write(talk, (mapping, n), "<I", each)
+            for n, entry in enumerate(objects, 1):
+                self._write(talk, (mapping, n), "<I", entry)
             self._write(talk, (mapping, 0), "<B", len(objects))
             self._write(talk, (parameters, 1), "<I", cob + self.node)
         self._set(talk, ABORT, "<h", 1)
@@ -213,10 +215,10 @@ class Cia402Drive(CanDrive):
         """The answer to an SDO of up to four bytes; empty for a missing object that is optional. Raises Problem E402
         without an answer, E404 where it is refused."""
         self._answer = None
-        asked = data[1:4]
+        multiplexer = data[1:4]
 
         def answered() -> bool:
-            return self._answer is not None and self._answer[1:4] == asked
+            return self._answer is not None and self._answer[1:4] == multiplexer
 
         if not talk.ask([CanFrame(SDO_ASK + self.node, data.ljust(8, b"\0"))], answered):
             raise talk.silent(self, what)
@@ -246,15 +248,15 @@ class Cia402Drive(CanDrive):
     def _set(self, talk: Talk, which: tuple[int, int], layout: str, value: int) -> None:
         """Set an object, and see that it is set. Raises Problem E404 where it is not."""
         self._write(talk, which, layout, value)
-        if (found := self._read(talk, which, layout)) != value:
+        if (value_read := self._read(talk, which, layout)) != value:
             raise self.wrong(
-                f"it does not take {value} for {_words(which)}, which is {found:g}", "set it by its maker's tool"
+                f"it does not take {value} for {_words(which)}, which is {value_read:g}", "set it by its maker's tool"
             )
 
     # Frames
 
-    def _pdo(self, control: int, told: int = 0) -> CanFrame:
-        return CanFrame(RPDO1 + self.node, struct.pack("<Hi" if self.rates else "<Hh", control, told))
+    def _pdo(self, control: int, command_counts: int = 0) -> CanFrame:
+        return CanFrame(RPDO1 + self.node, struct.pack("<Hi" if self.rates else "<Hh", control, command_counts))
 
     def armed(self) -> Sequence[CanFrame]:
         self._wanted = True
@@ -263,12 +265,12 @@ class Cia402Drive(CanDrive):
     def told(self, value: float) -> Sequence[CanFrame]:
         """The next step towards operation, or torque or rate once it is there. The drive's come last: they end with the
         heartbeat that feeds both watchdogs, and the SYNC at which both answer."""
-        told = 0
+        command_counts = 0
         if self.state == DriveState.DRIVING:
             counts = self.own(value) / (self._rate_unit if self.rates else 1e-3 * self._rated)
-            told = math.trunc(counts + math.copysign(1e-6, counts))  # rounding must not lose a step
-        self._checks.tell(told)
-        frames = (self._pdo(self._control if self._wanted else OFF, told),)
+            command_counts = math.trunc(counts + math.copysign(1e-6, counts))  # rounding must not lose a step
+        self._checks.tell(command_counts)
+        frames = (self._pdo(self._control if self._wanted else OFF, command_counts),)
         return frames if self.entry.role == "load" else (*frames, CanFrame(HEARTBEAT + HOST, b"\x05"), *self.asked())
 
     def asked(self) -> Sequence[CanFrame]:
@@ -293,7 +295,7 @@ class Cia402Drive(CanDrive):
             return frame.data[1:2] in (b"\0", bytes([self.node]))
         if frame.id == SDO_ASK + self.node:
             return frame.data[:1] != b"" and frame.data[0] >> 5 in DOWNLOADS
-        return frame.id in (SYNC, HEARTBEAT + HOST, *(each + self.node for each in RPDOS))
+        return frame.id in (SYNC, HEARTBEAT + HOST, *(base + self.node for base in RPDOS))
 
     def idle(self) -> Sequence[CanFrame]:
         self._wanted = False

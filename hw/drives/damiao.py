@@ -22,7 +22,7 @@ from hw.drives.mit import STEPS_12, STEPS_16, count_of, packed, value_of
 
 REGISTERS = 0x7FF
 READ, WRITE, REFRESH = 0x33, 0x55, 0xCC
-ENABLE, DISABLE, CLEAR = (bytes(7 * [0xFF]) + bytes([each]) for each in (0xFC, 0xFD, 0xFB))
+ENABLE, DISABLE, CLEAR = (bytes(7 * [0xFF]) + bytes([last_byte]) for last_byte in (0xFC, 0xFD, 0xFB))
 TIMEOUT, MODE, VERSION, PMAX, VMAX, TMAX, OVER_VOLTAGE, SUB_VERSION = 9, 10, 14, 21, 22, 23, 29, 36
 """Numbers of registers."""
 
@@ -77,9 +77,9 @@ class DamiaoDrive(CanDrive):
         talk.send([self._frame(DISABLE)])
         self._write(talk, MODE, MIT_MODE)
         self._write(talk, TIMEOUT, round(self.entry.figures["watchdog"] / TIMEOUT_UNIT))
-        ends = [self._read(talk, each) for each in (PMAX, VMAX, TMAX)]
+        ends = [self._read(talk, register) for register in (PMAX, VMAX, TMAX)]
         supply = self._read(talk, OVER_VOLTAGE)
-        if not all(math.isfinite(each) and each > 0.0 for each in (*ends, supply)):
+        if not all(math.isfinite(figure) and figure > 0.0 for figure in (*ends, supply)):
             raise self.wrong(
                 "what its fields or its overvoltage stand for is no number above zero", "set registers 21 to 29"
             )
@@ -126,10 +126,10 @@ class DamiaoDrive(CanDrive):
         """Set a register of a whole number, and see that it is set. Raises Problem E404 where it is not."""
         for _ in range(ASKS):
             self._register(talk, register, WRITE, struct.pack("<I", value))
-            if (found := self._read(talk, register)) == value:
+            if (value_read := self._read(talk, register)) == value:
                 return
         raise self.wrong(
-            f"it does not take {value} for register {register}, which is {found:g}", "its maker's tool does?"
+            f"it does not take {value} for register {register}, which is {value_read:g}", "its maker's tool does?"
         )
 
     # Frames

@@ -304,10 +304,12 @@ class Talk:
     def _overhear(self, frame: CanFrame) -> None:
         """Take a frame that is no drive's. One that commands a drive is another master's, unless this host has sent the
         same: some interfaces hand what they send to their sender too."""
-        told = next((drive for drive in self.drives if drive.is_command(frame)), None)
+        commanded = next((drive for drive in self.drives if drive.is_command(frame)), None)
         own = self.line.now() - self._sent.get(_content(frame), -math.inf) <= ECHOED
-        if told is not None and not self._heard and not own:
-            self._heard = f"{told.words} was sent a command by another, 0x{frame.id:X} {frame.data.hex(' ')}".rstrip()
+        if commanded is not None and not self._heard and not own:
+            self._heard = (
+                f"{commanded.words} was sent a command by another, 0x{frame.id:X} {frame.data.hex(' ')}".rstrip()
+            )
         if len(self.strange) < 64:
             self.strange[frame.id] = self.strange.get(frame.id, 0) + 1
 
@@ -344,10 +346,10 @@ class Talk:
 
     def _guessed(self) -> list[str]:
         """The dialect that frames nobody took look like, in words."""
-        if any(0x700 < each <= 0x77F for each in self.strange):
+        if any(0x700 < identifier <= 0x77F for identifier in self.strange):
             return ["identifiers from 0x701 on are heartbeats of CANopen: `cia402`?"]
-        if any(each & 0x1F == 1 and each < 0x800 for each in self.strange):
-            nodes = sorted({each >> 5 for each in self.strange if each & 0x1F == 1})
+        if any(identifier & 0x1F == 1 and identifier < 0x800 for identifier in self.strange):
+            nodes = sorted({identifier >> 5 for identifier in self.strange if identifier & 0x1F == 1})
             return [f"0x{(nodes[0] << 5) + 1:X} looks like the heartbeat of an ODrive, node {nodes[0]}"]
         return []
 

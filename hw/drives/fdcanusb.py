@@ -167,8 +167,10 @@ class FdcanusbLine:
                     break
                 came = came or text
         came, self._rest = came or self._rest, b""
-        said = "".join(each if each.isprintable() else "?" for each in came[:60].decode("ascii", "replace"))
-        message = f"no fdcanusb answers `{command}` on {self._name}: {f'`{said}` came' if said else 'nothing came'}"
+        answer = "".join(
+            character if character.isprintable() else "?" for character in came[:60].decode("ascii", "replace")
+        )
+        message = f"no fdcanusb answers `{command}` on {self._name}: {f'`{answer}` came' if answer else 'nothing came'}"
         helps = (
             "`channel` of `[bus]`: the adapter's device, such as /dev/fdcanusb or /dev/ttyACM0",
             "an adapter of another kind has another `interface`: slcan, socketcan, pcan ...",
@@ -178,10 +180,10 @@ class FdcanusbLine:
 
 def frame_of(text: bytes, time: float) -> CanFrame | None:
     """The frame that a line of an adapter says has come at a time, s; None where it is no whole line of a frame."""
-    found = _FRAME.fullmatch(text)
-    if found is None:
+    match_ = _FRAME.fullmatch(text)
+    if match_ is None:
         return None
-    number, data, flags = int(found[1], 16), bytes.fromhex(found[2].decode()), found[3].decode().split()
+    number, data, flags = int(match_[1], 16), bytes.fromhex(match_[2].decode()), match_[3].decode().split()
     if sorted(flag.upper() for flag in flags) != ["B", "E", "F", "R"]:
         return None
     extended, fd = "E" in flags, "F" in flags

@@ -79,17 +79,17 @@ def asked_for(kind: int, first: int, count: int = 1) -> bytes:
 
 def writes(data: bytes) -> bool:
     """True for the data of a frame that does more than to ask for registers."""
-    at = 0
+    position = 0
     try:
-        while at < len(data):
-            head, at = data[at], at + 1
+        while position < len(data):
+            head, position = data[position], position + 1
             if head == NOTHING:
                 continue
             if head & 0xF0 != READ:
                 return True
             if not head & 3:
-                _, at = _number(data, at)
-            _, at = _number(data, at)
+                _, position = _number(data, position)
+            _, position = _number(data, position)
     except IndexError:
         return False
     return False
@@ -102,39 +102,39 @@ def padded(data: bytes) -> bytes:
 
 def answered(data: bytes) -> dict[int, float] | None:
     """The registers that an answer tells, by number; None where it is no answer that can be read to its end."""
-    found: dict[int, float] = {}
-    at = 0
+    registers: dict[int, float] = {}
+    position = 0
     try:
-        while at < len(data):
-            head, at = data[at], at + 1
+        while position < len(data):
+            head, position = data[position], position + 1
             if head == NOTHING:
                 continue
             if head in (WRITE_ERROR, READ_ERROR):
-                _, at = _number(data, at)
-                _, at = _number(data, at)
+                _, position = _number(data, position)
+                _, position = _number(data, position)
                 continue
             if head & 0xF0 != ANSWER:
                 return None
             kind, count = head >> 2 & 3, head & 3
             if not count:
-                count, at = _number(data, at)
-            first, at = _number(data, at)
+                count, position = _number(data, position)
+            first, position = _number(data, position)
             layout = struct.Struct(f"<{count}{FORMATS[kind]}")
-            found |= dict(enumerate(layout.unpack_from(data, at), first))
-            at += layout.size
+            registers |= dict(enumerate(layout.unpack_from(data, position), first))
+            position += layout.size
     except (IndexError, struct.error):
         return None
-    return found
+    return registers
 
 
-def _number(data: bytes, at: int) -> tuple[int, int]:
+def _number(data: bytes, position: int) -> tuple[int, int]:
     value = shift = 0
     while True:
-        byte, at = data[at], at + 1
+        byte, position = data[position], position + 1
         value |= (byte & 0x7F) << shift
         shift += 7
         if byte < 0x80 or shift > 28:
-            return value, at
+            return value, position
 
 
 _STATE = asked_for(FLOAT, MODE, 3) + asked_for(FLOAT, POWER) + asked_for(FLOAT, VOLTAGE) + asked_for(INT8, FAULT)
@@ -212,20 +212,20 @@ class MoteusDrive(CanDrive):
     def take(self, frame: CanFrame) -> bool:
         if frame.id != self.node << 8 or not frame.fd or frame.remote:
             return False
-        found = answered(frame.data)
-        if not found:
+        registers = answered(frame.data)
+        if not registers:
             return False
-        if all(MODEL + n in found for n in range(3)):
-            self._about = {MODEL + n: found[MODEL + n] for n in range(3)}
+        if all(MODEL + n in registers for n in range(3)):
+            self._about = {MODEL + n: registers[MODEL + n] for n in range(3)}
             return True
-        values = [found.get(each, math.nan) for each in (MODE, POSITION, VELOCITY, VOLTAGE, FAULT)]
+        values = [registers.get(register, math.nan) for register in (MODE, POSITION, VELOCITY, VOLTAGE, FAULT)]
         if not all(math.isfinite(value) for value in values):
             return False
         mode, position, velocity, supply, fault = values
         if self.has_said((position, velocity), _TURN * velocity, frame.time):
             return False
         self.supply = supply
-        power = found.get(POWER, math.nan)
+        power = registers.get(POWER, math.nan)
         self.power = power if math.isfinite(power) else None
         self._state(int(mode), int(fault), frame.time)
         self.reading = DriveReading(frame.time, self.own(_TURN * position), self.own(_TURN * velocity))

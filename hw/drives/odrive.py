@@ -57,12 +57,12 @@ SUPPLY_RATE = "axis0.config.can.bus_voltage_msg_rate_ms"
 REPORTS = (HEARTBEAT_RATE, ESTIMATES_RATE, SUPPLY_RATE)
 
 
-def _endpoint(found: Any) -> tuple[int, str]:
+def _endpoint(entry: Any) -> tuple[int, str]:
     """The number of a property, of 16 bits, and the format of its value. Raises ValueError, KeyError, TypeError."""
-    number = found["id"]
+    number = entry["id"]
     if type(number) is not int or not 0 <= number < 1 << 16:
         raise ValueError
-    return number, _TYPES[found["type"]]
+    return number, _TYPES[entry["type"]]
 
 
 class OdriveDrive(OdriveAxis):
@@ -91,7 +91,7 @@ class OdriveDrive(OdriveAxis):
         assert self._version is not None
         _, *hardware = self._version[:4]
         firmware = tuple(self._version[4:7])
-        words = ".".join(str(each) for each in firmware), ".".join(str(each) for each in hardware)
+        words = ".".join(str(number) for number in firmware), ".".join(str(number) for number in hardware)
         self._check_firmware(firmware)
         talk.send(self.idle())
         self._numbers = self._endpoints(*words)
@@ -111,10 +111,10 @@ class OdriveDrive(OdriveAxis):
             raise self.wrong("the bench file does not say where its properties are", (f"`endpoints`: {helps}"))
         try:
             data = json.loads(read_regular(path, MOST_BYTES))
-            found, named = data["endpoints"], (data["fw_version"], data["hw_version"])
+            entries, named = data["endpoints"], (data["fw_version"], data["hw_version"])
             needed = (*REPORTS, *NEEDED, *NEEDED_FOR_RATES * self.rates)
-            missing = [each for each in needed if each not in found]
-            numbers = {each: _endpoint(found[each]) for each in needed if each in found}
+            missing = [path_ for path_ in needed if path_ not in entries]
+            numbers = {path_: _endpoint(entries[path_]) for path_ in needed if path_ in entries}
         except OSError as reason:
             raise self.wrong(f"{path} cannot be read: {(reason.strerror or str(reason)).lower()}", helps) from None
         except (ValueError, KeyError, TypeError, RecursionError):
@@ -122,8 +122,8 @@ class OdriveDrive(OdriveAxis):
         if missing:
             raise self.wrong(f"{path} has no `{missing[0]}`", helps)
         if named != (firmware, hardware):
-            said = f"{path} is for firmware {named[0]}, hardware {named[1]}"
-            raise self.other(f"it has {firmware}, hardware {hardware}, and {said}", helps)
+            mismatch = f"{path} is for firmware {named[0]}, hardware {named[1]}"
+            raise self.other(f"it has {firmware}, hardware {hardware}, and {mismatch}", helps)
         return numbers
 
     def _property(self, talk: Talk, number: int, payload: bytes) -> bytes:
@@ -211,8 +211,8 @@ class OdriveDrive(OdriveAxis):
         if command == ANSWERED and 4 <= len(data) <= 8:
             number = struct.unpack_from("<xH", data)[0]
             self._answered[number] = data[4:]
-            at, layout = self._numbers.get(self._checks.asked, (-1, ""))
-            if number == at and len(data) >= 4 + struct.calcsize(layout):
+            number_asked, layout = self._numbers.get(self._checks.asked, (-1, ""))
+            if number == number_asked and len(data) >= 4 + struct.calcsize(layout):
                 self._check(float(struct.unpack_from(layout, data, 4)[0]), frame.time)
             return True
         if len(data) != 8:

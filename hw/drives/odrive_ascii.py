@@ -80,14 +80,14 @@ class OdriveAsciiDrive(OdriveAxis):
         numbers = [self._read(talk, path) for path in (*FIRMWARE_NUMBERS, *HARDWARE_NUMBERS)]
         if not all(math.isfinite(number) for number in numbers):
             raise self.other("its version is no number", "MET speaks to firmware 0.6")
-        firmware, hardware = (tuple(int(number) for number in numbers[at : at + 3]) for at in (0, 3))
+        firmware, hardware = (tuple(int(number) for number in numbers[first : first + 3]) for first in (0, 3))
         self._check_firmware(firmware)
         took, most = talk.line.fastest(self.node), talk.line.late
         if took > most:
             helps = ("no hub between, another USB port of the computer", "a UART, at 921600 bits a second")
             raise self.wrong(f"an answer of its takes {1e3 * took:.3g} ms, and {1e3 * most:.3g} ms is the most", helps)
         talk.send(self.idle())
-        words = (".".join(str(each) for each in version) for version in (firmware, hardware))
+        words = (".".join(str(number) for number in version) for version in (firmware, hardware))
         facts = self._described(talk, *words)
         self._property(talk, VOLTAGE)
         seen = talk.line.now()
@@ -100,10 +100,10 @@ class OdriveAsciiDrive(OdriveAxis):
         """A property, read until two answers in a row are the same: the checksum lets some through that are altered."""
         before = ""
         for _ in range(ASKS):
-            said = self._property(talk, path)
-            if said == before:
-                return _number(said)
-            before = said
+            text = self._property(talk, path)
+            if text == before:
+                return _number(text)
+            before = text
         raise self.wrong(f"it answers each time differently what `{path}` is", "look at the cable of its line")
 
     def _property(self, talk: Talk, path: str) -> str:
@@ -111,10 +111,10 @@ class OdriveAsciiDrive(OdriveAxis):
         for _ in range(ASKS):
             talk.send([self._text(f"r {path}")])
             if talk.pump(talk.line.now() + GREETED / ASKS - QUIET, lambda: path in self._answered):
-                said = self._answered[path]
-                if math.isnan(_number(said)):
-                    raise self.other(f"it answers `{said[:40]}` to `r {path}`", "MET speaks to firmware 0.6")
-                return said
+                text = self._answered[path]
+                if math.isnan(_number(text)):
+                    raise self.other(f"it answers `{text[:40]}` to `r {path}`", "MET speaks to firmware 0.6")
+                return text
             talk.pump(talk.line.now() + QUIET)
         raise self._silent(talk, f"`r {path}`")
 
@@ -125,9 +125,11 @@ class OdriveAsciiDrive(OdriveAxis):
         """The error for a drive that does not answer a question of its greeting."""
         assert isinstance(talk.line, OdriveLines)
         came = talk.line.heard(self.node)
-        said = "".join(each if each.isprintable() else "?" for each in came[:60].decode("ascii", "replace"))
+        text = "".join(
+            character if character.isprintable() else "?" for character in came[:60].decode("ascii", "replace")
+        )
         if came:
-            helps = (f"what came is `{said}`: no answer with a checksum", "is this the line of an ODrive?")
+            helps = (f"what came is `{text}`: no answer with a checksum", "is this the line of an ODrive?")
         else:
             helps = (
                 "is it switched on? its line may have another name since it was plugged in: `ls /dev/serial/by-id`",
@@ -193,7 +195,7 @@ class OdriveAsciiDrive(OdriveAxis):
             return False
         question, _, answer = frame.data.decode("ascii", "replace").partition("\n")
         if question.startswith("f "):
-            angle, rate = (_number(each) for each in answer.split())
+            angle, rate = (_number(number) for number in answer.split())
             if not (math.isfinite(angle) and math.isfinite(rate)) or self.has_said(answer, TURN * rate, frame.time):
                 return False
             own = self.own(TURN * angle), self.own(TURN * rate)

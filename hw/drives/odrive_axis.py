@@ -104,16 +104,18 @@ class OdriveAxis(CanDrive):
         """Set a property, and see that it is set. Raises Problem E404 where it is not."""
         for _ in range(ASKS):
             self._put(talk, path, value)
-            found = self._read(talk, path)
-            if abs(found - value) <= 1e-6 * abs(value):
+            value_read = self._read(talk, path)
+            if abs(value_read - value) <= 1e-6 * abs(value):
                 self._written[path] = value
                 return
-        raise self.wrong(f"it does not take {value:g} for `{path}`, which is {found:g}", "set it by its maker's tool")
+        raise self.wrong(
+            f"it does not take {value:g} for `{path}`, which is {value_read:g}", "set it by its maker's tool"
+        )
 
     def _check_firmware(self, firmware: tuple[int, ...]) -> None:
         """Raise Problem E403 where MET does not speak to a firmware: its numbers, the first first."""
         if firmware[:2] != FIRMWARE:
-            words = ".".join(str(each) for each in firmware)
+            words = ".".join(str(number) for number in firmware)
             raise self.other(f"its firmware is {words}", "MET speaks to firmware 0.6")
 
     def _described(self, talk: Talk, firmware: str, hardware: str) -> DriveFacts:
@@ -142,12 +144,12 @@ class OdriveAxis(CanDrive):
         rate = TURN * self._read(talk, RATE_MAX)
         supply = self._read(talk, SUPPLY_MAX)
         watchdog = self._read(talk, WATCHDOG_TIMEOUT)
-        if not all(math.isfinite(each) and each > 0.0 for each in (kt, current, rate, supply, watchdog)):
+        if not all(math.isfinite(figure) and figure > 0.0 for figure in (kt, current, rate, supply, watchdog)):
             raise self.wrong("a limit of its is no number above zero", f"{', '.join(LIMITS)}: set them")
         loop = self._rate_loop(talk) if self.rates else None
-        told = (INPUT_RATE, INPUT_TORQUE) if self.rates else (INPUT_TORQUE,)
-        kept = dict.fromkeys((*NEEDED, *NEEDED_FOR_RATES * self.rates))
-        self._checks.begin(told, {path: self._read(talk, path) for path in kept if path not in told})
+        commanded = (INPUT_RATE, INPUT_TORQUE) if self.rates else (INPUT_TORQUE,)
+        paths = dict.fromkeys((*NEEDED, *NEEDED_FOR_RATES * self.rates))
+        self._checks.begin(commanded, {path: self._read(talk, path) for path in paths if path not in commanded})
         most = kt * current
         return DriveFacts(firmware, hardware, watchdog, most, rate, CONTROL_HZ, supply_max=supply, rate_loop=loop)
 

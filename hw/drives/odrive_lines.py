@@ -66,18 +66,18 @@ def summed(text: bytes) -> bytes:
 
 def checked(line: bytes) -> bytes | None:
     """The text of a line without its checksum; None where that is wrong, or missing."""
-    text, star, said = line.partition(b"*")
-    said = said.strip()
-    if not star or not said.isdigit() or len(said) > 3 or int(said) != _sum(text):
+    text, star, digits = line.partition(b"*")
+    digits = digits.strip()
+    if not star or not digits.isdigit() or len(digits) > 3 or int(digits) != _sum(text):
         return None
     return text.strip()
 
 
 def _sum(text: bytes) -> int:
-    found = 0
-    for each in text:
-        found ^= each
-    return found
+    checksum = 0
+    for byte in text:
+        checksum ^= byte
+    return checksum
 
 
 def answer_time(text: bytes, answer: bytes, baud: int | None) -> float:
@@ -90,15 +90,15 @@ def answer_time(text: bytes, answer: bytes, baud: int | None) -> float:
 def on_lines(frames: Iterable[CanFrame], baud: int | None) -> float:
     """Time that questions and answers of an exchange are reckoned to take, s: of the drive that takes longer, both
     having a line of their own."""
-    each: dict[int, float] = {}
+    time_of: dict[int, float] = {}
     for frame in frames:
         asks = frame.data.startswith((FEEDBACK, PROPERTY))
         if baud is None:
             time = USB_ANSWER if asks else 0.0
         else:
             time = BITS * (len(summed(frame.data)) + 1) / baud + UART_TURN * asks
-        each[frame.id] = each.get(frame.id, 0.0) + time
-    return max(each.values())
+        time_of[frame.id] = time_of.get(frame.id, 0.0) + time
+    return max(time_of.values())
 
 
 class _Questions:
@@ -129,11 +129,11 @@ class _Questions:
         if not self.lost:
             return self.waiting.popleft()
         other = PROPERTY if FEEDBACK in self.lost else FEEDBACK
-        found = next((each for each in self.waiting if each.startswith(other)), None)
-        if found is None:
+        question = next((waiting for waiting in self.waiting if waiting.startswith(other)), None)
+        if question is None:
             return ANY[other]
-        self.waiting.remove(found)
-        return found
+        self.waiting.remove(question)
+        return question
 
     def fits(self, answer: bytes) -> bool:
         """True where a text can be the answer to the last question."""
@@ -245,15 +245,15 @@ class OdriveLines:
                 drive.heard = line.strip()[:LONGEST_LINE] or drive.heard
                 continue
             assert drive.sent is not None
-            asked, now = drive.at, max(frame.time, drive.at)
-            took, text = now - asked, drive.sent + b"\n" + answer
+            sent_at, now = drive.at, max(frame.time, drive.at)
+            took, text = now - sent_at, drive.sent + b"\n" + answer
             drive.sent = None
             drive.lost.clear()
             self._fastest[frame.id] = min(took, self._fastest.get(frame.id, took))
             if not text.startswith(FEEDBACK):
                 self._frames.append(CanFrame(frame.id, text, time=now))
             elif took <= self.late:
-                self._frames.append(CanFrame(frame.id, text, time=asked + 0.5 * took, time_unsure=0.5 * took))
-            elif not any(each.startswith(FEEDBACK) for each in drive.waiting):
+                self._frames.append(CanFrame(frame.id, text, time=sent_at + 0.5 * took, time_unsure=0.5 * took))
+            elif not any(question.startswith(FEEDBACK) for question in drive.waiting):
                 drive.waiting.append(text.partition(b"\n")[0])  # asked for again
             self._ask(frame.id, self.now())

@@ -153,9 +153,9 @@ class RobstrideDrive(CanDrive):
         """The ranges of its fields of rate (rad/s) and torque (N m). Raises Problem E404."""
         model = self.entry.model
         if model not in MODELS:
-            said = f"there is no model `{model}`" if model else "the bench file does not say which model it is"
+            why = f"there is no model `{model}`" if model else "the bench file does not say which model it is"
             helps = (*did_you_mean(model, MODELS), f'`model = "RS02"` in `[{self.entry.role}]`: {", ".join(MODELS)}')
-            raise self.wrong(f"{said}, by which its frames mean other numbers", helps)
+            raise self.wrong(f"{why}, by which its frames mean other numbers", helps)
         return MODELS[model]
 
     def _firmware(self, talk: Talk) -> str:
@@ -168,7 +168,7 @@ class RobstrideDrive(CanDrive):
                     raise talk.silent(self, "what its firmware is")
                 break
             if self._version == before:
-                return ".".join(str(each) for each in self._version or b"")
+                return ".".join(str(number) for number in self._version or b"")
             before = self._version
         raise self.other("it does not say its firmware's version", "put its maker's newest firmware on it")
 
@@ -210,10 +210,10 @@ class RobstrideDrive(CanDrive):
         """Set a parameter, and see that it is set. Raises Problem E404 where it is not."""
         for _ in range(ASKS):
             talk.send([self._writes(number, value)])
-            if (found := self._read(talk, number)) == value:
+            if (value_read := self._read(talk, number)) == value:
                 return
         helps = "put its maker's newest firmware on it"
-        raise self.wrong(f"it does not take {value} for its parameter 0x{number:X}, which is {found:g}", helps)
+        raise self.wrong(f"it does not take {value} for its parameter 0x{number:X}, which is {value_read:g}", helps)
 
     # Frames
 
@@ -244,8 +244,8 @@ class RobstrideDrive(CanDrive):
         return frame.extended and frame.id & 0xFF == self.node and frame.id >> 24 in (TELL, ENABLE, STOP, WRITE)
 
     def is_command(self, frame: CanFrame) -> bool:
-        told = frame.extended and not frame.fd and not frame.remote and frame.id & 0xFF == self.node
-        return told and frame.id >> 24 not in (IDENTITY, FEEDBACK, READ, FAULT)
+        for_this = frame.extended and not frame.fd and not frame.remote and frame.id & 0xFF == self.node
+        return for_this and frame.id >> 24 not in (IDENTITY, FEEDBACK, READ, FAULT)
 
     def idle(self) -> Sequence[CanFrame]:
         """Send no torque while the drive still takes it, so that none is left when it is enabled."""
@@ -311,12 +311,12 @@ class RobstrideDrive(CanDrive):
 
     def _state(self, mode: int, faults: int, time: float) -> None:
         self.stated = time
-        said = [words for bit, words in FAULTS.items() if self._faults & bit]
-        said += [words for bit, words in FEEDBACK_FAULTS.items() if faults & bit and words not in said]
+        faults_named = [words for bit, words in FAULTS.items() if self._faults & bit]
+        faults_named += [words for bit, words in FEEDBACK_FAULTS.items() if faults & bit and words not in faults_named]
         if self._faults & ~sum(FAULTS):
-            said.append(f"fault 0x{self._faults:X}")
-        self.starved = not said and self._ran and mode != RUNNING
-        self.errors = STARVED if self.starved else ", ".join(said)
+            faults_named.append(f"fault 0x{self._faults:X}")
+        self.starved = not faults_named and self._ran and mode != RUNNING
+        self.errors = STARVED if self.starved else ", ".join(faults_named)
         if mode == RUNNING:  # whatever its faults
             self.state, self._ran = DriveState.DRIVING, self._wanted
         else:

@@ -40,18 +40,18 @@ class Side:
         d, f = self.drive, self.facts
         counts = ((f.torque_count, "N*m"), (f.angle_count, "rad"), (f.rate_count, "rad/s"))
         steps = ", ".join(f"{count:.3g} {unit}" for count, unit in counts if count)
-        said = [
+        parts = [
             f"{d.where}, {d.dialect} {f.firmware}, {f.hardware}",
             f"in steps of {steps}" if steps else "in floats",
             *(["counts the other way round"] if d.sense < 0 else []),
         ]
-        return "; ".join(said if d.supply is None else [*said, f"supply {d.supply:.4g} V"])
+        return "; ".join(parts if d.supply is None else [*parts, f"supply {d.supply:.4g} V"])
 
-    def begin(self, reading: DriveReading, at: float) -> None:
+    def begin(self, reading: DriveReading, time: float) -> None:
         """Count the angle from its present value, by an answer, at a time of the line's clock, s."""
         self._told, self.angle, self.rate, self.time = (
             reading.angle,
-            -reading.rate * (at - reading.time),
+            -reading.rate * (time - reading.time),
             reading.rate,
             reading.time,
         )
@@ -96,16 +96,16 @@ def agree(sides: tuple[Side, Side], readings: tuple[DriveReading, DriveReading],
     """True where two drives on one shaft say the same of it, at once, and go on from before: their angles and rates
     differ by no more than the largest acceleration (rad/s^2) makes of the time between their samples, and by the steps
     in which they are told."""
-    (one, other), (first, second) = sides, readings
+    (first_side, other), (first, second) = sides, readings
     apart, unsure = abs(first.time - second.time), first.time_unsure + second.time_unsure
-    if apart > APART + unsure or not (one.goes_on(first, acceleration) and other.goes_on(second, acceleration)):
+    if apart > APART + unsure or not (first_side.goes_on(first, acceleration) and other.goes_on(second, acceleration)):
         return False
-    steps = one.unsure(first), other.unsure(second)
+    steps = first_side.unsure(first), other.unsure(second)
     skew = apart + SKEW + unsure
     rate_most = acceleration * skew + steps[0][1] + steps[1][1]
-    angle_steps = steps[0][0] + steps[1][0] + one.zero_unsure + other.zero_unsure
+    angle_steps = steps[0][0] + steps[1][0] + first_side.zero_unsure + other.zero_unsure
     angle_most = 2.0 * ((abs(first.rate) + rate_most) * skew + angle_steps)
-    differ = one.angle_of(first) - other.angle_of(second)
-    if turns := max(one.facts.angle_range, other.facts.angle_range):
+    differ = first_side.angle_of(first) - other.angle_of(second)
+    if turns := max(first_side.facts.angle_range, other.facts.angle_range):
         differ = math.remainder(differ, turns)  # after a pause nobody knows how often either went round
     return abs(differ) <= angle_most and abs(first.rate - second.rate) <= rate_most

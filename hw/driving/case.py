@@ -64,7 +64,7 @@ def pace_of(experiment: Experiment) -> Pace:
 def run(request: CaseRequest) -> loop.LoopEnd:
     """Drive the case. Raises Problem."""
     experiment = plan_file.loads(request.plan).experiments[0]
-    of = pace_of(experiment)
+    bed_pace = pace_of(experiment)
     stop_requested = process.listening()
     joints = substituted(prepare(experiment, wire=True))
     check(experiment, request.row, request.lock_step)
@@ -73,28 +73,28 @@ def run(request: CaseRequest) -> loop.LoopEnd:
     try:
         for joint in joints:
             port = Port(request.ports[joint], request.baud, request.lock_step, request.transcripts.get(joint))
-            beds.append(opened(port, experiment, joint, request.row, of.period))
+            beds.append(opened(port, experiment, joint, request.row, bed_pace.period))
             abouts.append(_greeted(beds[-1], joint, experiment, request))
             _check_drive(abouts[-1], experiment, joint)
         lock_step = request.lock_step
         _check_time(abouts, lock_step)
-        _check_ticks(abouts, of, lock_step)
-        prepared = prepare(experiment, wire=True, late=of.late(lock_step), lanes=LANES)
-        driven = CaseKernel(prepared, request.row, of.repeats)
+        _check_ticks(abouts, bed_pace, lock_step)
+        prepared = prepare(experiment, wire=True, late=bed_pace.late(lock_step), lanes=LANES)
+        driven = CaseKernel(prepared, request.row, bed_pace.repeats)
         if not lock_step:
             process.precedence()
         driven(0, [0.0] * len(beds), [[0.0, 0.0] for _ in beds])  # code and memory are there when time begins to count
         if not lock_step:  # a motor that is simulated in lock-step does not get hot
             _rest(beds, request.rest, stop_requested)
         for bed in beds:
-            bed.patience = of.patience(lock_step)
+            bed.patience = bed_pace.patience(lock_step)
         if stop_requested():  # nothing was begun
             return loop.LoopEnd(0, "the host was asked to stop")
         head = {
             **request.head,
             "row": request.row,
-            "servo_hz": of.servo_hz,
-            "repeats": of.repeats,
+            "servo_hz": bed_pace.servo_hz,
+            "repeats": bed_pace.repeats,
             "lock_step": lock_step,
             "joints": list(joints),
             "tick_hz": abouts[0].tick_hz,
@@ -103,7 +103,7 @@ def run(request: CaseRequest) -> loop.LoopEnd:
         with recording(Path(request.records), head, (driven.exchanges + 1) * len(beds)) as put:
             process.say(began=True)
             ended = loop.drive(
-                beds, driven, of, driven.exchanges, put, lock_step=lock_step, stop_requested=stop_requested
+                beds, driven, bed_pace, driven.exchanges, put, lock_step=lock_step, stop_requested=stop_requested
             )
         for joint, bed in zip(joints, beds, strict=True):
             for line in bed.account():
@@ -142,10 +142,10 @@ def _greeted(bed: BedDriver, joint: str, experiment: Experiment, request: CaseRe
 def _check_drive(about: About, experiment: Experiment, joint: str) -> None:
     """Raise Problem E438 where a bed's drive is commanded another quantity than in the deck's bed model."""
     use = next(substitution for substitution in experiment.structure.substitutions if substitution.joint == joint)
-    told = models.find("bed", use.bed, use.place).drive
-    if told != about.drive:
-        message = f"bed `{about.name}` takes a {about.drive}, and `{use.bed}` of joint `{joint}` sends it a {told}"
-        fit = [name for name, each in models.available("bed").items() if each.drive == about.drive]
+    commanded = models.find("bed", use.bed, use.place).drive
+    if commanded != about.drive:
+        message = f"bed `{about.name}` takes a {about.drive}, and `{use.bed}` of joint `{joint}` sends it a {commanded}"
+        fit = [name for name, model in models.available("bed").items() if model.drive == about.drive]
         helps = f"bed models that send a {about.drive}: {', '.join(fit) or 'none'}"
         raise Problem(error("E438", message, help=helps))
 
@@ -159,11 +159,11 @@ def _check_time(abouts: Sequence[About], lock_step: bool) -> None:
             raise Problem(error("E414", message, help=helps))
 
 
-def _check_ticks(abouts: Sequence[About], of: Pace, lock_step: bool) -> None:
+def _check_ticks(abouts: Sequence[About], bed_pace: Pace, lock_step: bool) -> None:
     """Raise Problem E405 where a bed reads its sensors less often than they are requested. Clocks may be off by 1 %."""
     for about in abouts:
-        if not lock_step and about.tick_hz < 0.99 * of.hz:
-            message = f"bed `{about.name}` ticks at {about.tick_hz:g} Hz, and would be spoken to at {of.hz:g} Hz"
+        if not lock_step and about.tick_hz < 0.99 * bed_pace.hz:
+            message = f"bed `{about.name}` ticks at {about.tick_hz:g} Hz, and would be spoken to at {bed_pace.hz:g} Hz"
             helps = "what it answers would be older than the law believes: a lower rate of the servo, or a faster bed"
             raise Problem(error("E405", message, help=helps))
 

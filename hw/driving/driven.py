@@ -31,17 +31,21 @@ class CaseKernel:
         self.prepared, self.row = prepared, row
         program, schedule = prepared.program, prepared.experiment.structure.schedule
         self.joints = substituted(prepared)
-        given = np.zeros((1, len(program.inputs)))
+        input_values = np.zeros((1, len(program.inputs)))
         own = inputs(prepared.experiment, np.array([row]))
-        given[:, : own.shape[1]] = own
-        self.block: Block = prepared.kernel.block(given)
+        input_values[:, : own.shape[1]] = own
+        self.block: Block = prepared.kernel.block(input_values)
         self.divisor = divisor(prepared.experiment)
         self.ticks, self.repeats = schedule.ticks, repeats
         self.last = schedule.ticks // self.divisor
         """The servos' last tick."""
         self._rates = [self.block.inputs[program.inputs.index(f"wire:{joint}.rate")] for joint in self.joints]
         self._outputs = [  # the drive's command, and the load's current
-            [self.block.outputs[at] for at, name in enumerate(program.outputs) if name.startswith(f"wire:{joint}.")]
+            [
+                self.block.outputs[index]
+                for index, name in enumerate(program.outputs)
+                if name.startswith(f"wire:{joint}.")
+            ]
             for joint in self.joints
         ]
 
@@ -57,8 +61,8 @@ class CaseKernel:
             return
         for lane, rate in zip(self._rates, rates, strict=True):
             lane[:] = rate
-        at = tick * self.divisor
-        self.block.step(max(0, at - self.divisor + 1), at)
+        step = tick * self.divisor
+        self.block.step(max(0, step - self.divisor + 1), step)
         for b, (voltage, current) in enumerate(self._outputs):
             commands[b][0], commands[b][1] = float(voltage[0]), float(current[0])
 
@@ -82,10 +86,10 @@ class CaseKernel:
         return rows, self.block.outputs[:, 0].copy(), done
 
     def _recorded(self, rows: np.ndarray, record: int, first: int, last: int) -> int:
-        made = self.block.recorded(first, last)[0]
+        recorded = self.block.recorded(first, last)[0]
         if len(rows):
-            at = (first + record - 1) // record
-            rows[at : at + len(made)] = made
+            start = (first + record - 1) // record
+            rows[start : start + len(recorded)] = recorded
         return last
 
 

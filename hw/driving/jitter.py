@@ -70,13 +70,13 @@ def measure(request: JitterRequest) -> JitterResult:
             message = f"bed `{about.name}` has no time of its own, so that nothing can be late"
             raise Problem(error("E426", message, help="a line, or `--port firmware`, has one; `met bed run` drives it"))
         process.precedence()
-        of = Pace(request.hz, 1)
-        bed.patience = of.patience(False)
+        pace = Pace(request.hz, 1)
+        bed.patience = pace.patience(False)
         begun = time.perf_counter()
         ended = loop.drive(
             [bed] * request.joints,
             _nothing,
-            of,
+            pace,
             math.ceil(request.seconds * request.hz),
             rows.append,
             lock_step=False,

@@ -81,7 +81,9 @@ def drive(
         silent = ended.bed
         return ended
     finally:
-        for _, bed in sorted(enumerate(beds), key=lambda each: each[0] == silent):  # the others need not wait for it
+        for _, bed in sorted(
+            enumerate(beds), key=lambda numbered_bed: numbered_bed[0] == silent
+        ):  # the others need not wait for it
             bed.stop()
 
 

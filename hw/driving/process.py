@@ -68,8 +68,8 @@ def warnings(bed: BedDriver) -> None:
     """Report conditions that may make exchanges with a bed late, or differences of a bench from the deck."""
     for warning in bed.warnings:
         place = warning.at.place if warning.at else None
-        said = warning.message if place is None else f"{place.file}:{place.line}: {warning.message}"
-        say(said=said, help=list(warning.help))
+        text = warning.message if place is None else f"{place.file}:{place.line}: {warning.message}"
+        say(said=text, help=list(warning.help))
 
 
 def unseen(bed: BedDriver) -> str:
@@ -86,11 +86,11 @@ def precedence() -> None:
 def answer(question: Callable[..., Question], do: Callable[[Question], Mapping[str, Any]]) -> None:
     """The whole of the process: read the question, carry it out, and print the result, or the error."""
     try:
-        found = do(question(**json.loads(sys.stdin.readline())))
+        result = do(question(**json.loads(sys.stdin.readline())))
     except Problem as problem:
         say(wrong=json.loads(to_json(problem.diagnostics)))
         sys.exit(1)
-    say(**found)
+    say(**result)
 
 
 # Who started it
@@ -145,10 +145,15 @@ def talk(
                 if "wrong" in line and interrupted is not None:
                     raise interrupted
                 if "wrong" in line:
-                    found = line["wrong"]["diagnostics"]
-                    raise Problem([error(each["code"], each["message"], help=each["help"]) for each in found])
+                    diagnostics = line["wrong"]["diagnostics"]
+                    raise Problem(
+                        [
+                            error(diagnostic["code"], diagnostic["message"], help=diagnostic["help"])
+                            for diagnostic in diagnostics
+                        ]
+                    )
                 if "said" in line:
-                    hear(" ".join([line["said"], *(f"({each})" for each in line.get("help", ()))]))
+                    hear(" ".join([line["said"], *(f"({remedy})" for remedy in line.get("help", ()))]))
                 came = came or until in line
                 yield line
     except BaseException:  # also of whoever reads the lines

@@ -100,14 +100,14 @@ def peaks(limits: Limits, sheet: Mapping[str, float], request: MovesRequest) -> 
 def run(request: MovesRequest) -> MovesResult:
     """Lead the bed through the moves. Raises Problem."""
     experiment = plan_file.loads(request.plan).experiments[0]
-    of = pace_of(experiment)
+    pace = pace_of(experiment)
     stop_requested = process.listening()
     port = Port(request.port, request.baud, request.lock_step, request.transcript)
-    with opened(port, experiment, request.joint, request.row, of.period) as bed:
+    with opened(port, experiment, request.joint, request.row, pace.period) as bed:
         about = bed.connect()
         process.warnings(bed)
-        if said := process.unseen(bed):
-            process.say(said=said)
+        if notice := process.unseen(bed):
+            process.say(said=notice)
         latch.check(bed, about, request.port)
         if about.drive != "voltage":
             message = f"bed `{about.name}` takes a {about.drive}, and the moves that identify a motor are voltages"
@@ -122,14 +122,14 @@ def run(request: MovesRequest) -> MovesResult:
         bed.limit({"voltage": most.voltage + scales.voltage, "current": most.current + scales.current})
         # a change of command is of whole counts too
         slews = [SHARE * slew for slew in (about.limits.voltage_slew, about.limits.current_slew)]
-        guide = MoveGuide(guided(top), most, of.period, (slews[0], slews[1]))
+        guide = MoveGuide(guided(top), most, pace.period, (slews[0], slews[1]))
         process.say(about=process.about_as_json(about), peaks={**asdict(most), "top": top})
         if not lock_step:
             process.precedence()
-        bed.patience = of.patience(lock_step)
+        bed.patience = pace.patience(lock_step)
         head = {
             "joint": request.joint,
-            "hz": of.hz,
+            "hz": pace.hz,
             "lock_step": lock_step,
             "tick_hz": about.tick_hz,
             "bed": about.name,
@@ -139,14 +139,14 @@ def run(request: MovesRequest) -> MovesResult:
             ended = loop.drive(
                 [bed],
                 guide,
-                of,
+                pace,
                 guide.exchanges,
                 put,
                 lock_step=lock_step,
                 stop_requested=lambda: stop_requested() or guide.done or guide.stuck,
             )
         refusals.check_stopped([bed], [about], "" if guide.done else ended.why)
-        seconds = ended.exchanges * of.period
+        seconds = ended.exchanges * pace.period
         if guide.stuck:
             when = f"after move {len(guide.began)}" if guide.began else "before the first move"
             message = f"bed `{about.name}` does not come to rest {when}, at 0 V and 0 A"

@@ -95,9 +95,9 @@ def fitted(series: Series, groups: Sequence[int], start: Mapping[str, float]) ->
         settled, chance = True, np.random.default_rng(0)
         places = []
         for part in parts:
-            one = search.over(part, chance.uniform(-AWAY, AWAY, len(PARAMETERS)), [*sought, *RIPPLE])
-            settled = one.settle([*sought, *RIPPLE]) and settled
-            places.append(one.place)
+            local = search.over(part, chance.uniform(-AWAY, AWAY, len(PARAMETERS)), [*sought, *RIPPLE])
+            settled = local.settle([*sought, *RIPPLE]) and settled
+            places.append(local.place)
         factor = stdtrit(len(parts) - 1, 0.975) / math.sqrt(len(parts))
         half = dict(zip(PARAMETERS, (factor * np.std(places, axis=0, ddof=1)).tolist(), strict=True))
         unseen = [name for name in sought if not half[name] < VAGUE]
@@ -162,11 +162,11 @@ class _Search:
 
     def over(self, series: Series, away: np.ndarray, names: Sequence[str]) -> _Search:
         """The same search over another series, from a start `away` from this one in these parameters."""
-        found = copy.copy(self)
+        search = copy.copy(self)
         free = [PARAMETERS.index(name) for name in names]
-        found._series, found.place = series, self.place.copy()
-        found.place[free] += away[free]
-        return found
+        search._series, search.place = series, self.place.copy()
+        search.place[free] += away[free]
+        return search
 
     def residual(self) -> np.ndarray:
         """Simulated less measured rate at each step, rad/s."""
@@ -190,16 +190,18 @@ class _Search:
             return
         read = simulated(self._series, self._sets(self.place[None, :]))[:, :, 0]
         measured = (self._series.rate, self._series.drive_current)
-        spreads = [float(np.std(_off(one[:, None], each))) for one, each in zip(read, measured, strict=True)]
+        spreads = [
+            float(np.std(_off(channel[:, None], column))) for channel, column in zip(read, measured, strict=True)
+        ]
         self._weights = [1.0 / max(spread, 1e-9) for spread in spreads]
 
     def _residuals(self, places: np.ndarray) -> np.ndarray:
         """Weighted residuals [channel and step, place]."""
         read = simulated(self._series, self._sets(places))
-        found = [self._weights[0] * _off(read[0], self._series.rate)]
+        residuals = [self._weights[0] * _off(read[0], self._series.rate)]
         if self._series.drive_current is not None:
-            found.append(self._weights[1] * _off(read[1], self._series.drive_current))
-        return np.concatenate(found)
+            residuals.append(self._weights[1] * _off(read[1], self._series.drive_current))
+        return np.concatenate(residuals)
 
     def _linear(self) -> tuple[np.ndarray, np.ndarray]:
         """The residuals at this place, and their slopes by each free parameter."""
@@ -209,8 +211,8 @@ class _Search:
         for n, parameter in enumerate(self._free):
             places[1 + 2 * n, parameter] += STEP
             places[2 + 2 * n, parameter] -= STEP
-        found = self._residuals(places)
-        return found[:, 0], (found[:, 1::2] - found[:, 2::2]) / (2.0 * STEP)
+        residuals = self._residuals(places)
+        return residuals[:, 0], (residuals[:, 1::2] - residuals[:, 2::2]) / (2.0 * STEP)
 
 
 def _off(read: np.ndarray, measured: np.ndarray) -> np.ndarray:

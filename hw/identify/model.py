@@ -45,7 +45,7 @@ def _kernel(count: int) -> Kernel:
         p = {name: tape.input(name) for name in PARAMETERS}
         h = tape.input("time") / count
         decay = damping(p["kt"], p["resistance"], p["f_v"]) / p["inertia"]
-        of = butterworth.over(p["f_cut"], h)
+        coefficients = butterworth.over(p["f_cut"], h)
         load, voltage = p["kt_load"] * tape.input("current"), tape.input("voltage")
         w, angle, x = tape.read("rate"), tape.input("angle"), (tape.read("filtered"), tape.read("slope"))
         for _ in range(count):
@@ -57,7 +57,7 @@ def _kernel(count: int) -> Kernel:
             )
             smooth = torque(p["kt"], p["resistance"], p["tau_max"], voltage, w) + load - p["f_v"] * w + ripple
             after = shaft.slid(w, smooth, p["f_c"], inertia=p["inertia"], decay=decay, time=h)
-            x = butterworth.along_line(of, x, w, after)
+            x = butterworth.along_line(coefficients, x, w, after)
             angle = angle + 0.5 * h * (w + after)
             w = after
         for name, value in (("rate", w), ("filtered", x[0]), ("slope", x[1])):
@@ -86,10 +86,10 @@ def simulated(series: Series, sets: np.ndarray) -> np.ndarray:
     sets  parameters [set, parameter] in the order of `PARAMETERS`, at most `LANES` sets
     """
     count = max(1, math.ceil(float(np.median(series.time)) / SUBSTEP - 1e-9))
-    given = np.zeros((LANES, len(_GIVEN) + len(PARAMETERS)))
-    given[:, len(_GIVEN) :] = sets[0]
-    given[: len(sets), len(_GIVEN) :] = sets
-    block = _kernel(count).block(given)
+    block_inputs = np.zeros((LANES, len(_GIVEN) + len(PARAMETERS)))
+    block_inputs[:, len(_GIVEN) :] = sets[0]
+    block_inputs[: len(sets), len(_GIVEN) :] = sets
+    block = _kernel(count).block(block_inputs)
     steps = np.ascontiguousarray(np.column_stack([series.voltage, series.current, series.time, series.angle]))[
         :, :, None
     ]

@@ -58,11 +58,11 @@ def groups(moves: Sequence[Move]) -> list[int]:
     """The group of each move. Each of the `GROUPS` has moves of every kind, so that all parameters follow from one
     group."""
     seen: dict[str, int] = {}
-    found = []
+    numbers = []
     for move in moves:
-        found.append(seen.get(move.name, 0) % GROUPS)
+        numbers.append(seen.get(move.name, 0) % GROUPS)
         seen[move.name] = seen.get(move.name, 0) + 1
-    return found
+    return numbers
 
 
 def _levels(every: float, *levels: tuple[float, float]) -> Callable[[], Profile]:
@@ -77,12 +77,12 @@ def _steps() -> list[Move]:
 
 
 def _loaded() -> list[Move]:
-    found = []
+    moves = []
     for volts, amperes in [(0.3, 0.5), (0.5, -0.6), (0.15, 0.35), (0.4, 0.25)]:
         for sign in (1.0, -1.0):
             v, a = sign * volts, sign * amperes
-            found.append(Move("loaded", 0.8, _levels(0.2, (v, 0.0), (v, a), (v, -a), (v, 0.5 * a))))
-    return found
+            moves.append(Move("loaded", 0.8, _levels(0.2, (v, 0.0), (v, a), (v, -a), (v, 0.5 * a))))
+    return moves
 
 
 def _slow() -> list[Move]:
@@ -93,20 +93,20 @@ def _slow() -> list[Move]:
 
         return lambda: profile
 
-    found = []
+    moves = []
     for share in (1.0, -1.0):
-        found += [
+        moves += [
             Move("slow", 1.6, ramps(share * 0.12, 0.0, 1.6)),
             Move("slow", 1.6, ramps(share * 0.25, 0.0, 0.8)),
             Move("slow", 1.6, ramps(0.0, share * 0.6, 1.6)),
             Move("slow", 1.2, ramps(0.0, share * 0.9, 0.6)),
         ]
-    return found
+    return moves
 
 
 def _limited(top: float) -> list[Move]:
     def relay(sign: float, load: float, low: float, high: float) -> Callable[[], Profile]:
-        def made() -> Profile:
+        def profile() -> Profile:
             up = True
 
             def profile(t: float, w: float) -> tuple[float, float]:
@@ -116,7 +116,7 @@ def _limited(top: float) -> list[Move]:
 
             return profile
 
-        return made
+        return profile
 
     return [
         Move("limited", 0.8, relay(sign, load, low * top, high * top))

@@ -37,9 +37,9 @@ class Series:
 
     def of(self, moves: Sequence[int]) -> Series:
         """The steps of these moves alone, in this order, the moves numbered anew."""
-        at = [np.flatnonzero(self.move == move) for move in moves]
-        take = np.concatenate(at)
-        numbers = np.repeat(np.arange(len(at)), [len(each) for each in at])
+        steps_of = [np.flatnonzero(self.move == move) for move in moves]
+        take = np.concatenate(steps_of)
+        numbers = np.repeat(np.arange(len(steps_of)), [len(steps) for steps in steps_of])
         amperes = None if self.drive_current is None else self.drive_current[take]
         return Series(
             self.time[take], self.voltage[take], self.current[take], self.angle[take], self.rate[take], amperes, numbers

@@ -218,8 +218,10 @@ def _is_ours(path: str) -> bool:
 def _ports() -> str:
     from serial.tools.list_ports import comports
 
-    found = [port.device for port in comports()]
-    return f"serial lines here: {', '.join(found)}" if found else "there is no serial line on this machine: plug it in"
+    devices = [port.device for port in comports()]
+    return (
+        f"serial lines here: {', '.join(devices)}" if devices else "there is no serial line on this machine: plug it in"
+    )
 
 
 def latency(url: str) -> tuple[Diagnostic, ...]:
@@ -241,18 +243,18 @@ def _why(reason: Exception) -> str:
     number = _number(reason)
     if number and number > 0:
         return os.strerror(number).lower()
-    for each in _chain(reason):
-        if isinstance(each, socket.gaierror) and each.strerror:
-            return each.strerror.lower()
-        if isinstance(each, ValueError):
-            reason = each
+    for exception in _chain(reason):
+        if isinstance(exception, socket.gaierror) and exception.strerror:
+            return exception.strerror.lower()
+        if isinstance(exception, ValueError):
+            reason = exception
     return " ".join(str(reason).split())
 
 
 def _number(reason: BaseException | None) -> int | None:
     """The system's error number, of an error that pyserial raised or of its cause; None where there is none."""
-    for each in _chain(reason):
-        number = each.args[0] if isinstance(each, termios.error) else getattr(each, "errno", None)
+    for exception in _chain(reason):
+        number = exception.args[0] if isinstance(exception, termios.error) else getattr(exception, "errno", None)
         if number:
             return int(number)
     return None

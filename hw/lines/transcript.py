@@ -58,8 +58,8 @@ class TranscriptWriter:
         self._put(MAGIC + self._record(HEADER, 0.0, json.dumps(header).encode()))
 
     def add(self, kind: int, time: float, data: bytes) -> None:
-        for at in range(0, len(data) or 1, _MOST):
-            self._put(self._record(kind, time, data[at : at + _MOST]))
+        for start in range(0, len(data) or 1, _MOST):
+            self._put(self._record(kind, time, data[start : start + _MOST]))
 
     def _record(self, kind: int, time: float, data: bytes) -> bytes:
         body = _HEAD.pack(kind, time, len(data)) + data
@@ -151,17 +151,17 @@ def read(path: str | Path) -> Transcript:
         helps = "give the file that a run with a bed wrote"
         raise Problem(error("E409", f"{path} cannot be read: {reason.strerror}", help=helps)) from None
     records = list[TranscriptRecord]()
-    at, crc = len(MAGIC), 0
-    while len(data) - at >= _HEAD.size + 4:
-        kind, time, length = _HEAD.unpack_from(data, at)
-        end = at + _HEAD.size + length
-        crc = zlib.crc32(data[at:end], crc)
+    position, crc = len(MAGIC), 0
+    while len(data) - position >= _HEAD.size + 4:
+        kind, time, length = _HEAD.unpack_from(data, position)
+        end = position + _HEAD.size + length
+        crc = zlib.crc32(data[position:end], crc)
         if end + 4 > len(data) or crc != int.from_bytes(data[end : end + 4], "little"):
             break
         if kind > LOST or not math.isfinite(time):
             break
-        records.append(TranscriptRecord(kind, time, data[at + _HEAD.size : end]))
-        at = end + 4
+        records.append(TranscriptRecord(kind, time, data[position + _HEAD.size : end]))
+        position = end + 4
     try:
         if not data.startswith(MAGIC) or not records or records[0].kind != HEADER:
             raise ValueError
@@ -171,4 +171,4 @@ def read(path: str | Path) -> Transcript:
     except ValueError:
         helps = "give the file that a run with a bed wrote"
         raise Problem(error("E409", f"{path} is no transcript of a bed", help=helps)) from None
-    return Transcript(header, tuple(records[1:]), len(data) - at)
+    return Transcript(header, tuple(records[1:]), len(data) - position)

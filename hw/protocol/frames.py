@@ -22,13 +22,13 @@ def unframed(frame: bytes) -> bytes | None:
     """The payload of a frame without its zero; None if it is not one."""
     if len(frame) >= LONGEST or b"\0" in frame:
         return None
-    runs, at = [], 0
-    while at < len(frame):
-        end = at + frame[at]
-        runs.append(frame[at + 1 : end])
-        at = end
+    runs, position = [], 0
+    while position < len(frame):
+        end = position + frame[position]
+        runs.append(frame[position + 1 : end])
+        position = end
     whole = b"\0".join(runs)
-    if at != len(frame) or not 5 <= len(whole) <= LONGEST_PAYLOAD + 2:
+    if position != len(frame) or not 5 <= len(whole) <= LONGEST_PAYLOAD + 2:
         return None
     payload = whole[:-2]
     return payload if crc_hqx(payload, 0xFFFF) == int.from_bytes(whole[-2:], "little") else None

@@ -117,12 +117,12 @@ def read(path: Path) -> Records:
     data = read_regular(path)
     if not data.startswith(MAGIC[: len(data)]):
         raise UnsoundRecords("holds no records of a bed")
-    at = len(MAGIC) + 8
-    end = at + int.from_bytes(data[len(MAGIC) : at], "little")
-    if len(data) < max(at, end):
+    head_start = len(MAGIC) + 8
+    end = head_start + int.from_bytes(data[len(MAGIC) : head_start], "little")
+    if len(data) < max(head_start, end):
         return Records({}, np.empty(0, LAYOUT), len(data))
     try:
-        head = parse_json(data[at:end])
+        head = parse_json(data[head_start:end])
         if not isinstance(head, dict):
             raise ValueError
     except ValueError as reason:

@@ -38,17 +38,17 @@ class Ring:
             self._taken = _COUNT.unpack_from(self._memory, _HEAD)[0]
             if self._put - self._taken >= self.room:
                 raise RingFull
-        at = 2 * _HEAD + self._put % self.room * SIZE
-        self._memory[at : at + SIZE] = record
+        start = 2 * _HEAD + self._put % self.room * SIZE
+        self._memory[start : start + SIZE] = record
         self._put += 1
         _COUNT.pack_into(self._memory, 0, self._put)
 
     def take(self) -> Iterator[bytes]:
         """Take the present records, each once. A record counts as taken when the next is asked for."""
-        there = _COUNT.unpack_from(self._memory, 0)[0]
-        while self._taken < there:
-            at = 2 * _HEAD + self._taken % self.room * SIZE
-            record = self._memory[at : at + SIZE]
+        put_count = _COUNT.unpack_from(self._memory, 0)[0]
+        while self._taken < put_count:
+            start = 2 * _HEAD + self._taken % self.room * SIZE
+            record = self._memory[start : start + SIZE]
             if zlib.crc32(record[:-4]) != int.from_bytes(record[-4:], "little"):
                 return  # it is not completely visible from here yet
             yield record
