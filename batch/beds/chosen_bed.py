@@ -87,5 +87,5 @@ def split(word: str) -> tuple[str, str]:
 
 def on_none(word: str, joint: str, joints: Sequence[str]) -> Problem:
     """The error for a port of a joint that is not on a bed."""
-    on = ", ".join(f"`{joint_}`" for joint_ in joints)
+    on = ", ".join(f"`{joint}`" for joint in joints)
     return Problem(error("E418", f"port `{word}`: joint `{joint}` is on no bed here", help=f"on a bed here: {on}"))

@@ -43,7 +43,7 @@ def filter_range(
     def tightest(variant: Experiment) -> Margin:
         cases = margins(variant, rows, span=ratio if alone else None, reach=margin)
         return min(
-            (margin_ for case in cases for margin_ in case if margin_.joint == joint), key=lambda margin_: margin_.room
+            (margin for case in cases for margin in case if margin.joint == joint), key=lambda margin: margin.room
         )
 
     own = tightest(experiment)

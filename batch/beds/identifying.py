@@ -297,7 +297,7 @@ def included(
 
     head = re.sub(r"\W", "_", joint)
     [use] = (substitution for substitution in experiment.structure.substitutions if substitution.joint == joint)
-    [servo] = (servo_ for servo_ in experiment.structure.servos if servo_.joint == joint)
+    [servo] = (servo for servo in experiment.structure.servos if servo.joint == joint)
     bed = [*(f"{name} = {head}_{name}" for name in UNITS), *_believed(experiment, use)]
     scale = _scale_of(experiment, joint)
     times = {name: "" if (by := scale.of(UNITS[name])) == 1.0 else f" * {by:.12g}" for name in OF_SERVO}

@@ -45,7 +45,7 @@ def ports_of(words: Sequence[str], experiments: Sequence[Experiment]) -> dict[st
         if not joint and len(joints) == 1:
             joint = joints[0]
         if not joint:
-            own = " ".join(f"--port {joint_}=..." for joint_ in joints)
+            own = " ".join(f"--port {joint}=..." for joint in joints)
             raise Problem(error("E418", f"port `{word}`: of which joint?", help=f"each has its own: `{own}`"))
         if joint in port_of:
             raise Problem(error("E418", f"joint `{joint}` has two ports", help="leave one of the two out"))

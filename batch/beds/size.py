@@ -53,7 +53,7 @@ def size_and_tell(
     else:
         plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=silent)
     experiments = experiments_named(plan, names or None) if joint is not None else _on_beds(plan, names)
-    texts = {source_.name: source_.text for source_ in plan.sources}
+    texts = {source.name: source.text for source in plan.sources}
     joints = [joint_of(experiment, joint, texts) for experiment in experiments]
     bar, sizes = None if silent else Bar(), []
     for experiment, joint_ in zip(experiments, joints, strict=True):

@@ -105,7 +105,7 @@ def draw(
             figure = histories.Histories(archive, group, wanted.signals, cases, sheet, other_group).draw()
         else:
             theirs = [None] * len(pool.groups) if against is None else beside(archive, pool.groups, against)
-            others = {number: group_ for number, group_ in enumerate(theirs) if group_ is not None}
+            others = {number: group for number, group in enumerate(theirs) if group is not None}
             figure = metrics.draw(archive, pool, wanted.metrics, over, sheet, others, against)
         place.save(figure, target)
     return target

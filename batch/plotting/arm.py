@@ -91,7 +91,7 @@ def _recorded(group: ArchiveGroup, position: int) -> tuple[np.ndarray, dict[str,
 def _scene(archive: ArchiveFile, group: ArchiveGroup, position: int, recorded: Sequence[str]) -> ArmScene:
     plan = archive.plan(as_written=True)
     with reading(group.path):
-        experiment = next(experiment_ for experiment_ in plan.experiments if experiment_.name == group.name)
+        experiment = next(experiment for experiment in plan.experiments if experiment.name == group.name)
         scene = arm_scene(experiment, recorded)
     missing = lacking(scene, recorded)
     if missing:

@@ -39,7 +39,7 @@ def panels(
         ways = {name: course[channel] for name, course in courses.items() if channel in course}
         if ways:
             pair = Pair.of(instants, measured, next(iter(ways.values())))
-            computed = {name: channel_.at(pair.instants) for name, channel_ in ways.items()}
+            computed = {name: channel.at(pair.instants) for name, channel in ways.items()}
             drawable_panels.append(MeasuredPanel(channel, units[channel], pair.instants, pair.measured, computed))
     return drawable_panels
 

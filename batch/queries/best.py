@@ -255,7 +255,7 @@ class Designs:
         """The range of a good design along an axis; None where that has no order, or the designs do not form a grid."""
         if self._grid is None or not self.axes[axis].ordered:
             return None
-        line_index: list[int | slice] = [int(axis_.level[design]) for axis_ in self.axes]
+        line_index: list[int | slice] = [int(axis.level[design]) for axis in self.axes]
         own = int(self.axes[axis].level[design])
         line_index[axis] = slice(None)
         line = self._grid[tuple(line_index)]

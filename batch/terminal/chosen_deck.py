@@ -153,11 +153,11 @@ def fitted_deck(
     for fitted in values:
         remark = fitted.remark
         changed = written(fitted.value, remark)
-        for lost in [remark_ for remark_ in remarks if remark_ not in changed.text]:  # that of a value on the same line
+        for lost in [remark for remark in remarks if remark not in changed.text]:  # that of a value on the same line
             remark = f"{lost}, {fitted.interval}"
             changed = written(fitted.value, remark)
         after = changed.text
-        remarks = [remark_ for remark_ in (*remarks, remark) if remark_ in after]
+        remarks = [remark for remark in (*remarks, remark) if remark in after]
         others |= dict.fromkeys(changed.others)
     return ChosenDeck(target, output is None, before, after, experiment, tuple(others), newline)
 

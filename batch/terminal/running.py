@@ -119,7 +119,7 @@ def run_and_tell(
             return ok
         say("\n".join(result_lines(campaign, result, exported, performed)))
         if result.warned and not quiet:
-            _complain(Problem(result.warned, {source_.name: source_.text for source_ in campaign.plan.sources}), json)
+            _complain(Problem(result.warned, {source.name: source.text for source in campaign.plan.sources}), json)
         for line in compared:
             say(line)
         if missing and target is not None:

@@ -113,8 +113,8 @@ class OdriveDrive(OdriveAxis):
             data = json.loads(read_regular(path, MOST_BYTES))
             entries, named = data["endpoints"], (data["fw_version"], data["hw_version"])
             needed = (*REPORTS, *NEEDED, *NEEDED_FOR_RATES * self.rates)
-            missing = [path_ for path_ in needed if path_ not in entries]
-            numbers = {path_: _endpoint(entries[path_]) for path_ in needed if path_ in entries}
+            missing = [path for path in needed if path not in entries]
+            numbers = {path: _endpoint(entries[path]) for path in needed if path in entries}
         except OSError as reason:
             raise self.wrong(f"{path} cannot be read: {(reason.strerror or str(reason)).lower()}", helps) from None
         except (ValueError, KeyError, TypeError, RecursionError):

@@ -155,7 +155,7 @@ def _demand(pool: Pool, place: int, text: str) -> RequirementCounts:
     met, missed, unknown = (int((outcomes == value).sum()) for value in (1, 0, -1))
     furthest, case = "", None
     for column in pool.metrics():
-        for limit in (limit_ for limit_ in column.limits if limit_.text == text):
+        for limit in (limit for limit in column.limits if limit.text == text):
             values = np.where(np.isnan(column.values), -np.inf if limit.sense == "<" else np.inf, column.values)
             worst = int(values.argmax() if limit.sense == "<" else values.argmin())
             if not np.isnan(column.values[worst]):
