@@ -21,7 +21,7 @@ from ic.text.lexer import NAME, Token
 NO_INDEX = DeckIndex((), ())
 
 
-class Asked:
+class AskedPosition:
     """A position in an open text, with the deck that the text is part of, if it is known.
 
     text   the text as it is now;  file: its name in the deck's places
@@ -56,7 +56,7 @@ class Asked:
         structures = checks.structures.of(deck.deck.uri if deck is not None else uri, texts)
         self.text = structures[self.file]
         self.index = checks.indexes.get(deck.deck.uri, NO_INDEX) if deck is not None else NO_INDEX
-        self.names = NamesInTexts(structures.values(), self.index.made)
+        self.names = NamesInTexts(structures.values(), self.index.names_by_owner)
         lines = lines_of(current)
         line = lines[position.line] if position.line < len(lines) else ""
         self.offset = self.text.offset(position.line, characters(codec, line, position.character))
@@ -77,10 +77,10 @@ class Asked:
 
     def complete(self) -> list[types.CompletionItem]:
         """The words that may stand here."""
-        found = completion.offers(self.text, self.offset, self.names, self.index, self._files_beside())
+        offers = completion.offers(self.text, self.offset, self.names, self.index, self._files_beside())
         return [
-            types.CompletionItem(each.word, kind=each.kind, detail=each.about or None, sort_text=f"{n:04d}")
-            for n, each in enumerate(found)
+            types.CompletionItem(offer.word, kind=offer.kind, detail=offer.about or None, sort_text=f"{n:04d}")
+            for n, offer in enumerate(offers)
         ]
 
     def hover(self) -> types.Hover | None:
@@ -88,11 +88,11 @@ class Asked:
         token = self.token
         if token is None:
             return None
-        found = about(self.text, token, self.names, self.index, self.file)
-        if not found:
+        paragraphs = about(self.text, token, self.names, self.index, self.file)
+        if not paragraphs:
             return None
-        shown = types.MarkupContent(types.MarkupKind.Markdown, markdown(found))
-        return types.Hover(shown, self.location(token).range)
+        contents = types.MarkupContent(types.MarkupKind.Markdown, markdown(paragraphs))
+        return types.Hover(contents, self.location(token).range)
 
     def definitions(self) -> list[types.Location]:
         """Where the word here is defined, or the file that an include names."""
@@ -103,7 +103,7 @@ class Asked:
         token = self.name_here
         if token is None:
             return []
-        return [self.location(each.token) for each in self.names.meant_in(self.text, token)]
+        return [self.location(definition.token) for definition in self.names.meant_in(self.text, token)]
 
     def references(self, also_definitions: bool) -> list[types.Location]:
         """The uses of the word's meaning here: words that may mean the same definition."""
@@ -111,7 +111,7 @@ class Asked:
         if token is None or token.text not in self.names.by_name:
             return []
         meant = self.names.meant_in(self.text, token)
-        defined = {id(each.token) for each in self.names.by_name[token.text]}
+        defined = {id(definition.token) for definition in self.names.by_name[token.text]}
         return [
             self.location(use) for use in self._uses(token.text, meant) if also_definitions or id(use) not in defined
         ]
@@ -119,8 +119,8 @@ class Asked:
     def _uses(self, name: str, meant: list[NameInText]) -> Iterator[Token]:
         texts = {text.source.name: text for text in self.names.texts}
         for use in self.names.uses(name):
-            found = self.names.meant_in(texts[use.source.name], use)
-            if any(each in meant for each in found):
+            definitions = self.names.meant_in(texts[use.source.name], use)
+            if any(definition in meant for definition in definitions):
                 yield use
 
     def _included(self) -> str | None:
@@ -137,8 +137,8 @@ class Asked:
 
     def _address(self, file: str, angled: bool) -> str | None:
         """The address of a file that the text names; None where there is none."""
-        found = self._files().find(file, self._files().where(self._found_file(), angled))
-        return None if found is None else uri_of(os.path.abspath(found.path))
+        found_file = self._files().find(file, self._files().where(self._found_file(), angled))
+        return None if found_file is None else uri_of(os.path.abspath(found_file.path))
 
     def _files(self) -> Files:
         return Files(self._checks.include_dirs, unsaved=self._checks.unsaved())

@@ -22,13 +22,13 @@ class OpenCall:
 
     name        the function, model or shape
     argument    the argument whose value is written, `radius` in `cylinder(radius = `; "" where a name may stand
-    given       the arguments that are written before it
+    earlier     the arguments that are written before it
     parameters  those that it takes by name; none of a function
     """
 
     name: str
     argument: str
-    given: tuple[str, ...]
+    earlier: tuple[str, ...]
     parameters: tuple[Parameter, ...]
 
     @property
@@ -46,17 +46,17 @@ def open_call(texts: Sequence[str]) -> OpenCall | None:
         depth = max(depth, 0)  # a bracket that is open, as in `size = [1, `
     if opened < 1:
         return None
-    depth, argument, given = 0, "", []
+    depth, argument, arguments = 0, "", []
     for n in range(opened + 1, len(texts)):
         word = texts[n]
         depth += (word in _OPEN) - (word in _CLOSED)
         if depth == 0 and word == "=":
             argument = texts[n - 1]
         elif depth == 0 and word in (",", ";"):
-            given.append(argument)
+            arguments.append(argument)
             argument = ""
     name = texts[opened - 1]
-    return OpenCall(name, argument, tuple(given), _parameters(name, texts[0]))
+    return OpenCall(name, argument, tuple(arguments), _parameters(name, texts[0]))
 
 
 def ends_a_model(texts: Sequence[str]) -> bool:

@@ -39,40 +39,40 @@ def carried_over(last: CheckReply, now: CheckReply) -> CheckReply:
     """A preliminary reply, completed by the last one's messages about unchanged lines."""
     moved = {name: _MovedLines(last.sources[name], text) for name, text in now.sources.items() if name in last.sources}
 
-    def line(file: str, at: int) -> int:
-        found = moved[file].line(at) if file in moved else at
-        if found is None:
+    def line(file: str, number: int) -> int:
+        line_now = moved[file].line(number) if file in moved else number
+        if line_now is None:
             raise _Changed
-        return found
+        return line_now
 
     def place(old: Place) -> Place:
         return replace(
             old,
             line=line(old.file, old.line),
             expansions=tuple(replace(step, use=place(step.use)) for step in old.expansions),
-            included=tuple((file, line(file, at)) for file, at in old.included),
+            included=tuple((file, line(file, number)) for file, number in old.included),
         )
 
     def label(old: Label) -> Label:
         return replace(old, place=place(old.place))
 
-    told = {(each.code, each.at.place) for each in now.diagnostics if each.at is not None}
-    kept: list[Diagnostic] = []
+    reported = {(new.code, new.at.place) for new in now.diagnostics if new.at is not None}
+    diagnostics: list[Diagnostic] = []
     for diagnostic in last.diagnostics:
         try:
-            at = label(diagnostic.at) if diagnostic.at is not None else None
-            if at is not None and (diagnostic.code, at.place) not in told:
-                kept.append(replace(diagnostic, at=at, also=tuple(map(label, diagnostic.also))))
+            moved_label = label(diagnostic.at) if diagnostic.at is not None else None
+            if moved_label is not None and (diagnostic.code, moved_label.place) not in reported:
+                diagnostics.append(replace(diagnostic, at=moved_label, also=tuple(map(label, diagnostic.also))))
         except _Changed:
             continue
-    return replace(now, diagnostics=(*now.diagnostics, *kept), edits=(*now.edits, *(() for _ in kept)))
+    return replace(now, diagnostics=(*now.diagnostics, *diagnostics), edits=(*now.edits, *(() for _ in diagnostics)))
 
 
 class LastAudit:
     """The messages of a deck's last audit beyond those of its definitions, kept until the next audit has ended."""
 
     def __init__(self) -> None:
-        self._said: CheckReply | None = None
+        self._last: CheckReply | None = None
         self._defined: CheckReply | None = None  # the reply of the definitions whose audit has not ended
 
     def carried_into(self, reply: CheckReply) -> CheckReply:
@@ -80,24 +80,24 @@ class LastAudit:
         nothing is added, since an audit then examines no program, but the messages are kept until the errors are
         corrected."""
         self._defined = reply
-        if self._said is not None:
-            self._said = carried_over(self._said, replace(reply, diagnostics=(), edits=()))
-        return reply if self._said is None or _has_errors(reply) else carried_over(self._said, reply)
+        if self._last is not None:
+            self._last = carried_over(self._last, replace(reply, diagnostics=(), edits=()))
+        return reply if self._last is None or _has_errors(reply) else carried_over(self._last, reply)
 
     def take(self, reply: CheckReply) -> None:
         """Keep the messages of an audit, the one that belongs to the last reported definitions."""
         if self._defined is not None and not _has_errors(self._defined):
-            new = [n for n, each in enumerate(reply.diagnostics) if each not in self._defined.diagnostics]
+            new = [n for n, diagnostic in enumerate(reply.diagnostics) if diagnostic not in self._defined.diagnostics]
             diagnostics = tuple(reply.diagnostics[n] for n in new)
-            self._said = replace(reply, diagnostics=diagnostics, edits=tuple(reply.edits[n] for n in new))
+            self._last = replace(reply, diagnostics=diagnostics, edits=tuple(reply.edits[n] for n in new))
         self._defined = None
 
     def give_up(self) -> CheckReply | None:
         """Discard the kept messages where an audit has died; returns the reply of the definitions alone. None where it
         has ended, or nothing is kept."""
-        alone = self._defined if self._said is not None else None
+        alone = self._defined if self._last is not None else None
         if alone is not None:
-            self._said = None
+            self._last = None
         return alone
 
 

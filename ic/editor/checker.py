@@ -48,13 +48,13 @@ def serve(connection: socket.socket) -> None:
             connection.close()
             status = 1
             try:
-                with os.fdopen(passed[0], "rb") as asked:
-                    answer(pickle.load(asked), passed[1])
+                with os.fdopen(passed[0], "rb") as request_file:
+                    answer(pickle.load(request_file), passed[1])
                 status = 0
             finally:
                 os._exit(status)
-        for each in passed:
-            os.close(each)
+        for descriptor in passed:
+            os.close(descriptor)
 
 
 def main() -> None:

@@ -44,11 +44,11 @@ class CheckerProcess:
         self.start()
         assert self._socket is not None
         answers, out = os.pipe()
-        with os.fdopen(os.memfd_create("request"), "w+b") as asked, os.fdopen(out, "wb"):
-            pickle.dump(request, asked, pickle.HIGHEST_PROTOCOL)
-            asked.seek(0)
+        with os.fdopen(os.memfd_create("request"), "w+b") as request_file, os.fdopen(out, "wb"):
+            pickle.dump(request, request_file, pickle.HIGHEST_PROTOCOL)
+            request_file.seek(0)
             try:
-                socket.send_fds(self._socket, [b"c"], [asked.fileno(), out])
+                socket.send_fds(self._socket, [b"c"], [request_file.fileno(), out])
             except OSError:
                 os.close(answers)
                 return

@@ -99,14 +99,14 @@ def answer(request: CheckRequest, out: int) -> None:
     """Run the check, and write its answers into the file descriptor."""
     os.chdir(request.folder)
     try:
-        for each in answers(request, pause=AUDIT_PAUSE, keep=partial(_send, out)):
-            _send(out, each)
+        for reply in answers(request, pause=AUDIT_PAUSE, keep=partial(_send, out)):
+            _send(out, reply)
     except Exception:
         _send(out, Crash(traceback.format_exc()))
 
 
 def answers(
-    request: CheckRequest, *, pause: float, keep: Callable[[FoundAnswers], object] = lambda found: None
+    request: CheckRequest, *, pause: float, keep: Callable[[FoundAnswers], object] = lambda _: None
 ) -> Iterator[CheckReply | DeckIndex]:
     """All answers about a deck, in turn; the audit comes after the pause, in s.
 
@@ -146,17 +146,17 @@ def first_replies(request: CheckRequest, clock: Callable[[], float] = time.monot
     except Problem as problem:
         yield _reply(problem.diagnostics, problem.sources)
         return
-    checks, told, last = DefinitionChecks(deck, request.known), None, began
+    checks, reported, last = DefinitionChecks(deck, request.known), None, began
     while checks.to_come:
-        if clock() - last > EARLY and (found := checks.diagnostics()) != told:
-            yield _reply(*found, audited=False)
-            told, last = found, clock()
+        if clock() - last > EARLY and (diagnostics := checks.diagnostics()) != reported:
+            yield _reply(*diagnostics, audited=False)
+            reported, last = diagnostics, clock()
         checks.check_next()
     yield _reply(*checks.diagnostics(), known=checks.findings, audited=False)
 
 
 def compiled_with_reply(
-    request: CheckRequest, keep: Callable[[FoundAnswers], object] = lambda found: None
+    request: CheckRequest, keep: Callable[[FoundAnswers], object] = lambda _: None
 ) -> tuple[Compiled, CheckReply]:
     """A compiled deck, with the reply to the request, made in this process. keep: as for `answers`"""
     from ic.driver.compile import check
@@ -164,13 +164,13 @@ def compiled_with_reply(
 
     kept_at = time.monotonic()
 
-    def found() -> None:
+    def keep_so_far() -> None:
         nonlocal kept_at
         if time.monotonic() - kept_at > DEAR:
             keep(FoundAnswers(pickle.dumps(memo.so_far, pickle.HIGHEST_PROTOCOL)))
             kept_at = time.monotonic()
 
-    memo = AnalysisMemo(pickle.loads(request.answers) if request.answers else None, found)
+    memo = AnalysisMemo(pickle.loads(request.answers) if request.answers else None, keep_so_far)
     compiled = check(
         request.name,
         include_dirs=request.include_dirs,
@@ -185,11 +185,17 @@ def compiled_with_reply(
 
 
 def _reply(
-    found: tuple[Diagnostic, ...], sources: Mapping[str, str], *, known: Known | None = None, audited: bool = True
+    diagnostics: tuple[Diagnostic, ...], sources: Mapping[str, str], *, known: Known | None = None, audited: bool = True
 ) -> CheckReply:
     from met.messages.edits import edits
 
-    return CheckReply(found, tuple(tuple(edits(each, sources)) for each in found), dict(sources), known, audited)
+    return CheckReply(
+        diagnostics,
+        tuple(tuple(edits(diagnostic, sources)) for diagnostic in diagnostics),
+        dict(sources),
+        known,
+        audited,
+    )
 
 
 def _send(out: int, answer: object) -> None:

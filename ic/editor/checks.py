@@ -203,10 +203,10 @@ class DeckChecks:
         self._log(f"this is a defect of MET; please report it:\n{traceback.format_exc()}")
 
     def _changed(self, identities: Iterable[str]) -> None:
-        found = set(identities)
+        changed = set(identities)
         for uri, text in self.texts.items():
             checked = self.checked.get(uri)
-            if text.identity in found or (checked is not None and found & checked.files):
+            if text.identity in changed or (checked is not None and changed & checked.files):
                 self._make_stale(uri)
 
     def _make_stale(self, uri: str) -> None:
@@ -293,9 +293,9 @@ class DeckChecks:
         elif self._auditing:
             self._audits[deck.uri].take(answer)
         elif not answer.audited and deck.uri in self.checked:
-            shown = self.checked[deck.uri].reply
-            further = {name: text for name, text in shown.sources.items() if name not in answer.sources}
-            answer = carried_over(shown, answer)
+            last_reply = self.checked[deck.uri].reply
+            further = {name: text for name, text in last_reply.sources.items() if name not in answer.sources}
+            answer = carried_over(last_reply, answer)
             answer = replace(answer, sources={**answer.sources, **further})  # files of values are read later
         self._keep(deck, request, texts, answer)
 

@@ -80,14 +80,14 @@ def offers(text: DeckText, offset: int, names: NamesInTexts, index: DeckIndex, f
     macro = names.macros.at(text, offset)
     indices = indices_around(text.entries if macro is None else names.macros.body(macro), offset)
     seen = names.seen_from(text) if "." not in (word.text for word in words[-1:]) else names
-    may_stand = [each for each in _of_entry(words, around, seen, index, offset) if _has_indices(each.word, indices)]
-    found = {offer.word: offer for offer in reversed(may_stand)}
-    return list(reversed(found.values()))
+    may_stand = [offer for offer in _of_entry(words, around, seen, index, offset) if _has_indices(offer.word, indices)]
+    by_word = {offer.word: offer for offer in reversed(may_stand)}
+    return list(reversed(by_word.values()))
 
 
 def _has_indices(word: str, indices: Collection[str]) -> bool:
     """True except for a name with braces, `seg_{i-1}`, outside of the loop of its index."""
-    return not any(set(re.findall(r"[A-Za-z_]\w*", each)) - set(indices) for each in re.findall(r"\{(.*?)\}", word))
+    return not any(set(re.findall(r"[A-Za-z_]\w*", braces)) - set(indices) for braces in re.findall(r"\{(.*?)\}", word))
 
 
 def _of_directive(line: str, files: Iterable[str]) -> Iterator[Offer]:
@@ -102,7 +102,7 @@ def _of_directive(line: str, files: Iterable[str]) -> Iterator[Offer]:
         elif '"' in rest:
             yield from (Offer(file, types.CompletionItemKind.File) for file in files)
     elif not rest and " " not in line.lstrip():
-        yield from (Offer(each, types.CompletionItemKind.Keyword) for each in DIRECTIVES)
+        yield from (Offer(directive, types.CompletionItemKind.Keyword) for directive in DIRECTIVES)
 
 
 def _is_in_comment_or_string(text: DeckText, offset: int) -> bool:
@@ -110,7 +110,7 @@ def _is_in_comment_or_string(text: DeckText, offset: int) -> bool:
         written = text.source.text[token.offset : token.end]
         if token.offset < offset < token.end or (offset == token.end and not written.endswith("*/")):
             return True
-    return any(each.kind == STRING and each.offset < offset < each.end for each in text.tokens)
+    return any(token.kind == STRING and token.offset < offset < token.end for token in text.tokens)
 
 
 def _before(text: DeckText, offset: int, names: NamesInTexts) -> tuple[list[Token], TextEntry | None]:
@@ -140,10 +140,13 @@ def _of_entry(
     if texts[0] == "default" and around is None:
         texts, words = texts[1:], words[1:]
         if not words:
-            yield from (Offer(each, types.CompletionItemKind.Keyword, BLOCKS[each].doc) for each in EXPERIMENTS)
+            yield from (
+                Offer(experiment, types.CompletionItemKind.Keyword, BLOCKS[experiment].doc)
+                for experiment in EXPERIMENTS
+            )
             return
     if texts == [EDITION_WORD] and around is None:
-        yield from (Offer(str(each), types.CompletionItemKind.Constant, "an edition") for each in EDITIONS)
+        yield from (Offer(str(edition), types.CompletionItemKind.Constant, "an edition") for edition in EDITIONS)
         return
     if last.text == ".":
         yield from _rest_of_path(words, names, index)
@@ -167,7 +170,7 @@ def _of_entry(
     if len(texts) == 1 and texts[0] in NAMING and texts[0] != "require":
         return
     if len(texts) == 2 and texts[0] == "joint":
-        yield from (Offer(each, types.CompletionItemKind.Keyword) for each in JOINT_KINDS)
+        yield from (Offer(joint_kind, types.CompletionItemKind.Keyword) for joint_kind in JOINT_KINDS)
         return
     if len(texts) == 2 and texts[0] == "link" and last.kind == NAME:
         return
@@ -190,14 +193,16 @@ def _behind_a_name(definition: str) -> Iterator[Offer]:
             "of", types.CompletionItemKind.Keyword, f"names the run that the cases are of: `{definition} NAME of RUN`"
         )
     else:
-        said = f"takes the entries of another {definition}, and changes or adds some: `{definition} NAME like OTHER`"
-        yield Offer("like", types.CompletionItemKind.Keyword, said)
+        about = f"takes the entries of another {definition}, and changes or adds some: `{definition} NAME like OTHER`"
+        yield Offer("like", types.CompletionItemKind.Keyword, about)
 
 
 def _beginnings(around: TextEntry | None, names: NamesInTexts) -> Iterator[Offer]:
     """The words with which an entry of a block may begin."""
     if around is None:
-        yield from (Offer(each, types.CompletionItemKind.Keyword, BLOCKS[each].doc) for each in DEFINITIONS)
+        yield from (
+            Offer(definition, types.CompletionItemKind.Keyword, BLOCKS[definition].doc) for definition in DEFINITIONS
+        )
         for entry in TOP_LEVEL.entries:
             yield Offer(entry.name, types.CompletionItemKind.Keyword, f"{entry.doc}: `{entry.written}`")
         yield Offer("default", types.CompletionItemKind.Keyword, "marks the run that `met run` takes if none is named")
@@ -215,7 +220,7 @@ def _beginnings(around: TextEntry | None, names: NamesInTexts) -> Iterator[Offer
             yield Offer(
                 "remove", types.CompletionItemKind.Keyword, "removes an entry of the definition that this one is `like`"
             )
-    yield from (_of_parameter(each) for each in parameters_of(around, names))
+    yield from (_of_parameter(parameter) for parameter in parameters_of(around, names))
     if around.kind == "environment":
         for name in models.available("environment"):
             yield Offer(name, types.CompletionItemKind.Class, summary(models.available("environment")[name]))
@@ -226,11 +231,11 @@ def parameters_of(entry: TextEntry, names: NamesInTexts) -> tuple[Parameter, ...
     """The parameters of an entry's model."""
     name = names.model_of(entry)
     for kind in models.GROUPS:
-        found = models.available(kind).get(name)
-        of = entry.block or entry.kind
-        wanted = kind == of or (of not in models.GROUPS and kind not in ("servo", "metric"))
-        if found is not None and wanted:
-            return models.written(found)
+        model = models.available(kind).get(name)
+        entry_kind = entry.block or entry.kind
+        wanted = kind == entry_kind or (entry_kind not in models.GROUPS and kind not in ("servo", "metric"))
+        if model is not None and wanted:
+            return models.written(model)
     return ()
 
 
@@ -241,12 +246,12 @@ def _parameter(texts: list[str], around: TextEntry | None, names: NamesInTexts) 
     call = open_call(texts)
     if call is not None:
         return call.wanted
-    compared = [n for n, each in enumerate(texts) if each in COMPARISONS]
+    compared = [n for n, word in enumerate(texts) if word in COMPARISONS]
     if texts[0] == "require" and compared:
         return _limit(texts[compared[-1] - 1], names)
-    for each in parameters_of(around, names):
-        if each.name == texts[0]:
-            return each
+    for parameter in parameters_of(around, names):
+        if parameter.name == texts[0]:
+            return parameter
     if around.block == "servo" and texts[0] == "rate":
         return BLOCKS["rates"]["servos"].parameter
     block = BLOCKS.get(around.block)
@@ -256,9 +261,9 @@ def _parameter(texts: list[str], around: TextEntry | None, names: NamesInTexts) 
 
 def _limit(metric: str, names: NamesInTexts) -> Parameter | None:
     """The limit on a metric of the texts, in the metric's unit."""
-    for found in names.by_name.get(metric, ()):
-        if found.kind == "metric" and found.entry is not None:
-            model = models.available("metric").get(names.model_of(found.entry))
+    for definition in names.by_name.get(metric, ()):
+        if definition.kind == "metric" and definition.entry is not None:
+            model = models.available("metric").get(names.model_of(definition.entry))
             return Parameter(name=metric, unit=model.unit, doc="the limit") if model is not None else None
     return None
 
@@ -271,18 +276,18 @@ def _units(wanted: Parameter | None, names: NamesInTexts) -> Iterator[Offer]:
             fit = units_of(parse_unit(wanted.unit).dimension)
         except (ValueError, KeyError):
             fit = []
-        shown = wanted.unit
-        if shown not in ("joint", "effort", "of", "command") and not any(
-            word in shown for word in ("joint", "effort", "of", "command")
+        unit = wanted.unit
+        if unit not in ("joint", "effort", "of", "command") and not any(
+            word in unit for word in ("joint", "effort", "of", "command")
         ):
-            yield Offer(shown, types.CompletionItemKind.Unit, f"the unit of `{wanted.name}`")
+            yield Offer(unit, types.CompletionItemKind.Unit, f"the unit of `{wanted.name}`")
         if fit:
-            yield from (Offer(each, types.CompletionItemKind.Unit, ALL_UNITS[each].word) for each in fit)
-            if shown in ALL_UNITS:
+            yield from (Offer(unit_name, types.CompletionItemKind.Unit, ALL_UNITS[unit_name].word) for unit_name in fit)
+            if unit in ALL_UNITS:
                 yield from _named(names, UNIT)
                 return  # other units may be a factor: `deg/s`
     yield from _named(names, UNIT)
-    yield from (Offer(each, types.CompletionItemKind.Unit, ALL_UNITS[each].word) for each in ALL_UNITS)
+    yield from (Offer(unit_name, types.CompletionItemKind.Unit, ALL_UNITS[unit_name].word) for unit_name in ALL_UNITS)
 
 
 def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
@@ -311,19 +316,23 @@ def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> 
         if found_head := begins.match(path):
             part, _, more = path[found_head.end() :].partition(".")
             about.setdefault(part, "" if more else "in the table")
-    yield from (Offer(part, types.CompletionItemKind.Field, said) for part, said in about.items())
+    yield from (Offer(part, types.CompletionItemKind.Field, meaning) for part, meaning in about.items())
     files = names.used.under(words[0].source.name, head[:-1].split("."))
     for name, defined in names.by_name.items() if files else ():
-        kinds = [each.kind for each in defined if each.kind in (*DEFINED, "roof") and each.file in files]
+        kinds = [
+            definition.kind
+            for definition in defined
+            if definition.kind in (*DEFINED, "roof") and definition.file in files
+        ]
         yield from (Offer(name, types.CompletionItemKind.Reference, kind) for kind in kinds[:1])
-    for found in names.by_name.get(head[:-1], ()):
-        if not signals_alone and found.kind == "servo" and found.entry is not None:
-            yield from (_of_parameter(each) for each in parameters_of(found.entry, names))
+    for definition in names.by_name.get(head[:-1], ()):
+        if not signals_alone and definition.kind == "servo" and definition.entry is not None:
+            yield from (_of_parameter(parameter) for parameter in parameters_of(definition.entry, names))
 
 
 def _names_a_joint(head: str, names: NamesInTexts) -> bool:
     """True for `JOINT.`, with a joint of the texts: its signals are known before the deck is without errors."""
-    return any(found.kind == "joint" for found in names.by_name.get(head[:-1], ()))
+    return any(definition.kind == "joint" for definition in names.by_name.get(head[:-1], ()))
 
 
 def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
@@ -339,7 +348,7 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
         yield from _sweeps_of(around.word_behind("of"), names)
         return
     if where == "joint" and texts in (["axis", "="], ["axis", "=", "-"]):
-        yield from (Offer(each, types.CompletionItemKind.EnumMember, "an axis of the joint's frame") for each in AXES)
+        yield from (Offer(axis, types.CompletionItemKind.EnumMember, "an axis of the joint's frame") for axis in AXES)
     if texts[-2:] == ["rows", "="]:
         yield Offer(ALL_ROWS, types.CompletionItemKind.EnumMember, "requires that every row is used")
         return
@@ -363,14 +372,16 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
     }  # fmt: skip
     kind = model_kinds.get(key, "environment" if where == "environment" else None)
     if texts[-2:] == ["shape", "="] and where == "link":
-        yield from (Offer(each, types.CompletionItemKind.Class) for each in SHAPES)
+        yield from (Offer(shape, types.CompletionItemKind.Class) for shape in SHAPES)
         return
     if kind is not None and "=" in texts and "(" not in texts:
         for name, model in models.available(kind).items():
             yield Offer(name, types.CompletionItemKind.Class, summary(model))
         if key != "command":
             return
-        yield from (Offer(each, types.CompletionItemKind.Function, "a command of this kind") for each in COMMAND_UNIT)
+        yield from (
+            Offer(command, types.CompletionItemKind.Function, "a command of this kind") for command in COMMAND_UNIT
+        )
     if len(texts) > 1 and texts[-1] == "(" and texts[-2] in COMMAND_UNIT:
         for name, model in models.available("command").items():
             yield Offer(name, types.CompletionItemKind.Class, summary(model))
@@ -392,7 +403,7 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
             return
         yield from _named(names, "joint", "metric", "servo", around=around)
     if call is not None and texts[-1] in ("(", ",", ";") and not call.argument:
-        yield from (_of_parameter(parameter) for parameter in call.parameters if parameter.name not in call.given)
+        yield from (_of_parameter(parameter) for parameter in call.parameters if parameter.name not in call.earlier)
         if key == "shape":
             return
     yield from _of_expression(names)
@@ -401,8 +412,10 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
 def _of_expression(names: NamesInTexts) -> Iterator[Offer]:
     """The words that may occur in any value."""
     yield from _named(names, "let", "macro", "roof")
-    yield from (Offer(each, types.CompletionItemKind.Function, ", ".join(USAGE[each])) for each in FUNCTIONS)
-    yield from (Offer(each, types.CompletionItemKind.Constant) for each in CONSTANTS)
+    yield from (
+        Offer(function, types.CompletionItemKind.Function, ", ".join(USAGE[function])) for function in FUNCTIONS
+    )
+    yield from (Offer(constant, types.CompletionItemKind.Constant) for constant in CONSTANTS)
 
 
 def _of_goal(texts: list[str], around: TextEntry | None, names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
@@ -419,8 +432,8 @@ def _of_goal(texts: list[str], around: TextEntry | None, names: NamesInTexts, in
         yield from _named(names, "metric", "macro", around=around)
         if texts[0] == "require":
             over_time = [name for name, model in models.available("metric").items() if model.condition]
-            for each in (*over_time, *FIGURES, STEP_ERROR, PERCENTILE):
-                yield Offer(each, types.CompletionItemKind.Function, "a figure to require a limit of")
+            for figure in (*over_time, *FIGURES, STEP_ERROR, PERCENTILE):
+                yield Offer(figure, types.CompletionItemKind.Function, "a figure to require a limit of")
 
 
 def _of_varied(texts: list[str], names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
@@ -443,7 +456,11 @@ def _of_varied(texts: list[str], names: NamesInTexts, index: DeckIndex) -> Itera
 def _sweeps_of(run: str, names: NamesInTexts) -> Iterator[Offer]:
     """The sweeps of a run, and those that are made of others."""
     for offer in _named(names, "sweep"):
-        entries = [each.entry for each in names.by_name[offer.word] if each.kind == "sweep" and each.entry is not None]
+        entries = [
+            definition.entry
+            for definition in names.by_name[offer.word]
+            if definition.kind == "sweep" and definition.entry is not None
+        ]
         if any(entry.word_behind("of") in ("", run) for entry in entries):
             yield offer
 
@@ -451,7 +468,7 @@ def _sweeps_of(run: str, names: NamesInTexts) -> Iterator[Offer]:
 def _named(names: NamesInTexts, *kinds: str, around: TextEntry | None = None) -> Iterator[Offer]:
     """The names of some kinds. around: restricts names to those of arms and runs that the surrounding entries may mean,
     if there are any"""
-    shown = {
+    icons = {
         "let": types.CompletionItemKind.Variable,
         "macro": types.CompletionItemKind.Constant,
         "run": types.CompletionItemKind.Function,
@@ -462,9 +479,9 @@ def _named(names: NamesInTexts, *kinds: str, around: TextEntry | None = None) ->
         known = names.of_kind(kind)
         own = [name for name in known if any(names.is_of(name, kind, owner) for owner in owners)]
         for name in own or known:
-            made = names.written_out(name, kind, owners) if "{" in name else ()
-            for each in (name, *made):
-                yield Offer(each, shown.get(kind, types.CompletionItemKind.Reference), kind)
+            written = names.written_out(name, kind, owners) if "{" in name else ()
+            for spelling in (name, *written):
+                yield Offer(spelling, icons.get(kind, types.CompletionItemKind.Reference), kind)
 
 
 def _of_parameter(parameter: Parameter) -> Offer:

@@ -38,9 +38,9 @@ class MacrosInTexts:
 
     def meant(self, use: Token) -> TextMacro | None:
         """The macro that a token uses: the last that its text defines before it, or else any."""
-        found = self.by_name.get(use.text, ())
-        before = [each for each in found if each.name.source is use.source and each.name.offset <= use.offset]
-        return before[-1] if before else found[-1] if found else None
+        macros = self.by_name.get(use.text, ())
+        before = [macro for macro in macros if macro.name.source is use.source and macro.name.offset <= use.offset]
+        return before[-1] if before else macros[-1] if macros else None
 
     @staticmethod
     def at(text: DeckText, offset: int) -> TextMacro | None:
@@ -79,7 +79,7 @@ class MacrosInTexts:
                     if token.text in self.by_name:
                         yield token.text, (text, token)
 
-    def made(self, text: DeckText) -> Iterator[TextEntry]:
+    def entries_in(self, text: DeckText) -> Iterator[TextEntry]:
         """The entries that uses of macros make in a text, where the use is an entry, or begins one."""
         room = TokensLeft(MOST_TOKENS)
         for entry in text.all_entries():
@@ -92,24 +92,24 @@ class MacrosInTexts:
 
         within  the macros whose bodies these are of: they are not used again
         """
-        made: list[Token] = []
-        at = 0
-        while at < len(tokens) and room.left > 0:
-            token = tokens[at]
-            at += 1
+        expansion: list[Token] = []
+        index = 0
+        while index < len(tokens) and room.left > 0:
+            token = tokens[index]
+            index += 1
             room.left -= 1
             macro = self.meant(token) if token.kind == NAME and token.text not in within else None
             if macro is None:
-                made.append(token)
+                expansion.append(token)
             elif macro.parameters is None:
-                made += self.expanded(pasted(macro.body), room, within | {token.text})
-            elif at < len(tokens) and tokens[at].text == "(":
-                arguments, at = arguments_at(tokens, at)
-                given = dict(zip((parameter.text for parameter in macro.parameters), arguments, strict=False))
-                made += self.expanded(pasted(_filled(macro.body, given)), room, within | {token.text})
+                expansion += self.expanded(pasted(macro.body), room, within | {token.text})
+            elif index < len(tokens) and tokens[index].text == "(":
+                arguments, index = arguments_at(tokens, index)
+                by_parameter = dict(zip((parameter.text for parameter in macro.parameters), arguments, strict=False))
+                expansion += self.expanded(pasted(_filled(macro.body, by_parameter)), room, within | {token.text})
             else:
-                made.append(token)
-        return made
+                expansion.append(token)
+        return expansion
 
 
 @dataclass
@@ -119,13 +119,13 @@ class TokensLeft:
     left: int
 
 
-def arguments_at(tokens: Sequence[Token], at: int) -> tuple[list[list[Token]], int]:
+def arguments_at(tokens: Sequence[Token], index: int) -> tuple[list[list[Token]], int]:
     """The arguments in the parentheses that begin at an index, and the index after them."""
     arguments: list[list[Token]] = [[]]
     depth = 0
-    while at < len(tokens):
-        token = tokens[at]
-        at += 1
+    while index < len(tokens):
+        token = tokens[index]
+        index += 1
         depth += (token.text == "(") - (token.text == ")")
         if depth == 0:
             break
@@ -133,28 +133,28 @@ def arguments_at(tokens: Sequence[Token], at: int) -> tuple[list[list[Token]], i
             arguments.append([])
         elif depth > 1 or token.text != "(":
             arguments[-1].append(token)
-    return arguments, at
+    return arguments, index
 
 
-def _filled(body: Iterable[Token], given: Mapping[str, list[Token]]) -> Iterator[Token]:
+def _filled(body: Iterable[Token], arguments: Mapping[str, list[Token]]) -> Iterator[Token]:
     for token in body:
-        if token.kind == NAME and token.text in given:
-            yield from given[token.text]
+        if token.kind == NAME and token.text in arguments:
+            yield from arguments[token.text]
         else:
             yield token
 
 
 def pasted(tokens: Iterable[Token]) -> list[Token]:
     """The tokens with `##` carried out; a joined token stands at the place of its first part."""
-    made: list[Token] = []
+    joined: list[Token] = []
     joins = False
     for token in tokens:
         if token.kind == PASTE:
-            joins = bool(made)
+            joins = bool(joined)
         elif joins:
-            first = made.pop()
-            made.append(Token(NAME, first.text + token.text, first.source, first.offset, first.length))
+            first = joined.pop()
+            joined.append(Token(NAME, first.text + token.text, first.source, first.offset, first.length))
             joins = False
         else:
-            made.append(token)
-    return made
+            joined.append(token)
+    return joined

@@ -30,7 +30,7 @@ class QuickFix:
 def quick_fixes(
     diagnostic: Diagnostic,
     edits: tuple[tuple[int, Edit], ...],
-    shown: types.Diagnostic,
+    shown_diagnostic: types.Diagnostic,
     texts: Texts,
     address: Callable[[str], str | None],
 ) -> Iterable[QuickFix]:
@@ -45,10 +45,12 @@ def quick_fixes(
             title = f"{title}: `{edit.text.strip()}`"
         first = texts.position(edit.file, edit.line, edit.column)
         last = texts.position(edit.file, edit.end_line, edit.end_column)
-        yield QuickFix(shown, title, file, types.TextEdit(types.Range(first, last), edit.text), len(edits) == 1)
+        yield QuickFix(
+            shown_diagnostic, title, file, types.TextEdit(types.Range(first, last), edit.text), len(edits) == 1
+        )
 
 
-def actions(fixes: Iterable[QuickFix], at: types.Range) -> list[types.CodeAction]:
+def actions(fixes: Iterable[QuickFix], selection: types.Range) -> list[types.CodeAction]:
     """The fixes whose diagnostics meet a range, in the form of an editor's list."""
     return [
         types.CodeAction(
@@ -59,8 +61,8 @@ def actions(fixes: Iterable[QuickFix], at: types.Range) -> list[types.CodeAction
             edit=types.WorkspaceEdit(changes={fix.file: [fix.edit]}),
         )
         for fix in fixes
-        if _ordered(at.start) <= _ordered(fix.diagnostic.range.end)
-        and _ordered(fix.diagnostic.range.start) <= _ordered(at.end)
+        if _ordered(selection.start) <= _ordered(fix.diagnostic.range.end)
+        and _ordered(fix.diagnostic.range.start) <= _ordered(selection.end)
     ]
 
 

@@ -25,8 +25,8 @@ def about(text: DeckText, token: Token, names: NamesInTexts, index: DeckIndex, f
     file  the name that places of the deck give the text's file
     """
     entry = names.entry_at(text, token)
-    found = [*_of_key(token, entry, names), *_of_model(token), *_of_unit(text, token)]
-    return [*found, *_of_name(text, token, names, index), *_of_values(index, token, entry, file)]
+    paragraphs = [*_of_key(token, entry, names), *_of_model(token), *_of_unit(text, token)]
+    return [*paragraphs, *_of_name(text, token, names, index), *_of_values(index, token, entry, file)]
 
 
 def _of_key(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Iterator[str]:
@@ -34,11 +34,11 @@ def _of_key(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Itera
         return
     around = entry.within
     block = BLOCKS.get(around.block) if around is not None else None
-    for each in block.entries if block is not None else ():
-        if each.name.split()[0] == token.text:
-            unit = f"unit: {each.unit}; " if each.unit not in ("", "1") else ""
-            default = each.default if each.default.startswith("needed") else f"default: {each.default}"
-            yield f"`{each.written}`\n\n{each.doc}\n\n{unit}{default}"
+    for declared in block.entries if block is not None else ():
+        if declared.name.split()[0] == token.text:
+            unit = f"unit: {declared.unit}; " if declared.unit not in ("", "1") else ""
+            default = declared.default if declared.default.startswith("needed") else f"default: {declared.default}"
+            yield f"`{declared.written}`\n\n{declared.doc}\n\n{unit}{default}"
             return
     for parameter in parameters_of(around, names) if around is not None else ():
         if parameter.name == token.text:
@@ -68,22 +68,26 @@ def _of_unit(text: DeckText, token: Token) -> Iterator[str]:
 
 
 def _of_name(text: DeckText, token: Token, names: NamesInTexts, index: DeckIndex) -> Iterator[str]:
-    for found in names.meant_in(text, token)[:2] if token.kind == NAME else ():
-        source = found.token.source
-        line = source.text.split("\n")[source.line(found.token.offset) - 1].strip()
-        size = index.units.get(token.text) if found.kind == UNIT else None
-        said = f": {size} in SI" if size is not None else ""
-        yield f"{found.kind} `{found.token.text}`{said}\n\n```met\n{line}\n```"
+    for definition in names.meant_in(text, token)[:2] if token.kind == NAME else ():
+        source = definition.token.source
+        line = source.text.split("\n")[source.line(definition.token.offset) - 1].strip()
+        size = index.units.get(token.text) if definition.kind == UNIT else None
+        size_words = f": {size} in SI" if size is not None else ""
+        yield f"{definition.kind} `{definition.token.text}`{size_words}\n\n```met\n{line}\n```"
 
 
 def _of_values(index: DeckIndex, token: Token, entry: TextEntry | None, file: str) -> Iterator[str]:
     """The values that are written in the entry of a word, or at it."""
     lines = _lines(token, entry)
-    found = [each for each in index.values if each.place is not None and _is_at(each.place, file, lines, token)]
-    for value in found[:MOST_VALUES]:
+    values = [
+        candidate
+        for candidate in index.values
+        if candidate.place is not None and _is_at(candidate.place, file, lines, token)
+    ]
+    for value in values[:MOST_VALUES]:
         yield _words(value)
-    if len(found) > MOST_VALUES:
-        yield f"and {len(found) - MOST_VALUES} more values are written here"
+    if len(values) > MOST_VALUES:
+        yield f"and {len(values) - MOST_VALUES} more values are written here"
 
 
 def _lines(token: Token, entry: TextEntry | None) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -95,14 +99,17 @@ def _lines(token: Token, entry: TextEntry | None) -> tuple[tuple[int, int], tupl
 
 def _is_at(place: Place, file: str, lines: tuple[tuple[int, int], tuple[int, int]], token: Token) -> bool:
     return any(
-        each.file == file and lines[0] <= (each.line, each.column) < lines[1] for each in {place, shown_place(place)}
+        seen_place.file == file and lines[0] <= (seen_place.line, seen_place.column) < lines[1]
+        for seen_place in {place, shown_place(place)}
     )
 
 
 def _words(value: ValueInDeck) -> str:
-    said = "; ".join(value.said)
+    notes = "; ".join(value.origins)
     return (
-        f"`{value.path}` = {value.value}" + (f"  \n{said}" if said else "") + (f"  \n{value.doc}" if value.doc else "")
+        f"`{value.path}` = {value.value}"
+        + (f"  \n{notes}" if notes else "")
+        + (f"  \n{value.doc}" if value.doc else "")
     )
 
 

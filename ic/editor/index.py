@@ -31,14 +31,14 @@ class ValueInDeck:
 
     path   the parameter's, or the name of a `let`
     value  in SI, as a person reads it
-    said   where it comes from: what it overrode, in which run
+    origins  where it comes from: what it overrode, in which run
     doc    what the parameter means
     place  where it is written; None for a default
     """
 
     path: str
     value: str
-    said: tuple[str, ...]
+    origins: tuple[str, ...]
     doc: str
     place: Place | None
 
@@ -49,7 +49,8 @@ class DeckIndex:
 
     cases  how many each run, sweep and search has, by name
     units  the sizes in SI of those that the deck declares
-    made   the names that the compiler knows, written out where loops make them: by kind, and arm or run that has them
+    names_by_owner  the names that the compiler knows, written out where loops make them: by kind, and arm or run that
+           has them
     cells  the paths of the values of tables by row name, `bodies.boom.mass`
     """
 
@@ -58,13 +59,13 @@ class DeckIndex:
     cases: Mapping[str, int] = field(default_factory=dict)
     cells: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
-    made: Mapping[tuple[str, str], tuple[str, ...]] = field(default_factory=dict)
+    names_by_owner: Mapping[tuple[str, str], tuple[str, ...]] = field(default_factory=dict)
 
 
 def index_of(compiled: Compiled) -> DeckIndex:
     """The index of a deck that has a plan."""
     assert compiled.plan is not None
-    signals = {path: None for each in compiled.plan.experiments for path in recordable(each.structure)}
+    signals = {path: None for experiment in compiled.plan.experiments for path in recordable(experiment.structure)}
     signals = {path: None for path in signals if _PATH.fullmatch(path)}  # no expression, as a metric may watch
     cases: dict[str, int] = {}
     for experiment in compiled.plan.experiments:
@@ -73,10 +74,10 @@ def index_of(compiled: Compiled) -> DeckIndex:
     values = tuple(islice(_values(compiled), MOST_VALUES))
     cells = tuple(islice(_cells(compiled), MOST_VALUES))
     units = {name: size_in_si(measure) for name, measure in compiled.units.items()}
-    return DeckIndex(values, tuple(signals), cases, cells, units, dict(_made(compiled.plan)))
+    return DeckIndex(values, tuple(signals), cases, cells, units, dict(_names_by_owner(compiled.plan)))
 
 
-def _made(plan: Plan) -> Iterator[tuple[tuple[str, str], tuple[str, ...]]]:
+def _names_by_owner(plan: Plan) -> Iterator[tuple[tuple[str, str], tuple[str, ...]]]:
     """Joints, links and metrics of the plan by kind and by the arm or run that has them."""
     for experiment in plan.experiments:
         structure = experiment.structure
@@ -104,17 +105,19 @@ def _values(compiled: Compiled) -> Iterator[ValueInDeck]:
             if key in seen:
                 continue
             seen.add(key)
-            yield ValueInDeck(path, _shown(settled), tuple(_said(settled, experiment.name)), settled.doc, place)
+            yield ValueInDeck(
+                path, _settled_text(settled), tuple(_origins(settled, experiment.name)), settled.doc, place
+            )
         for name in scope.definitions.lets if number == 0 else ():
-            for found in explanations_of(compiled, name):
-                if found.path == name and found.place is not None:
-                    value = found.value
-                    text = _text(value if not found.varies else None, found.unit)
-                    yield ValueInDeck(name, text, (f"written `{found.written}`",), found.doc, found.place)
+            for explained in explanations_of(compiled, name):
+                if explained.path == name and explained.place is not None:
+                    value = explained.value
+                    text = _text(value if not explained.varies else None, explained.unit)
+                    yield ValueInDeck(name, text, (f"written `{explained.written}`",), explained.doc, explained.place)
                     break
 
 
-def _shown(settled: Settled) -> str:
+def _settled_text(settled: Settled) -> str:
     return _text(None if isinstance(settled.value, Scalar) else settled.value, settled.unit)
 
 
@@ -129,9 +132,9 @@ def _text(value: float | tuple[float, ...] | str | None, unit: str) -> str:
     return written(float(value), unit)
 
 
-def _said(settled: Settled, run: str) -> Iterator[str]:
+def _origins(settled: Settled, run: str) -> Iterator[str]:
     origin = settled.origin
     words = {"case": "a sweep varies it", "default": "the default", "derived": "computed"}.get(origin.kind, "")
-    note = ", ".join(each for each in (words, origin.note) if each)
+    note = ", ".join(part for part in (words, origin.note) if part)
     yield f"in `{run}`" + (f": {note}" if note else "")
     yield from (f"overrides {shown_place(place)}" for place in origin.overrides)

@@ -55,9 +55,9 @@ def lenses(
             continue
         where = range_of(entry.words[0].offset, entry.words[-1].end)
         last = runs.get(name)
-        said = _said(index.cases.get(name), last)
-        if said:
-            yield types.CodeLens(where, types.Command(said, ""))
+        title = _title(index.cases.get(name), last)
+        if title:
+            yield types.CodeLens(where, types.Command(title, ""))
         if path is not None:
             yield types.CodeLens(where, types.Command("run", IN_TERMINAL, arguments=[["run", path, name]]))
             if last is not None:
@@ -68,7 +68,7 @@ def lenses(
             yield from _verdicts(entry, last, range_of)
 
 
-def _said(cases: int | None, last: LastRun | None) -> str:
+def _title(cases: int | None, last: LastRun | None) -> str:
     words = [f"{cases} case" + ("s" if cases != 1 else "")] if cases is not None else []
     if cases is not None and last is not None and last.seconds is not None and last.cases:
         words.append(f"about {_duration(last.seconds * cases / last.cases)}, after the last run")
@@ -89,6 +89,6 @@ def _verdicts(entry: TextEntry, last: LastRun, range_of: RangeOf) -> Iterator[ty
         written = "".join(source[inner.words[1].offset : inner.words[-1].end].split())
         if written in words:
             met, missed, unknown = words[written]
-            said = [f"met by {met} of {met + missed + unknown}"] + ([f"{unknown} not known"] if unknown else [])
+            counts = [f"met by {met} of {met + missed + unknown}"] + ([f"{unknown} not known"] if unknown else [])
             where = range_of(inner.words[0].offset, inner.words[-1].end)
-            yield types.CodeLens(where, types.Command(f"last run: {', '.join(said)}", ""))
+            yield types.CodeLens(where, types.Command(f"last run: {', '.join(counts)}", ""))

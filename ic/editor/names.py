@@ -43,20 +43,20 @@ REMOVED = ("metric", "require", "guide", "sensor", "payload", "signal", "linear"
 OUTERMOST = (*DEFINED, "roof", "run", "sweep", "search", "tune", "macro", UNIT)
 """The kinds of names that belong to a deck itself, not to an arm or a run."""
 
-NOTHING_MADE: Mapping[tuple[str, str], Sequence[str]] = MappingProxyType({})
+NO_NAMES: Mapping[tuple[str, str], Sequence[str]] = MappingProxyType({})
 
 
 @frozen
 class NameInText:
     """A name that is defined: its kind (`servo`, `let`, `link`, `macro`), its token, and its entry if it has one.
 
-    made  whether a macro makes it, of an argument
+    by_macro  whether a macro makes it, of an argument
     """
 
     kind: str
     token: Token
     entry: TextEntry | None
-    made: bool = False
+    by_macro: bool = False
 
     @property
     def file(self) -> str:
@@ -72,35 +72,46 @@ class NameInText:
 class NamesInTexts:
     """The definitions of some texts, by name.
 
-    made  by kind and arm or run, the names that it had when the deck was last compiled: what loops make is among them
+    names_by_owner  by kind and arm or run, the names that it had when the deck was last compiled: what loops make is
+           among them
     """
 
-    def __init__(self, texts: Iterable[DeckText], made: Mapping[tuple[str, str], Sequence[str]] = NOTHING_MADE) -> None:
-        self._made = made
+    def __init__(
+        self, texts: Iterable[DeckText], names_by_owner: Mapping[tuple[str, str], Sequence[str]] = NO_NAMES
+    ) -> None:
+        self._names_by_owner = names_by_owner
         self.texts = tuple(texts)
         self.used = DecksUsed(self.texts)
         self.macros = MacrosInTexts(self.texts)
         self.by_name: dict[str, list[NameInText]] = {}
         for text in self.texts:
-            for each in self._defined(text):
-                self.by_name.setdefault(each.token.text, []).append(each)
+            for definition in self._defined(text):
+                self.by_name.setdefault(definition.token.text, []).append(definition)
         self._all: Mapping[str, list[NameInText]] = self.by_name
-        self._with_braces = {name: found for name, found in self.by_name.items() if "{" in name}
+        self._with_braces = {name: definitions for name, definitions in self.by_name.items() if "{" in name}
 
     def of_kind(self, *kinds: str) -> list[str]:
         """The names of these kinds, each once."""
-        return [name for name, found in self.by_name.items() if any(each.kind in kinds for each in found)]
+        return [
+            name
+            for name, definitions in self.by_name.items()
+            if any(definition.kind in kinds for definition in definitions)
+        ]
 
     def is_of(self, name: str, kind: str, owner: str) -> bool:
         """True where an arm or a run of that name defines the name."""
-        return any(each.kind == kind and each.owner == owner for each in self.by_name.get(name, ()))
+        return any(definition.kind == kind and definition.owner == owner for definition in self.by_name.get(name, ()))
 
     def written_out(self, name: str, kind: str, owners: Sequence[str]) -> list[str]:
         """The names that a loop makes from one with braces: those of these arms and runs, or of all where there are
         none."""
         pattern = re.compile(_BRACES.sub(r"\\w+", name))
-        made = (each for (of, owner), each in self._made.items() if of == kind and (not owners or owner in owners))
-        return [each for found in made for each in found if pattern.fullmatch(each)]
+        lists = (
+            names
+            for (loop_kind, owner), names in self._names_by_owner.items()
+            if loop_kind == kind and (not owners or owner in owners)
+        )
+        return [word for names in lists for word in names if pattern.fullmatch(word)]
 
     def entry_at(self, text: DeckText, token: Token) -> TextEntry | None:
         """The entry of a word of a text, before its block; also one in a macro's body."""
@@ -114,15 +125,17 @@ class NamesInTexts:
         """The innermost entry in whose block an offset is, also in a macro's body, and the entries beside it."""
         macro = self.macros.at(text, offset)
         if macro is None:
-            found = text.around(offset)
-            return found, text.entries if found is None else found.entries
+            innermost = text.around(offset)
+            return innermost, text.entries if innermost is None else innermost.entries
         body = self.macros.body(macro)
-        found = innermost_around(body, offset)
-        return (body[0].within if body else None, body) if found is None else (found, found.entries)
+        innermost = innermost_around(body, offset)
+        return (body[0].within if body else None, body) if innermost is None else (innermost, innermost.entries)
 
     def meant_in(self, text: DeckText, token: Token) -> list[NameInText]:
         """The definitions that a word of a text means: of a macro's parameter, where the macro has it."""
-        macro = next((each for each in text.macros if each.name.offset <= token.offset <= each.end), None)
+        macro = next(
+            (candidate for candidate in text.macros if candidate.name.offset <= token.offset <= candidate.end), None
+        )
         for parameter in macro.parameters or () if macro is not None else ():
             if parameter.text == token.text:
                 return [NameInText("parameter", parameter, None)]
@@ -130,70 +143,76 @@ class NamesInTexts:
 
     def meant(self, token: Token, entry: TextEntry | None) -> list[NameInText]:
         """The definitions that a word in an entry means: those of the kind that is expected there."""
-        found = self.by_name.get(token.text) or self._made_by_loops(token.text)
-        if any(_same(each.token, token) for each in found):
-            return [each for each in found if _same(each.token, token)]
+        definitions = self.by_name.get(token.text) or self._made_by_loops(token.text)
+        if any(_same(definition.token, token) for definition in definitions):
+            return [definition for definition in definitions if _same(definition.token, token)]
         under = self._under_roof(token, entry)
         if under is not None:
             return under
-        found = self._seen(found, token)
+        definitions = self._seen(definitions, token)
         for kind in _wanted(token, entry):
-            of_kind = [each for each in found if each.kind == kind]
+            of_kind = [definition for definition in definitions if definition.kind == kind]
             if of_kind:
                 macro = self.macros.meant(token) if kind == "macro" else None
-                return [each for each in of_kind if macro is not None and each.token is macro.name] or (
-                    self._of_owner(of_kind, entry)
-                )
-        return found if entry is None else []
+                return [
+                    definition for definition in of_kind if macro is not None and definition.token is macro.name
+                ] or (self._of_owner(of_kind, entry))
+        return definitions if entry is None else []
 
-    def _seen(self, found: list[NameInText], token: Token) -> list[NameInText]:
+    def _seen(self, definitions: list[NameInText], token: Token) -> list[NameInText]:
         """The definitions among these that a word's text sees without a roof."""
-        if not self.used or not found:
-            return found
+        if not self.used or not definitions:
+            return definitions
         seen = self.used.seen_from(token.source.name)
-        return [each for each in found if each.file in seen or each.kind not in OUTERMOST]
+        return [definition for definition in definitions if definition.file in seen or definition.kind not in OUTERMOST]
 
     def seen_from(self, text: DeckText) -> NamesInTexts:
         """The names that a text sees without a roof, and those of arms and runs."""
         if not self.used:
             return self
-        made, seen = copy(self), self.used.seen_from(text.source.name)
-        made.by_name = {}
-        for name, found in self.by_name.items():
-            kept = [each for each in found if each.file in seen or each.kind not in OUTERMOST]
-            made.by_name |= {name: kept} if kept else {}
-        return made
+        names, seen = copy(self), self.used.seen_from(text.source.name)
+        names.by_name = {}
+        for name, definitions in self.by_name.items():
+            visible = [
+                definition for definition in definitions if definition.file in seen or definition.kind not in OUTERMOST
+            ]
+            names.by_name |= {name: visible} if visible else {}
+        return names
 
     def _under_roof(self, token: Token, entry: TextEntry | None) -> list[NameInText] | None:
         """The definitions that a word after roofs means, `d1` of `cell.panda.d1`, and the roof that the word before
         means; None where there is no roof."""
         words = entry.words if entry is not None and entry.kind != USE and self.used else []
-        at = next((i for i, word in enumerate(words) if word.offset == token.offset), None)
-        if at is None:
+        index = next((i for i, word in enumerate(words) if word.offset == token.offset), None)
+        if index is None:
             return None
         roofs: list[str] = []
-        begin = at
+        begin = index
         while begin >= 2 and words[begin - 1].text == "." and words[begin - 2].kind == NAME:
             begin -= 2
             roofs.insert(0, words[begin].text)
         files = self.used.under(token.source.name, roofs)
-        is_before_dot = at + 1 < len(words) and words[at + 1].text == "."
+        is_before_dot = index + 1 < len(words) and words[index + 1].text == "."
         roof = self.used.roofs(files).get(token.text) if is_before_dot else None
         if roof is not None:
             return [NameInText("roof", roof.roof, None)]
         if not roofs or not files:
             return None
-        return [each for each in self._all.get(token.text, ()) if each.kind in DEFINED and each.file in files]
+        return [
+            definition
+            for definition in self._all.get(token.text, ())
+            if definition.kind in DEFINED and definition.file in files
+        ]
 
-    def _of_owner(self, found: list[NameInText], entry: TextEntry | None) -> list[NameInText]:
+    def _of_owner(self, definitions: list[NameInText], entry: TextEntry | None) -> list[NameInText]:
         """The definitions of the arm or the run that an entry is about, if there are some."""
-        if len(found) < 2 or entry is None:
-            return found
+        if len(definitions) < 2 or entry is None:
+            return definitions
         for owner in self.owners(entry):
-            own = [each for each in found if each.owner == owner]
+            own = [definition for definition in definitions if definition.owner == owner]
             if own:
                 return own
-        return found
+        return definitions
 
     def owners(self, entry: TextEntry) -> list[str]:
         """The arms and runs whose names an entry may mean, its own first, then those that it is `like`."""
@@ -218,8 +237,8 @@ class NamesInTexts:
         if token is None:
             return []
         under = self._under_roof(token, entry)
-        found = under if under is not None else self._seen(self._all.get(token.text, []), token)
-        return [each for each in found if each.kind == kind]
+        definitions = under if under is not None else self._seen(self._all.get(token.text, []), token)
+        return [definition for definition in definitions if definition.kind == kind]
 
     def _made_by_loops(self, name: str) -> list[NameInText]:
         """The definitions whose names with braces may be this one: `seg_{i}` of `seg_7` and of `seg_{i-1}`."""
@@ -227,10 +246,10 @@ class NamesInTexts:
             return []
         plain = _BRACES.sub("0", name)
         return [
-            each
-            for written, found in self._with_braces.items()
+            definition
+            for written, definitions in self._with_braces.items()
             if re.fullmatch(_BRACES.sub(r"\\w+", written), plain)
-            for each in found
+            for definition in definitions
         ]
 
     def uses(self, name: str) -> Iterator[Token]:
@@ -250,65 +269,74 @@ class NamesInTexts:
             behind = "=" if "=" in entry.texts else "like"
             if behind == "=" and entry.block != "servo":
                 return entry.word_behind("=")
-            found = [each for each in self._named_behind(behind, entry, entry.block) if each.entry is not None]
-            if not found or found[0].entry is entry:
+            definitions = [
+                definition
+                for definition in self._named_behind(behind, entry, entry.block)
+                if definition.entry is not None
+            ]
+            if not definitions or definitions[0].entry is entry:
                 return ""
-            assert found[0].entry is not None
-            entry = found[0].entry
+            assert definitions[0].entry is not None
+            entry = definitions[0].entry
         return ""
 
     def _defined(self, text: DeckText) -> Iterator[NameInText]:
-        yield from _named(text.all_entries(), made=False)
+        yield from _named(text.all_entries(), by_macro=False)
         yield from (NameInText("roof", use.roof, None) for use in uses_in(text))
         parameters = {parameter.text for macro in text.macros for parameter in macro.parameters or ()}
         for macro in text.macros:
             yield NameInText("macro", macro.name, None)
         known: set[tuple[str, int]] = set()
-        for each in _named(self.macros.made(text), made=True):
-            if each.token.text not in parameters and (each.token.text, each.token.offset) not in known:
-                known.add((each.token.text, each.token.offset))
-                yield each
+        for definition in _named(self.macros.entries_in(text), by_macro=True):
+            if (
+                definition.token.text not in parameters
+                and (definition.token.text, definition.token.offset) not in known
+            ):
+                known.add((definition.token.text, definition.token.offset))
+                yield definition
 
 
-def _named(entries: Iterable[TextEntry], made: bool) -> Iterator[NameInText]:
+def _named(entries: Iterable[TextEntry], by_macro: bool) -> Iterator[NameInText]:
     for entry in entries:
         name = entry.named
         if name is not None:
-            yield NameInText("let" if entry.kind in LETS else entry.kind, name, entry, made)
+            yield NameInText("let" if entry.kind in LETS else entry.kind, name, entry, by_macro)
 
 
-def _same(one: Token, other: Token) -> bool:
+def _same(token: Token, other: Token) -> bool:
     """True for the same token, and for one that stands for the same text."""
-    return one is other or (one.source is other.source and one.offset == other.offset and one.text == other.text)
+    return token is other or (
+        token.source is other.source and token.offset == other.offset and token.text == other.text
+    )
 
 
 def _wanted(token: Token, entry: TextEntry | None) -> Sequence[str]:
     """The kinds of definitions that a word may mean at its place, the likeliest first."""
     words = entry.words if entry is not None else []
-    at = next((i for i, word in enumerate(words) if word is token or word.offset == token.offset), None)
-    if entry is None or at is None:
+    index = next((i for i, word in enumerate(words) if word is token or word.offset == token.offset), None)
+    if entry is None or index is None:
         return ()
-    before = words[at - 1].text if at else ""
-    behind = words[at + 1].text if at + 1 < len(words) else ""
+    before = words[index - 1].text if index else ""
+    behind = words[index + 1].text if index + 1 < len(words) else ""
     around = entry.within.kind if entry.within is not None else ""
-    if words[at] is entry.head or (before in ("[", ",") and words[0].text == "[" and "=" not in entry.texts[:at]):
+    if words[index] is entry.head or (before in ("[", ",") and words[0].text == "[" and "=" not in entry.texts[:index]):
         return ("joint", "macro") if around in ("servos", "initial") else ("macro",)
-    if before in BASE_WORDS and at > 1:
+    if before in BASE_WORDS and index > 1:
         return (BASE_WORDS[before] or entry.kind,)
     if before == "substitute":
         return ("joint",)
     if entry.kind == "remove":
         return REMOVED
-    if at and (words[at - 1].kind in NUMBERS or (before in ("*", "/", ")", "]") and entry.kind == UNIT)):
+    if index and (words[index - 1].kind in NUMBERS or (before in ("*", "/", ")", "]") and entry.kind == UNIT)):
         return (UNIT, *_VALUES)
     if before == ".":
-        return (UNDER[words[at - 2].text],) if at >= 2 and words[at - 2].text in UNDER else ()
+        return (UNDER[words[index - 2].text],) if index >= 2 and words[index - 2].text in UNDER else ()
     if behind == ".":
         return ("joint", "servo", "arm", "run", "let")
     if around == "servos" and before == "=":
         return ("servo", "macro")
-    if before == "=" and at >= 2:
-        key = words[at - 2].text
+    if before == "=" and index >= 2:
+        key = words[index - 2].text
         return (*_OF_KEY[key], "let", "macro", "metric", "signal") if key in _OF_KEY else _VALUES
     if entry.kind in ("require", "exclude", "maximise", "minimise"):
         return ("metric", *_VALUES)

@@ -29,14 +29,14 @@ _KINDS: Mapping[str, types.SymbolKind] = MappingProxyType({
 
 def symbols(text: DeckText, position: Position) -> list[types.DocumentSymbol]:
     """The definitions of a text, those of a block below it, and its macros."""
-    found = list(_symbols(text.entries, position))
+    all_symbols = list(_symbols(text.entries, position))
     for directive in text.directives:
         if directive.name == "define" and len(directive.tokens) > 2:
             name = directive.tokens[2]
             whole = types.Range(position(directive.tokens[0].offset), position(directive.tokens[-1].end))
             own = types.Range(position(name.offset), position(name.end))
-            found.append(types.DocumentSymbol(name.text, types.SymbolKind.Constant, whole, own, "#define"))
-    return sorted(found, key=lambda each: (each.range.start.line, each.range.start.character))
+            all_symbols.append(types.DocumentSymbol(name.text, types.SymbolKind.Constant, whole, own, "#define"))
+    return sorted(all_symbols, key=lambda symbol: (symbol.range.start.line, symbol.range.start.character))
 
 
 def _symbols(entries: Iterable[TextEntry], position: Position, levels: int = DEPTH) -> Iterator[types.DocumentSymbol]:
@@ -47,13 +47,13 @@ def _symbols(entries: Iterable[TextEntry], position: Position, levels: int = DEP
             continue
         if name is None and (entry.opened is None or entry.kind not in BLOCKS):
             continue
-        shown = name if name is not None else entry.words[0]
+        title = name if name is not None else entry.words[0]
         yield types.DocumentSymbol(
-            shown.text,
+            title.text,
             _KINDS.get(entry.kind, types.SymbolKind.Object),
-            types.Range(position(entry.words[0].offset), position(max(entry.closed, shown.end))),
-            types.Range(position(shown.offset), position(shown.end)),
-            detail=" ".join(text for text in entry.texts if text != shown.text)[:80] or None,
+            types.Range(position(entry.words[0].offset), position(max(entry.closed, title.end))),
+            types.Range(position(title.offset), position(title.end)),
+            detail=" ".join(text for text in entry.texts if text != title.text)[:80] or None,
             children=list(_symbols(entry.entries, position, levels - 1)) if levels else [],
         )
 
@@ -61,14 +61,14 @@ def _symbols(entries: Iterable[TextEntry], position: Position, levels: int = DEP
 def folds(text: DeckText) -> list[types.FoldingRange]:
     """The stretches of lines that fold: blocks, comments of several lines, conditionals, runs of includes."""
     line = text.source.line
-    found: list[Fold] = [
+    all_folds: list[Fold] = [
         (line(entry.opened.offset) - 1, line(max(entry.closed - 1, 0)) - (2 if entry.complete else 1), None)
         for entry in text.all_entries()
         if entry.opened is not None
     ]
-    found += _folded_comments(text.comments, line)
-    found += _folded_conditionals(text, line)
-    several = sorted((each for each in found if each[1] > each[0]), key=lambda each: each[:2])
+    all_folds += _folded_comments(text.comments, line)
+    all_folds += _folded_conditionals(text, line)
+    several = sorted((fold for fold in all_folds if fold[1] > fold[0]), key=lambda fold: fold[:2])
     return [types.FoldingRange(first, last, kind=kind) for first, last, kind in several]
 
 
@@ -88,10 +88,10 @@ def _folded_comments(comments: list[Token], line: Callable[[int], int]) -> Itera
 def _folded_conditionals(text: DeckText, line: Callable[[int], int]) -> Iterator[Fold]:
     opened: list[int] = []
     for directive in text.directives:
-        at = line(directive.tokens[0].offset) - 1
+        line_number = line(directive.tokens[0].offset) - 1
         if directive.name.startswith("if"):
-            opened.append(at)
+            opened.append(line_number)
         elif directive.name.startswith(("el", "end")) and opened:
-            yield opened.pop(), at - 1, types.FoldingRangeKind.Region
+            yield opened.pop(), line_number - 1, types.FoldingRangeKind.Region
             if directive.name != "endif":
-                opened.append(at)
+                opened.append(line_number)

@@ -12,7 +12,7 @@ from lsprotocol import types
 from pygls.exceptions import JsonRpcException
 from pygls.workspace import PositionCodec
 
-from ic.editor.answers import Asked
+from ic.editor.answers import AskedPosition
 from ic.editor.checking import CheckRequest
 from ic.editor.checks import CheckedDeck, DeckChecks
 from ic.editor.positions import Texts, path_of, uri_of
@@ -30,19 +30,19 @@ class CannotRename(JsonRpcException):
     CODE = types.LSPErrorCodes.RequestFailed.value
 
 
-def nameable(asked: Asked) -> types.PrepareRenamePlaceholder | None:
+def nameable(asked_position: AskedPosition) -> types.PrepareRenamePlaceholder | None:
     """The stretch of the name here, if the texts allow a renaming. Raises CannotRename."""
-    token = asked.name_here
+    token = asked_position.name_here
     if token is None:
         return None
-    reason = refusal_of_name(token, asked.names.meant_in(asked.text, token))
+    reason = refusal_of_name(token, asked_position.names.meant_in(asked_position.text, token))
     if reason:
         raise CannotRename(reason)
-    return types.PrepareRenamePlaceholder(range=asked.location(token).range, placeholder=token.text)
+    return types.PrepareRenamePlaceholder(range=asked_position.location(token).range, placeholder=token.text)
 
 
 async def rename(
-    asked: Asked,
+    asked_position: AskedPosition,
     new: str,
     checks: DeckChecks,
     deck: CheckedDeck | None,
@@ -53,18 +53,18 @@ async def rename(
 
     folders  that the editor has open, their paths;  deck: of which the text is a part
     """
-    token = asked.name_here
+    token = asked_position.name_here
     if token is None or deck is None:
         raise CannotRename("there is no name here")
-    reason = refusal_of_word(new) or refusal_of_name(token, asked.names.meant_in(asked.text, token))
+    reason = refusal_of_word(new) or refusal_of_name(token, asked_position.names.meant_in(asked_position.text, token))
     if reason:
         raise CannotRename(reason)
     first = checks.request(deck.deck)
-    roots = tuple(os.path.realpath(each) for each in (*folders, first.folder))
+    roots = tuple(os.path.realpath(root) for root in (*folders, first.folder))
     others = tuple(_others(checks, deck, token.text, roots))
     if len(others) > MOST_DECKS:
         raise CannotRename(f"more than {MOST_DECKS} decks have the word `{token.text}`")
-    request = RenameRequest((first, *others), asked.file, token.offset, new, roots)
+    request = RenameRequest((first, *others), asked_position.file, token.offset, new, roots)
     done = await _proved(request)
     if done.refused:
         raise CannotRename(done.refused)
@@ -99,14 +99,14 @@ def _others(checks: DeckChecks, deck: CheckedDeck, word: str, roots: Iterable[st
             known.add(other.deck.identity)
             yield checks.request(other.deck)
     unsaved = checks.unsaved()
-    found = 0
+    count = 0
     for path in _decks_in(roots):
         real = os.path.realpath(path)
-        if real in known or found > MOST_DECKS:
+        if real in known or count > MOST_DECKS:
             continue
         known.add(real)
         if has_word.search(unsaved.get(real) or _text(real)):
-            found += 1
+            count += 1
             folder, name = os.path.split(path)
             yield CheckRequest(folder, name, None, checks.include_dirs, checks.defines, unsaved)
 
@@ -115,7 +115,7 @@ def _decks_in(roots: Iterable[str]) -> Iterator[str]:
     seen = 0
     for root in roots:
         for folder, folders, files in os.walk(root):
-            folders[:] = sorted(each for each in folders if not each.startswith("."))
+            folders[:] = sorted(entry for entry in folders if not entry.startswith("."))
             for name in sorted(files):
                 seen += 1
                 if seen > MOST_FILES:
@@ -137,12 +137,14 @@ def _text(path: str) -> str:
 def _changes(
     done: Renamed, new: str, checks: DeckChecks, own: str, codec: PositionCodec
 ) -> Iterator[tuple[str, list[types.TextEdit]]]:
-    open_at: Mapping[str, str] = {each.identity: each.uri for each in checks.texts.values() if path_of(each.uri)}
+    open_at: Mapping[str, str] = {
+        open_text.identity: open_text.uri for open_text in checks.texts.values() if path_of(open_text.uri)
+    }
     for path, edits in done.edits.items():
         text = done.texts[path]
         texts = Texts({path: text}, codec)
-        made = [types.TextEdit(_range(texts, path, text, *edit), new) for edit in edits]
-        yield own if not path else open_at.get(path, uri_of(path)), made
+        text_edits = [types.TextEdit(_range(texts, path, text, *edit), new) for edit in edits]
+        yield own if not path else open_at.get(path, uri_of(path)), text_edits
 
 
 def _range(texts: Texts, path: str, text: str, offset: int, length: int) -> types.Range:

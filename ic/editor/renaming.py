@@ -84,11 +84,11 @@ def _begins_entries(word: str) -> bool:
 
 def refusal_of_name(token: Token, meant: Sequence[NameInText]) -> str:
     """The reason why the meaning of a word cannot be renamed, judged by texts alone; "" where it can."""
-    if any("{" in each.token.text for each in meant):
+    if any("{" in definition.token.text for definition in meant):
         return f"`{token.text}` is made by a loop: change `{meant[0].token.text}` by hand"
-    if any(each.made for each in meant):
+    if any(definition.by_macro for definition in meant):
         return f"`{token.text}` is made by a macro: change what the macro is given by hand"
-    library = [each for each in meant if each.file.startswith("<")]
+    library = [definition for definition in meant if definition.file.startswith("<")]
     if library:
         return f"`{token.text}` is defined in {library[0].file}, which comes with MET"
     if not meant:
@@ -125,50 +125,50 @@ def _compiled(request: CheckRequest) -> Compiled:
     return compiled_with_reply(request)[0]
 
 
-def renamed(asked: RenameRequest) -> Renamed:
+def renamed(rename_request: RenameRequest) -> Renamed:
     """The proved edits that change the name, or the reason why there are none."""
     try:
-        return _renamed(asked)
+        return _renamed(rename_request)
     except NotRenamed as reason:
         return Renamed({}, {}, str(reason))
 
 
-def _renamed(asked: RenameRequest) -> Renamed:
-    first = _Deck(asked.decks[0])
-    text = next((each for each in first.names.texts if each.source.name == asked.file), None)
-    token = text.token_at(asked.offset) if text is not None else None
+def _renamed(rename_request: RenameRequest) -> Renamed:
+    first = _Deck(rename_request.decks[0])
+    text = next((candidate for candidate in first.names.texts if candidate.source.name == rename_request.file), None)
+    token = text.token_at(rename_request.offset) if text is not None else None
     if text is None or token is None or token.kind != NAME:
         raise NotRenamed("there is no name here")
     meant = first.names.meant_in(text, token)
-    reason = refusal_of_word(asked.new) or refusal_of_name(token, meant)
+    reason = refusal_of_word(rename_request.new) or refusal_of_name(token, meant)
     if reason:
         raise NotRenamed(reason)
-    home = {first.path(each.file) for each in meant}
+    home = {first.path(definition.file) for definition in meant}
     decks = [first]
-    for request in asked.decks[1:]:
+    for request in rename_request.decks[1:]:
         other = _Deck(request)
         if home & {other.path(name) for name in other.compiled.sources}:
             decks.append(other)
-    found: dict[str, set[tuple[int, int]]] = {}
+    uses: dict[str, set[tuple[int, int]]] = {}
     texts: dict[str, str] = {}
-    places = {(first.path(each.file), each.token.offset) for each in meant}
+    places = {(first.path(definition.file), definition.token.offset) for definition in meant}
     for deck in decks:
-        _refuse_taken(deck, asked.new)
+        _refuse_taken(deck, rename_request.new)
         for use in _uses(deck, token.text, places):
             path = deck.path(use.source.name)
-            _refuse_outside(use, path, asked.roots)
-            found.setdefault(path, set()).add((use.offset, use.length))
+            _refuse_outside(use, path, rename_request.roots)
+            uses.setdefault(path, set()).add((use.offset, use.length))
             texts[path] = use.source.text
-    edits = {path: tuple(sorted(offsets)) for path, offsets in found.items()}
-    proved = [_is_proved(deck, edits, token.text, asked.new) for deck in decks]
+    edits = {path: tuple(sorted(offsets)) for path, offsets in uses.items()}
+    proved = [_is_proved(deck, edits, token.text, rename_request.new) for deck in decks]
     if not any(proved):
         raise NotRenamed("no deck has a run by which the change could be proved: open one that includes this text")
     return Renamed(edits, texts)
 
 
 def _refuse_taken(deck: _Deck, new: str) -> None:
-    for each in deck.names.by_name.get(new, ()):
-        raise NotRenamed(f"`{new}` exists: {each.kind} at {each.token.place}")
+    for definition in deck.names.by_name.get(new, ()):
+        raise NotRenamed(f"`{new}` exists: {definition.kind} at {definition.token.place}")
 
 
 def _refuse_outside(use: Token, path: str, roots: Iterable[str]) -> None:
@@ -181,12 +181,12 @@ def _refuse_outside(use: Token, path: str, roots: Iterable[str]) -> None:
 def _uses(deck: _Deck, name: str, places: set[tuple[str, int]]) -> list[Token]:
     """The tokens of a deck's texts that mean one of the definitions."""
     texts = {text.source.name: text for text in deck.names.texts}
-    found = []
+    uses = []
     for use in deck.names.uses(name):
         meant = deck.names.meant_in(texts[use.source.name], use)
-        if any((deck.path(each.file), each.token.offset) in places for each in meant):
-            found.append(use)
-    return found
+        if any((deck.path(definition.file), definition.token.offset) in places for definition in meant):
+            uses.append(use)
+    return uses
 
 
 def edited(text: str, edits: Iterable[tuple[int, int]], new: str) -> str:
@@ -201,8 +201,8 @@ def _is_proved(deck: _Deck, edits: Mapping[str, tuple[tuple[int, int], ...]], ol
     NotRenamed."""
     codes = deck.codes
     if codes and codes != [NO_RUN]:
-        at = deck.compiled.diagnostics[0].at
-        raise NotRenamed(f"{at.place if at is not None else deck.request.name}: mend {codes[0]} first")
+        label = deck.compiled.diagnostics[0].at
+        raise NotRenamed(f"{label.place if label is not None else deck.request.name}: mend {codes[0]} first")
     changed = {
         deck.path(name): edited(text, edits[deck.path(name)], new)
         for name, text in deck.compiled.sources.items()
@@ -219,8 +219,8 @@ def _is_proved(deck: _Deck, edits: Mapping[str, tuple[tuple[int, int], ...]], ol
         ]:
             raise NotRenamed(f"`{old}` would not be found everywhere: {after.diagnostics[0].message}")
         return False
-    one, other = (encode(type(each), each) for each in (before.plan, after.plan))
-    if not same_but_for(old, new, one, other) or [d.code for d in before.diagnostics] != [
+    old_plan, new_plan = (encode(type(plan), plan) for plan in (before.plan, after.plan))
+    if not same_but_for(old, new, old_plan, new_plan) or [d.code for d in before.diagnostics] != [
         d.code for d in after.diagnostics
     ]:
         raise NotRenamed(f"{deck.request.name or 'the deck'} would mean something else: `{old}` has other uses")
@@ -236,16 +236,16 @@ def same_but_for(old: str, new: str, before: Any, after: Any) -> bool:
         return before == after or _renamed_words(old, new, before, after)
     if isinstance(before, dict) and isinstance(after, dict):
         if "sources" in before and "experiments" in before:
-            before, after = ({k: v for k, v in each.items() if k != "sources"} for each in (before, after))
+            before, after = ({k: v for k, v in value.items() if k != "sources"} for value in (before, after))
         if "file" in before and "line" in before:
-            before, after = ({k: v for k, v in each.items() if k not in _COLUMNS} for each in (before, after))
+            before, after = ({k: v for k, v in value.items() if k not in _COLUMNS} for value in (before, after))
         keys = [(key, key if key in after else _in_words(old, new, key)) for key in before]
         return len(before) == len(after) and all(
             other in after and same_but_for(old, new, before[key], after[other]) for key, other in keys
         )
     if isinstance(before, list | tuple) and isinstance(after, list | tuple):
         return len(before) == len(after) and all(
-            same_but_for(old, new, one, other) for one, other in zip(before, after, strict=True)
+            same_but_for(old, new, old_value, new_value) for old_value, new_value in zip(before, after, strict=True)
         )
     return type(before) is type(after) and bool(before == after)
 
@@ -253,9 +253,10 @@ def same_but_for(old: str, new: str, before: Any, after: Any) -> bool:
 def _renamed_words(old: str, new: str, before: str, after: str) -> bool:
     ones, others = _WORDS.findall(before), _WORDS.findall(after)
     return len(ones) == len(others) and all(
-        one == other or (one == old and other == new) for one, other in zip(ones, others, strict=True)
+        old_word == new_word or (old_word == old and new_word == new)
+        for old_word, new_word in zip(ones, others, strict=True)
     )
 
 
 def _in_words(old: str, new: str, text: str) -> str:
-    return "".join(new if each == old else each for each in _WORDS.findall(text))
+    return "".join(new if word == old else word for word in _WORDS.findall(text))

@@ -48,14 +48,14 @@ def semantic_tokens(
     data: list[int] = []
     line = column = 0
     for token, kind, modifiers in meanings(text, names):
-        at = position(token.offset)
+        start = position(token.offset)
         written = text.source.text[token.offset : token.end]
         if "\n" in written:
             continue
-        if at.line != line:
+        if start.line != line:
             column = 0
-        data += [at.line - line, at.character - column, units(written), TYPES.index(kind), modifiers]
-        line, column = at.line, at.character
+        data += [start.line - line, start.character - column, units(written), TYPES.index(kind), modifiers]
+        line, column = start.line, start.character
     return types.SemanticTokens(data)
 
 
@@ -70,17 +70,17 @@ def meanings(text: DeckText, names: NamesInTexts) -> Iterator[tuple[Token, str, 
     loops = [entry for entry in entries if entry.kind == LOOP and entry.opened is not None and len(entry.words) > 1]
     in_lines = (token for line in text.directives if line.name != "include" for token in line.tokens[2:])
     files = [(use.first.offset, use.last.offset) for use in uses_in(text)]
-    deck = (each for each in text.tokens if not any(first < each.offset < last for first, last in files))
+    deck = (token for token in text.tokens if not any(first < token.offset < last for first, last in files))
     every = sorted((*deck, *in_lines), key=lambda token: token.offset)
     before: Token | None = None
     for n, token in enumerate(every):
         if token.kind == NAME:
             behind = every[n + 1].text if n + 1 < len(every) else ""
-            at = bisect_right(begins, token.offset) - 1
-            entry = entries[at] if at >= 0 and token.offset <= entries[at].words[-1].offset else None
-            found = _parameter_or_index(text, token, loops) or _meaning(text, token, entry, names, before, behind)
-            if found is not None:
-                yield token, *found
+            index = bisect_right(begins, token.offset) - 1
+            entry = entries[index] if index >= 0 and token.offset <= entries[index].words[-1].offset else None
+            meaning = _parameter_or_index(text, token, loops) or _meaning(text, token, entry, names, before, behind)
+            if meaning is not None:
+                yield token, *meaning
         before = token
 
 
@@ -101,10 +101,10 @@ def _parameter_or_index(text: DeckText, token: Token, loops: list[TextEntry]) ->
 def _meaning(
     text: DeckText, token: Token, entry: TextEntry | None, names: NamesInTexts, before: Token | None, behind: str
 ) -> tuple[str, int] | None:
-    for found in names.meant(token, entry)[:1]:
-        defines = found.token.offset == token.offset and found.file == text.source.name
-        library = OF_LIBRARY if found.file.startswith("<") else 0
-        return _OF_NAME.get(found.kind, "variable"), (DEFINES if defines else 0) | library
+    for definition in names.meant(token, entry)[:1]:
+        defines = definition.token.offset == token.offset and definition.file == text.source.name
+        library = OF_LIBRARY if definition.file.startswith("<") else 0
+        return _OF_NAME.get(definition.kind, "variable"), (DEFINES if defines else 0) | library
     if token.text in UNITS and before is not None and _may_precede_unit(text, token):
         return "type", 0
     if entry is None or entry.head is None:
@@ -138,12 +138,12 @@ def _key(token: Token, entry: TextEntry, names: NamesInTexts) -> tuple[str, int]
     if around is None:
         return ("keyword", 0) if token.text in (*BLOCKS, *_OF_DECK, LOOP) else None
     block = BLOCKS.get(around.block)
-    declared = {each.name.split()[0]: each for each in block.entries} if block is not None else {}
+    declared = {declaration.name.split()[0]: declaration for declaration in block.entries} if block is not None else {}
     if token.text in declared:
         return ("property" if declared[token.text].form == "key" and entry.opened is None else "keyword"), 0
     if token.text in ("remove", LOOP):
         return "keyword", 0
-    return ("property", 0) if any(each.name == token.text for each in parameters_of(around, names)) else None
+    return ("property", 0) if any(parameter.name == token.text for parameter in parameters_of(around, names)) else None
 
 
 def _words_of(entry: TextEntry, names: NamesInTexts) -> tuple[str, ...]:
@@ -151,11 +151,11 @@ def _words_of(entry: TextEntry, names: NamesInTexts) -> tuple[str, ...]:
     around = entry.within
     if around is None:
         return ()
-    declared = [each for each in parameters_of(around, names) if each.name == entry.kind]
+    declared = [parameter for parameter in parameters_of(around, names) if parameter.name == entry.kind]
     block = BLOCKS.get(around.block)
     declared += [
-        each.parameter
-        for each in (block.entries if block is not None else ())
-        if each.name == entry.kind and each.parameter is not None
+        declaration.parameter
+        for declaration in (block.entries if block is not None else ())
+        if declaration.name == entry.kind and declaration.parameter is not None
     ]
-    return tuple(word for each in declared for word in each.words)
+    return tuple(word for parameter in declared for word in parameter.words)

@@ -13,7 +13,7 @@ from typing import Any
 from lsprotocol import types
 from pygls.lsp.server import LanguageServer
 
-from ic.editor.answers import Asked
+from ic.editor.answers import AskedPosition
 from ic.editor.checker_process import CheckerProcess
 from ic.editor.checks import CheckedDeck, DeckChecks, OpenText
 from ic.editor.fixes import QuickFix, actions, quick_fixes
@@ -65,8 +65,8 @@ class DeckServer(LanguageServer):
 
     def begin(self, parameters: types.InitializeParams) -> None:
         """Take the editor's options, and start to check."""
-        shown = parameters.capabilities.text_document and parameters.capabilities.text_document.publish_diagnostics
-        self.related = bool(shown and shown.related_information)
+        support = parameters.capabilities.text_document and parameters.capabilities.text_document.publish_diagnostics
+        self.related = bool(support and support.related_information)
         drawn = parameters.capabilities.workspace
         self._refreshes_colours = bool(drawn and drawn.semantic_tokens and drawn.semantic_tokens.refresh_support)
         self._refreshes_lenses = bool(drawn and drawn.code_lens and drawn.code_lens.refresh_support)
@@ -75,8 +75,8 @@ class DeckServer(LanguageServer):
         if self._worker is None:  # an editor may begin twice: two workers would wait for each other's checks
             self._worker = asyncio.create_task(self.checks.work())
 
-    def _take_options(self, given: Any) -> None:
-        options = given if isinstance(given, dict) else {}
+    def _take_options(self, settings: Any) -> None:
+        options = settings if isinstance(settings, dict) else {}
         for name in options.keys() - set(OPTIONS):
             self._warn(f"no option `{name}`; there are: {', '.join(OPTIONS)}")
         for name in ("includeDirs", "defines"):
@@ -134,7 +134,7 @@ class DeckServer(LanguageServer):
     def unchanged(self, deck: CheckedDeck) -> bool:
         """True where all texts of a deck are the same as when it was checked."""
         return all(
-            self._as_checked(deck, uri) for uri, each in self.checks.texts.items() if each.identity in deck.files
+            self._as_checked(deck, uri) for uri, text in self.checks.texts.items() if text.identity in deck.files
         )
 
     def layout(self, uri: str) -> list[types.TextEdit]:
@@ -186,46 +186,50 @@ class DeckServer(LanguageServer):
 
     def lenses(self, uri: str) -> list[types.CodeLens]:
         """The lines above the runs of a text, with data from archives beside its file."""
-        asked, path = self.asked_about(uri, types.Position(0, 0)), path_of(uri)
+        asked_position, path = self.position_in_text(uri, types.Position(0, 0)), path_of(uri)
         known = self._last_runs(path) if self._last_runs is not None and path is not None else {}
-        position = self.position_in(asked.text)
+        position = self.position_in(asked_position.text)
         return list(
             lenses(
-                asked.text, asked.index, path, known, lambda *ends: types.Range(position(ends[0]), position(ends[1]))
+                asked_position.text,
+                asked_position.index,
+                path,
+                known,
+                lambda *ends: types.Range(position(ends[0]), position(ends[1])),
             )
         )
 
-    def asked(self, parameters: types.TextDocumentPositionParams | Any) -> Asked:
+    def asked_position(self, parameters: types.TextDocumentPositionParams | Any) -> AskedPosition:
         """The position that a request is about."""
-        return self.asked_about(parameters.text_document.uri, parameters.position)
+        return self.position_in_text(parameters.text_document.uri, parameters.position)
 
-    def asked_about(self, uri: str, position: types.Position) -> Asked:
+    def position_in_text(self, uri: str, position: types.Position) -> AskedPosition:
         """A position of a text."""
-        return Asked(self.checks, self.workspace.position_codec, self.address, uri, position)
+        return AskedPosition(self.checks, self.workspace.position_codec, self.address, uri, position)
 
     def publish(self, decks: Iterable[CheckedDeck]) -> None:
         """Send the editor the diagnostics of each file whose diagnostics have changed."""
-        found: dict[str, list[types.Diagnostic]] = {}
+        by_file: dict[str, list[types.Diagnostic]] = {}
         versions: dict[str, int | None] = {}
         self.fixes = {}
         for deck in decks:
             texts = Texts(deck.reply.sources, self.workspace.position_codec)
-            versions |= {uri: each.version for uri, each in deck.texts.items()}
+            versions |= {uri: text.version for uri, text in deck.texts.items()}
             address = partial(self.address, deck)
             for diagnostic, edits in zip(deck.reply.diagnostics, deck.reply.edits, strict=True):
-                uri, made = in_editor(diagnostic, deck.name, texts, address, self.related)
-                there = found.setdefault(uri, [])
-                if made in there:
+                uri, shown_diagnostic = in_editor(diagnostic, deck.name, texts, address, self.related)
+                diagnostics = by_file.setdefault(uri, [])
+                if shown_diagnostic in diagnostics:
                     continue
-                there.append(made)
-                fixes = quick_fixes(diagnostic, edits, made, texts, address)
+                diagnostics.append(shown_diagnostic)
+                fixes = quick_fixes(diagnostic, edits, shown_diagnostic, texts, address)
                 self.fixes.setdefault(uri, []).extend(fix for fix in fixes if self._as_checked(deck, fix.file))
-        for uri in {**self._published, **dict.fromkeys(self.checks.texts), **found}:
-            told = types.PublishDiagnosticsParams(uri, found.get(uri, []), versions.get(uri))
-            if self._published.get(uri) != told:
-                self.text_document_publish_diagnostics(told)
-                self._published[uri] = told
-        for uri in [uri for uri, told in self._published.items() if not told.diagnostics]:
+        for uri in {**self._published, **dict.fromkeys(self.checks.texts), **by_file}:
+            publication = types.PublishDiagnosticsParams(uri, by_file.get(uri, []), versions.get(uri))
+            if self._published.get(uri) != publication:
+                self.text_document_publish_diagnostics(publication)
+                self._published[uri] = publication
+        for uri in [uri for uri, published in self._published.items() if not published.diagnostics]:
             if uri not in self.checks.texts:
                 del self._published[uri]
 
@@ -242,15 +246,15 @@ def make(
 
     @server.feature(types.TEXT_DOCUMENT_DID_OPEN)
     def did_open(parameters: types.DidOpenTextDocumentParams) -> None:
-        given = parameters.text_document
-        server.checks.open(OpenText(given.uri, given.text, given.version))
+        document = parameters.text_document
+        server.checks.open(OpenText(document.uri, document.text, document.version))
 
     @server.feature(types.TEXT_DOCUMENT_DID_CHANGE)
     def did_change(parameters: types.DidChangeTextDocumentParams) -> None:
-        given = parameters.text_document
-        text = server.workspace.get_text_document(given.uri).source
+        document = parameters.text_document
+        text = server.workspace.get_text_document(document.uri).source
         server.forget_notifications()
-        server.checks.change(OpenText(given.uri, text, given.version))
+        server.checks.change(OpenText(document.uri, text, document.version))
 
     @server.feature(types.TEXT_DOCUMENT_DID_SAVE)
     def did_save(parameters: types.DidSaveTextDocumentParams) -> None:
@@ -292,19 +296,19 @@ def make(
         types.TEXT_DOCUMENT_COMPLETION, types.CompletionOptions(trigger_characters=[".", "<", '"', "#", "="])
     )
     def complete(parameters: types.CompletionParams) -> list[types.CompletionItem]:
-        return server.asked(parameters).complete()
+        return server.asked_position(parameters).complete()
 
     @server.feature(types.TEXT_DOCUMENT_HOVER)
     def hover(parameters: types.HoverParams) -> types.Hover | None:
-        return server.asked(parameters).hover()
+        return server.asked_position(parameters).hover()
 
     @server.feature(types.TEXT_DOCUMENT_DEFINITION)
     def definition(parameters: types.DefinitionParams) -> list[types.Location]:
-        return server.asked(parameters).definitions()
+        return server.asked_position(parameters).definitions()
 
     @server.feature(types.TEXT_DOCUMENT_REFERENCES)
     def references(parameters: types.ReferenceParams) -> list[types.Location]:
-        return server.asked(parameters).references(parameters.context.include_declaration)
+        return server.asked_position(parameters).references(parameters.context.include_declaration)
 
     @server.feature(types.TEXT_DOCUMENT_CODE_LENS)
     def code_lens(parameters: types.CodeLensParams) -> list[types.CodeLens]:
@@ -312,19 +316,23 @@ def make(
 
     @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
     def prepare_rename(parameters: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:
-        return nameable(server.asked(parameters))
+        return nameable(server.asked_position(parameters))
 
     @server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))
     async def renamed(parameters: types.RenameParams) -> types.WorkspaceEdit:
         await server.checks.rest()
         deck, codec = server.checks.deck_of(parameters.text_document.uri), server.workspace.position_codec
-        return await rename(server.asked(parameters), parameters.new_name, server.checks, deck, server.folders(), codec)
+        return await rename(
+            server.asked_position(parameters), parameters.new_name, server.checks, deck, server.folders(), codec
+        )
 
     @server.feature(types.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL, LEGEND)
     def words(parameters: types.SemanticTokensParams) -> types.SemanticTokens:
-        asked = server.asked_about(parameters.text_document.uri, types.Position(0, 0))
+        asked_position = server.position_in_text(parameters.text_document.uri, types.Position(0, 0))
         units = server.workspace.position_codec.client_num_units
-        return semantic_tokens(asked.text, asked.names, server.position_in(asked.text), units)
+        return semantic_tokens(
+            asked_position.text, asked_position.names, server.position_in(asked_position.text), units
+        )
 
     @server.feature("met/settled")
     async def settled(parameters: None) -> bool:

@@ -99,10 +99,10 @@ class TextEntry:
     def name_behind(self, word: str) -> Token | None:
         """The token of the name after a word, `drive` in `like panda.drive`; None where there is none."""
         words = self.words[len(self.words) - len(self.texts) :]
-        at = self.texts.index(word) + 1 if word in self.texts[:-1] else len(words)
-        while at + 2 < len(words) and words[at + 1].text == "." and words[at + 2].kind == NAME:
-            at += 2
-        return words[at] if at < len(words) else None
+        index = self.texts.index(word) + 1 if word in self.texts[:-1] else len(words)
+        while index + 2 < len(words) and words[index + 1].text == "." and words[index + 2].kind == NAME:
+            index += 2
+        return words[index] if index < len(words) else None
 
 
 @dataclass
@@ -168,33 +168,33 @@ def entries_of(tokens: Iterable[Token], last: int, within: TextEntry | None = No
     return outermost
 
 
-def _end(entry: TextEntry | None, at: int, complete: bool) -> None:
+def _end(entry: TextEntry | None, offset: int, complete: bool) -> None:
     if entry is not None:
-        entry.closed, entry.complete = at, complete
+        entry.closed, entry.complete = offset, complete
 
 
 def with_whole_names(seen: Sequence[Token]) -> Iterator[Token]:
     """The tokens, with a name with braces in a loop joined into one: `seg_{i-1}`."""
     indices: list[str] = [""]  # of each block that is open; "" where it is no loop's
-    index, at = "", 0
-    while at < len(seen):
-        token, length = seen[at], 1
+    index, first = "", 0
+    while first < len(seen):
+        token, length = seen[first], 1
         if token.kind == NAME or token.text == "{":
-            length = max(1, name_length(seen, at))
-            inside = seen[at : at + length]
-            if not any(each.text in indices for each in inside[1:] if each.kind == NAME):
+            length = max(1, name_length(seen, first))
+            inside = seen[first : first + length]
+            if not any(part.text in indices for part in inside[1:] if part.kind == NAME):
                 length = 1
         if length > 1:
-            text = "".join(each.text for each in seen[at : at + length])
-            token = Token(NAME, text, token.source, token.offset, seen[at + length - 1].end - token.offset)
-        elif token.text == LOOP and at + 2 < len(seen) and seen[at + 2].text == "in":
-            index = seen[at + 1].text
+            text = "".join(part.text for part in seen[first : first + length])
+            token = Token(NAME, text, token.source, token.offset, seen[first + length - 1].end - token.offset)
+        elif token.text == LOOP and first + 2 < len(seen) and seen[first + 2].text == "in":
+            index = seen[first + 1].text
         elif token.text == "{":
             indices.append(index)
             index = ""
         elif token.text == "}" and len(indices) > 1:
             indices.pop()
-        at += length
+        first += length
         yield token
 
 
@@ -209,13 +209,13 @@ def flattened(entries: Iterable[TextEntry]) -> Iterator[TextEntry]:
 
 def innermost_around(entries: Iterable[TextEntry], offset: int) -> TextEntry | None:
     """The innermost of the entries in whose block an offset is, through loops; None outside all blocks."""
-    found: TextEntry | None = None
+    innermost: TextEntry | None = None
     while True:
         inside = [e for e in entries if e.opened is not None and e.opened.end <= offset < max(e.closed, 1)]
         inside += [e for e in entries if e.opened is not None and not e.complete and offset == e.closed]
         if not inside:
-            return _no_loop(found)
-        found, entries = inside[-1], inside[-1].entries
+            return _no_loop(innermost)
+        innermost, entries = inside[-1], inside[-1].entries
 
 
 def through_loops(entries: Iterable[TextEntry]) -> Iterator[TextEntry]:
@@ -230,7 +230,7 @@ def through_loops(entries: Iterable[TextEntry]) -> Iterator[TextEntry]:
 
 def indices_around(entries: Iterable[TextEntry], offset: int) -> set[str]:
     """The indices of the loops in whose bodies an offset is."""
-    loops = (each for each in flattened(entries) if _no_loop(each) is not each and each.opened is not None)
+    loops = (entry for entry in flattened(entries) if _no_loop(entry) is not entry and entry.opened is not None)
     return {loop.texts[1] for loop in loops if loop.opened is not None and loop.opened.end <= offset < loop.closed}
 
 
@@ -271,7 +271,7 @@ class DeckText:
         for line in logical_lines(self.source):
             seen = [token for token in line if token.kind != SPACE and token.text]
             self.comments += (
-                each for each in line if each.kind == SPACE and text[each.offset : each.offset + 1] == "/"
+                token for token in line if token.kind == SPACE and text[token.offset : token.offset + 1] == "/"
             )
             if seen and seen[0].text == "#":
                 self.directives.append(TextDirective(seen))
@@ -309,7 +309,7 @@ class DeckText:
         """The offset of a column of a line, both counted from 0."""
         lines = self.source.text.split("\n")
         line = min(line, len(lines) - 1)
-        return sum(len(each) + 1 for each in lines[:line]) + min(column, len(lines[line]))
+        return sum(len(text_line) + 1 for text_line in lines[:line]) + min(column, len(lines[line]))
 
 
 class KnownStructures:
@@ -326,15 +326,15 @@ class KnownStructures:
 
     def of(self, deck: str, texts: Mapping[str, str]) -> dict[str, DeckText]:
         """The structures of all texts of a deck at an address, by the texts' names."""
-        known = {each.source.name: each for other in self._of.values() for each in other.values()}
+        known = {structure.source.name: structure for other in self._of.values() for structure in other.values()}
         known.update(self._of.get(deck, {}))
-        found = {}
+        structures = {}
         for name, text in texts.items():
-            kept = known.get(name)
-            found[name] = kept if kept is not None and kept.source.text == text else DeckText(name, text)
+            last = known.get(name)
+            structures[name] = last if last is not None and last.source.text == text else DeckText(name, text)
         if deck in self._opened:
-            self._of[deck] = found
-        return found
+            self._of[deck] = structures
+        return structures
 
     def forget(self, deck: str) -> None:
         """Release the structures of a deck that an editor has closed."""

@@ -29,46 +29,47 @@ def in_editor(
     address  of the file of that name; None for the command line
     related  whether the editor shows what is related; where not, it is in the message, as a terminal has it
     """
-    at = diagnostic.at.place if diagnostic.at is not None else None
-    shown = shown_place(at) if at is not None else None
-    uri = address(shown.file) if shown is not None else None
-    if shown is None or uri is None:
-        shown = Place(deck, 1, 1, 0)
+    origin = diagnostic.at.place if diagnostic.at is not None else None
+    shown_at = shown_place(origin) if origin is not None else None
+    uri = address(shown_at.file) if shown_at is not None else None
+    if shown_at is None or uri is None:
+        shown_at = Place(deck, 1, 1, 0)
         uri = address(deck) or ""
-    about = list(_related(diagnostic, shown))
+    about = list(_related(diagnostic, shown_at))
     message = diagnostic.message
     if not related:
-        message = "\n".join([message, *(_in_words(place, text, shown) for place, text in about)])
-    made = types.Diagnostic(
-        range=texts.range(shown),
+        message = "\n".join([message, *(_in_words(place, text, shown_at) for place, text in about)])
+    editor_diagnostic = types.Diagnostic(
+        range=texts.range(shown_at),
         message=message,
         severity=_SEVERITIES[diagnostic.severity],
         code=diagnostic.code,
         source=SOURCE,
         related_information=[
             types.DiagnosticRelatedInformation(
-                types.Location(address(place.file) or uri, texts.range(place if address(place.file) else shown)), text
+                types.Location(address(place.file) or uri, texts.range(place if address(place.file) else shown_at)),
+                text,
             )
             for place, text in about
         ]
         if related
         else None,
     )
-    return uri, made
+    return uri, editor_diagnostic
 
 
-def _related(diagnostic: Diagnostic, shown: Place) -> Iterator[tuple[Place, str]]:
+def _related(diagnostic: Diagnostic, shown_at: Place) -> Iterator[tuple[Place, str]]:
     """The places and words that a terminal prints below the message."""
     if diagnostic.at is not None:
-        at = diagnostic.at
-        if at.text:
-            yield shown, at.text
-        if at.place.expansions and shown_place(at.place) is not at.place:
-            yield at.place, f"written here, in macro {at.place.expansions[0].macro}"
+        own_label = diagnostic.at
+        if own_label.text:
+            yield shown_at, own_label.text
+        if own_label.place.expansions and shown_place(own_label.place) is not own_label.place:
+            yield own_label.place, f"written here, in macro {own_label.place.expansions[0].macro}"
     for label in diagnostic.also:
         yield shown_place(label.place), label.text
     for text in diagnostic.help:
-        yield shown, f"help: {text}"
+        yield shown_at, f"help: {text}"
     if diagnostic.at is not None:
         for step in diagnostic.at.place.expansions:
             yield step.use, f"note: in expansion of macro {step.macro}"
@@ -79,5 +80,5 @@ def _related(diagnostic: Diagnostic, shown: Place) -> Iterator[tuple[Place, str]
             )
 
 
-def _in_words(place: Place, text: str, shown: Place) -> str:
-    return text if place == shown else f"{place}  {text}"
+def _in_words(place: Place, text: str, shown_at: Place) -> str:
+    return text if place == shown_at else f"{place}  {text}"

@@ -58,14 +58,14 @@ class DecksUsed:
         self._uses = {text.source.name: list(uses_in(text)) for text in texts}
         self._beside: dict[str, set[str]] = {name: set() for name in self._uses}  # includes, or is included by
         reached: set[str] = set()
-        for each in texts if any(self._uses.values()) else ():
-            here = each.source.name
-            for quoted, angled in _INCLUDE.findall(each.source.text):
-                for found in self._called(quoted or angled) - {here}:
-                    self._beside[here].add(found)
-                    self._beside[found].add(here)
-                    reached.add(found)
-            reached.update(*(self._called(use.file) for use in self._uses[here]))
+        for text in texts if any(self._uses.values()) else ():
+            including = text.source.name
+            for quoted, angled in _INCLUDE.findall(text.source.text):
+                for other in self._called(quoted or angled) - {including}:
+                    self._beside[including].add(other)
+                    self._beside[other].add(including)
+                    reached.add(other)
+            reached.update(*(self._called(use.file) for use in self._uses[including]))
         for name in list(self._uses)[1:]:
             if name not in reached:
                 self._beside[name].add(texts[0].source.name)
@@ -85,13 +85,13 @@ class DecksUsed:
         return self._connected({name}) if self else set(self._uses)
 
     def _connected(self, names: Iterable[str]) -> set[str]:
-        found: set[str] = set()
+        connected: set[str] = set()
         waiting = set(names)
         while waiting:
             name = waiting.pop()
-            found.add(name)
-            waiting |= self._beside.get(name, set()) - found
-        return found
+            connected.add(name)
+            waiting |= self._beside.get(name, set()) - connected
+        return connected
 
     def roofs(self, names: Iterable[str]) -> dict[str, UseInText]:
         """The roofs that some texts have."""
@@ -100,8 +100,8 @@ class DecksUsed:
     def under(self, name: str, words: Sequence[str]) -> set[str]:
         """The texts for which roofs in a text stand, `cell`, `panda` in `cell.panda.d1`; none where one is not a
         roof."""
-        found = self.seen_from(name)
+        seen = self.seen_from(name)
         for word in words:
-            use = self.roofs(found).get(word)
-            found = self._connected(self._called(use.file)) if use is not None else set()
-        return found
+            use = self.roofs(seen).get(word)
+            seen = self._connected(self._called(use.file)) if use is not None else set()
+        return seen

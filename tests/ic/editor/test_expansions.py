@@ -37,7 +37,7 @@ def names() -> NamesInTexts:
 )
 def test_a_name_that_a_macro_makes_is_defined_where_its_argument_stands(name: str, kind: str, written: str) -> None:
     (found,) = names().by_name[name]
-    assert found.made and found.kind == kind
+    assert found.by_macro and found.kind == kind
     assert found.token.offset == DECK.index(written)
 
 
