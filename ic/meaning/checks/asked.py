@@ -29,15 +29,15 @@ def grapples(run: RunNumbers) -> Iterator[Scale]:
         for joint in q if t > 0.0 else ():
             motion = motions.get(joint)
             q[joint] = math.nan if motion is None else float(np.interp(t, run.instants, motion[0]))
-        turned, at, _ = run.poses(q)
+        turned, places, _ = run.poses(q)
         flown = run.vector(f"{head}.position") + run.vector(f"{head}.velocity") * t + 0.5 * t * t * run.gravity
-        place = at[payload.link] + turned[payload.link] @ run.vector(f"{head}.at")
+        place = places[payload.link] + turned[payload.link] @ run.vector(f"{head}.at")
         apart = float(np.linalg.norm(flown - place))
         loose = run.extent(head) + run.length(f"{head}.com") * (2.0 + run.length(f"{head}.rate") * t)
         beyond = known.away(np.array([[run.numbers[path] for path in known.paths]]), run.duration)[0].size
         most = run.depths[payload.link] + run.length(f"{head}.at") + 4.0 * loose
         if math.isfinite(apart) and most > 0.0 and not beyond:
-            there = ", ".join(f"{x:.4g}" for x in np.round(place, 6) + 0.0)
+            coordinates = ", ".join(f"{x:.4g}" for x in np.round(place, 6) + 0.0)
             yield Scale(
                 "grapple",
                 f"{head}.position",
@@ -49,8 +49,8 @@ def grapples(run: RunNumbers) -> Iterator[Scale]:
                 0.25,
                 "a grapple closes on what is near",
                 verb="is apart from the place of the grapple by",
-                said=f"leads it {apart:.4g} m past its place on `{payload.link}`, which grapples it at {t:.4g} s",
-                cure=f"its place is at [{there}] m then: let it be there",
+                clause=f"leads it {apart:.4g} m past its place on `{payload.link}`, which grapples it at {t:.4g} s",
+                cure=f"its place is at [{coordinates}] m then: let it be there",
             )
 
 
@@ -75,7 +75,7 @@ def spreads(run: RunNumbers) -> Iterator[Scale]:
         fine = 0.0 < stays < least * (4.0 * run.reach) ** 2  # else its radius of gyration is told
         if least < most and fine and all(low == high for low, high in moments):
             of_shape = stays * most / least
-            said = f"stays {stays:.4g} kg*m^2 while `{head}.mass` varies from {least:.4g} to {most:.4g} kg"
+            clause = f"stays {stays:.4g} kg*m^2 while `{head}.mass` varies from {least:.4g} to {most:.4g} kg"
             yield Scale(
                 "inertia that stays",
                 f"{head}.inertia",
@@ -86,7 +86,7 @@ def spreads(run: RunNumbers) -> Iterator[Scale]:
                 0.0,
                 0.5,
                 usual,
-                said=said,
+                clause=clause,
                 cure="write a `shape`, from which the inertia follows, or let it vary with the mass",
             )
 
@@ -96,31 +96,33 @@ def targets(run: RunNumbers) -> Iterator[Scale]:
     usual = "a servo goes where it is asked to"
     motions = {use.joint: motion for use in run.uses if (motion := run.motion(use)) is not None}
     for metric in run.structure.metrics:
-        joint, _, of = metric.of.partition(".")
+        joint, _, quantity = metric.of.partition(".")
         head, name = f"metrics.{metric.name}", models.find("metric", metric.model, metric.place).target
         target, begins = run.numbers.get(f"{head}.{name}"), run.numbers.get(f"initial.{metric.of}")
-        if target is None or begins is None or of not in ("q", "qd") or joint not in motions:
+        if target is None or begins is None or quantity not in ("q", "qd") or joint not in motions:
             continue
-        k = ("q", "qd").index(of)
+        k = ("q", "qd").index(quantity)
         of_both = f"{joint}.servo.command", f"{head}.{name}"
         if any(least < most and path.startswith(of_both) for path, (least, most) in run.ranges.items()):
             continue  # a sweep over commands may judge all by one target
-        asked, rates = np.append(motions[joint][k], begins), motions[joint][1]
-        away = max(float(asked.min()) - target, target - float(asked.max()), 0.0)
+        commanded, rates = np.append(motions[joint][k], begins), motions[joint][1]
+        away = max(float(commanded.min()) - target, target - float(commanded.max()), 0.0)
         band = run.numbers.get(f"{head}.band", 0.0) * abs(target) + run.numbers.get(f"{head}.within", 0.0)
         band = max(band, 0.02 * abs(target - begins))
         if band > 0.0 and math.isfinite(away):
             unit, scale = unit_written([run.settled[f"{head}.{name}"]], run.settled[f"{head}.{name}"].unit)
-            low, high = (f"{end / scale:.4g}" for end in (asked.min(), asked.max()))
-            others = [each for each, of_it in motions.items() if of_it[k].min() <= target <= of_it[k].max()]
+            low, high = (f"{end / scale:.4g}" for end in (commanded.min(), commanded.max()))
+            others = [
+                other_joint for other_joint, of_it in motions.items() if of_it[k].min() <= target <= of_it[k].max()
+            ]
             cure = (
-                f"look at `{others[0]}.{of}`, whose command leads there"
+                f"look at `{others[0]}.{quantity}`, whose command leads there"
                 if others
                 else "look at the joint that is meant"
             )
             lead = f"from {low} to {high}" if low != high else f"to {low}"
             wait = "let the run last longer" if rates[-1] else "wait for what this one's leads to"
-            said = f"is {target / scale:.4g} {unit}, and what `{joint}` is asked for leads {lead} {unit}"
+            clause = f"is {target / scale:.4g} {unit}, and what `{joint}` is asked for leads {lead} {unit}"
             other = f"the band of metric `{metric.name}`"
             yield Scale(
                 "target beside a command",
@@ -132,6 +134,6 @@ def targets(run: RunNumbers) -> Iterator[Scale]:
                 0.0,
                 1.0,
                 usual,
-                said=said,
+                clause=clause,
                 cure=f"{cure}, or {wait}",
             )

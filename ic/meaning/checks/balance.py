@@ -20,16 +20,19 @@ def check_balance(scope: Scope, experiment: Experiment) -> None:
     weak = unheld_at_start(experiment)
     blamed = usual_number(scope, experiment, lambda changed: not unheld_at_start(changed)) if weak else []
     with scope.complaints.gather():
-        for each in weak:
+        for unheld_joint in weak:
             unloaded = "or let the servos begin unloaded: without `servos = balanced` the arm sinks in"
-            limits = [experiment.parameters[f"{each.joint.name}.servo.{name}"] for name, _ in each.limits]
+            limits = [
+                experiment.parameters[f"{unheld_joint.joint.name}.servo.{name}"] for name, _ in unheld_joint.limits
+            ]
             places = [quantity.origin.place for quantity in limits if quantity.origin.place is not None]
-            use = each.servo.place
+            use = unheld_joint.servo.place
             scope.complaints.error(
                 "D343",
-                f"joint `{each.joint.name}` cannot begin balanced: it takes {each.wanted:.3g} {each.unit}, and its "
-                f"servo can hold {each.there:.3g} {each.unit}",
+                f"joint `{unheld_joint.joint.name}` cannot begin balanced: "
+                f"it takes {unheld_joint.wanted:.3g} {unheld_joint.unit}, and its servo can hold "
+                f"{unheld_joint.there:.3g} {unheld_joint.unit}",
                 places[0] if places else use,
-                also=[Label(use, f"drives joint `{each.joint.name}`")] if places and use is not None else [],
-                help=[*blamed, each.reason, unloaded],
+                also=[Label(use, f"drives joint `{unheld_joint.joint.name}`")] if places and use is not None else [],
+                help=[*blamed, unheld_joint.reason, unloaded],
             )

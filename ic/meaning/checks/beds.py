@@ -24,35 +24,35 @@ def check_beds(complaints: Complaints, experiment: Experiment, memo: AnalysisMem
     from met.analysis.margin import margins
     from met.analysis.step_size import chosen_cases
 
-    told: set[str] = set()
+    reported: set[str] = set()
     cases = chosen_cases(experiment)[:MOST_CASES]
     left = experiment.cases.count - len(cases)
     try:
-        found = memo.answer("margins", experiment, lambda: margins(experiment, cases), cases)
+        by_case = memo.answer("margins", experiment, lambda: margins(experiment, cases), cases)
     except Problem:  # reported where the program is built
         return
-    for each in (one for of_case in found for one in of_case):
-        if not each.stable and each.joint not in told:
-            told.add(each.joint)
-            where = f"reckoned with the arm as it stands {at_the_start(experiment, each.case)}"
+    for margin in (candidate for of_case in by_case for candidate in of_case):
+        if not margin.stable and margin.joint not in reported:
+            reported.add(margin.joint)
+            where = f"reckoned with the arm as it stands {at_the_start(experiment, margin.case)}"
             where += f"; {left:,} of {experiment.cases.count:,} cases were not looked at" if left else ""
-            complaints.pass_on(bed_warning(experiment, each, where))
+            complaints.pass_on(bed_warning(experiment, margin, where))
 
 
-def bed_warning(experiment: Experiment, found: Margin, where: str) -> Diagnostic:
+def bed_warning(experiment: Experiment, margin: Margin, where: str) -> Diagnostic:
     """A warning about a loop that grows. where: the pose and the case, in words"""
     from met.analysis.margin import remedy
 
-    r = found.least if found.too_light else found.together
-    if found.limit == 0.0 or r != r:
+    r = margin.least if margin.too_light else margin.together
+    if margin.limit == 0.0 or r != r:
         ends = "stable with no arm" if r == r else "no number"
     else:
-        ends = f"above {found.lower:.3g}" if found.too_light else f"up to {found.limit:.3g}"
+        ends = f"above {margin.lower:.3g}" if margin.too_light else f"up to {margin.limit:.3g}"
         ends = f"stable {ends}"
     message = (
-        f"the loop of joint `{found.joint}` on its bed is unstable with `{found.law}` at {found.rate_hz:.12g} Hz: "
+        f"the loop of joint `{margin.joint}` on its bed is unstable with `{margin.law}` at {margin.rate_hz:.12g} Hz: "
         f"r = {r:.3g}, and it is {ends}"
     )
-    place = next(use.place for use in experiment.structure.substitutions if use.joint == found.joint)
-    helps = (f"{remedy(found)} may help", "`met margin` says it of all cases", where)
+    place = next(use.place for use in experiment.structure.substitutions if use.joint == margin.joint)
+    helps = (f"{remedy(margin)} may help", "`met margin` says it of all cases", where)
     return Diagnostic("D321", message, None if place is None else Label(place), (), helps, "warning")

@@ -31,7 +31,7 @@ def masses(run: RunNumbers) -> Iterator[Scale]:
             continue
         turned = (12.0 * run.gyration(head) ** 2 * mass / WATER) ** 0.2  # the cube with this inertia
         long = max(run.extents[link], 2.0 * run.length(f"{head}.com"), turned)
-        long = max([long, *(run.offsets[each] for each in run.carried[link])])
+        long = max([long, *(run.offsets[carried_link] for carried_link in run.carried[link])])
         moments = {run.numbers.get(f"{head}.inertia.{part}") for part in INERTIA[:3]}
         water, most = WATER * long**3, 20.0 if not run.extents[link] and len(moments) > 1 else 1e9
         if water > 0.0:
@@ -84,7 +84,7 @@ def shared_lines(run: RunNumbers) -> Iterator[Scale]:
                     0.0,
                     1e6,
                     "two motors in a row usually turn about two lines",
-                    said=f"turns `{joint.name}` about the line of `{last}`",
+                    clause=f"turns `{joint.name}` about the line of `{last}`",
                     cure="write another axis, or another place, of one of the two",
                 )
 
@@ -94,12 +94,14 @@ def forgotten(run: RunNumbers) -> Iterator[Scale]:
     usual, by_dh = "without `at` both joints of a link are in one place", {x.partition(".dh.")[0] for x in run.settled}
     for joint in run.structure.joints:
         long, wide = run.slender(f"links.{joint.parent}")
-        given = joint.name in by_dh or joint.kind == "prismatic" or joint.parent not in run.moved
-        if wide > 0.0 and not given and not run.is_written(f"{joint.name}.at"):
-            said = f"is not written, and `{joint.parent}`, which carries the joint, is {long:.4g} m long"
+        placed = joint.name in by_dh or joint.kind == "prismatic" or joint.parent not in run.moved
+        if wide > 0.0 and not placed and not run.is_written(f"{joint.name}.at"):
+            clause = f"is not written, and `{joint.parent}`, which carries the joint, is {long:.4g} m long"
             cure = "write where it is, or `at = [0, 0, 0] m` if it is meant so"
             path, other = f"{joint.name}.at", "its width"
-            yield Scale("joint without a place", path, long, "m", wide, other, 0.0, 2.0, usual, said=said, cure=cure)
+            yield Scale(
+                "joint without a place", path, long, "m", wide, other, 0.0, 2.0, usual, clause=clause, cure=cure
+            )
 
 
 def booms(run: RunNumbers) -> Iterator[Scale]:
@@ -121,10 +123,10 @@ def held(run: RunNumbers) -> Iterator[Scale]:
         load, most, stiffness = abs(loads[joint]), weight * run.reach, run.numbers.get(f"{joint}.servo.stiffness")
         begins = run.settled.get(f"initial.{joint}.q")
         if joint not in servos and motors and begins is not None and begins.origin.place is None and most > 0.0:
-            said = f"has no servo, and gravity loads it by {load:.4g} N*m at the start"
+            clause = f"has no servo, and gravity loads it by {load:.4g} N*m at the start"
             cure = f"write `{joint} = SERVO;` in `servos`, of model `passive` if it is to be free, or where it begins"
             other, usual = f"the moved links' weight at the arm's reach, {most:.4g} N*m", "what nothing holds sinks in"
-            yield Scale("free joint", joint, load, "N*m", most, other, 0.0, 0.01, usual, said=said, cure=cure)
+            yield Scale("free joint", joint, load, "N*m", most, other, 0.0, 0.01, usual, clause=clause, cure=cure)
         elif stiffness and f"{joint}.servo.kt" not in run.numbers:
             path, other, usual = f"{joint}.servo.stiffness", "half a turn", "springs bend by less than that"
             verb = "lets the load at the start wind it up by"

@@ -34,7 +34,7 @@ class Bounds:
 
 def channel_bounds(scope: Scope, structure: Structure, path: str) -> Bounds:
     """The bounds of a channel, `*.servo.voltage` of all joints included; infinite where none are known."""
-    expression = next((each for each in structure.expressions if each.name == path), None)
+    expression = next((candidate for candidate in structure.expressions if candidate.name == path), None)
     if expression is not None:
         return _of_formula(expression.formula, lambda channel: channel_bounds(scope, structure, channel))
     joint, _, name = path.partition(".")
@@ -42,10 +42,10 @@ def channel_bounds(scope: Scope, structure: Structure, path: str) -> Bounds:
     uses = [use for use in structure.servos if joint in ("*", use.joint) and use.joint not in on_beds]
     if not uses or (joint == "*" and len(uses) < len(structure.moving)):
         return Bounds()
-    found = _of_joint(scope, uses[0], name)
+    bounds = _of_joint(scope, uses[0], name)
     for use in uses[1:]:
-        found |= _of_joint(scope, use, name)
-    return found
+        bounds |= _of_joint(scope, use, name)
+    return bounds
 
 
 def _of_joint(scope: Scope, use: ServoUse, name: str) -> Bounds:
@@ -57,49 +57,49 @@ def _of_joint(scope: Scope, use: ServoUse, name: str) -> Bounds:
 
     head = f"{use.joint}.servo"
     servo = models.find("servo", use.model)
-    for each in (*servo.outputs, *servo.signals):
-        limit = number(f"{head}.{each.limit}") if each.limit and name == f"servo.{each.name}" else None
+    for signal in (*servo.outputs, *servo.signals):
+        limit = number(f"{head}.{signal.limit}") if signal.limit and name == f"servo.{signal.name}" else None
         if limit is not None:
-            return Bounds(-limit, limit, (f"{head}.{each.limit}",))
+            return Bounds(-limit, limit, (f"{head}.{signal.limit}",))
     if use.model == "rigid_gearbox" and name == "tau" and number(f"{head}.f_v") == 0.0:
         ratio, most, friction = number(f"{head}.ratio"), number(f"{head}.tau_max"), number(f"{head}.f_c")
         if ratio is not None and most is not None and friction is not None and f"{head}.f_s" not in scope.parameters:
             torque = ratio * (most + friction)
-            return Bounds(-torque, torque, tuple(f"{head}.{each}" for each in ("ratio", "tau_max", "f_c")))
+            return Bounds(-torque, torque, tuple(f"{head}.{parameter}" for parameter in ("ratio", "tau_max", "f_c")))
     if use.model == "locked" and number(f"{head}.release") == math.inf and name in ("q", "qd", "qdd"):
-        at = number(f"initial.{use.joint}.q") if name == "q" else 0.0
-        return Bounds() if at is None else Bounds(at, at, (head,))
+        start = number(f"initial.{use.joint}.q") if name == "q" else 0.0
+        return Bounds() if start is None else Bounds(start, start, (head,))
     return Bounds()
 
 
 def _of_formula(formula: Formulas, of_channel: Callable[[str], Bounds]) -> Bounds:
     """The bounds of an expression of channels, by interval arithmetic; infinite behind any other operation."""
-    found: list[Bounds] = []
+    node_bounds: list[Bounds] = []
 
     def operand(ref: int) -> Bounds:
-        return -found[ref >> 1] if ref & 1 else found[ref >> 1]
+        return -node_bounds[ref >> 1] if ref & 1 else node_bounds[ref >> 1]
 
     for node in formula.nodes:
         a, b, c = ([operand(ref) for ref in node[1 : 1 + OPERANDS[node[0]]]] + [Bounds()] * 3)[:3]
         match node[0]:
             case "const":
-                found.append(Bounds(float(node[1]), float(node[1])))
+                node_bounds.append(Bounds(float(node[1]), float(node[1])))
             case "input" if node[1].startswith(CHANNEL_INPUT):
-                found.append(of_channel(node[1].removeprefix(CHANNEL_INPUT)))
+                node_bounds.append(of_channel(node[1].removeprefix(CHANNEL_INPUT)))
             case "add":
-                found.append(_sum(a, b))
+                node_bounds.append(_sum(a, b))
             case "sub":
-                found.append(_sum(a, -b))
+                node_bounds.append(_sum(a, -b))
             case "mul":
-                found.append(_product(a, b))
+                node_bounds.append(_product(a, b))
             case "fma":
-                found.append(_sum(_product(a, b), c))
+                node_bounds.append(_sum(_product(a, b), c))
             case "abs":
-                found.append(Bounds(max(a.least, -a.most, 0.0), max(-a.least, a.most), a.because))
+                node_bounds.append(Bounds(max(a.least, -a.most, 0.0), max(-a.least, a.most), a.because))
             case "where":
-                found.append(b | c)
+                node_bounds.append(b | c)
             case _:
-                found.append(Bounds())
+                node_bounds.append(Bounds())
     return operand(formula.outputs[0])
 
 

@@ -53,13 +53,13 @@ def uncarried(
     if len(points) < 2:
         return []
     inner = [hump for hump in humps_of_turns(points) if hump.times[0] >= 0.0 and hump.times[-1] <= duration]
-    known = {(float(each.times[0]), float(each.times[-1])) for each in inner}
+    known = {(float(pulse.times[0]), float(pulse.times[-1])) for pulse in inner}
     from_zero = humps_from_zero(points, duration) if integral else ()
-    every = [*inner, *(each for each in from_zero if (float(each.times[0]), float(each.times[-1])) not in known)]
-    truths = [each.impulse if integral else float(each.heights.max()) for each in every]
+    every = [*inner, *(pulse for pulse in from_zero if (float(pulse.times[0]), float(pulse.times[-1])) not in known)]
+    truths = [pulse.impulse if integral else float(pulse.heights.max()) for pulse in every]
     least = SLIGHT * max(truths, default=0.0)
     looked_at = ((hump, truth) for hump, truth in zip(every, truths, strict=True) if truth > least)
-    return [found for found in _judged(looked_at, interval, duration, integral) if found.off > OFF]
+    return [pulse for pulse in _judged(looked_at, interval, duration, integral) if pulse.off > OFF]
 
 
 def _judged(

@@ -25,11 +25,11 @@ def constant_values(scope: Scope, head: str, declared: Iterable[Parameter]) -> S
     head  path of the model's use, such as `environment.stop`
     """
     values: dict[str, Any] = {}
-    for each in (each for each in declared if each.only is None):
-        path = f"{head}.{each.name}"
-        if each.shape == "vector":
+    for parameter in (parameter for parameter in declared if parameter.only is None):
+        path = f"{head}.{parameter.name}"
+        if parameter.shape == "vector":
             parts = tuple(constant_value(scope, f"{path}.{axis}") for axis in XYZ)
-            values[each.name] = None if None in parts else parts
+            values[parameter.name] = None if None in parts else parts
         else:
-            values[each.name] = constant_value(scope, path)
+            values[parameter.name] = constant_value(scope, path)
     return None if None in values.values() else SimpleNamespace(**values)

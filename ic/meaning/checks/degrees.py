@@ -26,18 +26,18 @@ def remark_degrees(deck: Deck, definitions: Definitions, complaints: Complaints)
             continue
         argument = call.positional[0]
         try:
-            found = names.evaluate(argument)
+            angle = names.evaluate(argument)
         except Problem:
             continue  # reported where the value is used
-        if not isinstance(found, Value) or not found.bare or found.hertz is None:
+        if not isinstance(angle, Value) or not angle.bare or angle.hertz is None:
             continue
-        if isinstance(found.number, Scalar) or abs(found.number) <= 2.0 * math.pi:
+        if isinstance(angle.number, Scalar) or abs(angle.number) <= 2.0 * math.pi:
             continue
         plain = isinstance(argument, Number)
         written = spell(argument) if plain else f"({spell(argument)})"
         complaints.warn(
             "D306",
-            f"`{call.name.text}` of {found.number:g}, a bare number: these are radians",
+            f"`{call.name.text}` of {angle.number:g}, a bare number: these are radians",
             place_of(argument),
             help=[
                 write(

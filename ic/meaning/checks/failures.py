@@ -58,9 +58,9 @@ def check_failures(
             wrong = f"`{use.name}` would let go of joint `{joint}`, whose motor is on a bed", "leave it out", place
             also = [Label(bed, "on a bed")] if (bed := beds[joint]) is not None else []
         if wrong is not None:
-            message, help, at = wrong
+            message, help, mistake_place = wrong
             helps = leave_out(help, use.place) if "leave it out" in help else help
-            scope.complaints.error("D247", message, at or place, also=also, help=helps)
+            scope.complaints.error("D247", message, mistake_place or place, also=also, help=helps)
         elif servo is not None:
             sound.append(failure)
             _check_full(scope, failure, servo)
@@ -145,7 +145,7 @@ def _wrong(
     if (model.replaced_outputs is not None or model.replaced_reading is not None) and not servo.has_law:
         return f"{label} has no law that `{use.name}` could do anything to", "leave it out", None
     if model.replaced_outputs is not None and servo.servo.full is None:
-        known = [name for name, each in models.find_own("servo").items() if each.full is not None]
+        known = [name for name, servo_model in models.find_own("servo").items() if servo_model.full is not None]
         own = servo.servo.name in models.find_own("servo")
         remedy = (
             known_words("servo models that have one", known)
@@ -156,10 +156,10 @@ def _wrong(
     if model.replaced_reading is None:
         return None
     head = f"environment.{use.name}"
-    of, reads = scope.parameters.get(f"{head}.of"), scope.parameters.get(f"{head}.reads")
+    quantity, reads = scope.parameters.get(f"{head}.of"), scope.parameters.get(f"{head}.reads")
     seen = list(quantities(ServoUse(joint, "", servo.servo.name, servo.command, 1, words=servo.words)))
-    if of is not None and str(of.value) not in seen:
-        return f"{label} does not see `{of.value}`", known_words("it sees", seen), of.origin.place
+    if quantity is not None and str(quantity.value) not in seen:
+        return f"{label} does not see `{quantity.value}`", known_words("it sees", seen), quantity.origin.place
     if continuous and reads is not None and reads.value == "last":
         message = f"the law of joint `{joint}` is continuous: it has no last tick"
         return message, "write `reads = zero;`, or a rate in Hz for the law", reads.origin.place
@@ -188,7 +188,10 @@ def _check_full(scope: Scope, failure: ServoFailure, servo: Use) -> None:
             f"`{servo.definition}` ({servo.servo.name}) can give, and that has no limit",
             failure.place,
             also=[Label(servo.place, "its servo")],
-            help=[f"write `{each.name} = ... {each.unit};` in the servo: {each.doc}" for each in lacking],
+            help=[
+                f"write `{parameter.name} = ... {parameter.unit};` in the servo: {parameter.doc}"
+                for parameter in lacking
+            ],
         )
 
 
@@ -228,8 +231,8 @@ def _remark_overlaps(scope: Scope, failures: Iterable[ServoFailure]) -> None:
         window, model = _window(scope, failure), failure.model
         if window is None or (model.replaced_outputs is None and model.replaced_reading is None) or model not in known:
             continue
-        of = scope.parameters.get(f"environment.{failure.use.name}.of")
-        same = before.setdefault((failure.joint, model.name, of.value if of is not None else None), [])
+        quantity = scope.parameters.get(f"environment.{failure.use.name}.of")
+        same = before.setdefault((failure.joint, model.name, quantity.value if quantity is not None else None), [])
         for earlier, (begins, ends) in same:
             first, last = max(begins, window[0], 0.0), min(ends, window[1])
             if first < last:

@@ -36,17 +36,17 @@ def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str,
     numbers = [x for value in values.values() for x in (value if isinstance(value, tuple) else (value,))]
     if environment.idle is None or any(isinstance(x, Scalar) for x in numbers):
         return False
-    found = environment.idle(SimpleNamespace(**values), duration)
-    if found is not None:
+    idleness = environment.idle(SimpleNamespace(**values), duration)
+    if idleness is not None:
         body = item.body or MergedBlock()
-        written = [part for name in found[0] if (part := body.get(name)) is not None and part.value is not None]
+        written = [part for name in idleness[0] if (part := body.get(name)) is not None and part.value is not None]
         scope.complaints.remark(
             "D168",
-            f"environment `{item.name}` never acts: {found[1]}",
+            f"environment `{item.name}` never acts: {idleness[1]}",
             value_place(written[0]) if written else item.place,
             help=leave_out("change that, or leave it out", item.place),
         )
-    return found is not None
+    return idleness is not None
 
 
 def remark_kinds(scope: Scope, environment: Any, item: Item, arm: ResolvedArm) -> None:
@@ -73,24 +73,33 @@ def remark_beginnings(scope: Scope, joints: Iterable[Joint], uses: Iterable[Envi
         _observe_beginning(scope, joint.name, ends, f"joint:{joint.name}", "its range", joint.place, help)
     for use in uses:
         model = models.find("environment", use.model)
-        of = [parameter.name for parameter in model.parameters if parameter.names == "joint"]
-        named = [settled for each in of if (settled := scope.parameters.get(f"environment.{use.name}.{each}"))]
+        joint_parameters = [parameter.name for parameter in model.parameters if parameter.names == "joint"]
+        named = [
+            settled for name in joint_parameters if (settled := scope.parameters.get(f"environment.{use.name}.{name}"))
+        ]
         if named and len(model.initial_range) == 2:
-            ends = [scope.parameters.get(f"environment.{use.name}.{each}") for each in model.initial_range]
+            ends = [scope.parameters.get(f"environment.{use.name}.{name}") for name in model.initial_range]
             help = "the run begins with what drives it back: begin within, or move the end"
             needs = f"environment.{use.name}"
             _observe_beginning(scope, str(named[0].value), ends, needs, f"an end of `{use.name}`", use.place, help)
 
 
 def _observe_beginning(
-    scope: Scope, joint: str, ends: Sequence[Settled | None], needs: str, of: str, at: Place | None, help: str
+    scope: Scope,
+    joint: str,
+    ends: Sequence[Settled | None],
+    needs: str,
+    owner: str,
+    owner_place: Place | None,
+    help: str,
 ) -> None:
-    """Report a joint that begins beyond one of two ends. of: whose they are, in words;  at: place of the same"""
+    """Report a joint that begins beyond one of two ends. owner: whose they are, in words;  owner_place: its
+    place"""
     begins = scope.parameters.get(f"initial.{joint}.q")
-    known = [each for each in (begins, *ends) if each is not None]
-    if begins is None or at is None or len(known) < 3:
+    known = [settled for settled in (begins, *ends) if settled is not None]
+    if begins is None or owner_place is None or len(known) < 3:
         return
-    place = next((each.origin.place for each in known if each.origin.place), at)
+    place = next((settled.origin.place for settled in known if settled.origin.place), owner_place)
     unit, scale = unit_written(known, begins.unit)
 
     def warn(values: np.ndarray) -> None:
@@ -103,11 +112,11 @@ def _observe_beginning(
             which = f"below {lower:g} {unit}" if q < lower else f"above {upper:g} {unit}"
             scope.complaints.remark(
                 "D294",
-                f"joint `{joint}` begins at {q:g} {unit}, beyond {of}: {which}",
+                f"joint `{joint}` begins at {q:g} {unit}, beyond {owner}: {which}",
                 place,
-                also=[Label(at, "this one")],
+                also=[Label(owner_place, "this one")],
                 help=help,
             )
 
-    values: tuple[Real, ...] = tuple(each.value for each in known)  # type: ignore[misc]  # they are numbers
+    values: tuple[Real, ...] = tuple(settled.value for settled in known)  # type: ignore[misc]  # they are numbers
     scope.checks.observe(values, warn, place, needs=(f"initial.{joint}.q", needs))

@@ -24,16 +24,16 @@ def skipped_elements(entries: Sequence[Entry]) -> Iterator[Diagnostic]:
             taken[part.name.text].append(part)
         elif isinstance(part, Name):
             named[part.path[0].text] += 1
-    for name, found in taken.items():
+    for name, elements in taken.items():
         written = lists[name].value if name in lists else None
         items = written.inner if isinstance(written, WithUnit) else written
-        indices = {_index(each) for each in found}
-        if not isinstance(items, List) or len(indices) < 2 or indices & {None, 0} or named[name] > len(found):
+        indices = {_index(element) for element in elements}
+        if not isinstance(items, List) or len(indices) < 2 or indices & {None, 0} or named[name] > len(elements):
             continue
         first = items.items[0]
         if not (isinstance(first, Number) and first.value == 0.0):  # a filler, so that counts begin at 1
             message = f"nothing takes `{name}[0]`, the first element of a list that loops take element by element"
-            also = Label(found[0].place, "taken here")
+            also = Label(elements[0].place, "taken here")
             helps = f"elements count from 0: is the index to be one less, as in `{name}[i - 1]`?"
             yield Diagnostic("D388", message, Label(place_of(first)), (also,), (Help(helps),), severity="warning")
 

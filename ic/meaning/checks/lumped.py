@@ -27,14 +27,15 @@ def check_lumped(complaints: Complaints, experiment: Experiment, memo: AnalysisM
 
     names, cases = ", ".join(link.name for link in lumped), chosen_cases(experiment)
     try:
-        found = memo.answer(f"mass matrix; {names}", experiment, lambda: definiteness(experiment, cases), cases)
+        mass_matrix = memo.answer(f"mass matrix; {names}", experiment, lambda: definiteness(experiment, cases), cases)
     except Problem:  # reported where the program is built
         return experiment
     several, left = experiment.cases.count > 1, experiment.cases.count - len(cases)
-    poses = f"{found.poses:,} pose{'s' * (found.poses > 1)}" + f" of {len(cases)} cases" * several
-    if found.least > LEAST:
+    poses = f"{mass_matrix.poses:,} pose{'s' * (mass_matrix.poses > 1)}" + f" of {len(cases)} cases" * several
+    if mass_matrix.least > LEAST:
         note = (
-            f"lumped links: {names}; mass matrix positive definite at {poses}, least eigenvalue {found.least:.3g}, "
+            f"lumped links: {names}; mass matrix positive definite at {poses}, "
+            f"least eigenvalue {mass_matrix.least:.3g}, "
             + SCALED
             + f"; {left:,} of {experiment.cases.count:,} cases were not looked at" * (left > 0)
         )
@@ -44,13 +45,13 @@ def check_lumped(complaints: Complaints, experiment: Experiment, memo: AnalysisM
             f"{joint.name} = {q:.4g} m, "
             if joint.kind == "prismatic"
             else f"{joint.name} = {math.degrees(q):.4g} deg, "
-            for joint, q in zip(structure.moving, found.q, strict=True)
+            for joint, q in zip(structure.moving, mass_matrix.q, strict=True)
         )
-        + f"case #{int(experiment.cases.table[found.case])}, " * several
+        + f"case #{int(experiment.cases.table[mass_matrix.case])}, " * several
     )
     help = "no larger moment of inertia of one such link is enough: look at their masses and centres of mass too"
-    if found.remedy is not None:
-        amount, link, moment = found.remedy
+    if mass_matrix.remedy is not None:
+        amount, link, moment = mass_matrix.remedy
         value = experiment.parameters[f"links.{link}.inertia.{moment}"].value
         help = (
             f"with {moment} of the inertia of `{link}` larger by {amount:.2g} kg*m^2"
@@ -66,7 +67,7 @@ def check_lumped(complaints: Complaints, experiment: Experiment, memo: AnalysisM
         "D182",
         f"the mass matrix is not positive definite with the lumped link{'s' * bool(others)} "
         + " and ".join(f"`{link.name}`" for link in lumped),
-        Label(first.place, f"{where}an eigenvalue is {found.least:.3g}, {SCALED}".replace(", an", ": an")),
+        Label(first.place, f"{where}an eigenvalue is {mass_matrix.least:.3g}, {SCALED}".replace(", an", ": an")),
         also=others,
         help=[help, "is the set one that leaves the rotors to the motors? then the servos need their inertia"],
     )

@@ -14,20 +14,25 @@ ALIKE = {("+", "+"), ("+", "-"), ("*", "*"), ("*", "/"), ("-", "*"), ("-", "/")}
 
 def macros_taken_apart(entries: Sequence[Entry]) -> Iterator[Diagnostic]:
     """Warn about each macro of whose operators one takes an operand that reaches beyond the macro (D389)."""
-    found: dict[str, Diagnostic] = {}
+    by_macro: dict[str, Diagnostic] = {}
     for node in parts(entries):  # the last come first
         is_taken = isinstance(node, Unary) or (isinstance(node, Binary) and node.operator in "+-*/")
         for expansion in node.place.expansions if is_taken else ():
             by, name = _beyond(node, expansion), expansion.macro
             if by and not expansion.iteration:
-                of, cure = "", f"put its value in brackets: `#define {name} (...)`"
+                part_of, cure = "", f"put its value in brackets: `#define {name} (...)`"
                 if _is_argument(node, expansion):
-                    of, cure = "an argument of ", f"put the parameters of `{name}` in brackets where its value has them"
+                    part_of, cure = (
+                        "an argument of ",
+                        f"put the parameters of `{name}` in brackets where its value has them",
+                    )
                 message = (
-                    f"`{by}` takes a part of {of}macro `{name}` alone: it binds before the `{node.operator}` in it"
+                    f"`{by}` takes a part of {part_of}macro `{name}` alone: it binds before the `{node.operator}` in it"
                 )
-                found[name] = Diagnostic("D389", message, Label(expansion.use), (), (Help(cure),), severity="warning")
-    yield from found.values()
+                by_macro[name] = Diagnostic(
+                    "D389", message, Label(expansion.use), (), (Help(cure),), severity="warning"
+                )
+    yield from by_macro.values()
 
 
 def _beyond(node: Binary | Unary, expansion: Expansion) -> str:

@@ -133,12 +133,12 @@ MEANT = 'if it is meant so, `allow {} because "...";`'
 
 def check_magnitudes(scope: Scope, structure: Structure) -> None:
     """Warn about implausible numbers and bodies; about several of one kind once, with the worst."""
-    found: dict[Magnitude, list[tuple[str, Settled]]] = {}
+    by_kind: dict[Magnitude, list[tuple[str, Settled]]] = {}
     for path, settled in (*scope.parameters.items(), *scope.auxiliary.items()):
         for kind in BY_UNIT.get(settled.unit, ()):
             if _may_be_beyond(kind, settled) and kind.pattern.fullmatch(path):
-                found.setdefault(kind, []).append((path, settled))
-    for kind, those in found.items():
+                by_kind.setdefault(kind, []).append((path, settled))
+    for kind, those in by_kind.items():
         _observe(scope, kind, those)
     bodies = list(_bodies(scope, structure.straight))
     _observe_densities(scope, [body for body in bodies if body.sizes and body.may_be_odd])
@@ -164,7 +164,10 @@ def _observe(scope: Scope, kind: Magnitude, those: list[tuple[str, Settled]]) ->
         worst = np.where(beyond, np.abs(np.log(np.abs(np.where(beyond, rows, 1.0)))), 0.0)
         row, column = np.unravel_index(int(worst.argmax()), worst.shape)
         path, settled, _ = numbers[column]
-        value, several = float(rows[row, column]), len({numbers[at][0] for at in np.flatnonzero(beyond.any(axis=0))})
+        value, several = (
+            float(rows[row, column]),
+            len({numbers[index][0] for index in np.flatnonzero(beyond.any(axis=0))}),
+        )
         unit, small, where = settled.unit, abs(value) < kind.low, scope.checks.where(int(row), [numbers[column][2]])
         helps = [
             f"{times:,.0f} times {'more' if small else 'less'} would be {value * factor:.6g} {unit}: "
@@ -262,7 +265,7 @@ def _bodies(scope: Scope, structure: Structure) -> Iterator[WeighedBody]:
         mass = scope.parameters.get(f"{head}.mass")
         moments = [scope.parameters.get(f"{head}.inertia.{part}") for part in INERTIA]
         written = [*sizes.values(), *moments]
-        place = next((each.origin.place for each in written if each is not None and each.origin.place), None)
+        place = next((number.origin.place for number in written if number is not None and number.origin.place), None)
         if mass is not None and place is not None and None not in moments:
             yield WeighedBody(
                 f"{word} `{name}`", head, place, mass, tuple(moment for moment in moments if moment), sizes
@@ -271,11 +274,11 @@ def _bodies(scope: Scope, structure: Structure) -> Iterator[WeighedBody]:
 
 def _observe_densities(scope: Scope, bodies: Sequence[WeighedBody]) -> None:
     """Check the densities that follow from bodies' shapes and masses."""
-    settled = [each for body in bodies for each in (body.mass, *body.sizes.values())]
+    settled = [number for body in bodies for number in (body.mass, *body.sizes.values())]
     ends = np.cumsum([1 + len(body.sizes) for body in bodies]).tolist()
 
     def warn(rows: np.ndarray) -> None:
-        found = []
+        odd_bodies = []
         for body, first, last in zip(bodies, [0, *ends], ends, strict=False):
             mass, sizes = rows[:, first], rows[:, first + 1 : last]
             thin, dense = body.densities
@@ -285,17 +288,17 @@ def _observe_densities(scope: Scope, bodies: Sequence[WeighedBody]) -> None:
             bad = fine & np.isfinite(densities) & (mass > 0.0) & ((densities < thin) | (densities > dense))
             if bad.any():
                 row = int(np.flatnonzero(bad)[np.abs(np.log(densities[bad])).argmax()])
-                found.append((body, float(densities[row]), _where(scope, body, row, float(mass[row]))))
-        if not found or scope.complaints.error_count:
+                odd_bodies.append((body, float(densities[row]), _where(scope, body, row, float(mass[row]))))
+        if not odd_bodies or scope.complaints.error_count:
             return
-        body, density, where = max(found, key=lambda each: abs(math.log(each[1])))
+        body, density, where = max(odd_bodies, key=lambda candidate: abs(math.log(candidate[1])))
         cures = MORE if density < 1.0 else LESS
         unit, known, least, most = SOLIDS[body.is_rod]
         changed = [(words, density * times * across ** (1 if body.is_rod else 3)) for words, times, across in cures]
         helps = [f"{words} it would be {x:.4g} {unit}: is a unit another?" for words, x in changed if least < x < most]
         scope.complaints.remark(
             "D298",
-            f"{body.name} would be of {density:.4g} {unit}{where}{_others(len(found))}, and {known}",
+            f"{body.name} would be of {density:.4g} {unit}{where}{_others(len(odd_bodies))}, and {known}",
             body.place,
             help=[*helps[:1], "look at the units of its mass and of its shape", MEANT.format("D298")],
         )
@@ -311,13 +314,13 @@ def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[Weigh
     vectors = [scope.parameters.get(f"{path}.{axis}") for path in paths for axis in XYZ]
     if None in vectors:
         return
-    settled = [each for body in bodies for each in (body.mass, *body.inertia, *body.sizes.values())]
+    settled = [number for body in bodies for number in (body.mass, *body.inertia, *body.sizes.values())]
     ends = np.cumsum([7 + len(body.sizes) for body in bodies]).tolist()
 
     def warn(rows: np.ndarray) -> None:
         with np.errstate(over="ignore"):  # an arm of 1e200 m overflows to infinity, which is reported
             arm = np.sqrt((rows[:, ends[-1] :].reshape(len(rows), -1, 3) ** 2).sum(axis=2)).sum(axis=1)
-        found: dict[Remark, list[tuple[float, WeighedBody, OddBody, str]]] = {}
+        by_remark: dict[Remark, list[tuple[float, WeighedBody, OddBody, str]]] = {}
         for body, first, last in zip(bodies, [0, *ends], ends, strict=False):
             mass, inertia, sizes = rows[:, first], rows[:, first + 1 : first + 7], rows[:, first + 7 : last]
             largest = inertia[:, :3].max(axis=1)
@@ -338,14 +341,14 @@ def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[Weigh
             for remark, bad, excess in kinds:
                 if bad.any():
                     row = int(np.where(bad, excess, 0.0).argmax())
-                    numbers = (float(each[row]) for each in (radius, length, largest, mass, density))
+                    numbers = (float(array[row]) for array in (radius, length, largest, mass, density))
                     odd = OddBody(body.sizes, *numbers)
                     where = _where(scope, body, row, odd.mass)
-                    found.setdefault(remark, []).append((float(excess[row]), body, odd, where))
+                    by_remark.setdefault(remark, []).append((float(excess[row]), body, odd, where))
         if scope.complaints.error_count:
             return
-        for remark, those in found.items():
-            _, body, odd, where = max(those, key=lambda each: each[0])
+        for remark, those in by_remark.items():
+            _, body, odd, where = max(those, key=lambda candidate: candidate[0])
             beside, helps = remark(odd)
             scope.complaints.remark(
                 "D298",
@@ -398,7 +401,9 @@ def _too_small(odd: OddBody) -> tuple[str, list[str]]:
     helps = [
         f"it would be of {odd.radius * math.sqrt(times):.4g} m, were it {odd.largest * times:.4g} kg*m^2: was it "
         f"converted from {unit} twice?"
-        for times, unit in sorted(OTHER_INERTIAS, key=lambda each: _unlikely(odd.radius * math.sqrt(each[0]), odd))
+        for times, unit in sorted(
+            OTHER_INERTIAS, key=lambda other_unit: _unlikely(odd.radius * math.sqrt(other_unit[0]), odd)
+        )
         if 0.05 * odd.length <= odd.radius * math.sqrt(times) <= 2.0 * odd.length
     ]
     return (
@@ -421,7 +426,7 @@ def _ellipsoid_density(mass: np.ndarray, inertia: np.ndarray) -> np.ndarray:
 
 def _where(scope: Scope, body: WeighedBody, row: int, mass: float) -> str:
     """A remark on the case in which a body is so, with its mass; empty where it is so in all cases."""
-    numbers = [each.value for each in (body.mass, *body.inertia, *body.sizes.values())]
+    numbers = [number.value for number in (body.mass, *body.inertia, *body.sizes.values())]
     case = scope.checks.where(row, numbers)
     return f"{case} ({mass:.4g} kg)" if case else ""
 
@@ -435,5 +440,5 @@ def _together(
     scope: Scope, settled: Sequence[Settled], warn: Callable[[np.ndarray], None], bodies: Sequence[WeighedBody]
 ) -> None:
     if bodies:
-        values: tuple[Real, ...] = tuple(each.value for each in settled)  # type: ignore[misc]  # they are numbers
+        values: tuple[Real, ...] = tuple(number.value for number in settled)  # type: ignore[misc]  # they are numbers
         scope.checks.observe(values, warn, bodies[0].place, needs=tuple(body.head for body in bodies))

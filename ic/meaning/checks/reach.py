@@ -35,7 +35,7 @@ def check_reach(scope: Scope, block: MergedBlock, structure: Structure) -> None:
 def flies_from_afar(experiment: Experiment, name: str) -> bool:
     """True where the check warns about the grapple of the payload of this name."""
     structure = experiment.structure
-    payload = next((each for each in structure.payloads if each.name == name), None)
+    payload = next((candidate for candidate in structure.payloads if candidate.name == name), None)
     looked_at = grapple_numbers(structure, payload, experiment.parameters) if payload is not None else None
     if looked_at is None or experiment.allows("D339"):
         return False
@@ -62,10 +62,10 @@ class GrappleNumbers:
         rows  values at the paths: [case, path]
         """
         time, own, of_link = rows[:, 0], rows[:, 1:5], rows[:, 5:9]
-        at, position, velocity, rate, com, middle, *others = np.moveaxis(rows[:, 9:].reshape(len(rows), -1, 3), 1, 0)
-        g = sum(others[: self.gravities], np.zeros_like(at))
+        place, position, velocity, rate, com, middle, *others = np.moveaxis(rows[:, 9:].reshape(len(rows), -1, 3), 1, 0)
+        g = sum(others[: self.gravities], np.zeros_like(place))
         away = _length(position + velocity * time[:, None] + 0.5 * g * (time * time)[:, None])
-        reach = sum((_length(other) for other in others[self.gravities :]), _length(at))
+        reach = sum((_length(other) for other in others[self.gravities :]), _length(place))
         reach = reach + 2.0 * _length(middle) + _size(of_link)
         # its frame goes round its centre, which flies straight; and as far again as its body is large
         loose = _length(com) * (2.0 + _length(rate) * time) + _size(own)
@@ -84,7 +84,7 @@ def grapple_numbers(structure: Structure, payload: Payload, parameters: Mapping[
     link = f"links.{payload.link}" if f"links.{payload.link}.mass" in parameters else head
     sizes = ("mass", *(f"inertia.{x}{x}" for x in "xyz"))
     gravity = [f"environment.{load.name}.g" for load in structure.environment if load.model == "gravity"]
-    numbers = [f"{head}.grapple", *(f"{each}.{name}" for each in (head, link) for name in sizes)]
+    numbers = [f"{head}.grapple", *(f"{owner}.{name}" for owner in (head, link) for name in sizes)]
     vectors = [
         *(f"{head}.{name}" for name in _OF_PAYLOAD),
         f"{link}.com",
@@ -97,14 +97,14 @@ def grapple_numbers(structure: Structure, payload: Payload, parameters: Mapping[
 def _way_to(structure: Structure, link: str) -> list[str] | None:
     """The joints between a link and the base; None where one of them slides, so that the reach is unlimited."""
     carrying = {joint.child: joint for joint in structure.joints}
-    found = []
+    joints = []
     while link in carrying:
         joint = carrying[link]
         if joint.kind == "prismatic":
             return None
-        found.append(joint.name)
+        joints.append(joint.name)
         link = joint.parent
-    return found
+    return joints
 
 
 def _is_pushed(structure: Structure, payload: Payload, parameters: Mapping[str, Any]) -> bool:
@@ -116,7 +116,7 @@ def _is_pushed(structure: Structure, payload: Payload, parameters: Mapping[str, 
         named = [parameters.get(f"environment.{load.name}.{link}") for link in links]
         if load.model not in known or model.free_fall is not None:
             return True
-        if any(each is not None and each.value == payload.name for each in named):
+        if any(joint_name is not None and joint_name.value == payload.name for joint_name in named):
             return True
     return False
 
@@ -124,7 +124,7 @@ def _is_pushed(structure: Structure, payload: Payload, parameters: Mapping[str, 
 def _observe(scope: Scope, payload: Payload, looked_at: GrappleNumbers, duration: float, place: Place) -> None:
     head = f"payloads.{payload.name}"
     settled = [scope.parameters.get(path) for path in looked_at.paths]
-    values: list[Real] = [each.value for each in settled if each is not None]  # type: ignore[misc]  # they are numbers
+    values: list[Real] = [number.value for number in settled if number is not None]  # type: ignore[misc]  # they are numbers
     if len(values) < len(settled):
         return  # a missing one is already reported
 

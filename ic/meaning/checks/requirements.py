@@ -48,8 +48,8 @@ def _bounds(scope: Scope, structure: Structure, use: MetricUse, metric: Metric) 
     """The bounds of a metric that follow from its channel's."""
     if metric.bounds is None:
         return Bounds()
-    of = channel_bounds(scope, structure, use.of)
-    return Bounds(*metric.bounds(of.least, of.most), of.because)
+    channel = channel_bounds(scope, structure, use.of)
+    return Bounds(*metric.bounds(channel.least, channel.most), channel.because)
 
 
 def _remark_bound(scope: Scope, requirement: Requirement, bounds: Bounds, model: str, place: Place) -> bool:
@@ -60,11 +60,12 @@ def _remark_bound(scope: Scope, requirement: Requirement, bounds: Bounds, model:
     if not (below or above):
         return False
     because = " by " + ", ".join(f"`{path}`" for path in bounds.because) if bounds.because else ""
-    of = f"`{requirement.metric}`" if bounds.because else f"a metric `{model}`"
+    subject = f"`{requirement.metric}`" if bounds.because else f"a metric `{model}`"
     end = f"above {bounds.most + 0.0:.6g}" if below else f"below {bounds.least + 0.0:.6g}"
     scope.complaints.remark(
         "D340",
-        f"`require {requirement.text}` cannot be {'missed' if below is upper else 'met'}: {of} is never {end}{because}",
+        f"`require {requirement.text}` cannot be {'missed' if below is upper else 'met'}: "
+        f"{subject} is never {end}{because}",
         place,
         help=leave_out("write a limit that it may pass, or leave it out"),
     )
@@ -77,12 +78,12 @@ def _remark_contradictions(scope: Scope, requirements: Iterable[Requirement]) ->
     highest: dict[str, Requirement] = {}
     for requirement in requirements:
         upper = requirement.comparison.startswith("<")
-        kept = (highest if upper else lowest).setdefault(requirement.metric, requirement)
-        tighter = (requirement.limit < kept.limit) if upper else (requirement.limit > kept.limit)
+        first = (highest if upper else lowest).setdefault(requirement.metric, requirement)
+        tighter = (requirement.limit < first.limit) if upper else (requirement.limit > first.limit)
         if tighter:
             (highest if upper else lowest)[requirement.metric] = requirement
-        if kept is not requirement:
-            _remark_looser(scope, *((kept, requirement) if tighter else (requirement, kept)))
+        if first is not requirement:
+            _remark_looser(scope, *((first, requirement) if tighter else (requirement, first)))
     for name in lowest.keys() & highest.keys():
         low, high = lowest[name], highest[name]
         strict = "=" not in low.comparison or "=" not in high.comparison

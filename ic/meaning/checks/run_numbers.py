@@ -43,8 +43,8 @@ class RunNumbers:
         self.duration = structure.schedule.duration
         self.instants = np.linspace(0.0, self.duration, INSTANTS)
         self.by_unit = defaultdict[str, list[tuple[str, Settled]]](list)
-        for path, each in settled.items():
-            self.by_unit[each.unit].append((path, each))
+        for path, parameter in settled.items():
+            self.by_unit[parameter.unit].append((path, parameter))
         self.moved = {link.name for link in structure.links} - {BASE, *structure.ground}
         """The links that move against the base."""
         self.lumped = {link.name for link in structure.links if link.lumped}
@@ -68,15 +68,15 @@ class RunNumbers:
 
     def largest(self, head: str, unit: str) -> dict[str, float]:
         """The parameters in this unit at this path or below it: the number, or of a list the one farthest from 0."""
-        found = {}
+        largest = {}
         for path, settled in self.by_unit[unit]:
             if path == head or path.startswith(f"{head}."):
                 value = self.numbers.get(path, settled.value)
                 if isinstance(value, tuple):
-                    found[path] = max(value, key=abs, default=0.0)
+                    largest[path] = max(value, key=abs, default=0.0)
                 elif isinstance(value, (int, float)):
-                    found[path] = float(value)
-        return found
+                    largest[path] = float(value)
+        return largest
 
     def is_placed(self, joint: str) -> bool:
         """True of a joint whose servo follows a position."""
@@ -141,8 +141,10 @@ class RunNumbers:
     def is_written(self, path: str) -> bool:
         """True where the deck wrote a number of this vector, or of this tensor."""
         ends = [f"{path}.{part}" for part in (*XYZ, *INERTIA)]
-        found = [self.settled[end] for end in ends if end in self.settled]
-        return any(each.origin.place is not None and each.origin.kind != "derived" for each in found)
+        components = [self.settled[end] for end in ends if end in self.settled]
+        return any(
+            component.origin.place is not None and component.origin.kind != "derived" for component in components
+        )
 
     def gyration(self, head: str) -> float:
         """The largest radius of gyration of a body about a frame axis, m; 0 of one without mass."""
@@ -160,7 +162,7 @@ class RunNumbers:
         limits = [torque] if torque is not None else []
         if current is not None and kt is not None:
             limits.append((current[0], kt * current[1]))
-        least = min(limits, key=lambda each: each[1], default=None)
+        least = min(limits, key=lambda limit: limit[1], default=None)
         return least if least is not None and least[1] > 0.0 else None
 
     @cached_property
@@ -177,7 +179,7 @@ class RunNumbers:
         if self.structure.base is not None or not g.any():
             return {}
         begins = {joint.name: self.numbers.get(f"initial.{joint.name}.q", 0.0) for joint in self.structure.moving}
-        turned, at, lines = self.poses(begins)
+        turned, places, lines = self.poses(begins)
         bodies = [
             (link.name, f"links.{link.name}", self.vector(f"links.{link.name}.com")) for link in self.structure.links
         ]
@@ -186,43 +188,43 @@ class RunNumbers:
                 head = f"payloads.{payload.name}"
                 own = np.array(rotation_rpy(*self.vector(f"{head}.rpy"))) @ self.vector(f"{head}.com")
                 bodies.append((payload.link, head, self.vector(f"{head}.at") + own))
-        masses = dict.fromkeys(at, 0.0)
-        moments = {link: np.zeros(3) for link in at}
+        masses = dict.fromkeys(places, 0.0)
+        moments = {link: np.zeros(3) for link in places}
         for link, head, centre in bodies:
-            if link in at:
+            if link in places:
                 mass = self.numbers.get(f"{head}.mass", 0.0)
                 masses[link] += mass
-                moments[link] = moments[link] + mass * (at[link] + turned[link] @ centre)
-        found = {}
+                moments[link] = moments[link] + mass * (places[link] + turned[link] @ centre)
+        loads = {}
         for joint in reversed(self.outward):
             axis, through = lines[joint.name]
             mass, moment = masses[joint.child], moments[joint.child]
             force = mass * g
             torque = np.cross(moment - mass * through, g)
-            found[joint.name] = float(axis @ (force if joint.kind == "prismatic" else torque))
+            loads[joint.name] = float(axis @ (force if joint.kind == "prismatic" else torque))
             masses[joint.parent] += mass
             moments[joint.parent] = moments[joint.parent] + moment
-        return {joint.name: found[joint.name] for joint in self.structure.moving}
+        return {joint.name: loads[joint.name] for joint in self.structure.moving}
 
     def poses(
         self, q: Mapping[str, float]
     ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], dict[str, tuple[np.ndarray, np.ndarray]]]:
         """Rotations and places of links against the base, and each joint's axis with a point of it, for positions of
         joints."""
-        turned, at = {BASE: np.eye(3)}, {BASE: np.zeros(3)}
+        turned, places = {BASE: np.eye(3)}, {BASE: np.zeros(3)}
         lines: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         for joint in self.outward:
             parent = turned[joint.parent]
             frame = parent @ np.array(rotation_rpy(*self.vector(f"{joint.name}.rpy")))
             axis = frame @ self.vector(f"{joint.name}.axis")
-            origin = at[joint.parent] + parent @ self.vector(f"{joint.name}.at")
+            origin = places[joint.parent] + parent @ self.vector(f"{joint.name}.at")
             pivot = frame @ self.vector(f"{joint.name}.pivot")
             way = q.get(joint.name, 0.0)
             turn = np.array(rotation_about(tuple(axis), way)) if joint.kind == "revolute" else np.eye(3)
             slide = axis * way if joint.kind == "prismatic" else 0.0
-            turned[joint.child], at[joint.child] = turn @ frame, origin + pivot - turn @ pivot + slide
+            turned[joint.child], places[joint.child] = turn @ frame, origin + pivot - turn @ pivot + slide
             lines[joint.name] = axis, origin + pivot
-        return turned, at, lines
+        return turned, places, lines
 
     def is_helped(self, joint: str) -> bool:
         """True where a model of the environment may bear a joint's load at the start: one that puts a force
@@ -230,7 +232,7 @@ class RunNumbers:
         bearing = [use.name for use in self.structure.environment if at_rest(use) == "force"]
         others = [name for name in bearing if not self.numbers.get(f"environment.{name}.from", 0.0) > 0.0]
         joints = [self.settled.get(f"environment.{name}.joint") for name in others]
-        return any(each is None or each.value == joint for each in joints)
+        return any(helped is None or helped.value == joint for helped in joints)
 
     def vector(self, path: str) -> np.ndarray:
         """A vector; zeros where there is none."""
@@ -238,10 +240,12 @@ class RunNumbers:
 
     def limit(self, use: Use, unit: str) -> tuple[str, float] | None:
         """The parameter that limits a servo's output or signal of this unit, and its value; None where none does."""
-        for each in (*use.servo.outputs, *use.servo.signals):
-            value = self.numbers.get(f"{use.joint}.servo.{each.limit}") if each.limit and each.unit == unit else None
+        for signal in (*use.servo.outputs, *use.servo.signals):
+            value = (
+                self.numbers.get(f"{use.joint}.servo.{signal.limit}") if signal.limit and signal.unit == unit else None
+            )
             if value is not None:
-                return each.limit, value
+                return signal.limit, value
         return None
 
     def course(self, use: Use) -> tuple[np.ndarray, np.ndarray] | None:
@@ -261,7 +265,7 @@ class RunNumbers:
             setattr(p, parameter.name, value)
         t = self.instants
         with np.errstate(all="ignore"):  # of a swing at 1e308 Hz there are no numbers
-            values, slopes = (np.broadcast_to(np.asarray(each, float), t.shape) for each in profile.course(p, t))
+            values, slopes = (np.broadcast_to(np.asarray(samples, float), t.shape) for samples in profile.course(p, t))
         return values, slopes
 
     def motion(self, use: Use) -> tuple[np.ndarray, np.ndarray] | None:

@@ -98,7 +98,7 @@ def check_sampling(scope: Scope, structure: Structure, requirements: Iterable[Re
     instants."""
     schedule, named = structure.schedule, {requirement.metric for requirement in requirements}
     judged = {use.of for use in structure.metrics if use.name in named}
-    finishing = {f"{of.rpartition('.')[0]}.servo.command" for of in judged if of.endswith((".q", ".qd"))}
+    finishing = {f"{channel.rpartition('.')[0]}.servo.command" for channel in judged if channel.endswith((".q", ".qd"))}
     recorded = schedule.record / schedule.base_hz if structure.record else 0.0
     for sampled in _all_sampled(structure):
         _observe(scope, replace(sampled, recorded=recorded, finishes=sampled.path in finishing), schedule)
@@ -107,23 +107,26 @@ def check_sampling(scope: Scope, structure: Structure, requirements: Iterable[Re
             label = f"sensor `{sensor.of}` of servo `{use.definition}`"
             path = f"{use.joint}.servo.sensor.{sensor.of}"
             _observe_filter(scope, sensor, label, path, use.divisor, "its servo ticks", schedule)
-    for each in structure.sensors:
-        label, path = f"sensor `{each.name}`", f"sensors.{each.name}"
-        _observe_filter(scope, each, label, path, each.divisor, "it reads", schedule)
+    for link_sensor in structure.sensors:
+        label, path = f"sensor `{link_sensor.name}`", f"sensors.{link_sensor.name}"
+        _observe_filter(scope, link_sensor, label, path, link_sensor.divisor, "it reads", schedule)
 
 
 def _observe_filter(
     scope: Scope, use: SensorUse | LinkSensor, label: str, path: str, divisor: int, by: str, schedule: Schedule
 ) -> None:
     """Warn about a sensor whose filter passes what its instants, every `divisor` base ticks, take for slower swings."""
-    found = {
+    by_name = {
         sensor_part.name: scope.parameters.get(f"{path}.{sensor_part.name}")
         for sensor_part in sensor_parts(use, "parameters")
     }
-    settled = {name: each for name, each in found.items() if each is not None}
-    values = {name: each.value for name, each in settled.items()}
+    settled = {name: setting for name, setting in by_name.items() if setting is not None}
+    values = {name: setting.value for name, setting in settled.items()}
     rate = evaluate_declared(scope, models.find("sensor", use.model).fastest, values, path)
-    place = next((each.origin.place for each in settled.values() if each.unit == "Hz" and each.origin.place), use.place)
+    place = next(
+        (setting.origin.place for setting in settled.values() if setting.unit == "Hz" and setting.origin.place),
+        use.place,
+    )
     if rate is None or place is None:
         return
     hz = schedule.base_hz / divisor
@@ -165,12 +168,17 @@ def _all_sampled(structure: Structure) -> Iterator[SampledContent]:
             yield from course(label, path, use.command.model, interval, by, use.place, integral=integral)
     for guide in structure.guides:
         interval = guide.divisor / schedule.base_hz
-        for each in guide.courses:
-            label, path = f"`{each.component}` of guide `{guide.name}`", f"guides.{guide.name}.{each.component}"
-            yield from course(label, path, each.model, interval, "the guide ticks", guide.place)
-    for each in structure.base.courses if structure.base is not None else ():
-        path = f"{BASE}.{each.component}"
-        yield from course(f"`{each.component}` of the base", path, each.model, schedule.step, steps, None)
+        for component_course in guide.courses:
+            label, path = (
+                f"`{component_course.component}` of guide `{guide.name}`",
+                f"guides.{guide.name}.{component_course.component}",
+            )
+            yield from course(label, path, component_course.model, interval, "the guide ticks", guide.place)
+    for component_course in structure.base.courses if structure.base is not None else ():
+        path = f"{BASE}.{component_course.component}"
+        yield from course(
+            f"`{component_course.component}` of the base", path, component_course.model, schedule.step, steps, None
+        )
     for load in structure.environment:
         model = models.find("environment", load.model, load.place)
         if model.content is not None:
@@ -179,14 +187,18 @@ def _all_sampled(structure: Structure) -> Iterator[SampledContent]:
 
 
 def _observe(scope: Scope, sampled: SampledContent, schedule: Schedule) -> None:
-    settled = {each.name: scope.parameters.get(f"{sampled.path}.{each.name}") for each in sampled.declared}
-    known = {name: each.value for name, each in settled.items() if each is not None}
+    settled = {
+        parameter.name: scope.parameters.get(f"{sampled.path}.{parameter.name}") for parameter in sampled.declared
+    }
+    known = {name: setting.value for name, setting in settled.items() if setting is not None}
     if len(known) < len(settled):
         return  # what it has no number for is already reported
     fixed = {name: value for name, value in known.items() if isinstance(value, str | tuple)}
     numbers: dict[str, Real] = {name: value for name, value in known.items() if name not in fixed}  # type: ignore[misc]
-    by_use = sorted((each for each in settled.values() if each), key=lambda each: each.unit not in ("s", "Hz"))
-    place = next((each.origin.place for each in by_use if each.origin.place), sampled.place)
+    by_use = sorted(
+        (setting for setting in settled.values() if setting), key=lambda setting: setting.unit not in ("s", "Hz")
+    )
+    place = next((setting.origin.place for setting in by_use if setting.origin.place), sampled.place)
     if place is None:
         return
 
@@ -197,16 +209,16 @@ def _observe(scope: Scope, sampled: SampledContent, schedule: Schedule) -> None:
         if len(rows) > MOST_ROWS:
             chosen = np.linspace(0, len(rows) - 1, MOST_ROWS).astype(int)
             rows, cases, counts = rows[chosen], cases[chosen], counts[chosen]
-        found = [
+        contents = [
             sampled.content(SimpleNamespace(**fixed, **dict(zip(numbers, row, strict=True))), schedule.duration)
             for row in rows.tolist()
         ]
-        _remark(scope, sampled, found, schedule, place)
-        late = [at for at, each in enumerate(found) if schedule.duration <= each.begins < math.inf]
-        if 0 < len(late) < len(found) and not sampled.path.startswith("environment."):
-            first = min(late, key=lambda at: cases[at])
+        _remark(scope, sampled, contents, schedule, place)
+        late = [index for index, content in enumerate(contents) if schedule.duration <= content.begins < math.inf]
+        if 0 < len(late) < len(contents) and not sampled.path.startswith("environment."):
+            first = min(late, key=lambda index: cases[index])
             others = " and others" if counts[late].sum() > 1 else ""
-            _remark_late(scope, sampled, found[first].begins, schedule, place, f" in case #{cases[first]}{others}")
+            _remark_late(scope, sampled, contents[first].begins, schedule, place, f" in case #{cases[first]}{others}")
 
     scope.checks.observe(tuple(numbers.values()), warn, place, needs=(sampled.path,))
 
@@ -223,12 +235,12 @@ def _remark_late(
     )
 
 
-def _remark(scope: Scope, sampled: SampledContent, found: list[Content], schedule: Schedule, place: Place) -> None:
+def _remark(scope: Scope, sampled: SampledContent, contents: list[Content], schedule: Schedule, place: Place) -> None:
     duration, base = schedule.duration, schedule.base_hz
-    first = min(found, key=lambda each: each.begins)
+    first = min(contents, key=lambda content: content.begins)
     if duration <= first.begins < math.inf:
         return _remark_late(scope, sampled, first.begins, schedule, place, " in this run")
-    last = max(found, key=lambda each: each.ends)
+    last = max(contents, key=lambda content: content.ends)
     if duration * (1.0 + NEAR) < last.ends < math.inf and sampled.finishes and not last.frequency:
         scope.complaints.remark(
             "D349",
@@ -239,12 +251,12 @@ def _remark(scope: Scope, sampled: SampledContent, found: list[Content], schedul
             "end earlier",
         )
     hz = 1.0 / sampled.interval
-    fastest = min(max(each.frequency for each in found), sys.float_info.max)
+    fastest = min(max(content.frequency for content in contents), sys.float_info.max)
     swing = Swing(sampled.label, fastest, place)
     if not swing.remark(scope, base, sampled.interval, sampled.by, "what is seen of it", "give what sees it"):
-        rows, shown = "the histories have rows", "what they show of it, and of what follows it,"
-        swing.remark(scope, base, sampled.recorded, rows, shown, "record at", schedule.ticks)
-    lost = [pulse for each in found for pulse in _lost(each.pulses, sampled.interval, duration)]
+        rows, visible = "the histories have rows", "what they show of it, and of what follows it,"
+        swing.remark(scope, base, sampled.recorded, rows, visible, "record at", schedule.ticks)
+    lost = [pulse for content in contents for pulse in _lost(content.pulses, sampled.interval, duration)]
     if lost:
         begins, ends = min(lost, key=lambda pulse: pulse[1] - pulse[0])
         before = math.floor(begins * hz)
@@ -260,9 +272,9 @@ def _remark(scope: Scope, sampled: SampledContent, found: list[Content], schedul
             help=[f"let it last longer than {sampled.interval:.6g} s", *rate],
         )
         return
-    off = [(each.points, one) for each in found for one in _uncarried(sampled, each, duration)]
+    off = [(content.points, pulse) for content in contents for pulse in _uncarried(sampled, content, duration)]
     if off:
-        points, worst = max(off, key=lambda each: each[1].off)
+        points, worst = max(off, key=lambda pair: pair[1].off)
         others = f", and {len(off) - 1} more" if len(off) > 1 else ""
         what = "integral" if sampled.integral else "peak"
         scope.complaints.remark(
@@ -301,7 +313,7 @@ def _fitting(wanted: float, base: float, ticks: int = 0) -> float:
     """
     if wanted <= base:
         n = math.floor(base / wanted * (1.0 + ROUNDING))
-        return base / next(each for each in range(n, 0, -1) if ticks % each == 0)
+        return base / next(divisor for divisor in range(n, 0, -1) if ticks % divisor == 0)
     times = wanted / base * (1.0 - ROUNDING)
     return base * math.ceil(times) if times < math.inf else math.inf
 

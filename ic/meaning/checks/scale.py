@@ -31,7 +31,7 @@ class Scale:
     low     smallest usual multiple;  high: the largest;  usual: where these are from, in words
     meant   unit of the parameter where another may have been meant, "" where it may not;  power: the multiple goes as
             this power of the parameter
-    said    what is so, in words, where the multiple does not say it;  cure: its remedy, where another than to be
+    clause  what is so, in words, where the multiple does not say it;  cure: its remedy, where another than to be
             within the usual range
     typical  a multiple in the middle of what is usual, of a number on which the motion depends; 0: none is known
     """
@@ -48,7 +48,7 @@ class Scale:
     verb: str = "is"
     meant: str = ""
     power: float = 1.0
-    said: str = ""
+    clause: str = ""
     cure: str = ""
     typical: float = 0.0
 
@@ -65,8 +65,8 @@ class Scale:
     def sentence(self, case: str, others: int) -> str:
         """The warning in words. case: words for the case; others: number of further paths that are so"""
         more = f"; {others} more {'is' if others == 1 else 'are'} so" if others else ""
-        said = self.said or f"{self.verb} {self.size:.4g} {self.unit}".rstrip()
-        return f"`{self.path}` {said}{case}{'' if self.said else self.times}{more}; {self.usual}"
+        clause = self.clause or f"{self.verb} {self.size:.4g} {self.unit}".rstrip()
+        return f"`{self.path}` {clause}{case}{'' if self.clause else self.times}{more}; {self.usual}"
 
     @property
     def times(self) -> str:
@@ -81,15 +81,17 @@ class Scale:
     @property
     def remedies(self) -> list[str]:
         """Other units of the parameter with which the multiple would be usual, if there are any, and what is usual."""
-        if self.said or self.cure:
+        if self.clause or self.cure:
             return [self.cure or "ask for less, or move the limit"]
         multiples = [(unit, self.multiple * factor**self.power) for unit, factor in OTHER_UNITS.get(self.meant, ())]
-        usual = [(unit, each) for unit, each in multiples if max(self.low, 1e-2 * self.high) <= each <= self.high]
-        usual.sort(key=lambda each: abs(math.log(each[1] / (0.1 * self.high))))
-        found = ", ".join(f"in {unit} it would be {multiple:.3g} times" for unit, multiple in usual[:2])
+        usual = [
+            (unit, multiple) for unit, multiple in multiples if max(self.low, 1e-2 * self.high) <= multiple <= self.high
+        ]
+        usual.sort(key=lambda pair: abs(math.log(pair[1] / (0.1 * self.high))))
+        alternatives = ", ".join(f"in {unit} it would be {multiple:.3g} times" for unit, multiple in usual[:2])
         end, word, side = (self.low, "least", 2.0) if self.multiple < self.low else (self.high, "most", 0.5)
         limit = f"at {word} {inside(end * self.beside, side, 3)} {self.unit}".rstrip() + " is usual"
-        return [*([f"{found} {self.other}: is the unit another?"] if found else []), limit]
+        return [*([f"{alternatives} {self.other}: is the unit another?"] if alternatives else []), limit]
 
 
 OTHER_UNITS: Mapping[str, tuple[tuple[str, float], ...]] = {

@@ -152,13 +152,15 @@ def _pushes(run: RunNumbers) -> Iterator[Scale]:
     begins = {joint.name: run.numbers.get(f"initial.{joint.name}.q", 0.0) for joint in run.structure.moving}
     wrenches = [use.name for use in run.structure.environment if use.model == "wrench" and _lasts(run, use.name)]
     motors = {use.joint: use for use in run.uses}
-    turned, at, lines = run.poses(begins) if wrenches else ({}, {}, {})
+    turned, places, lines = run.poses(begins) if wrenches else ({}, {}, {})
     for name in wrenches:
         head, link = f"environment.{name}", str(run.settled[f"environment.{name}.link"].value)
-        point = at.get(link, np.zeros(3)) + turned.get(link, np.eye(3)) @ run.vector(f"{head}.point")
+        point = places.get(link, np.zeros(3)) + turned.get(link, np.eye(3)) @ run.vector(f"{head}.point")
         own = turned.get(link, np.eye(3)) if str(run.settled[f"{head}.axes"].value) == "link" else np.eye(3)
         force, moment = own @ run.vector(f"{head}.force"), own @ run.vector(f"{head}.moment")
-        while (joint := next((each for each in run.structure.joints if each.child == link), None)) is not None:
+        while (
+            joint := next((candidate for candidate in run.structure.joints if candidate.child == link), None)
+        ) is not None:
             link, use = joint.parent, motors.get(joint.name)
             limit, ratio = (run.largest_torque(use), run.of_motor(use, RATIO.name)) if use is not None else (None, None)
             if limit is not None and ratio is not None:
@@ -212,18 +214,18 @@ def _limits(run: RunNumbers) -> Iterator[Scale]:
             continue
         places, rates = motion
         own = {name: run.numbers.get(f"{use.joint}.{name}", math.nan) for name in JOINT_LIMITS}
-        for name, asked, other, beside in (
+        for name, commanded, other, beside in (
             ("q_min", places, own["q_max"], "the range of the joint"),
             ("q_max", places, own["q_min"], "the range of the joint"),
             ("tau_max" if kind == "torque" else "qd_max", np.abs(rates), 0.0, "the limit of the joint"),
         ):
-            path, multiples = f"{use.joint}.{name}", (asked - other) / (own[name] - other)
+            path, multiples = f"{use.joint}.{name}", (commanded - other) / (own[name] - other)
             k = int(multiples.argmax())
             if math.isfinite(multiples[k]) and kind != "acceleration":
                 unit, scale = unit_written([run.settled[path]], run.settled[path].unit)
                 end = f"`{path}` is {own[name] / scale:.6g} {unit}"
-                said = f"leads to {asked[k] / scale:.6g} {unit} at {t[k]:.4g} s, and {end}"
-                size, most = abs(float(asked[k]) - other), abs(own[name] - other)
+                clause = f"leads to {commanded[k] / scale:.6g} {unit} at {t[k]:.4g} s, and {end}"
+                size, most = abs(float(commanded[k]) - other), abs(own[name] - other)
                 yield Scale(
                     "command beside a limit",
                     f"{use.joint}.servo.command",
@@ -234,7 +236,7 @@ def _limits(run: RunNumbers) -> Iterator[Scale]:
                     0.0,
                     1.01 if kind == "rate" else 1.001,
                     usual,
-                    said=said,
+                    clause=clause,
                 )
 
 
@@ -243,10 +245,10 @@ def _strengths(run: RunNumbers) -> Iterator[Scale]:
     usual = "a motor has more only where it is turned backwards, and then at most twice that"
     for use in run.uses:
         kt, resistance, volts = run.of_motor(use, "kt"), run.of_motor(use, "resistance"), run.limit(use, "V")
-        for unit, each in (("N*m", kt), ("A", 1.0)):
+        for unit, constant in (("N*m", kt), ("A", 1.0)):
             limit = run.limit(use, unit)
-            if limit is not None and volts is not None and each and resistance and volts[1] < math.inf:
-                path, most = f"{use.joint}.servo.{limit[0]}", each * volts[1] / resistance
+            if limit is not None and volts is not None and constant and resistance and volts[1] < math.inf:
+                path, most = f"{use.joint}.servo.{limit[0]}", constant * volts[1] / resistance
                 other = f"what all of `{volts[0]}` gives at a standstill, {most:.4g} {unit}"
                 if 0.0 < limit[1] < FAR * most:
                     yield Scale("limit of a motor", path, limit[1], unit, most, other, 0.0, 10.0, usual, meant=unit)
@@ -282,9 +284,9 @@ def _loads(run: RunNumbers) -> Iterator[Scale]:
             if constant is not None and current is not None:
                 path, most = f"{use.joint}.bed.i_max", ratio * constant * current * (1.0 if scale is None else scale)
                 other, weak = "what the load motor makes at the joint", "a bed brings its joint's load"
-                said = f"makes {most:.4g} {unit} at the joint, which gravity loads by {load:.4g} {unit} at the start"
+                clause = f"makes {most:.4g} {unit} at the joint, which gravity loads by {load:.4g} {unit} at the start"
                 cure = f"{1.01 * current * load / most:.4g} A would bring it" if most > 0.0 else "give it a current"
-                yield Scale("load of a bed", path, load, unit, most, other, 0.0, 1.0, weak, said=said, cure=cure)
+                yield Scale("load of a bed", path, load, unit, most, other, 0.0, 1.0, weak, clause=clause, cure=cure)
 
 
 def _brakes(run: RunNumbers) -> Iterator[Scale]:
@@ -337,9 +339,9 @@ def _sensors(run: RunNumbers) -> Iterator[Scale]:
             "q": float(np.ptp(values)) if places else 0.0,
             "qd": float(np.abs(slopes if places else values).max()),
         }
-        for of, motion in motions.items():
+        for quantity, motion in motions.items():
             for name in ("noise", "resolution", "step"):
-                path = f"{use.joint}.servo.sensor.{of}.{name}"
+                path = f"{use.joint}.servo.sensor.{quantity}.{name}"
                 if run.numbers.get(path, 0.0) > 0.0 and motion > 0.0:
                     unit = run.settled[path].unit
                     size, other = run.numbers[path], f"what is commanded, {motion:.4g} {unit}"
@@ -350,14 +352,14 @@ def _bands(run: RunNumbers) -> Iterator[Scale]:
     """Steps of sensors beside the bands in which what they see is to settle."""
     usual = "a servo knows its joint no better than its sensor"
     for metric in run.structure.metrics:
-        joint, _, of = metric.of.partition(".")
+        joint, _, quantity = metric.of.partition(".")
         head = f"metrics.{metric.name}"
         band = max(
             abs(run.numbers.get(f"{head}.band", 0.0) * run.numbers.get(f"{head}.target", 0.0)),
             run.numbers.get(f"{head}.within", 0.0),
         )
         for name in ("resolution", "step"):
-            path = f"{joint}.servo.sensor.{of}.{name}"
+            path = f"{joint}.servo.sensor.{quantity}.{name}"
             if run.numbers.get(path, 0.0) > 0.0 and band > 0.0:
                 step, unit = run.numbers[path], run.settled[path].unit
                 other = f"the band of metric `{metric.name}`, {band:.4g} {unit}"
@@ -415,9 +417,11 @@ def _gravities(run: RunNumbers) -> Iterator[Scale]:
             up, feet = run.vector(path)[2], [joint for joint in run.structure.joints if joint.parent == BASE]
             upright = all(rotation_rpy(*run.vector(f"{joint.name}.rpy"))[2][2] > -0.5 for joint in feet)
             if 0.0 < size <= up and run.structure.base is None and upright:
-                said, cure = f"leads up: its z is {up:.4g} m/s^2", f"where z is up, its z is -{up:.4g} m/s^2"
+                clause, cure = f"leads up: its z is {up:.4g} m/s^2", f"where z is up, its z is -{up:.4g} m/s^2"
                 where = "z is up in most decks and robots' files"
-                yield Scale("upward gravity", path, up, "m/s^2", EARTH, other, 0.0, 1e-3, where, said=said, cure=cure)
+                yield Scale(
+                    "upward gravity", path, up, "m/s^2", EARTH, other, 0.0, 1e-3, where, clause=clause, cure=cure
+                )
 
 
 SCALES: tuple[Callable[[RunNumbers], Iterator[Scale]], ...] = (
@@ -463,8 +467,10 @@ def scales(run: RunNumbers) -> list[Scale]:
 def check_scales(scope: Scope, structure: Structure, uses: Iterable[Use]) -> None:
     """Warn about numbers far outside what is usual beside the run's other numbers; of one kind about the worst."""
     settled = {**scope.parameters, **scope.auxiliary}
-    numbers_of = {path: each.value for path, each in settled.items() if not isinstance(each.value, (str, tuple))}
-    place = next((each.origin.place for each in settled.values() if each.origin.place is not None), None)
+    numbers_of = {
+        path: setting.value for path, setting in settled.items() if not isinstance(setting.value, (str, tuple))
+    }
+    place = next((setting.origin.place for setting in settled.values() if setting.origin.place is not None), None)
     if place is None:
         return
 
@@ -486,15 +492,17 @@ def check_scales(scope: Scope, structure: Structure, uses: Iterable[Use]) -> Non
                     if scale.what not in worst or scale.nearness > worst[scale.what][0].nearness:
                         worst[scale.what] = scale, row
         for scale, row in worst.values():
-            own = [each for path, each in settled.items() if path == scale.path or path.startswith(f"{scale.path}.")]
-            own.sort(key=lambda each: each.unit == "s")  # of a table rather its values than their instants
-            at = next((each.origin.place for each in own if each.origin.place is not None), place)
+            own = [
+                setting for path, setting in settled.items() if path == scale.path or path.startswith(f"{scale.path}.")
+            ]
+            own.sort(key=lambda setting: setting.unit == "s")  # of a table rather its values than their instants
+            scale_place = next((setting.origin.place for setting in own if setting.origin.place is not None), place)
             varies = len(by_path[scale.what, scale.path]) > 1
             case = scope.checks.where(row, numbers_of.values() if varies else ())
             scope.complaints.remark(
                 "D297",
                 scale.sentence(case, len(others[scale.what]) - 1),
-                at,
+                scale_place,
                 help=[*scale.remedies, MEANT.format("D297")],
             )
 

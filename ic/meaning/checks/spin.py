@@ -31,7 +31,7 @@ def check_spins(scope: Scope, block: MergedBlock, structure: Structure) -> None:
     limit = (FIRST if integrator.order == 1 else HIGHER) * (LOST_A_TURN / (2.0 * math.pi)) ** (1.0 / integrator.order)
     for label, path, place in _spinning(block, structure):
         paths = tuple(f"{path}.{axis}" for axis in XYZ)
-        settled = [each.value for name in paths if (each := scope.parameters.get(name)) is not None]
+        settled = [setting.value for name in paths if (setting := scope.parameters.get(name)) is not None]
 
         def warn(rows: np.ndarray, label: str = label, place: Place = place) -> None:
             fastest = float(np.max(np.sqrt((rows * rows).sum(axis=1))))

@@ -34,11 +34,11 @@ def at_the_start(experiment: Experiment, case: int) -> str:
     return "at the start" + (f" of {_case(experiment, case)}" if experiment.cases.count > 1 else "")
 
 
-def from_instants(experiment: Experiment, case: int, at: float, until: float | None = None) -> str:
+def from_instants(experiment: Experiment, case: int, time: float, until: float | None = None) -> str:
     """An instant of a case, with the duration of the finding if it is known, in words; in s from the start of the
     run."""
-    of = f" of {_case(experiment, case)}" if experiment.cases.count > 1 else ""
-    return f"at t = {at:.4g} s{of}" + (f", and so it is until {until:.4g} s" if until is not None else "")
+    of_case = f" of {_case(experiment, case)}" if experiment.cases.count > 1 else ""
+    return f"at t = {time:.4g} s{of_case}" + (f", and so it is until {until:.4g} s" if until is not None else "")
 
 
 def _case(experiment: Experiment, case: int) -> str:
@@ -57,20 +57,21 @@ def loop_warning(experiment: Experiment, loop: Unstable, place: Place | None, wh
     structure = experiment.structure
     uses = [use for use in structure.servos if use.joint in loop.joints]
     every = f"a disturbance grows by e in every {loop.every:.3g} s"
-    at = ""
+    ticking = ""
     if loop.ticks:
         rates = " and ".join(dict.fromkeys(f"{hz(structure.schedule.base_hz / use.divisor)} Hz" for use in uses))
-        at = f" at {rates}"
+        ticking = f" at {rates}"
     if loop.weak:
         message = f"the loop of servo `{uses[0].definition}` is too weak to hold joint `{uses[0].joint}`: {every}"
     elif len(uses) == 1:
         by_itself = "" if loop.ticks else " by itself"
         message = (
-            f"the loop of servo `{uses[0].definition}`{at} is unstable{by_itself} on joint `{uses[0].joint}`: {every}"
+            f"the loop of servo `{uses[0].definition}`{ticking} is unstable{by_itself} "
+            f"on joint `{uses[0].joint}`: {every}"
         )
     else:
         joints = ", ".join(f"`{joint}`" for joint in loop.joints)
-        message = f"the servo loops of joints {joints}{at} are unstable together: {every}"
+        message = f"the servo loops of joints {joints}{ticking} are unstable together: {every}"
     helps = [_fitting(experiment, loop)]
     if loop.sensed:
         helps.append("stable if the law saw what is so: a sensor with less lag or delay, in place of the one it has")
@@ -175,9 +176,9 @@ def _places(experiment: Experiment, fault: StepFault, better: Remedy) -> Iterato
     for use in structure.servos:
         if use.joint == fault.joint and use.place is not None:
             yield Label(use.place, f"its servo, `{use.definition}`")
-    for each in structure.environment:
-        if each.name == better.cause and each.place is not None:
-            yield Label(each.place, "without this it would not be so")
+    for model in structure.environment:
+        if model.name == better.cause and model.place is not None:
+            yield Label(model.place, "without this it would not be so")
 
 
 def _others(better: Remedy, head: str) -> list[str]:

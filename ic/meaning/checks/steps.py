@@ -60,95 +60,97 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
         return looked[0]
 
     try:
-        found = memo.answer("steps", full, lambda: look().without_matrices(), rows)
+        findings = memo.answer("steps", full, lambda: look().without_matrices(), rows)
     except Problem:  # reported where the program is built
         complaints.settle()
         return experiment
     except TooLarge as reason:
         complaints.settle()
         return replace(experiment, notes=(*experiment.notes, f"{NOT_LOOKED_AT}{reason}"))
-    grows = any(fault.kind == "grows" for fault in found.faults)
-    fast = any(fault.kind == "fast" for fault in found.faults)
+    grows = any(fault.kind == "grows" for fault in findings.faults)
+    fast = any(fault.kind == "fast" for fault in findings.faults)
     refuted = set()
-    if found.finite:
+    if findings.finite:
         # a released payload leaves a lighter arm than that of the start
         refuted |= set() if grows or experiment.structure.payloads else {"D104"}
         refuted |= set() if fast else {"D105"}
-        refuted |= set() if grows and found.grown <= BEYOND * declared.get("D249", (0.0, ()))[0] else {"D249"}
-    kept = complaints.settle(refuted)
-    for each in found.faults:
-        if _is_told(each, kept, declared, found) or _is_of_loops(each, found):
+        refuted |= set() if grows and findings.grown <= BEYOND * declared.get("D249", (0.0, ()))[0] else {"D249"}
+    codes = complaints.settle(refuted)
+    for step_fault in findings.faults:
+        if _is_reported(step_fault, codes, declared, findings) or _is_of_loops(step_fault, findings):
             continue
 
-        def better_step(fault: StepFault = each) -> Remedy:
+        def better_step(fault: StepFault = step_fault) -> Remedy:
             return remedy(full, (looked[0] if looked else look()).map, fault)
 
-        better = memo.answer(f"remedy for what {each.kind}", full, better_step, rows)
-        complaints.pass_on(fault_warning(experiment, each, better, scope.rate_place, _where(experiment, each, found)))
-    if "D104" not in kept and not any(
-        fault.kind == "grows" and not _is_of_loops(fault, found) for fault in found.faults
+        better = memo.answer(f"remedy for what {step_fault.kind}", full, better_step, rows)
+        complaints.pass_on(
+            fault_warning(experiment, step_fault, better, scope.rate_place, _where(experiment, step_fault, findings))
+        )
+    if "D104" not in codes and not any(
+        fault.kind == "grows" and not _is_of_loops(fault, findings) for fault in findings.faults
     ):
 
         def find_usual() -> list[str]:
             return usual_number(scope, full, lambda changed: not step_size(changed, rows).loops)
 
-        told = [loop for loop in found.loops if not experiment.allows("D320" if loop.ticks else "D322")]
-        far = any(loop.parameters or loop.gain is None or not NEAR < loop.gain < 1.0 / NEAR for loop in told)
+        reported = [loop for loop in findings.loops if not experiment.allows("D320" if loop.ticks else "D322")]
+        far = any(loop.parameters or loop.gain is None or not NEAR < loop.gain < 1.0 / NEAR for loop in reported)
         blamed = memo.answer("usual number", full, find_usual, rows) if far else []
-        for loop in found.loops:
+        for loop in findings.loops:
             start = at_the_start(experiment, loop.case)
             warning = loop_warning(experiment, loop, scope.rate_place, f"as it stands {start}")
             complaints.pass_on(replace(warning, help=(*blamed, *warning.help)))
-    return replace(experiment, notes=(*experiment.notes, *_note(experiment, found)))
+    return replace(experiment, notes=(*experiment.notes, *_note(experiment, findings)))
 
 
 NEAR = 0.3
 """Share of their gain from which on loops are so near to be stable that no other number is looked for."""
 
 
-def _is_told(
-    fault: StepFault, kept: frozenset[str], declared: dict[str, tuple[float, tuple[int, ...]]], found: StepSize
+def _is_reported(
+    fault: StepFault, codes: frozenset[str], declared: dict[str, tuple[float, tuple[int, ...]]], findings: StepSize
 ) -> bool:
     """True where the declaration of a servo or sensor has reported it."""
-    if "D104" in kept:
+    if "D104" in codes:
         return True
     if fault.kind == "grows":
-        return "D249" in kept
-    if fault.kind == "fast" and any(each.kind != "fast" for each in found.faults):
+        return "D249" in codes
+    if fault.kind == "fast" and any(other.kind != "fast" for other in findings.faults):
         return True
-    return fault.kind == "fast" and "D105" in kept and fault.figure <= BEYOND * declared.get("D105", (0.0, ()))[0]
+    return fault.kind == "fast" and "D105" in codes and fault.figure <= BEYOND * declared.get("D105", (0.0, ()))[0]
 
 
-def _is_of_loops(fault: StepFault, found: StepSize) -> bool:
+def _is_of_loops(fault: StepFault, findings: StepSize) -> bool:
     """True where a mode truly grows, and unstable loops explain it."""
-    return bool(found.loops) and fault.kind == "grows" and fault.mode.grows_in_truth(found.map.h)
+    return bool(findings.loops) and fault.kind == "grows" and fault.mode.grows_in_truth(findings.map.h)
 
 
-def _where(experiment: Experiment, fault: StepFault, found: StepSize) -> str:
+def _where(experiment: Experiment, fault: StepFault, findings: StepSize) -> str:
     """The state concerned, in words, with the cases that were not examined."""
     cases = experiment.cases
     where = at_the_start(experiment, fault.mode.case)
     if fault.mode.loose:
         where = f"in the pose {where.removeprefix('at ')}".replace("pose the", "pose of the")
         where += ", at rest, with no drive and nothing held by friction"
-    left = cases.count - len(found.cases)
+    left = cases.count - len(findings.cases)
     return f"reckoned {where}" + (f"; {left:,} of {cases.count:,} cases were not looked at" if left > 0 else "")
 
 
-def _note(experiment: Experiment, found: StepSize) -> Iterator[str]:
+def _note(experiment: Experiment, findings: StepSize) -> Iterator[str]:
     """The fastest mode of the first case, its growth in a step, the line of its joint's servo; and the examined
     cases."""
-    looked = _looked_at(experiment, found.cases)
-    if found.mode is None:
+    looked = _looked_at(experiment, findings.cases)
+    if findings.mode is None:
         yield f"{NOTE}nothing changes by more than 1 % in a step{looked}"
         return
-    h, mode = experiment.structure.schedule.step, found.mode
+    h, mode = experiment.structure.schedule.step, findings.mode
     grown = h * mode.root.real
     truth = math.exp(grown) if grown < LARGEST else math.inf
-    lines = (use.place for use in experiment.structure.servos if use.joint == found.joint)
-    where = next((f" ({each.file}:{each.line})" for each in map(shown_place, filter(None, lines))), "")
+    lines = (use.place for use in experiment.structure.servos if use.joint == findings.joint)
+    where = next((f" ({place.file}:{place.line})" for place in map(shown_place, filter(None, lines))), "")
     yield (
-        f"{NOTE}{found.owner} {motion_words(mode.root)}: h * lambda = {h * abs(mode.root):.3g}, and a step makes "
+        f"{NOTE}{findings.owner} {motion_words(mode.root)}: h * lambda = {h * abs(mode.root):.3g}, and a step makes "
         f"{abs(mode.factor):.3g} of it, in truth {truth:.3g}{where}{looked}"
     )
 
@@ -162,6 +164,6 @@ def _looked_at(experiment: Experiment, rows: Sequence[int]) -> str:
         np.ptp(coordinate.values[list(rows)]) == np.ptp(coordinate.values[list(ends(coordinate.values))])
         for coordinate in cases.coordinates
     ]
-    of = "all that varies" if all(both) else f"{sum(both)} of the {len(both)} that vary"
-    those = f", with the least and the largest of {of}" if any(both) else ""
+    subject = "all that varies" if all(both) else f"{sum(both)} of the {len(both)} that vary"
+    those = f", with the least and the largest of {subject}" if any(both) else ""
     return f"; looked at {len(rows)} of {cases.count:,} cases{those}: the others are left to the run"

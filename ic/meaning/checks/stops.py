@@ -36,12 +36,14 @@ def check_stops(complaints: Complaints, experiment: Experiment) -> None:
         ]
         stiffness = {name: experiment.parameters[path] for name, path in paths if path in experiment.parameters}
         stiffest = {name: _stiffest(experiment, quantity) for name, quantity in stiffness.items()}
-        found = {case: contacts(experiment, case) for case in set(stiffest.values())}
-        for each in (each for name, case in stiffest.items() for each in found[case] if each.stop == name):
-            if not each.steps < enough:
+        by_case = {case: contacts(experiment, case) for case in set(stiffest.values())}
+        for contact in (
+            contact for name, case in stiffest.items() for contact in by_case[case] if contact.stop == name
+        ):
+            if not contact.steps < enough:
                 continue
-            place = stiffness[each.stop].origin.place or uses[each.stop].place
-            times = enough / each.steps if each.steps > 0.0 else math.inf
+            place = stiffness[contact.stop].origin.place or uses[contact.stop].place
+            times = enough / contact.steps if contact.steps > 0.0 else math.inf
             rate = times * structure.schedule.base_hz / structure.schedule.dynamics
             fits = "no rate is so high: make it softer"
             if math.isfinite(rate):
@@ -49,11 +51,12 @@ def check_stops(complaints: Complaints, experiment: Experiment) -> None:
                 fits = f"quicken the dynamics to {least}, or make it softer"
             complaints.remark(
                 "D295",
-                f"`{each.stop}` is stiff for the dynamics' step: {each.body} touches it for {each.steps:.2g} steps",
+                f"`{contact.stop}` is stiff for the dynamics' step: "
+                f"{contact.body} touches it for {contact.steps:.2g} steps",
                 Label(place, f"h = {structure.schedule.step:g} s") if place else place,
                 help=[
                     f"with {integrator.name} a contact of fewer than {enough:g} steps gives energy that nobody put in",
-                    f"{fits}: it feels {each.inertia:.3g} {each.unit} at the start",
+                    f"{fits}: it feels {contact.inertia:.3g} {contact.unit} at the start",
                 ],
             )
 

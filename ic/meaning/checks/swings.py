@@ -79,13 +79,15 @@ def check_swing(
             every = h / (float(np.max(grown)) / steps)
             still = [
                 f"integrator = {name};"
-                for name, each in known.items()
-                if name != integrator.name and steps * growth(each, h, a, b) <= GROWS
+                for name, other in known.items()
+                if name != integrator.name and steps * growth(other, h, a, b) <= GROWS
             ]
             enough = _enough(integrator, h, steps, a, b)
             helps = [f"the slowest rate at which it does not: {_slowest(schedule, integrator, a, b)}"]
             if still:
-                helps.append(known_words("at this rate it does not with", (f"`{each}`" for each in still)))
+                helps.append(
+                    known_words("at this rate it does not with", (f"`{integrator_name}`" for integrator_name in still))
+                )
             if enough is not None:
                 helps.append(f"or damp it: of x'' = -a x - b x', b is {b:.3g} 1/s, and {enough:.3g} 1/s would do")
             scope.complaints.remark(
@@ -137,8 +139,8 @@ def check_circuits(
     path, servo = f"{use.joint}.servo", use.servo
     if servo.swings is not None and not on_bed and use.parameters is not None:
         kind = use.command.kind if use.command is not None else "none"
-        found = evaluate_declared(scope, servo.swings, use.parameters, path, kind)
-        for what, swing in (found or {}).items():
+        swings = evaluate_declared(scope, servo.swings, use.parameters, path, kind)
+        for what, swing in (swings or {}).items():
             label = f"the {what} of servo `{use.definition}`"
             check_swing(scope, label, swing, schedule, integrator, dynamics, path, held=True)
     for sensor in use.sensors:

@@ -68,8 +68,8 @@ def _stays_between(scope: Scope, load: EnvironmentUse, model: Environment, servo
     if course is None or None in (lower, upper, begins) or moves != 0.0:
         return False
     with np.errstate(all="ignore"):
-        asked = np.append(profile.course(course, np.linspace(0.0, duration, INSTANTS))[0], begins)
-    return bool(np.all((asked > lower) & (asked < upper)))
+        commanded = np.append(profile.course(course, np.linspace(0.0, duration, INSTANTS))[0], begins)
+    return bool(np.all((commanded > lower) & (commanded < upper)))
 
 
 def _remark_hold(scope: Scope, load: EnvironmentUse, servos: Mapping[str, Use], structure: Structure) -> None:
@@ -87,15 +87,15 @@ def _remark_hold(scope: Scope, load: EnvironmentUse, servos: Mapping[str, Use], 
     between = _joints_between(structure, bodies) if bodies else None
     if not between or any(joint not in servos for joint in between):
         return
-    told = [servos[joint] for joint in between]
-    if any(use.parameters is None or not accelerates(use.bare, use.parameters) for use in told):
+    prescribed = [servos[joint] for joint in between]
+    if any(use.parameters is None or not accelerates(use.bare, use.parameters) for use in prescribed):
         return
-    using = next((use for use in told if use.servo.at_rest is None), None)
+    using = next((use for use in prescribed if use.servo.at_rest is None), None)
     if using is not None:
         scope.complaints.remark(
             "D296",
             f"`{load.name}` holds nothing: servo `{using.definition}` ({using.servo.name}) tells joint `{using.joint}` "
-            f"its acceleration{_and_others(len(told) - 1)}, and what holds `{bodies[0]}` gives way to it",
+            f"its acceleration{_and_others(len(prescribed) - 1)}, and what holds `{bodies[0]}` gives way to it",
             load.place,
             also=[Label(using.place, "its servo")],
             help=[

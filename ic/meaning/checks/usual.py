@@ -55,11 +55,11 @@ def _changed(experiment: Experiment, path: str, factor: float) -> Experiment | N
     """The experiment with a number, or a vector, times a factor: a mass together with its inertia, and also what has
     its number from the same place in the deck, as joints with one servo. None where one of them varies."""
     heads = (f"{path}.", f"{path.removesuffix('mass')}inertia." if path.endswith(".mass") else f"{path}.")
-    found = {name: each for name, each in experiment.parameters.items() if f"{name}.".startswith(heads)}
-    places = {each.origin.place for each in found.values()} - {None}
-    found |= {name: each for name, each in experiment.parameters.items() if each.origin.place in places}
-    numbers = {name: each.value for name, each in found.items() if isinstance(each.value, float)}
-    if len(numbers) < len(found):
+    alike = {name: quantity for name, quantity in experiment.parameters.items() if f"{name}.".startswith(heads)}
+    places = {quantity.origin.place for quantity in alike.values()} - {None}
+    alike |= {name: quantity for name, quantity in experiment.parameters.items() if quantity.origin.place in places}
+    numbers = {name: quantity.value for name, quantity in alike.items() if isinstance(quantity.value, float)}
+    if len(numbers) < len(alike):
         return None
-    changed = {name: replace(found[name], value=number * factor) for name, number in numbers.items()}
+    changed = {name: replace(alike[name], value=number * factor) for name, number in numbers.items()}
     return replace(experiment, parameters={**experiment.parameters, **changed})
