@@ -49,7 +49,7 @@ def read(
     findings = Findings()
     used = UsedDecks(files, findings)
     file = files.deck(path) if text is None else None
-    seen = preprocess_on(files, findings, lambda: file or files.given(text or ""), defines)
+    seen = preprocess_on(files, findings, lambda: file or files.in_memory(text or ""), defines)
     parsed, roofs = Parsed(), NO_ROOFS
     if seen.complete:
         with suppress(GiveUp):

@@ -92,7 +92,7 @@ class UsedDecks:
         if self._used > MOST_USED:
             self._findings.error("D018", f"more than {MOST_USED} decks are used", use.at)
             raise GiveUp
-        includer = self._files.found.get(use.source, within[-1])
+        includer = self._files.read_files.get(use.source, within[-1])
         file = find_file(self._files, self._findings, includer, use.file, use.angled, use.at)
         if file is None:
             return None

@@ -71,8 +71,8 @@ class DefinitionFindings:
 class Complaints:
     """Diagnostics in the order found, each once."""
 
-    def __init__(self, found: Iterable[Diagnostic] = ()) -> None:
-        self._found: dict[Diagnostic, None] = dict.fromkeys(found)
+    def __init__(self, findings: Iterable[Diagnostic] = ()) -> None:
+        self._diagnostics: dict[Diagnostic, None] = dict.fromkeys(findings)
         self._remarks: dict[Diagnostic, None] = {}
         self._provisional: list[Diagnostic] = []
         self.error_count = (
@@ -85,7 +85,7 @@ class Complaints:
         self.known_missing: set[tuple[Place, str]] = set()  # definitions, and entries that they lack, already reported
         self._allowed: Mapping[str, Place] | None = None  # codes that the run at hand allows; None outside of runs
         self._silenced: dict[Diagnostic, Place] = {}
-        self._of_no_run: set[Diagnostic] = set(self._found)
+        self._of_no_run: set[Diagnostic] = set(self._diagnostics)
         # of each mistake in a loop's body the iterations that make it
         self._iterations: dict[object, dict[tuple[Expansion, ...], None]] = {}
         self.needed_allowances: set[Place] = set()  # the places of each `allow` that silenced a warning
@@ -94,34 +94,34 @@ class Complaints:
     @property
     def is_clear(self) -> bool:
         """True where nothing was found or noted."""
-        return not (self._found or self._remarks or self._provisional or self.known_missing or self.error_count)
+        return not (self._diagnostics or self._remarks or self._provisional or self.known_missing or self.error_count)
 
     def copied(self) -> Complaints:
         """A copy with the same findings, to which others can be added."""
-        made = copy(self)
+        complaints = copy(self)
         for name, value in vars(self).items():
             if isinstance(value, dict | set | list):
-                setattr(made, name, copy(value))
-        made._iterations = {mistake: dict(iterations) for mistake, iterations in self._iterations.items()}
-        return made
+                setattr(complaints, name, copy(value))
+        complaints._iterations = {mistake: dict(iterations) for mistake, iterations in self._iterations.items()}
+        return complaints
 
     def apart(self) -> Complaints:
         """A collector for one definition alone, which knows only `known_before` of the present findings."""
-        made = Complaints([_BEFORE] if self.errors else [])
-        made._torn, made._lost = set(self._torn), set(self._lost)
-        made.known_missing = set(self.known_missing)
-        return made
+        complaints = Complaints([_BEFORE] if self.errors else [])
+        complaints._torn, complaints._lost = set(self._torn), set(self._lost)
+        complaints.known_missing = set(self.known_missing)
+        return complaints
 
     @property
     def known_before(self) -> tuple[object, ...]:
         """Everything on which the findings of an `apart` collector depend: if it is equal, they are equal."""
-        sets = (frozenset(each) for each in (self._torn, self._lost, self.known_missing))
+        sets = (frozenset(group) for group in (self._torn, self._lost, self.known_missing))
         return (bool(self.errors), *sets)
 
     def findings(self) -> DefinitionFindings:
         """The findings of an `apart` collector."""
         return DefinitionFindings(
-            tuple(each for each in self._found if each != _BEFORE),
+            tuple(diagnostic for diagnostic in self._diagnostics if diagnostic != _BEFORE),
             tuple(self._remarks),
             dict(self._lacking),
             frozenset(self.known_missing),
@@ -131,22 +131,22 @@ class Complaints:
             {mistake: tuple(iterations) for mistake, iterations in self._iterations.items()},
         )
 
-    def take(self, found: DefinitionFindings) -> None:
+    def take(self, findings: DefinitionFindings) -> None:
         """Take over findings of an `apart` collector, except those known here already."""
         before = self._allowed
-        for each in (*found.diagnostics, *found.remarks):  # without those that the definition allows
-            self._allowed = None if each in found.of_no_run else {}
-            if each in found.remarks:
-                self._note_remark(each)
-            elif found.lacking.get(each) not in self.known_missing:
-                self.add(each)
+        for diagnostic in (*findings.diagnostics, *findings.remarks):  # without those that the definition allows
+            self._allowed = None if diagnostic in findings.of_no_run else {}
+            if diagnostic in findings.remarks:
+                self._note_remark(diagnostic)
+            elif findings.lacking.get(diagnostic) not in self.known_missing:
+                self.add(diagnostic)
         self._allowed = before
-        for mistake, iterations in found.iterations.items():
+        for mistake, iterations in findings.iterations.items():
             self._iterations.setdefault(mistake, {}).update(dict.fromkeys(iterations))
-        for each, place in found.silenced.items():
-            self._silenced.setdefault(each, place)
-        self.known_missing |= found.missing
-        self.needed_allowances |= found.needed
+        for diagnostic, place in findings.silenced.items():
+            self._silenced.setdefault(diagnostic, place)
+        self.known_missing |= findings.missing
+        self.needed_allowances |= findings.needed
 
     @property
     def all(self) -> tuple[Diagnostic, ...]:
@@ -157,25 +157,31 @@ class Complaints:
     def _without_guesses(self) -> Iterator[Diagnostic]:
         """All findings; those that may follow from an error of another kind without a guess of what was meant, which
         would change what a sound entry means."""
-        others = any(each.severity == "error" and each.code not in MAY_FOLLOW for each in self._found)
-        for each in self._found:
-            plain = tuple(line for line in each.help if not getattr(line, "changes", ()))
-            if others and each.code in MAY_FOLLOW and len(plain) < len(each.help):
-                each = replace(each, help=(*plain, "it may follow from another error here: mend that first"))
-            yield each
+        others = any(
+            diagnostic.severity == "error" and diagnostic.code not in MAY_FOLLOW for diagnostic in self._diagnostics
+        )
+        for diagnostic in self._diagnostics:
+            plain = tuple(line for line in diagnostic.help if not getattr(line, "changes", ()))
+            if others and diagnostic.code in MAY_FOLLOW and len(plain) < len(diagnostic.help):
+                diagnostic = replace(
+                    diagnostic, help=(*plain, "it may follow from another error here: mend that first")
+                )
+            yield diagnostic
 
     @property
     def errors(self) -> tuple[Diagnostic, ...]:
-        return tuple(d for d in self._found if d.severity == "error")
+        return tuple(d for d in self._diagnostics if d.severity == "error")
 
     @property
     def warnings(self) -> tuple[Diagnostic, ...]:
-        return tuple(d for d in self._found if d.severity == "warning")
+        return tuple(d for d in self._diagnostics if d.severity == "warning")
 
     @property
     def allowed(self) -> Mapping[Diagnostic, Place]:
         """The allowed warnings wherever they were found, each with the place of an `allow`."""
-        return {each: place for each, place in self._silenced.items() if each not in self._found}
+        return {
+            diagnostic: place for diagnostic, place in self._silenced.items() if diagnostic not in self._diagnostics
+        }
 
     def add(self, *diagnostics: Diagnostic) -> None:
         for diagnostic in diagnostics:
@@ -186,11 +192,11 @@ class Complaints:
         self.error_count += diagnostic.severity == "error"
         if (
             not self.is_of_another_iteration(diagnostic)
-            and len(self._found) < MOST_DIAGNOSTICS
+            and len(self._diagnostics) < MOST_DIAGNOSTICS
             and not self._is_known_at_this_place(diagnostic)
             and not self._follows_from_unreadable(diagnostic)
         ):
-            self._found.setdefault(diagnostic)
+            self._diagnostics.setdefault(diagnostic)
 
     def is_of_another_iteration(self, diagnostic: Diagnostic) -> bool:
         """Return True if an iteration of a loop made the same mistake in the same place before; this one is noted."""
@@ -210,15 +216,15 @@ class Complaints:
         loop = diagnostic.at.place.iterations[0]
         text = f"likewise in {len(others):,} other iteration{'s' * (len(others) > 1)}"
         if all(len(iterations) == 1 for iterations in others):
-            shown = [iterations[0].iteration for iterations in others[:MOST_ITERATIONS_SHOWN]]
-            more = f" and {len(others) - len(shown):,} more" * (len(others) > len(shown))
-            text = f"likewise where {loop.macro} = {', '.join(shown)}{more}"
+            listed = [iterations[0].iteration for iterations in others[:MOST_ITERATIONS_SHOWN]]
+            more = f" and {len(others) - len(listed):,} more" * (len(others) > len(listed))
+            text = f"likewise where {loop.macro} = {', '.join(listed)}{more}"
         return replace(diagnostic, also=(*diagnostic.also, Label(loop.use, text)))
 
     def note_unreadable(self, stretches: Sequence[UnreadableStretch]) -> None:
         """Note stretches that could not be read, so that errors that follow from them, or from the errors so far, are
         not reported."""
-        self._spots.update(_spot(each.at.place) for each in self.errors if each.at is not None)
+        self._spots.update(_spot(diagnostic.at.place) for diagnostic in self.errors if diagnostic.at is not None)
         self._unreadable += stretches
         self._torn.update(stretch.within for stretch in stretches if stretch.within is not None)
         self.note_lost_names(*(name for stretch in stretches for name in stretch.names))
@@ -231,10 +237,10 @@ class Complaints:
         """Return True if this name may be defined by something that could not be taken in."""
         return name in self._lost
 
-    def note_base(self, of: Place, base: Place) -> None:
-        """Note that the definition at `of` inherits its base's entries, and lacks those that the base lacks."""
+    def note_base(self, definition: Place, base: Place) -> None:
+        """Note that the definition at this place inherits its base's entries, and lacks those that the base lacks."""
         if base in self._torn:
-            self._torn.add(of)
+            self._torn.add(definition)
 
     def _follows_from_unreadable(self, diagnostic: Diagnostic) -> bool:
         """Return True if this is about an unreadable stretch, or a name that it may have defined."""
@@ -246,8 +252,8 @@ class Complaints:
             return False
         file, line, column = _spot(diagnostic.at.place)
         return (file, line, column) in self._spots or any(
-            each.place.file == file and (each.place.line, each.place.column) <= (line, column) < each.end
-            for each in self._unreadable
+            stretch.place.file == file and (stretch.place.line, stretch.place.column) <= (line, column) < stretch.end
+            for stretch in self._unreadable
         )
 
     def _is_known_at_this_place(self, diagnostic: Diagnostic) -> bool:
@@ -255,109 +261,113 @@ class Complaints:
         if diagnostic.at is None or diagnostic.code not in REPORTED_ONCE:
             return False
         return any(
-            each.code == diagnostic.code and each.at is not None and each.at.place == diagnostic.at.place
-            for each in self._found
+            earlier.code == diagnostic.code and earlier.at is not None and earlier.at.place == diagnostic.at.place
+            for earlier in self._diagnostics
         )
 
     def error(
         self,
         code: str,
         message: str,
-        at: Label | Place | None = None,
+        place: Label | Place | None = None,
         *,
         also: Iterable[Label] = (),
         help: Iterable[str] | str = (),
     ) -> None:
-        found = error(code, message, at, also=also, help=help)
+        diagnostic = error(code, message, place, also=also, help=help)
         if code in PROVISIONAL:
-            self._provisional.append(found)
+            self._provisional.append(diagnostic)
         else:
-            self.add(found)
+            self.add(diagnostic)
 
     def settle(self, refuted: Collection[str] = ()) -> frozenset[str]:
         """Report provisional warnings, except those of these codes; returns the codes that were reported."""
-        kept = [each for each in self._provisional if each.code not in refuted]
+        reported = [diagnostic for diagnostic in self._provisional if diagnostic.code not in refuted]
         self._provisional = []
-        for each in kept:
-            if each.severity == "error":
-                self.add(each)
+        for diagnostic in reported:
+            if diagnostic.severity == "error":
+                self.add(diagnostic)
             else:
-                self._note_remark(each)
-        return frozenset(each.code for each in kept)
+                self._note_remark(diagnostic)
+        return frozenset(diagnostic.code for diagnostic in reported)
 
-    def note_misspelling(self, of: Place, word: str, known: Iterable[str]) -> None:
-        """Note the entry for which an unknown one in the definition at `of` may have been meant, so that it is not
-        reported as missing."""
+    def note_misspelling(self, definition: Place, word: str, known: Iterable[str]) -> None:
+        """Note the entry for which an unknown one in the definition at this place may have been meant, so that it is
+        not reported as missing."""
         near = meant(word, known)
         if near is not None:
-            self.known_missing.add((of, near.rpartition(".")[2]))
+            self.known_missing.add((definition, near.rpartition(".")[2]))
 
-    def is_known_to_lack(self, of: Place, *names: str) -> bool:
-        """Return True if one of these entries of the definition at `of` was reported as missing, another word was taken
-        for it, or an entry there could not be read."""
-        if of in self._torn:
+    def is_known_to_lack(self, definition: Place, *names: str) -> bool:
+        """Return True if one of these entries of the definition at this place was reported as missing, another word was
+        taken for it, or an entry there could not be read."""
+        if definition in self._torn:
             return True
-        return any((of, name) in self.known_missing for name in names)
+        return any((definition, name) in self.known_missing for name in names)
 
     def missing(
         self,
-        of: Place,
+        definition: Place,
         names: tuple[str, ...],
         code: str,
         message: str,
-        at: Place | None = None,
+        place: Place | None = None,
         *,
         also: Iterable[Label] = (),
         help: Iterable[str] | str = (),
     ) -> None:
-        """Report an error about the definition at `of`, which has none of these entries, unless that is known
+        """Report an error about the definition at this place, which has none of these entries, unless that is known
         already."""
-        if not self.is_known_to_lack(of, *names):
-            self.error(code, message, at or of, also=also, help=help)
+        if not self.is_known_to_lack(definition, *names):
+            self.error(code, message, place or definition, also=also, help=help)
 
-    def withdraw(self, code: str, at: Place) -> None:
+    def withdraw(self, code: str, place: Place) -> None:
         """Take back what was reported with this code at a place, where another message turns out to say why."""
-        self._found = {each: None for each in self._found if (each.code, each.at and each.at.place) != (code, at)}
+        self._diagnostics = {
+            diagnostic: None
+            for diagnostic in self._diagnostics
+            if (diagnostic.code, diagnostic.at and diagnostic.at.place) != (code, place)
+        }
 
     def lack(
         self,
-        of: Place,
+        definition: Place,
         name: str,
         code: str,
         message: str,
-        at: Label | Place,
+        place: Label | Place,
         *,
         also: Iterable[Label],
         help: Iterable[str] | str,
     ) -> None:
-        """Report an error about the definition at `of`, which has no entry of this name, and note that."""
-        self.known_missing.add((of, name))
-        found = error(code, message, at, also=also, help=help)
-        self._lacking[found] = (of, name)
-        self.add(found)
+        """Report an error about the definition at this place, which has no entry of this name, and note that."""
+        self.known_missing.add((definition, name))
+        diagnostic = error(code, message, place, also=also, help=help)
+        self._lacking[diagnostic] = (definition, name)
+        self.add(diagnostic)
 
     def warn(
         self,
         code: str,
         message: str,
-        at: Label | Place | None = None,
+        place: Label | Place | None = None,
         *,
         also: Iterable[Label] = (),
         help: Iterable[str] | str = (),
     ) -> None:
-        self.add(replace(error(code, message, at, also=also, help=help), severity="warning"))
+        self.add(replace(error(code, message, place, also=also, help=help), severity="warning"))
 
     def remark(
         self,
         code: str,
         message: str,
-        at: Label | Place | None = None,
+        place: Label | Place | None = None,
         *,
         also: Iterable[Label] = (),
         help: Iterable[str] | str = (),
     ) -> None:
         """Add a warning about the deck's meaning, which is given only if the deck has no errors."""
-        self.pass_on(replace(error(code, message, at, also=also, help=help), severity="warning"))
+        self.pass_on(replace(error(code, message, place, also=also, help=help), severity="warning"))
 
     def pass_on(self, diagnostic: Diagnostic) -> None:
         """Add such a warning that is already put in words."""
@@ -402,7 +412,7 @@ class Complaints:
             places = tuple(allowed[diagnostic.code])
             self.needed_allowances.update(places)
             self._silenced[diagnostic] = places[0]
-            del self._found[diagnostic]
+            del self._diagnostics[diagnostic]
 
     def _is_silenced(self, diagnostic: Diagnostic) -> bool:
         """Return True if the run that is checked allows this warning, or one that allows it has found it too."""
@@ -420,12 +430,19 @@ class Complaints:
 
     def mark(self, since: int, *labels: Label) -> None:
         """Add places, with texts, to the errors found after the first `since` diagnostics."""
-        found = list(self._found)
-        for n, each in enumerate(found):
-            if n >= since and each.severity == "error":
-                more = (label for label in labels if each.at is None or label.place != each.at.place)
-                found[n] = Diagnostic(each.code, each.message, each.at, (*each.also, *more), each.help, each.severity)
-        self._found = dict.fromkeys(found)
+        diagnostics = list(self._diagnostics)
+        for n, diagnostic in enumerate(diagnostics):
+            if n >= since and diagnostic.severity == "error":
+                more = (label for label in labels if diagnostic.at is None or label.place != diagnostic.at.place)
+                diagnostics[n] = Diagnostic(
+                    diagnostic.code,
+                    diagnostic.message,
+                    diagnostic.at,
+                    (*diagnostic.also, *more),
+                    diagnostic.help,
+                    diagnostic.severity,
+                )
+        self._diagnostics = dict.fromkeys(diagnostics)
 
     @contextmanager
     def gather(self) -> Iterator[None]:
@@ -443,35 +460,35 @@ def _mistake(diagnostic: Diagnostic) -> object:
     return diagnostic.code, diagnostic.severity, place.file, place.line, place.column, place.macros
 
 
-def once_for_all_roofs(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+def once_for_all_roofs(diagnostics: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
     """The diagnostics with each mistake of a file under several roofs once, at the first of them."""
     first: dict[object, Diagnostic] = {}
     others: dict[object, dict[Place, None]] = {}
-    kept: list[tuple[Diagnostic, object]] = []
+    with_keys: list[tuple[Diagnostic, object]] = []
     key: object
-    for each in found:
-        place = each.at.place if each.at is not None else None
-        key = (_mistake(each), place.iterations) if place is not None and place.used else None
-        known = first.setdefault(key, each)
+    for diagnostic in diagnostics:
+        place = diagnostic.at.place if diagnostic.at is not None else None
+        key = (_mistake(diagnostic), place.iterations) if place is not None and place.used else None
+        known = first.setdefault(key, diagnostic)
         came_by = known.at.place.included if known.at is not None else ()
         roofs = [place.included[n] for n in place.used if place.included[n] not in came_by] if place and key else []
         if roofs:
             others.setdefault(key, {})[Place(*roofs[-1], 1)] = None
         else:
-            kept.append((each, key if known is each else None))
-    for each, key in kept:
+            with_keys.append((diagnostic, key if known is diagnostic else None))
+    for diagnostic, key in with_keys:
         uses = list(others.get(key, ())) if key is not None else []
         labels = [Label(use, "likewise where it is used here") for use in uses[:MOST_ROOFS_SHOWN]]
         if len(uses) > MOST_ROOFS_SHOWN:
             more = f", and in {len(uses) - MOST_ROOFS_SHOWN:,} more"
             labels[-1] = replace(labels[-1], text=labels[-1].text + more)
-        yield replace(each, also=(*each.also, *labels)) if labels else each
+        yield replace(diagnostic, also=(*diagnostic.also, *labels)) if labels else diagnostic
 
 
 def _spot(place: Place) -> tuple[str, int, int]:
     """The file, line and column that the deck's reader sees; for the product of a macro, those of the macro's use."""
-    at = place.macros[-1].use if place.macros else place
-    return at.file, at.line, at.column
+    reader_place = place.macros[-1].use if place.macros else place
+    return reader_place.file, reader_place.line, reader_place.column
 
 
 def where_it_belongs(word: str) -> list[str]:
@@ -494,5 +511,5 @@ def with_article(word: str, *, quoted: bool = False) -> str:
 def known_words(what: str, known: Iterable[str], most: int = 24) -> str:
     """The known words in a sentence, `keys of a link: com, inertia, mass, shape`, cut where there are many."""
     names = list(dict.fromkeys(known))
-    shown = ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
-    return f"{what}: {shown}" if names else f"{what}: none"
+    listed = ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+    return f"{what}: {listed}" if names else f"{what}: none"

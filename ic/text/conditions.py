@@ -72,14 +72,14 @@ def with_defined(tokens: Sequence[Token], is_defined: Callable[[Token], bool], f
     stretches = _each_defined(written, findings)
     if stretches is None:
         raise Refused
-    made, at = [], 0
+    replaced, position = [], 0
     for first, name, end in stretches:
-        made += written[at:first]
+        replaced += written[position:first]
         truth = written[first].__copy__()
         truth.kind, truth.text = WHOLE, "1" if is_defined(written[name]) else "0"
-        made.append(truth)
-        at = end
-    return [*made, *written[at:]]
+        replaced.append(truth)
+        position = end
+    return [*replaced, *written[position:]]
 
 
 def _each_defined(written: Sequence[Token], findings: Findings) -> list[tuple[int, int, int]] | None:
@@ -114,28 +114,28 @@ class _Condition:
         self.tokens = tokens
         self.unknown = unknown
         self.findings = findings
-        self.at = 0
+        self.position = 0
         self.depth = 0
 
     def truth(self) -> bool:
         value = self.whole(live=True)
-        if self.at < len(self.tokens):
+        if self.position < len(self.tokens):
             self.cannot_follow()
         return value.number != 0
 
     # complaints
 
-    def refuse(self, message: str, at: Token | Place, help: str = "", code: str = "D009") -> NoReturn:
-        self.findings.error(code, message, at.place if isinstance(at, Token) else at, help=help or ())
+    def refuse(self, message: str, place: Token | Place, help: str = "", code: str = "D009") -> NoReturn:
+        self.findings.error(code, message, place.place if isinstance(place, Token) else place, help=help or ())
         raise Refused
 
-    def not_understood(self, why: str, at: Token, help: str = "") -> NoReturn:
+    def not_understood(self, why: str, token: Token, help: str = "") -> NoReturn:
         used = next((token.text for token in self.tokens if token.text in _WORDS), "")
         words = f"the preprocessor writes `{_WORDS[used]}` for `{used}`" if used else ""
-        self.refuse(f"this condition cannot be understood: {why}", at, help or words or _USUAL)
+        self.refuse(f"this condition cannot be understood: {why}", token, help or words or _USUAL)
 
     def cannot_follow(self) -> NoReturn:
-        token, before = self.tokens[self.at], self.tokens[self.at - 1]
+        token, before = self.tokens[self.position], self.tokens[self.position - 1]
         self.no_stray(token)
         if token.text == "=":
             self.refuse("`=` does not compare", token, write("=="))
@@ -156,7 +156,7 @@ class _Condition:
     def no_double(self, token: Token) -> None:
         """Report `--` and `++`, which C reads as one token."""
         if token.text in ("-", "+") and self.text() == token.text:
-            after = self.tokens[self.at]
+            after = self.tokens[self.position]
             if after.source is token.source and after.offset == token.end:
                 both = token.source.place(token.offset, 2, token.expansions)
                 self.refuse(
@@ -166,16 +166,16 @@ class _Condition:
     # reading
 
     def text(self) -> str:
-        return self.tokens[self.at].text if self.at < len(self.tokens) else ""
+        return self.tokens[self.position].text if self.position < len(self.tokens) else ""
 
     def take(self, text: str, opening: Token) -> None:
         if self.text() != text:
-            if self.at < len(self.tokens):
+            if self.position < len(self.tokens):
                 if self.text() not in (")", ":"):
                     self.cannot_follow()
-                self.not_understood(f"expected `{text}`, found `{self.text()}`", self.tokens[self.at])
+                self.not_understood(f"expected `{text}`, found `{self.text()}`", self.tokens[self.position])
             self.not_understood(f"this `{opening.text}` lacks its `{text}`", opening)
-        self.at += 1
+        self.position += 1
 
     def deeper(self, token: Token) -> None:
         self.depth += 1
@@ -186,7 +186,7 @@ class _Condition:
         """The value of a condition with commas, of which the last value counts."""
         value = self.choice(live)
         while self.text() == ",":
-            self.at += 1
+            self.position += 1
             value = self.choice(live)
         return value
 
@@ -194,9 +194,9 @@ class _Condition:
         condition = self.binary(1, live)
         if self.text() != "?":
             return condition
-        question = self.tokens[self.at]
+        question = self.tokens[self.position]
         self.deeper(question)
-        self.at += 1
+        self.position += 1
         holds = condition.number != 0
         yes = self.whole(live and holds)
         self.take(":", question)
@@ -211,8 +211,8 @@ class _Condition:
             level = _LEVEL.get(operator, 0)
             if level < least:
                 return left
-            token = self.tokens[self.at]
-            self.at += 1
+            token = self.tokens[self.position]
+            self.position += 1
             self.no_double(token)
             if operator in ("&&", "||"):
                 decides = (left.number != 0) == (operator == "||")
@@ -247,14 +247,14 @@ class _Condition:
 
     def unary(self, live: bool) -> _Value:
         """A value, with the operators in front of it."""
-        if self.at == len(self.tokens):
+        if self.position == len(self.tokens):
             self.not_understood("it ends too early", self.tokens[-1])
-        token = self.tokens[self.at]
+        token = self.tokens[self.position]
         text = token.text
         if text not in ("-", "+", "~", "!", "("):
             return self.operand(token, live)
         self.deeper(token)
-        self.at += 1
+        self.position += 1
         if text == "(":
             value = self.whole(live)
             self.take(")", token)
@@ -274,7 +274,7 @@ class _Condition:
         if token.kind == WHOLE:
             return self.number(token)
         if token.kind == NAME:  # a name that is not a macro is 0, as in C
-            self.at += 1
+            self.position += 1
             if live:
                 self.unknown(token)
             return _Value(0)
@@ -295,21 +295,21 @@ class _Condition:
         self.not_understood(f"expected a value, found `{token.text[:LONGEST_NUMBER]}`", token)
 
     def number(self, token: Token) -> _Value:
-        self.at += 1
+        self.position += 1
         text = token.text
-        found = _NUMBER.fullmatch(text)
-        if len(text) > LONGEST_NUMBER or found is None:
+        matched = _NUMBER.fullmatch(text)
+        if len(text) > LONGEST_NUMBER or matched is None:
             self.refuse(
                 f"`{text[:LONGEST_NUMBER]}` is not a whole number that C knows",
                 token,
                 "a number that begins with 0 is octal" if text.startswith("0") else "",
             )
-        base = 16 if found["hex"] else 10 if found["decimal"] else 8
-        value = int(found["hex"] or found["decimal"] or found["octal"] or "0", base)
+        base = 16 if matched["hex"] else 10 if matched["decimal"] else 8
+        value = int(matched["hex"] or matched["decimal"] or matched["octal"] or "0", base)
         if value >= 1 << 64:
             self.refuse(f"`{text}` does not fit into 64 bits", token, f"the largest number is {2**64 - 1}")
         plain = value >= 1 << 63
-        after = self.tokens[self.at] if self.at < len(self.tokens) else None
+        after = self.tokens[self.position] if self.position < len(self.tokens) else None
         if after is not None and after.kind == NAME and after.source is token.source and after.offset == token.end:
             if not _SUFFIX.fullmatch(after.text):
                 written = f"{text}{after.text}"[:LONGEST_NUMBER]
@@ -319,11 +319,11 @@ class _Condition:
                     "write it in decimal, or in hexadecimal as in `0x1F`",
                 )
             plain = plain or "u" in after.text.lower()
-            self.at += 1
+            self.position += 1
         return _Value(value, plain)
 
     def character(self, token: Token) -> _Value:
-        self.at += 1
+        self.position += 1
         inner = token.text[1:-1]
         escape = _ESCAPE.fullmatch(inner)
         if escape is not None:

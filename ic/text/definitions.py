@@ -189,35 +189,35 @@ def _checked_units(
 def _may_be_unit(body: Sequence[Token], parameters: Container[str], is_macro: Callable[[str], bool]) -> bool:
     """Return True if a unit could follow: the body ends in a number or closing bracket, or what may become one, or in
     `*`, `/` or `(` behind another unit."""
-    at = len(body)
-    while at > 0:
-        before = body[at - 1]
+    position = len(body)
+    while position > 0:
+        before = body[position - 1]
         if before.text == "(":
-            at -= 1
+            position -= 1
             continue
         if before.text not in ("*", "/"):
             if before.kind == NAME:
                 return before.text in parameters or is_macro(before.text)
             return before.kind in NUMBERS or before.text in ("]", ")", "%")
-        at -= 2
-        if at < 1:
+        position -= 2
+        if position < 1:
             return False
-        if body[at].text == "1" and (body[at - 1].kind in NUMBERS or body[at - 1].text in ("]", ")")):
+        if body[position].text == "1" and (body[position - 1].kind in NUMBERS or body[position - 1].text in ("]", ")")):
             return True  # `15 1/s`
-        if body[at].kind in NUMBERS:  # behind an exponent, or no unit at all
-            at -= 1
-            at -= body[at].text in ("-", "+")
-            if body[at].text != "^":
+        if body[position].kind in NUMBERS:  # behind an exponent, or no unit at all
+            position -= 1
+            position -= body[position].text in ("-", "+")
+            if body[position].text != "^":
                 return False
-            at -= 1
-        if body[at].text == ")":
+            position -= 1
+        if body[position].text == ")":
             depth = 0
-            while at > 0:
-                depth += {")": 1, "(": -1}.get(body[at].text, 0)
+            while position > 0:
+                depth += {")": 1, "(": -1}.get(body[position].text, 0)
                 if depth == 0:
                     break
-                at -= 1
-        elif not units.is_unit(body[at].text):
+                position -= 1
+        elif not units.is_unit(body[position].text):
             return False
     return False
 
@@ -261,13 +261,13 @@ def spelling(macro: Macro) -> tuple[object, ...]:
 
 def trimmed(body: list[Token]) -> list[Token]:
     """The body without white space at its ends and beside `##`."""
-    kept: list[Token] = []
+    tokens: list[Token] = []
     for token in body:
-        if token.kind == SPACE and (not kept or kept[-1].kind == PASTE):
+        if token.kind == SPACE and (not tokens or tokens[-1].kind == PASTE):
             continue
-        while token.kind == PASTE and kept and kept[-1].kind == SPACE:
-            kept.pop()
-        kept.append(token)
-    while kept and kept[-1].kind == SPACE:
-        kept.pop()
-    return kept
+        while token.kind == PASTE and tokens and tokens[-1].kind == SPACE:
+            tokens.pop()
+        tokens.append(token)
+    while tokens and tokens[-1].kind == SPACE:
+        tokens.pop()
+    return tokens

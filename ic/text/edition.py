@@ -37,15 +37,17 @@ def heading(text: str) -> Heading | None:
     first = 0
     while blank := _BLANK.match(text, first):
         first = blank.end()
-    found = _HEADING.match(text, first)
-    if found is None:
+    matched = _HEADING.match(text, first)
+    if matched is None:
         return None
-    return Heading(int(found["number"]), found.start(), found.end(), found.span("number"), found["end"] is not None)
+    return Heading(
+        int(matched["number"]), matched.start(), matched.end(), matched.span("number"), matched["end"] is not None
+    )
 
 
 def edition_of(text: str) -> int:
     """The edition of a file's text; the latest for an unknown one, which is reported."""
-    found = heading(text)
-    if found is None:
+    edition_line = heading(text)
+    if edition_line is None:
         return FIRST
-    return found.edition if found.edition in EDITIONS else LATEST
+    return edition_line.edition if edition_line.edition in EDITIONS else LATEST

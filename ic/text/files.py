@@ -112,18 +112,18 @@ class Files:
         named += [d for d in os.environ.get("MET_DECK_PATH", "").split(os.pathsep) if d]
         self.path = [Directory(d, d) for d in named] + [Directory(os.fspath(library), "<>")]
         self.read_so_far: dict[str, SourceFile] = {}
-        self.found: dict[str, FoundFile] = {}  # those that were read, by name
+        self.read_files: dict[str, FoundFile] = {}  # those that were read, by name
         self._refused: dict[str, Problem] = {}
 
     def deck(self, path: str | Path) -> FoundFile:
         """The deck of that name: a file, or else one of the library's."""
         name = os.fspath(path)
-        given = file_at(name)
-        if self._is_there(given) or os.path.isabs(name):
-            return given
-        return next((found for d in self.path if os.path.isfile((found := d.join(name)).path)), given)
+        as_named = file_at(name)
+        if self._is_there(as_named) or os.path.isabs(name):
+            return as_named
+        return next((library_file for d in self.path if os.path.isfile((library_file := d.join(name)).path)), as_named)
 
-    def given(self, text: str) -> FoundFile:
+    def in_memory(self, text: str) -> FoundFile:
         """The deck given as text: its includes are searched as if it stood in the current folder."""
         file = FoundFile(DECK_IN_MEMORY, DECK_IN_MEMORY)
         self._keep(file, text.encode("utf-8", "surrogatepass"), "deck", MOST_BYTES)
@@ -135,9 +135,9 @@ class Files:
 
     def find(self, header: str, directories: Sequence[Directory]) -> FoundFile | None:
         """The first existing file; a folder of that name only where there is no file."""
-        asked = [file_at(header)] if os.path.isabs(header) else [d.join(header) for d in directories]
-        there = [file for file in asked if self._is_there(file)]
-        return next((file for file in there if not os.path.isdir(file.path)), there[0] if there else None)
+        candidates = [file_at(header)] if os.path.isabs(header) else [d.join(header) for d in directories]
+        existing = [file for file in candidates if self._is_there(file)]
+        return next((file for file in existing if not os.path.isdir(file.path)), existing[0] if existing else None)
 
     def _is_there(self, file: FoundFile) -> bool:
         return os.path.exists(file.path) or (bool(self._unsaved) and file.identity in self._unsaved)
@@ -152,16 +152,16 @@ class Files:
         names: list[str] = []
         seen = 0
         for directory in directories:
-            for at, folders, files in os.walk(directory.path or "."):
+            for folder, folders, files in os.walk(directory.path or "."):
                 seen += len(folders) + len(files)
                 folders[:] = sorted(f for f in folders if not f.startswith("."))
-                if at.count(os.sep) - directory.path.count(os.sep) >= 2:
+                if folder.count(os.sep) - directory.path.count(os.sep) >= 2:
                     folders.clear()
-                beside = os.path.relpath(at, directory.path or ".")
+                beside = os.path.relpath(folder, directory.path or ".")
                 names += [
                     os.path.normpath(os.path.join(beside, f))
-                    for f in _shown(files, ending)
-                    if os.path.exists(os.path.join(at, f))
+                    for f in _printable(files, ending)
+                    if os.path.exists(os.path.join(folder, f))
                 ]  # not a link to nowhere
                 if len(names) > MOST_LISTED or seen > MOST_SEEN:
                     return names[:MOST_LISTED]
@@ -187,7 +187,7 @@ class Files:
         if len(data) > most:
             raise Problem(_too_large(file, kind, size_text(len(data)), most))
         text, complaint = decode(data, file.name, kind)
-        self.found[file.name] = file
+        self.read_files[file.name] = file
         self.read_so_far[file.name] = SourceFile(file.name, text, hashlib.sha256(data).hexdigest())
         if complaint is not None:
             self._refused[file.name] = Problem(complaint)
@@ -216,7 +216,7 @@ def folders_by_slash(name: str, quoted: str) -> tuple[Help, ...]:
     return (write(slashed, text),) if "\\" in name else ()
 
 
-def _shown(names: Iterable[str], ending: str) -> list[str]:
+def _printable(names: Iterable[str], ending: str) -> list[str]:
     """Names that a message can show and a deck can write, in order."""
     return sorted(name for name in names if name.endswith(ending) and name.isprintable())
 
@@ -231,7 +231,7 @@ def _read_bytes(file: FoundFile, kind: str, most: int) -> bytes:
         about = os.stat(file.path)
         if stat.S_ISDIR(about.st_mode):
             ending = ".ic" if kind == "deck" else ".csv"
-            inside = _shown(os.listdir(file.path), ending)[:MOST_NAMED]
+            inside = _printable(os.listdir(file.path), ending)[:MOST_NAMED]
             help = f"{kind}s in it: {', '.join(inside)}" if inside else f"there is no {kind} in it"
             raise Problem(error("D001", f"`{file.name}` is a directory, not a {kind}", help=help))
         if not stat.S_ISREG(about.st_mode):
@@ -279,12 +279,12 @@ def decode(data: bytes, name: str, kind: str) -> tuple[str, Diagnostic | None]:
     if wide is not None:
         complaint = error("D002", f"`{name}` is {wide[:6].upper()}, but {kind}s are UTF-8", help="save it as UTF-8")
         return data.decode(wide, errors="replace"), complaint
-    found = _NOT_TEXT.search(data)
-    if found is not None:
-        place = _place_of_byte(data, found.start(), name)
+    matched = _NOT_TEXT.search(data)
+    if matched is not None:
+        place = _place_of_byte(data, matched.start(), name)
         complaint = error(
             "D002",
-            f"`{name}` is not text: it holds the byte 0x{data[found.start()]:02x}",
+            f"`{name}` is not text: it holds the byte 0x{data[matched.start()]:02x}",
             place,
             help=f"is this an archive or a program? A {kind} is plain text in UTF-8",
         )
@@ -303,7 +303,7 @@ def decode(data: bytes, name: str, kind: str) -> tuple[str, Diagnostic | None]:
 
 def _xml(text: str, name: str) -> Diagnostic:
     before = text[: text.index("<")]
-    at = Place(name, before.count("\n") + 1, len(before) - before.rfind("\n"))
+    place = Place(name, before.count("\n") + 1, len(before) - before.rfind("\n"))
     file = posixpath.basename(name)
     helps = [
         f"`met import {name} -o robot.ic` makes a deck of a robot's URDF file",
@@ -311,11 +311,11 @@ def _xml(text: str, name: str) -> Diagnostic:
     ]
     if "<robot" not in text:
         helps = ["a deck is text in a language of its own; of robots in XML, MET reads URDF files (`met import`)"]
-    return error("D002", f"`{name}` is XML, not a deck", at, help=helps)
+    return error("D002", f"`{name}` is XML, not a deck", place, help=helps)
 
 
-def _place_of_byte(data: bytes, at: int, name: str) -> Place:
-    before = data[:at].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+def _place_of_byte(data: bytes, offset: int, name: str) -> Place:
+    before = data[:offset].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     start = before.rfind(b"\n") + 1
     column = len(before[start:].decode("utf-8-sig" if start == 0 else "utf-8", errors="replace")) + 1
     return Place(name, before.count(b"\n") + 1, column)

@@ -97,12 +97,12 @@ class Text:
     @cached_property
     def _joints(self) -> tuple[list[int], list[int]]:
         """Offsets in the joined text at which characters were removed, with the number removed up to each."""
-        at, taken, total = [], [], 0
+        offsets, taken, total = [], [], 0
         for match in _SPLICE.finditer(self.text):
-            at.append(match.start() - total)
+            offsets.append(match.start() - total)
             total += match.end() - match.start()
             taken.append(total)
-        return at, taken
+        return offsets, taken
 
     @cached_property
     def edition(self) -> int:
@@ -112,17 +112,23 @@ class Text:
     @cached_property
     def heading(self) -> Heading | None:
         """The line with the edition, by offsets in the text as written."""
-        found = heading(self.joined)
-        if found is None or len(self.joined) == len(self.text):
-            return found
-        first, last, (start, end) = found.first, found.last, found.number
-        at = self.written_at
-        return Heading(found.edition, at(first), at(last - 1) + 1, (at(start), at(end - 1) + 1), found.closed)
+        edition_line = heading(self.joined)
+        if edition_line is None or len(self.joined) == len(self.text):
+            return edition_line
+        first, last, (start, end) = edition_line.first, edition_line.last, edition_line.number
+        written_at = self.written_at
+        return Heading(
+            edition_line.edition,
+            written_at(first),
+            written_at(last - 1) + 1,
+            (written_at(start), written_at(end - 1) + 1),
+            edition_line.closed,
+        )
 
     def written_at(self, offset: int) -> int:
         """The offset in the text as written of the character at `offset` of the joined text."""
-        at, taken = self._joints
-        before = bisect_right(at, offset)
+        offsets, taken = self._joints
+        before = bisect_right(offsets, offset)
         return offset + taken[before - 1] if before else offset
 
     def line(self, offset: int) -> int:
@@ -141,10 +147,10 @@ class Text:
     def indent(self, offset: int) -> int:
         """The column, from 1, of the first thing on the line that holds `offset`."""
         start = self._starts[bisect_right(self._starts, offset) - 1]
-        at = start
-        while at < len(self.text) and self.text[at] in " \t":
-            at += 1
-        return at - start + 1
+        end = start
+        while end < len(self.text) and self.text[end] in " \t":
+            end += 1
+        return end - start + 1
 
     def rest_of_line(self, offset: int) -> str:
         """The text from `offset` to the end of its line and of those that a backslash joins to it."""
@@ -229,31 +235,31 @@ def _lines_of(source: Text, text: str) -> Iterator[list[Token]]:
     for match in _TOKEN.finditer(text):
         group = match.lastgroup
         piece = match.group()
-        at = match.start()
+        offset = match.start()
         if group == "space":
-            add(Token(SPACE, " ", source, at, len(piece)))
+            add(Token(SPACE, " ", source, offset, len(piece)))
         elif group == "name":
-            add(Token(NAME, piece, source, at, len(piece)))
+            add(Token(NAME, piece, source, offset, len(piece)))
         elif group == "symbol":
-            add(Token(_SYMBOLS[piece], piece, source, at, len(piece)))
+            add(Token(_SYMBOLS[piece], piece, source, offset, len(piece)))
         elif group == "newline":
-            add(Token(SPACE, "\n", source, at, 1))
+            add(Token(SPACE, "\n", source, offset, 1))
             yield line
             line = []
             add = line.append
         elif group == "number":
-            add(Token(_number_kind(piece), piece, source, at, len(piece)))
+            add(Token(_number_kind(piece), piece, source, offset, len(piece)))
         elif group == "comment":
-            add(Token(SPACE, " ", source, at, len(piece)))
+            add(Token(SPACE, " ", source, offset, len(piece)))
         elif group == "string":
-            add(Token(STRING, piece, source, at, len(piece)))
+            add(Token(STRING, piece, source, offset, len(piece)))
         elif group == "character":
-            add(Token(CHARACTER, piece, source, at, len(piece)))
+            add(Token(CHARACTER, piece, source, offset, len(piece)))
         elif group == "unclosed":
-            add(Token(BAD, piece, source, at, 2))
+            add(Token(BAD, piece, source, offset, 2))
             break
         else:
-            add(Token(BAD, piece, source, at, len(piece.rstrip())))
+            add(Token(BAD, piece, source, offset, len(piece.rstrip())))
     if line:
         add(Token(SPACE, "\n", source, len(text), 1))
         yield line

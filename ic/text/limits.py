@@ -51,16 +51,16 @@ class Findings(Complaints):
 
     def __init__(self) -> None:
         super().__init__()
-        self._told: set[tuple[object, ...]] = set()
+        self._reported: set[tuple[object, ...]] = set()
         self._errors = 0
 
     def add(self, *diagnostics: Diagnostic) -> None:
         for diagnostic in diagnostics:
             place = diagnostic.at.place if diagnostic.at else None
             key = (diagnostic.code, diagnostic.message, place and (place.file, place.line, place.column))
-            if self.is_of_another_iteration(diagnostic) or key in self._told:
+            if self.is_of_another_iteration(diagnostic) or key in self._reported:
                 continue
-            self._told.add(key)
+            self._reported.add(key)
             super().add(diagnostic)
             self._errors += diagnostic.severity == "error"
             if self._errors >= MOST_ERRORS:

@@ -38,7 +38,7 @@ class Macros(Pcpp):
         self._expanded = 0
         self._expanded_here = 0
         self._counted = 0
-        self.asked: dict[str, None] = {}  # names that were used as macros, or asked for
+        self.used_names: dict[str, None] = {}  # names that were used as macros, or asked for
         self._depth = 0
         self._inside: set[str] = set()  # macros that are not used now: what they made is being read
         self.in_condition = False
@@ -113,7 +113,7 @@ class Macros(Pcpp):
                 text = token.text
                 macro = macros.get(text)
                 if macro is not None and not token.painted:
-                    self.asked[text] = None
+                    self.used_names[text] = None
                     if text in inside:
                         token.painted = True
                     elif not (before == "macro" and self._is_varied(pending)) and self._use(token, macro, pending):
@@ -144,9 +144,9 @@ class Macros(Pcpp):
                 self._inside.discard(piece.text)
             else:
                 blanks.append(piece)
-        found = pending[-1] if pending else None
+        token = pending[-1] if pending else None
         pending.extend(reversed(blanks))
-        return found
+        return token
 
     def _opens(self, pending: list[Token]) -> bool:
         """Return True if a "(" is next, and take it."""
@@ -176,9 +176,9 @@ class Macros(Pcpp):
 
     def _predefined(self, token: Token) -> Token:
         outermost = token.expansions[-1].use if token.expansions else token.place
-        made = token.__copy__()
+        replacement = token.__copy__()
         if token.text == "__LINE__":
-            made.kind, made.text = WHOLE, str(outermost.line)
+            replacement.kind, replacement.text = WHOLE, str(outermost.line)
         elif token.text == COUNTER and self.in_condition:
             self.findings.error(
                 "D009",
@@ -186,12 +186,12 @@ class Macros(Pcpp):
                 token.place,
                 help="it counts its uses in the text; `#define` a macro to choose by",
             )
-            made.kind, made.text = BAD, ""
+            replacement.kind, replacement.text = BAD, ""
         elif token.text == COUNTER:
-            made.kind, made.text = WHOLE, str(self._counted)
+            replacement.kind, replacement.text = WHOLE, str(self._counted)
             self._counted += 1
         elif token.text == "__FILE__":
-            made.kind, made.text = STRING, f'"{outermost.file}"'
+            replacement.kind, replacement.text = STRING, f'"{outermost.file}"'
         elif token.text in CLOCK:
             self.findings.error(
                 "D016",
@@ -199,8 +199,8 @@ class Macros(Pcpp):
                 token.place,
                 help="leave it out: beside an archive, `.run.json` says when it was made",
             )
-            made.kind, made.text = BAD, ""
-        return made
+            replacement.kind, replacement.text = BAD, ""
+        return replacement
 
     def _use_refused(self, token: Token, pending: list[Token]) -> Token:
         """Skip the use of a refused macro, including arguments; its expansion causes no further messages."""
@@ -234,10 +234,10 @@ class Macros(Pcpp):
                 pending.append(bad)
                 return True
             arguments = collected
-        made = self._substitute(token, macro, arguments)
-        self._check_made(token, made)
+        replacement = self._substitute(token, macro, arguments)
+        self._check_made(token, replacement)
         pending.append(Token(LEFT, token.text, token.source, token.offset, 0))
-        pending.extend(_come_through(token, made)[::-1])
+        pending.extend(_come_through(token, replacement)[::-1])
         self._inside.add(token.text)
         return True
 
@@ -348,20 +348,20 @@ class Macros(Pcpp):
             return [Token(BAD, "", token.source, token.offset, token.length)]
 
     def is_macro(self, name: str) -> bool:
-        self.asked[name] = None
+        self.used_names[name] = None
         return name in self.macros or name in ("__FILE__", "__LINE__", COUNTER)
 
     def on_unknown_macro_in_defined_expr(self, token: Token) -> bool:
         return self.is_macro(token.text)
 
-    def _check_made(self, token: Token, made: list[Token]) -> None:
-        self._expanded += len(made) + 1
-        self._expanded_here += len(made) + 1
+    def _check_made(self, token: Token, replacement: list[Token]) -> None:
+        self._expanded += len(replacement) + 1
+        self._expanded_here += len(replacement) + 1
         if self._expanded_here > MOST_FROM_ONE_USE:
             self._endless(token, f"one use of a macro makes more than {MOST_FROM_ONE_USE} tokens")
         if self._expanded > MOST_EXPANDED:
             self._endless(token, f"the deck's macros make more than {MOST_EXPANDED} tokens")
-        for piece in made:
+        for piece in replacement:
             if len(piece.text) > LONGEST_NAME and len(piece.text) > (
                 LONGEST_STRING if piece.kind == STRING else LONGEST_NAME
             ):
@@ -384,12 +384,12 @@ class Macros(Pcpp):
                 "D007", f"nothing may follow `{what}`", extra.place, help="is it a comment? Write `//` before it"
             )
 
-    def _give_up(self, code: str, message: str, at: Place, also: Sequence[Label] = (), help: str = "") -> None:
-        self.findings.error(code, message, at, also=also, help=help or ())
+    def _give_up(self, code: str, message: str, place: Place, also: Sequence[Label] = (), help: str = "") -> None:
+        self.findings.error(code, message, place, also=also, help=help or ())
         raise GiveUp
 
 
-def _come_through(token: Token, made: list[Token]) -> list[Token]:
+def _come_through(token: Token, replacement: list[Token]) -> list[Token]:
     """Copies of the tokens that a macro made, each knowing that it came through this use of it.
 
     Where the use stands in a macro's body itself, an argument's tokens have come through what surrounds the use
@@ -401,7 +401,7 @@ def _come_through(token: Token, made: list[Token]) -> list[Token]:
     # by identity: to hash or compare chains of places would cost more than all the rest
     steps: dict[int, tuple[Expansion, ...]] = {id(()): through, id(around): through}
     copies = []
-    for piece in made:
+    for piece in replacement:
         copy = Token(piece.kind, piece.text, piece.source, piece.offset, piece.length)
         came = piece.expansions
         if id(came) not in steps:

@@ -19,7 +19,7 @@ MOST_IN_BRACES = 8  # tokens of one index
 class Named:
     """A name where it is defined: the number of its token in the deck, the word before it, and the token."""
 
-    at: int
+    number: int
     word: str
     token: Token
 
@@ -30,7 +30,7 @@ class Named:
         return f"this is the name of a {'used deck' if self.word == 'as' else f'`{self.word}`'}"
 
 
-def names_in(tokens: Sequence[Token], asked: Iterable[str]) -> dict[str, Named]:
+def names_in(tokens: Sequence[Token], names: Iterable[str]) -> dict[str, Named]:
     """The names that a deck defines, each where it is defined first. Of the names that a loop makes, such as
     `let w{i}`, those that are asked for."""
     named: dict[str, Named] = {}
@@ -41,30 +41,34 @@ def names_in(tokens: Sequence[Token], asked: Iterable[str]) -> dict[str, Named]:
             continue
         if word.text == "as" and not (n > 1 and (tokens[n - 2].kind == STRING or tokens[n - 2].text == ">")):
             continue
-        found = Named(n, word.text, token)
+        definition = Named(n, word.text, token)
         pattern = _pattern(tokens, n)
         if pattern == token.text:
-            named.setdefault(token.text, found)
+            named.setdefault(token.text, definition)
         else:
-            looped.append((re.compile(pattern), found))
-    for name in asked:
-        for made, found in looped:
-            if name not in named and made.fullmatch(name):
-                named[name] = found
+            looped.append((re.compile(pattern), definition))
+    for name in names:
+        for loop_pattern, definition in looped:
+            if name not in named and loop_pattern.fullmatch(name):
+                named[name] = definition
     return named
 
 
 def _pattern(tokens: Sequence[Token], n: int) -> str:
     """A regular expression for the name at a token: `w\\w+` for `w{i}`, whose index stands close to it."""
-    text, at = tokens[n].text, n + 1
-    while at < len(tokens) and tokens[at].offset == tokens[at - 1].end and tokens[at].source is tokens[n].source:
-        if tokens[at].text == "{":
-            inside = [token.text for token in tokens[at + 1 : at + 2 + MOST_IN_BRACES]]
+    text, position = tokens[n].text, n + 1
+    while (
+        position < len(tokens)
+        and tokens[position].offset == tokens[position - 1].end
+        and tokens[position].source is tokens[n].source
+    ):
+        if tokens[position].text == "{":
+            inside = [token.text for token in tokens[position + 1 : position + 2 + MOST_IN_BRACES]]
             if "}" not in inside[1:] or {"=", ";", "{"}.intersection(inside[: inside.index("}")]):
                 break
-            text, at = text + r"\w+", at + 2 + inside.index("}")
-        elif tokens[at].kind == NAME and tokens[at - 1].text == "}":
-            text, at = text + tokens[at].text, at + 1
+            text, position = text + r"\w+", position + 2 + inside.index("}")
+        elif tokens[position].kind == NAME and tokens[position - 1].text == "}":
+            text, position = text + tokens[position].text, position + 1
         else:
             break
     return text

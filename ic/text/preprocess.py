@@ -109,7 +109,7 @@ def preprocess_on(
 
 
 def find_file(
-    files: Files, findings: Findings, includer: FoundFile, name: str, angled: bool, at: Place
+    files: Files, findings: Findings, includer: FoundFile, name: str, angled: bool, place: Place
 ) -> FoundFile | None:
     """The file of an `#include` or a `use`; None where there is none, which is reported."""
     directories = files.where(includer, angled)
@@ -123,7 +123,7 @@ def find_file(
             else (f"`{link}` is a link to a file that is not there",)
         )
         looked = f"looked in {', '.join(dict.fromkeys(d.in_words for d in directories))}"
-        findings.error("D005", f"cannot find {quoted}", at, help=(*near, looked))
+        findings.error("D005", f"cannot find {quoted}", place, help=(*near, looked))
     return file
 
 
@@ -131,7 +131,7 @@ class _Conditional:
     """An open conditional: the directive, whether the text around it counts, whether its present part does; how many
     names had been asked for that were no macros, where an `#ifdef` asks for one; else 0."""
 
-    __slots__ = ("active", "asked", "done", "otherwise", "outer", "token")
+    __slots__ = ("active", "done", "otherwise", "outer", "token", "undefined_before")
 
     def __init__(self, token: Token, outer: bool, active: bool) -> None:
         self.token = token
@@ -139,7 +139,7 @@ class _Conditional:
         self.active = active
         self.done = active
         self.otherwise: Token | None = None
-        self.asked = 0
+        self.undefined_before = 0
 
 
 class _Preprocessor(Macros):
@@ -147,7 +147,7 @@ class _Preprocessor(Macros):
         self.files = files
         self.output: list[Token] = []
         self.command_line: tuple[SourceFile, ...] = ()
-        self.given: dict[str, Token] = {}
+        self.command_line_macros: dict[str, Token] = {}
         self._given_text: Text | None = None
         self._including: list[tuple[FoundFile, Text]] = []
         self._entered: list[Place] = []
@@ -176,7 +176,7 @@ class _Preprocessor(Macros):
         self._given_text = Text(COMMAND_LINE, written)
         for line in logical_lines(self._given_text):
             self.define(self.tokenstrip(line))
-        self.given = {name: macro.name_token for name, macro in self.macros.items()}
+        self.command_line_macros = {name: macro.name_token for name, macro in self.macros.items()}
 
     def read_deck(self, file: FoundFile, included: tuple[tuple[str, int], ...], used: tuple[int, ...]) -> None:
         source = Text(file.name, self.files.text(file), included, used)
@@ -187,9 +187,9 @@ class _Preprocessor(Macros):
 
     def warn_of_names(self) -> None:
         """Warn about names in conditions that are not macros, and macros on the command line that nothing uses."""
-        asked = (*self._zeros, *(token.text for token, *_ in self._not_defined))
-        named = names_in(self.output, (*asked, *(token.text for token in self.not_undefined)))
-        lets = [name for name, each in named.items() if each.word in VALUES]
+        names = (*self._zeros, *(token.text for token, *_ in self._not_defined))
+        named = names_in(self.output, (*names, *(token.text for token in self.not_undefined)))
+        lets = [name for name, defined_name in named.items() if defined_name.word in VALUES]
         for name, place in self._zeros.items():
             message = f"`{name}` is no macro, so it counts as 0 in this condition"
             if name in named:
@@ -200,18 +200,18 @@ class _Preprocessor(Macros):
         for token, before, end in self._not_defined:
             if token.text not in named:
                 continue
-            found = named[token.text]
-            behind = end is not None and _stands_before(end, found.token) and found.word in VALUES
-            if found.at <= before or _stands_before(found.token, token) or behind:
+            definition = named[token.text]
+            behind = end is not None and _stands_before(end, definition.token) and definition.word in VALUES
+            if definition.number <= before or _stands_before(definition.token, token) or behind:
                 message = f"`{token.text}` is no macro, so it counts as not defined in this condition"
                 self._warn_of_definition(message, token.place, named.pop(token.text))
         for token in self.not_undefined:
             if token.text in lets and token.text in named:
                 message = f"`{token.text}` is no macro, so this `#undef` changes nothing"
                 self._warn_of_definition(message, token.place, named.pop(token.text))
-        for name, token in self.given.items():
-            if name not in self.asked:
-                near = did_you_mean(name, [*self.asked, *self._zeros])
+        for name, token in self.command_line_macros.items():
+            if name not in self.used_names:
+                near = did_you_mean(name, [*self.used_names, *self._zeros])
                 let = nearest(name, lets)
                 values = [] if let is None else [f"a `let` is set by `--set '{let}=VALUE'`"]
                 self.findings.warn(
@@ -221,15 +221,15 @@ class _Preprocessor(Macros):
                     help=[*near, *values],
                 )
 
-    def _warn_of_definition(self, message: str, at: Place, named: Named) -> None:
+    def _warn_of_definition(self, message: str, place: Place, named: Named) -> None:
         """Warn about a condition that asks for the macro of a name which the deck defines otherwise."""
         label = Label(named.token.place, f"{named.what}; a condition sees macros alone")
         help = "define a macro for it, `#define NAME ...`, and ask that"
-        self.findings.warn("D036", message, at, also=(label,), help=help)
+        self.findings.warn("D036", message, place, also=(label,), help=help)
 
-    def _read(self, file: FoundFile, source: Text, at: Place) -> None:
+    def _read(self, file: FoundFile, source: Text, place: Place) -> None:
         self._including.append((file, source))
-        self._entered.append(at)
+        self._entered.append(place)
         self._ifs.append([])
         complain_of_unseen(source, self.findings)
         self._check_heading(source)
@@ -254,27 +254,29 @@ class _Preprocessor(Macros):
 
     def _check_heading(self, source: Text) -> None:
         """Check the line with a file's edition, which gives the deck no tokens."""
-        found = source.heading
-        if found is None:
+        edition_line = source.heading
+        if edition_line is None:
             return
-        if found.edition not in EDITIONS:
-            start, end = found.number
+        if edition_line.edition not in EDITIONS:
+            start, end = edition_line.number
             help = f"this MET knows the editions {' and '.join(map(str, EDITIONS))}"
-            if found.edition > LATEST:
+            if edition_line.edition > LATEST:
                 help += "; a newer one may know it"
-            message = f"there is no edition {found.edition} of the deck language"
+            message = f"there is no edition {edition_line.edition} of the deck language"
             self._give_up("D390", message, source.place(start, end - start), help=help)
-        if not found.closed:
-            at = source.place(found.last, 1)
-            self.findings.error("D021", "expected `;`", at, help=write(";", "an entry ends with `;`", where="before"))
+        if not edition_line.closed:
+            place = source.place(edition_line.last, 1)
+            self.findings.error(
+                "D021", "expected `;`", place, help=write(";", "an entry ends with `;`", where="before")
+            )
 
     def group_lines(self, _text: str, source: Text) -> Iterable[list[Token]]:
         """The lines for pcpp. Those that `#if` leaves out are lexed, since a comment may begin there."""
         ifs = self._ifs[-1]
         long = _LONG_LINE.search(source.joined)
         if long is not None:
-            at = source.place(source.written_at(long.start()), 1)
-            self._give_up("D018", f"a line has at most {LONGEST_LINE} characters", at)
+            place = source.place(source.written_at(long.start()), 1)
+            self._give_up("D018", f"a line has at most {LONGEST_LINE} characters", place)
         joined = len(source.joined) < len(source.text)
         headed = source.heading.last if source.heading is not None else 0
         for line in logical_lines(source):
@@ -322,30 +324,30 @@ class _Preprocessor(Macros):
         header = self._header(tokens, directive)
         if header is None:
             return ()
-        name, angled, at = header
+        name, angled, place = header
         includer, source = self._including[-1]
-        file = find_file(self.files, self.findings, includer, name, angled, at)
+        file = find_file(self.files, self.findings, includer, name, angled, place)
         if file is None or file.identity in self._once:
             return ()
         self._included += 1
         if len(self._including) > INCLUDE_DEPTH:
-            self._too_deep(at)
+            self._too_deep(place)
         if self._included > MOST_INCLUDES:
-            self._give_up("D018", f"more than {MOST_INCLUDES} files are included", at)
+            self._give_up("D018", f"more than {MOST_INCLUDES} files are included", place)
         included = ((source.name, directive.line), *source.included)
         used = tuple(n + 1 for n in source.used)
         try:
             text = self.files.text(file)
         except Problem as problem:
-            self.findings.add(*(reached_by(d, at, included, used) for d in problem.diagnostics))
+            self.findings.add(*(reached_by(d, place, included, used) for d in problem.diagnostics))
             return ()
-        self._read(file, Text(file.name, text, included, used), at)
+        self._read(file, Text(file.name, text, included, used), place)
         return ()
 
     def _header(self, tokens: list[Token], directive: Token) -> tuple[str, bool, Place] | None:
         """The name in an `#include`, whether in < >, and its place."""
         if tokens and tokens[0].kind == STRING:
-            name, angled, at, rest = tokens[0].text[1:-1], False, tokens[0].place, tokens[1:]
+            name, angled, place, rest = tokens[0].text[1:-1], False, tokens[0].place, tokens[1:]
         elif tokens and tokens[0].text == "<":
             first = tokens[0]
             close = next((i for i, token in enumerate(tokens) if token.text[:1] == ">"), None)
@@ -356,7 +358,7 @@ class _Preprocessor(Macros):
             if end < 0:
                 self.findings.error("D005", "`#include <` without its `>`", first.place, help=_INCLUDES)
                 return None
-            name, angled, at = written[1:end], True, first.source.place(first.offset, end + 1, first.expansions)
+            name, angled, place = written[1:end], True, first.source.place(first.offset, end + 1, first.expansions)
             rest = tokens[close + 1 :] if close is not None else []
         else:
             self.findings.error(
@@ -367,12 +369,12 @@ class _Preprocessor(Macros):
             )
             return None
         if not name.strip():
-            self.findings.error("D005", "`#include` needs a file, and this name is empty", at, help=_INCLUDES)
+            self.findings.error("D005", "`#include` needs a file, and this name is empty", place, help=_INCLUDES)
             return None
         self._nothing_after(rest, "#include")
-        return name, angled, at
+        return name, angled, place
 
-    def _too_deep(self, at: Place) -> None:
+    def _too_deep(self, place: Place) -> None:
         """Report the circle of includes, at the include that closes it, or just that they go too deep."""
         chain = [file.identity for file, _ in self._including]
         for last, identity in enumerate(chain):
@@ -381,7 +383,7 @@ class _Preprocessor(Macros):
                 loop = " -> ".join(file.name for file, _ in self._including[first : last + 1])
                 help = "`#pragma once` at the head of a file lets it be read only once"
                 self._give_up("D006", f"circular include: {loop}", self._entered[last], help=help)
-        self._give_up("D006", f"includes go deeper than {INCLUDE_DEPTH} files", at)
+        self._give_up("D006", f"includes go deeper than {INCLUDE_DEPTH} files", place)
 
     # directives
 
@@ -431,23 +433,23 @@ class _Preprocessor(Macros):
         raise OutputDirective(Action.IgnoreAndRemove)
 
     def _announce(self, name: str, directive: Token, args: list[Token]) -> None:
-        said = " ".join(directive.source.rest_of_line(args[0].offset).split()) if args else f"`#{name}`"
+        words = " ".join(directive.source.rest_of_line(args[0].offset).split()) if args else f"`#{name}`"
         tell = self.findings.error if name == "error" else self.findings.warn
-        tell("D014" if name == "error" else "D015", said[:LONGEST_NAME], directive.place)
+        tell("D014" if name == "error" else "D015", words[:LONGEST_NAME], directive.place)
 
     def _conditional(self, name: str, directive: Token, args: list[Token], ifs: list[_Conditional]) -> None:
         """Follow the conditionals beside pcpp, which gets only a name, 0 or 1."""
         if name in ("if", "ifdef", "ifndef"):
             outer = not ifs or ifs[-1].active
-            truth, asked = False, len(self._not_defined)
+            truth, undefined_before = False, len(self._not_defined)
             if name == "if":
                 truth = outer and self._condition(directive, args)
                 args[:] = [_constant(truth, directive)]
             elif outer:
                 truth = self._known(name, directive, args) == (name == "ifdef")
             ifs.append(_Conditional(directive, outer, truth))
-            if name == "ifdef" and len(self._not_defined) > asked:
-                ifs[-1].asked = len(self._not_defined)
+            if name == "ifdef" and len(self._not_defined) > undefined_before:
+                ifs[-1].undefined_before = len(self._not_defined)
             if len(ifs) > CONDITION_DEPTH:
                 self._give_up("D018", f"`#if` goes deeper than {CONDITION_DEPTH}", directive.place)
             return
@@ -457,14 +459,15 @@ class _Preprocessor(Macros):
         if not ifs:
             self.findings.error(
                 "D007",
-                f"`#{_shown(directive)}` without an `#if`",
+                f"`#{_directive_text(directive)}` without an `#if`",
                 directive.place,
                 help="leave it out, or write the `#if` that it belongs to",
             )
             raise OutputDirective(Action.IgnoreAndRemove)
         opened = ifs[-1]
         if name == "endif":
-            if question := ifs.pop().asked:  # what a deck defines behind it was not asked for, either: no order matters
+            # what a deck defines behind it was not asked for, either: no order matters
+            if question := ifs.pop().undefined_before:
                 token, before, _ = self._not_defined[question - 1]
                 self._not_defined[question - 1] = token, before, directive
             self._nothing_after(args, "#endif")
@@ -472,7 +475,7 @@ class _Preprocessor(Macros):
             label = Label(opened.otherwise.place, "the `#else` is here")
             self.findings.error(
                 "D007",
-                f"`#{_shown(directive)}` after `#else`",
+                f"`#{_directive_text(directive)}` after `#else`",
                 directive.place,
                 also=(label,),
                 help="`#elif` comes before the one `#else`",
@@ -485,7 +488,7 @@ class _Preprocessor(Macros):
         elif opened.outer and opened.active:
             opened.active = False
         elif opened.outer and not opened.done:
-            word = _shown(directive)
+            word = _directive_text(directive)
             if word == "elif":
                 opened.active = opened.done = self._condition(directive, args)
             else:
@@ -548,31 +551,34 @@ class _Preprocessor(Macros):
             self.findings.error("D007", f"the preprocessor cannot read this: {message}", self._directive.place)
 
 
-def _as_elif(line: list[Token], at: int) -> None:
+def _as_elif(line: list[Token], first: int) -> None:
     """Turn `#elifdef` and `#elifndef` into an `#elif`, which pcpp knows; the token's kind keeps the difference."""
-    directive = next((token for token in line[at:] if token.kind != SPACE), None)
+    directive = next((token for token in line[first:] if token.kind != SPACE), None)
     if directive is not None and directive.text in ("elifdef", "elifndef"):
         directive.kind, directive.text = directive.text, "elif"
 
 
-def _stands_before(name: Token, asked: Token) -> bool:
+def _stands_before(name: Token, condition: Token) -> bool:
     """Return True if a name of the output stands in the same file as a condition, and before it."""
-    at = name.place.macros[-1].use if name.place.macros else name.place
-    return at.file == asked.place.file and (at.line, at.column) < (asked.place.line, asked.place.column)
+    name_place = name.place.macros[-1].use if name.place.macros else name.place
+    return name_place.file == condition.place.file and (name_place.line, name_place.column) < (
+        condition.place.line,
+        condition.place.column,
+    )
 
 
-def _shown(directive: Token) -> str:
+def _directive_text(directive: Token) -> str:
     """The directive's name as written: see `_as_elif`."""
     return directive.text if directive.kind == NAME else directive.kind
 
 
 def reached_by(
-    complaint: Diagnostic, at: Place, included: tuple[tuple[str, int], ...], used: tuple[int, ...]
+    complaint: Diagnostic, including: Place, included: tuple[tuple[str, int], ...], used: tuple[int, ...]
 ) -> Diagnostic:
     """The mistake in an included file, moved to the line that names the file where it has no place of its own."""
-    place = at if complaint.at is None else replace(complaint.at.place, included=included, used=used)
+    place = including if complaint.at is None else replace(complaint.at.place, included=included, used=used)
     return replace(complaint, at=Label(place))
 
 
-def _constant(truth: bool, at: Token) -> Token:
-    return Token(TRUTH, "1" if truth else "0", at.source, at.offset, at.length)
+def _constant(truth: bool, token: Token) -> Token:
+    return Token(TRUTH, "1" if truth else "0", token.source, token.offset, token.length)

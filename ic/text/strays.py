@@ -80,9 +80,9 @@ def complain_of_stray(token: Token, findings: Findings) -> None:
             return
         plain = _PLAIN.get(first)
         known = unicodedata.name(first, "no name").lower()
-        said = f"`{text[:8]}`" if text.isprintable() else f"U+{ord(first):04X}"
+        name = f"`{text[:8]}`" if text.isprintable() else f"U+{ord(first):04X}"
         if not text.isascii():
-            said += f" ({known})"
+            name += f" ({known})"
         remedy = write(" ", "write a space", old=first) if plain == "a space" else write(plain or "", old=first)
         usual = write("", "leave it out", old=first) if text.isascii() else "names and units are written in plain ASCII"
-        tell("D004", f"{said} does not belong in a deck", token.place, help=remedy if plain else usual)
+        tell("D004", f"{name} does not belong in a deck", token.place, help=remedy if plain else usual)

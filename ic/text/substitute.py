@@ -56,7 +56,7 @@ class Macro:
 
     def _put_in_expanded(self) -> list[int]:
         """The parameters whose arguments are needed expanded: those that neither `#` nor `##` takes as written."""
-        found = []
+        positions = []
         solid = [token for token in self.body if token.kind != SPACE]
         for i, token in enumerate(solid):
             if token.kind != NAME:
@@ -64,10 +64,10 @@ class Macro:
             before = solid[i - 1].text if i else ""
             after = solid[i + 1].text if i + 1 < len(solid) else ""
             if token.text == OPTIONAL and self.variadic:
-                found.append(len(self.numbers) - 1)
+                positions.append(len(self.numbers) - 1)
             elif token.text in self.numbers and before not in ("#", "##") and after != "##":
-                found.append(self.numbers[token.text])
-        return found
+                positions.append(self.numbers[token.text])
+        return positions
 
 
 def substituted(macro: Macro, arguments: Sequence[Argument]) -> list[Token]:
@@ -77,8 +77,8 @@ def substituted(macro: Macro, arguments: Sequence[Argument]) -> list[Token]:
     """
     if macro.parameters is None and not macro.pastes:
         return macro.body
-    made = _Substitution(macro, arguments).of(macro.body)
-    return [token for token in made if token.kind != NOTHING]
+    tokens = _Substitution(macro, arguments).of(macro.body)
+    return [token for token in tokens if token.kind != NOTHING]
 
 
 class _Substitution:
@@ -89,38 +89,38 @@ class _Substitution:
 
     def of(self, body: list[Token]) -> list[Token]:
         """The tokens of an expanded body, or a part of one; an empty one beside a `##` is a token of kind NOTHING."""
-        made: list[Token] = []
-        at, pasting = 0, False
-        while at < len(body):
-            if body[at].kind == PASTE:
+        tokens: list[Token] = []
+        position, pasting = 0, False
+        while position < len(body):
+            if body[position].kind == PASTE:
                 pasting = True
-                at += 1
+                position += 1
                 continue
-            if not pasting and self.is_comma_of_rest(body, at):
-                self.comma_and_rest(body[at], made)
-                at += 3
+            if not pasting and self.is_comma_of_rest(body, position):
+                self.comma_and_rest(body[position], tokens)
+                position += 3
                 continue
-            pieces, at = self.pieces(body, at, pasting)
+            pieces, position = self.pieces(body, position, pasting)
             if pasting:
-                pieces = [_joined(made.pop(), pieces[0]), *pieces[1:]]
+                pieces = [_joined(tokens.pop(), pieces[0]), *pieces[1:]]
                 pasting = False
-            made += pieces
-        return [_as_one(token) for token in made] if self.macro.pastes else made
+            tokens += pieces
+        return [_as_one(token) for token in tokens] if self.macro.pastes else tokens
 
-    def pieces(self, body: list[Token], at: int, pasting: bool) -> tuple[list[Token], int]:
-        """The tokens of the expanded element at `at`, and the position after it; at least one token beside a `##`."""
-        token = body[at]
+    def pieces(self, body: list[Token], position: int, pasting: bool) -> tuple[list[Token], int]:
+        """The tokens of the expanded element at a position, and the position after it; at least one beside a `##`."""
+        token = body[position]
         if self.macro.parameters is None or token.text not in ("#", OPTIONAL, *self.macro.numbers):
-            return [token], at + 1
+            return [token], position + 1
         if token.text == "#" and token.kind != STRING:
-            at = _solid(body, at + 1)
-            return [self.string(body, at)], self.end(body, at)
+            position = _solid(body, position + 1)
+            return [self.string(body, position)], self.end(body, position)
         if token.kind != NAME:
-            return [token], at + 1
-        end = self.end(body, at)
+            return [token], position + 1
+        end = self.end(body, position)
         beside = pasting or (end < len(body) and body[end].kind == PASTE)
         if token.text == OPTIONAL:
-            pieces = self.optional(body, at, end)
+            pieces = self.optional(body, position, end)
         else:
             argument = self.arguments[self.macro.numbers[token.text]]
             pieces = list(argument) if beside else argument.expanded
@@ -128,25 +128,25 @@ class _Substitution:
             pieces = [Token(NOTHING, "", token.source, token.offset, token.length)]
         return pieces, end
 
-    def end(self, body: list[Token], at: int) -> int:
-        """The position after the parameter, or after the `__VA_OPT__(...)`, at `at`."""
-        return at + 1 if body[at].text != OPTIONAL else closing(body, _solid(body, at + 1)) + 1
+    def end(self, body: list[Token], position: int) -> int:
+        """The position after the parameter, or after the `__VA_OPT__(...)`, at a position."""
+        return position + 1 if body[position].text != OPTIONAL else closing(body, _solid(body, position + 1)) + 1
 
-    def optional(self, body: list[Token], at: int, end: int) -> list[Token]:
-        """The tokens of the expanded `__VA_OPT__(...)` at `at`: none where the rest of the arguments is empty."""
+    def optional(self, body: list[Token], position: int, end: int) -> list[Token]:
+        """The tokens of the expanded `__VA_OPT__(...)` at a position: none where the rest of the arguments is empty."""
         if not any(token.kind != SPACE for token in self.arguments[-1].expanded):
             return []
-        inside = body[_solid(body, at + 1) + 1 : end - 1]
+        inside = body[_solid(body, position + 1) + 1 : end - 1]
         self.optional_depth += 1
-        made = _stripped(self.of(_stripped(inside)))
+        tokens = _stripped(self.of(_stripped(inside)))
         self.optional_depth -= 1
-        return made
+        return tokens
 
-    def string(self, body: list[Token], at: int) -> Token:
-        """The string of `#` with the parameter, or the `__VA_OPT__(...)`, at `at`, with white space as one blank."""
-        token = body[at]
+    def string(self, body: list[Token], position: int) -> Token:
+        """The string of `#` with the parameter, or the `__VA_OPT__(...)`, at a position; white space is one blank."""
+        token = body[position]
         if token.text == OPTIONAL:
-            pieces = self.optional(body, at, self.end(body, at))
+            pieces = self.optional(body, position, self.end(body, position))
         else:
             pieces = list(self.arguments[self.macro.numbers[token.text]])
         texts: list[str] = []
@@ -158,24 +158,24 @@ class _Substitution:
         text = "".join(texts).strip(" ").replace("\\", "\\\\").replace('"', '\\"')
         return Token(STRING, f'"{text}"', token.source, token.offset, token.length)
 
-    def is_comma_of_rest(self, body: list[Token], at: int) -> bool:
+    def is_comma_of_rest(self, body: list[Token], position: int) -> bool:
         """Return True if gcc's `, ## __VA_ARGS__` begins here: a comma and the rest of the arguments, or neither."""
-        if not self.macro.variadic or body[at].text != "," or at + 2 >= len(body):
+        if not self.macro.variadic or body[position].text != "," or position + 2 >= len(body):
             return False
-        after = body[at + 3].kind if at + 3 < len(body) else ""
-        return body[at + 1].kind == PASTE and body[at + 2].text == REST and after != PASTE
+        after = body[position + 3].kind if position + 3 < len(body) else ""
+        return body[position + 1].kind == PASTE and body[position + 2].text == REST and after != PASTE
 
-    def comma_and_rest(self, comma: Token, made: list[Token]) -> None:
+    def comma_and_rest(self, comma: Token, tokens: list[Token]) -> None:
         """Add the comma and the rest of the arguments as written, or nothing where there is no rest."""
         rest = self.arguments[-1]
         if rest.omitted:
-            if made and made[-1].kind == SPACE:
-                made.pop()
+            if tokens and tokens[-1].kind == SPACE:
+                tokens.pop()
             return
-        made.append(comma)
+        tokens.append(comma)
         if rest.spaced:
-            made.append(Token(SPACE, " ", comma.source, comma.offset, comma.length))
-        made += rest
+            tokens.append(Token(SPACE, " ", comma.source, comma.offset, comma.length))
+        tokens += rest
 
 
 def _joined(left: Token, right: Token) -> Token:
@@ -184,36 +184,36 @@ def _joined(left: Token, right: Token) -> Token:
         return left
     if left.kind == NOTHING:
         return right
-    made = Token(JOINED, left.text + right.text, left.source, left.offset, left.length)
-    made.expansions = left.expansions
-    return made
+    joined = Token(JOINED, left.text + right.text, left.source, left.offset, left.length)
+    joined.expansions = left.expansions
+    return joined
 
 
 def _as_one(token: Token) -> Token:
     """The token that a row of `##` has made, with its kind. Raises NotOneToken."""
     if token.kind == JOINED:
-        found = [each for line in logical_lines(Text("", token.text)) for each in line if each.text != "\n"]
-        if len(found) != 1 or found[0].kind == SPACE:
+        tokens = [piece for line in logical_lines(Text("", token.text)) for piece in line if piece.text != "\n"]
+        if len(tokens) != 1 or tokens[0].kind == SPACE:
             raise NotOneToken(token.text)
-        token.kind = HASHES if found[0].kind == PASTE else found[0].kind
+        token.kind = HASHES if tokens[0].kind == PASTE else tokens[0].kind
     return token
 
 
 def closing(body: Sequence[Token], opening: int) -> int:
     """The position of the `)` that closes the parenthesis at `opening`; the end of the body where none does."""
     depth = 0
-    for at in range(opening, len(body)):
-        depth += {"(": 1, ")": -1}.get(body[at].text, 0)
+    for position in range(opening, len(body)):
+        depth += {"(": 1, ")": -1}.get(body[position].text, 0)
         if depth <= 0:
-            return at
+            return position
     return len(body)
 
 
-def _solid(body: Sequence[Token], at: int) -> int:
-    """The first place from `at` on without white space."""
-    while body[at].kind == SPACE:
-        at += 1
-    return at
+def _solid(body: Sequence[Token], position: int) -> int:
+    """The first place from a position on without white space."""
+    while body[position].kind == SPACE:
+        position += 1
+    return position
 
 
 def _stripped(tokens: list[Token]) -> list[Token]:
