@@ -31,11 +31,11 @@ def table(block: BlockDeclaration) -> list[str]:
 def with_tables(text: str) -> str:
     """The page with each table that has such a mark generated anew. Raises KeyError where a mark names no block."""
 
-    def made(match: re.Match[str]) -> str:
+    def with_table(match: re.Match[str]) -> str:
         return f"{match[1]}\n" + "".join(f"{line}\n" for line in table(BLOCKS[match[2]]))
 
     mark = re.escape(MARK).replace(r"\{\}", r"(\w+)")
-    return re.sub(rf"({mark})\n(?:\|.*\n)*", made, text)
+    return re.sub(rf"({mark})\n(?:\|.*\n)*", with_table, text)
 
 
 def main() -> None:

@@ -156,8 +156,8 @@ def why_not_started(python: Path, made_with: str) -> str | None:
 
 def holds(root: Path, marks: Path, purpose: str) -> bool:
     """True where the environment was made from this very lock."""
-    wanted, made = root / LOCKS[purpose], marks / LOCKS[purpose]
-    return made.exists() and filecmp.cmp(wanted, made, shallow=False)
+    wanted, installed = root / LOCKS[purpose], marks / LOCKS[purpose]
+    return installed.exists() and filecmp.cmp(wanted, installed, shallow=False)
 
 
 def mark(root: Path, marks: Path, purpose: str) -> None:
@@ -198,13 +198,13 @@ def step(command: list[str], log: Path, failure: str) -> None:
         done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=words, stderr=words, env=surroundings)
     if done.returncode == 0:
         return
-    said = log.read_bytes()[start:].decode(errors="replace")
-    if NO_CONNECTION.search(said):
+    log_text = log.read_bytes()[start:].decode(errors="replace")
+    if NO_CONNECTION.search(log_text):
         raise Refusal(
             f"{failure}: no connection to the package index; connect for this once, or name a mirror (PIP_INDEX_URL) "
             f"or a folder of wheels (PIP_FIND_LINKS with PIP_NO_INDEX=1); pip's own words are in {log}"
         )
-    lines = [line for line in said.splitlines() if line.strip()]
+    lines = [line for line in log_text.splitlines() if line.strip()]
     last = next((line for line in reversed(lines) if "rror" in line), lines[-1] if lines else "it said nothing")
     raise Refusal(f"{failure}: {last.strip()}; all of its words are in {log}")
 

@@ -54,11 +54,11 @@ def page() -> Iterator[str]:
     yield ""
     whole = sections()
     for section, pages in whole:
-        names = ", ".join(_link(each.subject, each) for each in pages)
+        names = ", ".join(_link(subject_page.subject, subject_page) for subject_page in pages)
         yield f"- {_link(section.title, section)}{': ' if names else ''}{names}"
     for section, pages in whole:
-        for level, each in ((2, section), *((3, each) for each in pages)):
-            yield from ("", *in_markdown(each, level))
+        for level, subject_page in ((2, section), *((3, subject_page) for subject_page in pages)):
+            yield from ("", *in_markdown(subject_page, level))
 
 
 def _link(text: str, page: Page) -> str:

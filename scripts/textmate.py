@@ -150,10 +150,10 @@ def _preprocessor() -> dict[str, Any]:
 def _unit() -> str:
     """A unit as written, with brackets one deep: `N*m/(rad/s)^2`."""
     letters = _any(name for name in units.ALL_UNITS if name.isalpha())
-    one = rf"(?:{letters}(?![A-Za-z0-9_])(?!\s*[.{{])(?:\s*\^\s*(?:-?[0-9]|\(\s*-?[0-9]\s*\)))?|%)"
-    joined = rf"{one}(?:\s*[*/]\s*{one})*"
+    factor = rf"(?:{letters}(?![A-Za-z0-9_])(?!\s*[.{{])(?:\s*\^\s*(?:-?[0-9]|\(\s*-?[0-9]\s*\)))?|%)"
+    joined = rf"{factor}(?:\s*[*/]\s*{factor})*"
     bracket = rf"\(\s*{joined}\s*\)(?:\s*\^\s*-?[0-9])?"
-    return rf"(?:1\s*/\s*)?{one}(?:\s*[*/]\s*(?:{one}|{bracket}))*"
+    return rf"(?:1\s*/\s*)?{factor}(?:\s*[*/]\s*(?:{factor}|{bracket}))*"
 
 
 def _numbers() -> dict[str, Any]:
@@ -227,9 +227,9 @@ def _keys() -> set[str]:
 
 def texts() -> dict[str, bytes]:
     """The files by name: for VS Code and others, and for Sublime Text and TextMate."""
-    made = grammar()
-    as_json = json.dumps(made, indent=2, ensure_ascii=False) + "\n"
-    return dict(zip(NAMES, (as_json.encode(), plistlib.dumps(made, sort_keys=False)), strict=True))
+    generated = grammar()
+    as_json = json.dumps(generated, indent=2, ensure_ascii=False) + "\n"
+    return dict(zip(NAMES, (as_json.encode(), plistlib.dumps(generated, sort_keys=False)), strict=True))
 
 
 def main() -> None:

@@ -74,7 +74,7 @@ def test_the_long_deck_has_its_lines_and_is_sound(lines: int) -> None:
 def test_what_a_figure_follows_from_is_taken_with_it() -> None:
     known = {one.name: one for subject in SUBJECTS for one in subject.BENCHMARKS}
     for one in known.values():
-        assert set(one.of if isinstance(one, Derived) else ()) <= set(known)
+        assert set(one.sources if isinstance(one, Derived) else ()) <= set(known)
     assert with_sources(["ratio.7R"], known) == ["ratio.7R", "static.7R", "pin.7R"]
 
 

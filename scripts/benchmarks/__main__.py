@@ -25,7 +25,7 @@ from benchmarks import (
     whole_process,
 )  # fmt: skip
 from benchmarks.benchmark import Benchmark, Derived, take, with_sources
-from benchmarks.machine import machine, told
+from benchmarks.machine import in_words, machine
 
 RATIOS = SimpleNamespace(
     TITLE="ratios of throughput over many cases, each on one core and in the same turns", BENCHMARKS=evaluation.RATIOS
@@ -51,23 +51,25 @@ TURNS, QUICK = 15, 3
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    known: dict[str, Benchmark | Derived] = {one.name: one for subject in SUBJECTS for one in subject.BENCHMARKS}
-    asked = _arguments(known, words)
-    if asked.list:
+    known: dict[str, Benchmark | Derived] = {
+        benchmark.name: benchmark for subject in SUBJECTS for benchmark in subject.BENCHMARKS
+    }
+    options = _arguments(known, words)
+    if options.list:
         width = max(map(len, known))
         for subject in SUBJECTS:
             print(subject.TITLE)
-            print("\n".join(f"    {one.name:{width}}  {one.doc}" for one in subject.BENCHMARKS))
+            print("\n".join(f"    {benchmark.name:{width}}  {benchmark.doc}" for benchmark in subject.BENCHMARKS))
         print("arms", *_legend(), sep="\n    ")
         return 0
-    then = report.read(asked.against) if asked.against is not None else None
-    names = with_sources(asked.names or list(known), known)
-    slow = {name for name, one in known.items() if getattr(one, "slow", False)} if asked.quick else set()
+    then = report.read(options.against) if options.against is not None else None
+    names = with_sources(options.names or list(known), known)
+    slow = {name for name, benchmark in known.items() if getattr(benchmark, "slow", False)} if options.quick else set()
     chosen = [known[name] for name in names if not slow & {name, *getattr(known[name], "of", ())}]
-    turns = asked.repeats or (QUICK if asked.quick else TURNS)
+    turns = options.repeats or (QUICK if options.quick else TURNS)
 
-    here = machine()
-    print(told(here))
+    this_machine = machine()
+    print(in_words(this_machine))
     print(f"best and median of {turns} turns, each of which takes every figure once; a target is for the best")
     print("arms", *_legend(), sep="\n    ")
     watched = sys.stderr.isatty()
@@ -75,14 +77,14 @@ def main(words: Sequence[str] | None = None) -> int:
     if watched:
         print(f"\r{'':60}\r", end="", file=sys.stderr)
     for subject in SUBJECTS:
-        own = {one.name for one in subject.BENCHMARKS}
-        shown = [figure for figure in figures if figure["name"] in own]
-        if shown:
-            print(f"\n{subject.TITLE}", *report.table(shown), sep="\n")
-    if asked.output is not None:
-        report.write(asked.output, here, turns, figures)
+        own = {benchmark.name for benchmark in subject.BENCHMARKS}
+        own_figures = [figure for figure in figures if figure["name"] in own]
+        if own_figures:
+            print(f"\n{subject.TITLE}", *report.table(own_figures), sep="\n")
+    if options.output is not None:
+        report.write(options.output, this_machine, turns, figures)
     if then is not None:
-        print("", *report.against(then, here, figures), sep="\n")
+        print("", *report.against(then, this_machine, figures), sep="\n")
     print("", *report.verdict(figures), sep="\n")
     return 1 if report.missed(figures) else 0
 
@@ -102,17 +104,17 @@ def _arguments(known: dict[str, Benchmark | Derived], words: Sequence[str] | Non
     parser.add_argument("--repeats", type=int, metavar="N", help=f"turns [{TURNS}]")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the figures there, as JSON")
     parser.add_argument("--against", type=Path, metavar="FILE", help="compare with figures that -o wrote")
-    asked = parser.parse_args(words)
+    options = parser.parse_args(words)
     names: list[str] = []
-    for word in asked.names:
-        found = [name for name in known if name == word] or [name for name in known if name.startswith(f"{word}.")]
-        if not found:
+    for word in options.names:
+        matches = [name for name in known if name == word] or [name for name in known if name.startswith(f"{word}.")]
+        if not matches:
             parser.error(f"no benchmark `{word}`; there are {', '.join(known)}")
-        names += found
-    asked.names = names
-    if asked.repeats is not None and asked.repeats < 1:
+        names += matches
+    options.names = names
+    if options.repeats is not None and options.repeats < 1:
         parser.error("--repeats: at least 1")
-    return asked
+    return options
 
 
 if __name__ == "__main__":

@@ -52,19 +52,19 @@ def _robots() -> tuple[Body, ...]:
         for i in range(30)
     ]
     rng = np.random.default_rng(30)
-    return tuple(_body(rng, i, parent, at, (turn, 0.0, 0.0)) for i, (parent, at, turn) in enumerate(places))
+    return tuple(_body(rng, i, parent, place, (turn, 0.0, 0.0)) for i, (parent, place, turn) in enumerate(places))
 
 
 @cache
 def _general() -> tuple[Body, ...]:
     """A random tree without right angles: each joint hangs from one of the three before it."""
     rng = np.random.default_rng(31)
-    made = []
+    bodies = []
     for i in range(30):
         parent = int(rng.integers(max(0, i - 3), i)) if i else -1
-        at, rpy = rng.standard_normal(3) * 0.3, rng.uniform(-math.pi, math.pi, 3)
-        made.append(_body(rng, i, parent, at.tolist(), rpy.tolist()))
-    return tuple(made)
+        place, rpy = rng.standard_normal(3) * 0.3, rng.uniform(-math.pi, math.pi, 3)
+        bodies.append(_body(rng, i, parent, place.tolist(), rpy.tolist()))
+    return tuple(bodies)
 
 
 @cache
@@ -113,14 +113,14 @@ def _deck(name: str) -> tuple[Body, ...]:
     )
 
 
-def _body(rng: np.random.Generator, number: int, parent: int, at: Sequence[float], rpy: Sequence[float]) -> Body:
+def _body(rng: np.random.Generator, number: int, parent: int, place: Sequence[float], rpy: Sequence[float]) -> Body:
     """A revolute joint about z and an asymmetric but physical link."""
     spread = rng.standard_normal((3, 3)) * 0.1
     second = spread @ spread.T
     J = np.trace(second) * np.eye(3) - second
     inertia = tuple(float(J[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
     return Body(
-        f"link{number}", f"joint{number}", "revolute", parent, at=tuple(map(float, at)), rpy=tuple(map(float, rpy)),
+        f"link{number}", f"joint{number}", "revolute", parent, at=tuple(map(float, place)), rpy=tuple(map(float, rpy)),
         axis=(0.0, 0.0, 1.0), mass=float(rng.uniform(1.0, 4.0)),
         com=tuple(float(x) for x in rng.standard_normal(3) * 0.1), inertia=inertia,
     )  # fmt: skip

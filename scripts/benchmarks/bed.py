@@ -59,19 +59,19 @@ def experiment(seconds: float) -> Experiment:
 
 def _step(share: float) -> Callable[[], float]:
     """The percentile of a step's time, us, for this share of all steps; wall-clock time, so including interruptions."""
-    made = experiment(5.0)
-    prepared = prepare(made, wire=True, late=1, lanes=LANES)
+    variant_ = experiment(5.0)
+    prepared = prepare(variant_, wire=True, late=1, lanes=LANES)
     clock = time.perf_counter_ns
 
     def measure() -> float:
         driven = CaseKernel(prepared, 0)
-        rates, told = [0.0], [[0.0, 0.0]]
-        driven(0, rates, told)
+        rates, commands = [0.0], [[0.0, 0.0]]
+        driven(0, rates, commands)
         times = np.zeros(driven.last, dtype=np.int64)
         gc.disable()
         for e in range(1, driven.last + 1):
             begun = clock()
-            driven(e, rates, told)
+            driven(e, rates, commands)
             times[e - 1] = clock() - begun
         gc.enable()
         return float(np.quantile(times, share)) * 1e-3
@@ -97,14 +97,14 @@ def _plant() -> Callable[[], float]:
 
 
 @contextmanager
-def _at(line: str, made: Experiment) -> Iterator[str]:
+def _port_at(line: str, experiment_: Experiment) -> Iterator[str]:
     """The port of a bed with a time of its own, at the other end of a line of this kind."""
     if line == "socket":
         yield "firmware"
         return
-    period = pace_of(made).period
-    program = build("host", config_of(bed_values(made, "joint2", 0), period, lock_step=False),
-                    plant_c(made, "joint2", period=period))  # fmt: skip
+    period = pace_of(experiment_).period
+    program = build("host", config_of(bed_values(experiment_, "joint2", 0), period, lock_step=False),
+                    plant_c(experiment_, "joint2", period=period))  # fmt: skip
     with subprocess.Popen([program], stdout=subprocess.PIPE, text=True) as process:
         realtime.put_first(process.pid)
         assert process.stdout is not None
@@ -115,53 +115,58 @@ def _at(line: str, made: Experiment) -> Iterator[str]:
 
 
 @cache
-def _kept(line: str) -> tuple[Timing, int]:
+def _timing_and_stops(line: str) -> tuple[Timing, int]:
     """The results of a minute of the loop, and the number of times it was stopped."""
-    made = experiment(SECONDS)
-    plan = plan_file.dumps(Plan("", (made,)))
-    wanted, found, hz = round(SECONDS * pace_of(made).hz), [], 0.0
+    experiment_ = experiment(SECONDS)
+    plan = plan_file.dumps(Plan("", (experiment_,)))
+    wanted, records_of_runs, hz = round(SECONDS * pace_of(experiment_).hz), [], 0.0
     for start in range(STARTS):
-        with tempfile.TemporaryDirectory() as folder, _at(line, made) as port:
+        with tempfile.TemporaryDirectory() as folder, _port_at(line, experiment_) as port:
             path = Path(folder) / "one.records"
-            said = list[str]()
+            messages = list[str]()
             for _ in talk(
-                "hw.driving.case", CaseRequest(plan=plan, row=0, ports={"joint2": port}, records=str(path)), said.append
+                "hw.driving.case",
+                CaseRequest(plan=plan, row=0, ports={"joint2": port}, records=str(path)),
+                messages.append,
             ):
                 pass
             rows = records.read(path)
         hz = rows.head["tick_hz"]
-        found.append(rows.rows[rows.rows["exchange"] > 0][: wanted - sum(map(len, found))])
-        if sum(map(len, found)) >= wanted:
-            return timing(np.concatenate(found), hz), start
-    raise Untaken(f"it was stopped {STARTS} times, each time after {sum(map(len, found)) / STARTS / hz:.3g} s or so")
+        records_of_runs.append(rows.rows[rows.rows["exchange"] > 0][: wanted - sum(map(len, records_of_runs))])
+        if sum(map(len, records_of_runs)) >= wanted:
+            return timing(np.concatenate(records_of_runs), hz), start
+    raise Untaken(
+        f"it was stopped {STARTS} times, each time after {sum(map(len, records_of_runs)) / STARTS / hz:.3g} s or so"
+    )
 
 
 def _loop(line: str) -> tuple[Benchmark, ...]:
     """The loop's figures for a minute over a line."""
 
-    def one(name: str, doc: str, unit: str, figure: Callable[[Timing, int], float]) -> Benchmark:
+    def loop_figure(name: str, doc: str, unit: str, figure: Callable[[Timing, int], float]) -> Benchmark:
         def take() -> Callable[[], float]:
-            kept = _kept(line)
-            return lambda: figure(*kept)
+            timing_and_stops = _timing_and_stops(line)
+            return lambda: figure(*timing_and_stops)
 
         return Benchmark(f"bed.{line}.{name}", doc, unit, take, turns=1, slow=True)
 
     miss = "exchanges in a minute that began a period late"
     return (
-        one("computing.p50", "the same in the loop", "us", lambda kept, _: 1e6 * kept.computing.median),
-        one("computing.p99", "its 99th percentile", "us", lambda kept, _: 1e6 * kept.computing.high),
-        one("exchange.p50", f"a command over the {line}, until its answer", "us",
-            lambda kept, _: 1e6 * kept.trip.median),
-        one("exchange.p99", "its 99th percentile", "us", lambda kept, _: 1e6 * kept.trip.high),
-        one("late.p50", "from when an exchange was due to when it began", "us",
-            lambda kept, _: 1e6 * kept.lateness.median),
-        one("late.p99", "its 99th percentile", "us", lambda kept, _: 1e6 * kept.lateness.high),
-        one("late.largest", "the largest", "us", lambda kept, _: 1e6 * kept.lateness.largest),
-        one("missed.woken", f"{miss}: woken too late", "", lambda kept, _: kept.woken),
-        one("missed.computed", f"{miss}: it computed too long", "", lambda kept, _: kept.computed),
-        one("missed.waited", f"{miss}: it waited for the answer before", "", lambda kept, _: kept.waited),
-        one("unanswered", "exchanges in a minute without an answer in time", "", lambda kept, _: kept.unanswered),
-        one("stopped", "times that five periods were missed, and the run stopped", "", lambda _, stops: stops),
+        loop_figure("computing.p50", "the same in the loop", "us", lambda times, _: 1e6 * times.computing.median),
+        loop_figure("computing.p99", "its 99th percentile", "us", lambda times, _: 1e6 * times.computing.high),
+        loop_figure("exchange.p50", f"a command over the {line}, until its answer", "us",
+            lambda times, _: 1e6 * times.trip.median),
+        loop_figure("exchange.p99", "its 99th percentile", "us", lambda times, _: 1e6 * times.trip.high),
+        loop_figure("late.p50", "from when an exchange was due to when it began", "us",
+            lambda times, _: 1e6 * times.lateness.median),
+        loop_figure("late.p99", "its 99th percentile", "us", lambda times, _: 1e6 * times.lateness.high),
+        loop_figure("late.largest", "the largest", "us", lambda times, _: 1e6 * times.lateness.largest),
+        loop_figure("missed.woken", f"{miss}: woken too late", "", lambda times, _: times.woken),
+        loop_figure("missed.computed", f"{miss}: it computed too long", "", lambda times, _: times.computed),
+        loop_figure("missed.waited", f"{miss}: it waited for the answer before", "", lambda times, _: times.waited),
+        loop_figure("unanswered", "exchanges in a minute without an answer in time", "",
+            lambda times, _: times.unanswered),
+        loop_figure("stopped", "times that five periods were missed, and the run stopped", "", lambda _, stops: stops),
     )  # fmt: skip
 
 

@@ -49,7 +49,7 @@ class Derived:
     name: str
     doc: str
     unit: str
-    of: tuple[str, ...]
+    sources: tuple[str, ...]
     compute: Callable[..., float]
     target: Target | None = None
 
@@ -64,12 +64,12 @@ Figure = dict[str, Any]
 reason."""
 
 
-def with_sources(asked: Sequence[str], known: Mapping[str, Benchmark | Derived]) -> list[str]:
+def with_sources(requested: Sequence[str], known: Mapping[str, Benchmark | Derived]) -> list[str]:
     """The requested names and those from which they are computed, in the order of `known`."""
-    wanted = set(asked)
-    for name in asked:
-        one = known[name]
-        wanted.update(one.of if isinstance(one, Derived) else ())
+    wanted = set(requested)
+    for name in requested:
+        benchmark = known[name]
+        wanted.update(benchmark.sources if isinstance(benchmark, Derived) else ())
     return [name for name in known if name in wanted]
 
 
@@ -84,20 +84,20 @@ def take(
     measures: dict[str, Callable[[], float]] = {}
     untaken: dict[str, str] = {}
     measured = [benchmark for benchmark in benchmarks if isinstance(benchmark, Benchmark)]
-    for each in measured:
-        say(f"preparing {each.name}")
+    for benchmark in measured:
+        say(f"preparing {benchmark.name}")
         try:
-            measures[each.name] = each.prepare()
-            if each.turns > 1:
-                measures[each.name]()
+            measures[benchmark.name] = benchmark.prepare()
+            if benchmark.turns > 1:
+                measures[benchmark.name]()
         except Untaken as reason:
-            untaken[each.name] = str(reason)
-    values: dict[str, list[float]] = {each.name: [] for each in measured}
+            untaken[benchmark.name] = str(reason)
+    values: dict[str, list[float]] = {benchmark.name: [] for benchmark in measured}
     for turn in range(turns):
         say(f"turn {turn + 1} of {turns}")
-        for each in measured:
-            if each.name not in untaken and turn < each.turns:
-                values[each.name].append(measures[each.name]())
+        for benchmark in measured:
+            if benchmark.name not in untaken and turn < benchmark.turns:
+                values[benchmark.name].append(measures[benchmark.name]())
     return [
         _derived(benchmark, values, untaken) if isinstance(benchmark, Derived)
         else _untaken(benchmark, untaken[benchmark.name]) if benchmark.name in untaken
@@ -106,29 +106,37 @@ def take(
     ]  # fmt: skip
 
 
-def _figure(one: Benchmark, values: Sequence[float]) -> Figure:
-    best = max(values) if one.target is not None and one.target.side == "at_least" else min(values)
-    return _told(one, best, statistics.median(values), max(values), len(values))
+def _figure(benchmark: Benchmark, values: Sequence[float]) -> Figure:
+    best = max(values) if benchmark.target is not None and benchmark.target.side == "at_least" else min(values)
+    return _figure_data(benchmark, best, statistics.median(values), max(values), len(values))
 
 
-def _derived(one: Derived, values: Mapping[str, Sequence[float]], untaken: Mapping[str, str]) -> Figure:
-    for name in one.of:
+def _derived(derived: Derived, values: Mapping[str, Sequence[float]], untaken: Mapping[str, str]) -> Figure:
+    for name in derived.sources:
         if name in untaken:
-            return _untaken(one, untaken[name])
-    best = one.compute(*(min(values[name]) for name in one.of))
-    median = one.compute(*(statistics.median(values[name]) for name in one.of))
-    return _told(one, best, median, max(best, median), min(len(values[name]) for name in one.of))
+            return _untaken(derived, untaken[name])
+    best = derived.compute(*(min(values[name]) for name in derived.sources))
+    median = derived.compute(*(statistics.median(values[name]) for name in derived.sources))
+    return _figure_data(derived, best, median, max(best, median), min(len(values[name]) for name in derived.sources))
 
 
-def _told(one: Benchmark | Derived, best: float, median: float, largest: float, turns: int) -> Figure:
+def _figure_data(benchmark: Benchmark | Derived, best: float, median: float, largest: float, turns: int) -> Figure:
     """A figure's data. The best decides whether a target is met: other load of the machine only adds to a time."""
-    target = None if one.target is None else {one.target.side: one.target.bound}
+    target = None if benchmark.target is None else {benchmark.target.side: benchmark.target.bound}
     return {
-        "name": one.name, "doc": one.doc, "unit": one.unit, "best": best, "median": median, "largest": largest,
-        "turns": turns, "target": target, "met": None if one.target is None else one.target.met(best),
+        "name": benchmark.name, "doc": benchmark.doc, "unit": benchmark.unit, "best": best, "median": median,
+        "largest": largest, "turns": turns, "target": target,
+        "met": None if benchmark.target is None else benchmark.target.met(best),
     }  # fmt: skip
 
 
-def _untaken(one: Benchmark | Derived, why: str) -> Figure:
-    target = None if one.target is None else {one.target.side: one.target.bound}
-    return {"name": one.name, "doc": one.doc, "unit": one.unit, "untaken": why, "target": target, "met": None}
+def _untaken(benchmark: Benchmark | Derived, why: str) -> Figure:
+    target = None if benchmark.target is None else {benchmark.target.side: benchmark.target.bound}
+    return {
+        "name": benchmark.name,
+        "doc": benchmark.doc,
+        "unit": benchmark.unit,
+        "untaken": why,
+        "target": target,
+        "met": None,
+    }

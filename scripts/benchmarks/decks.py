@@ -63,38 +63,38 @@ def experiment(arm: Arm, command: str, record: bool = False, variant: Variant | 
     variant  another servo, environment or base
     """
     text, start = COMMANDS[command]
-    of = variant or Variant()
-    text = text if of.command is None else of.command
-    told = f"command = {text};" if text else ""
-    lines, uses, states, poses = [SERVO, f"servo used {'like gearbox ' * of.like}{{ {of.servo} }}"], [], [], []
-    lines += ["arm measured {", *([f"    link base {{ {of.body} }}"] if of.base != "fixed" else [])]
+    spec = variant or Variant()
+    text = text if spec.command is None else spec.command
+    command_line = f"command = {text};" if text else ""
+    lines, uses, states, poses = [SERVO, f"servo used {'like gearbox ' * spec.like}{{ {spec.servo} }}"], [], [], []
+    lines += ["arm measured {", *([f"    link base {{ {spec.body} }}"] if spec.base != "fixed" else [])]
     for i, body in enumerate(arm.bodies()):
         vectors = {
             "at": (body.at, "m"), "rpy": (body.rpy, "rad"), "com": (body.com, "m"), "inertia": (body.inertia, "kg*m^2"),
         }  # fmt: skip
-        at, rpy, com, inertia = (
+        place, rpy, com, inertia = (
             f"[{', '.join(f'{x:.17g}' for x in values)}] {unit}" for values, unit in vectors.values()
         )
         parent = "base" if body.parent < 0 else arm.bodies()[body.parent].name
         axis = "" if body.kind == "fixed" else " axis = z;"
         lines.append(f"    link {body.name} {{ mass = {body.mass:.17g} kg; com = {com}; inertia = {inertia}; }}")
         lines.append(
-            f"    joint {body.joint} {body.kind} {{ parent = {parent}; child = {body.name}; at = {at}; rpy = {rpy};"
+            f"    joint {body.joint} {body.kind} {{ parent = {parent}; child = {body.name}; at = {place}; rpy = {rpy};"
             f"{axis} }}"
         )
         if body.kind != "fixed":
-            uses.append(f"{body.joint} = used {{ {told.format(phase=f'{0.7 * i:.1f}')} }}")
+            uses.append(f"{body.joint} = used {{ {command_line.format(phase=f'{0.7 * i:.1f}')} }}")
             states.append(f"{body.joint}.qd = {start} rad/s;")
             poses.append(f"initial.{body.joint}.q = linspace({-3.0 + 0.1 * i:g}, {3.0 - 0.07 * i:g}, {CASES}) rad;")
     lines += [
-        "}", "run one {", "    arm = measured;", f"    {of.run}",
+        "}", "run one {", "    arm = measured;", f"    {spec.run}",
         f"    servos {{ {' '.join(uses)} }}",
         f"    initial {{ {' '.join(states)} }}",
-        f"    environment {{ gravity = [{', '.join(map(str, GRAVITY))}] m/s^2; {of.environment} }}",
-        *([f"    base = {of.base}"] if of.base != "fixed" else []),
-        *([f"    payload weight {{ {of.payload} }}"] if of.payload else []),
-        *([f"    sensor reads = {of.sensor}"] if of.sensor else []),
-        f"    rates {{ dynamics = {of.rate}; servos = {of.rate}; record = 1 kHz; }}",
+        f"    environment {{ gravity = [{', '.join(map(str, GRAVITY))}] m/s^2; {spec.environment} }}",
+        *([f"    base = {spec.base}"] if spec.base != "fixed" else []),
+        *([f"    payload weight {{ {spec.payload} }}"] if spec.payload else []),
+        *([f"    sensor reads = {spec.sensor}"] if spec.sensor else []),
+        f"    rates {{ dynamics = {spec.rate}; servos = {spec.rate}; record = 1 kHz; }}",
         "    duration = 2 s;",
         "    record = [q, qd];" if record else f"    record = [{arm.joints[0]}.q];",
         "}",

@@ -90,8 +90,8 @@ def plant(path: Path, *, few: bool) -> None:
         for dataset in file.values():
             if isinstance(dataset, h5py.Dataset) and dataset.attrs.get("role") in (b"metric", b"signal"):
                 count = len(dataset)
-                at = np.linspace(0, count - 1, FEW).astype(int) if few else range(0, count, BLOCK)
-                for first in at:
+                places = np.linspace(0, count - 1, FEW).astype(int) if few else range(0, count, BLOCK)
+                for first in places:
                     some = slice(first, first + (1 if few else BLOCK))
                     dataset[some] = np.nextafter(dataset[some], np.inf)
 
@@ -142,10 +142,10 @@ def _met() -> list[str | Path]:
 
 
 def _h5diff() -> list[str | Path]:
-    found = shutil.which("h5diff")
-    if found is None:
+    path_of_h5diff = shutil.which("h5diff")
+    if path_of_h5diff is None:
         raise Untaken("`h5diff` is not installed; `apt install hdf5-tools`, or the package of the HDF5 tools here")
-    return [found]
+    return [path_of_h5diff]
 
 
 XARRAY = "import sys, xarray; xarray.testing.assert_identical(*map(xarray.open_dataset, sys.argv[1:]))"
@@ -168,8 +168,8 @@ def compared(command: Sequence[str | Path], tool: str, pair: Pair, state: str) -
         drop(path)
     used = timed([*command, *paths], _folder().name)
     if used.status != (state != "same") or (used.status and TELLS[tool] not in used.text):
-        told = f"it ended with {used.status}:\n{used.text}"
-        raise SystemExit(f"{tool} was wrong over {pair.doc}, {STATES[state]}: {told}")
+        ending = f"it ended with {used.status}:\n{used.text}"
+        raise SystemExit(f"{tool} was wrong over {pair.doc}, {STATES[state]}: {ending}")
     return used
 
 
@@ -211,12 +211,12 @@ def _cold() -> Callable[[], float]:
 BENCHMARKS: tuple[Benchmark | Derived, ...] = (
     Benchmark("diff.cold", "pages of both files of a million cases that are in memory at a start", "", _cold,
               Target(0.0), turns=1, slow=True),
-    *(one for state in STATES for one in _pair(MILLION, state, Target(1.0))),
+    *(benchmark for state in STATES for benchmark in _pair(MILLION, state, Target(1.0))),
     *(Benchmark(f"diff.million.{state}.memory", f"memory that met diff has in use: {STATES[state]}", "MiB",
                 partial(_prepared, "met", MILLION, state, lambda used: used.memory), Target(1024.0), 1, True)
       for state in STATES),
     Benchmark("diff.million.same.read", "what met diff reads from the disk, of 2 * 250 MiB", "MiB",
               partial(_prepared, "met", MILLION, "same", lambda used: used.read), turns=1, slow=True),
-    *(one for state in STATES for one in _pair(HISTORIES, state, Target(1.0))),
+    *(benchmark for state in STATES for benchmark in _pair(HISTORIES, state, Target(1.0))),
     *_pair(SMALL, "few", None),
 )  # fmt: skip

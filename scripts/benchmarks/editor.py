@@ -78,9 +78,9 @@ def long_arms() -> str:
 def keystrokes(text: str, words: int, seed: int = 1) -> Iterator[str]:
     """The text after each keystroke."""
     chance = random.Random(seed)
-    code = list(re.finditer(r"[\w.]+", re.sub(r"//.*", lambda found: " " * len(found[0]), text)))
-    for found in chance.sample(code, words):
-        first, last = found.span()
+    code = list(re.finditer(r"[\w.]+", re.sub(r"//.*", lambda comment: " " * len(comment[0]), text)))
+    for word in chance.sample(code, words):
+        first, last = word.span()
         for end in (*range(last - 1, first - 1, -1), *range(first + 1, last + 1)):
             yield text[:first] + text[first:end] + text[last:]
 
@@ -136,10 +136,10 @@ def _known(text: str) -> object:
     return list(first_replies(_request(text, {})))[-1].known
 
 
-def _at(share: float, which: int, name: str) -> Callable[[], float]:
+def _delay(share: float, which: int, name: str) -> Callable[[], float]:
     def measure() -> float:
-        found = delays(name)[which]
-        return found[int(share * (len(found) - 1))]
+        sorted_delays = delays(name)[which]
+        return sorted_delays[int(share * (len(sorted_delays) - 1))]
 
     return measure
 
@@ -163,10 +163,10 @@ def _audit(name: str) -> Callable[[], float]:
 
 def _audit_again(name: str) -> Callable[[], float]:
     """The second audit, of the deck with a new first line and another duration of its last run."""
-    kept: list[FoundAnswers] = []
-    compiled_with_reply(_request(_text(name), {}), kept.append)
+    answers: list[FoundAnswers] = []
+    compiled_with_reply(_request(_text(name), {}), answers.append)
     head, last, tail = _text(name).rpartition("duration = ")
-    request = replace(_request(f"// a line\n{head}{last}1{tail}", {}), answers=kept[-1].pickled)
+    request = replace(_request(f"// a line\n{head}{last}1{tail}", {}), answers=answers[-1].pickled)
 
     def measure() -> float:
         began = time.process_time()
@@ -187,12 +187,12 @@ BENCHMARKS: tuple[Benchmark | Derived, ...] = tuple(
     benchmark
     for name, most in DECKS.items()
     for benchmark in (
-        Benchmark(f"editor.{name}.p50", "told, half of all keystrokes", "s", partial(_at, 0.5, 0, name), turns=1),
+        Benchmark(f"editor.{name}.p50", "told, half of all keystrokes", "s", partial(_delay, 0.5, 0, name), turns=1),
         Benchmark(
-            f"editor.{name}.p95", "told, 95 % of all keystrokes", "s", partial(_at, 0.95, 0, name), Target(most), 1
+            f"editor.{name}.p95", "told, 95 % of all keystrokes", "s", partial(_delay, 0.95, 0, name), Target(most), 1
         ),
         Benchmark(
-            f"editor.{name}.all.p95", "all but the audit, of what is waited for", "s", partial(_at, 0.95, 1, name),
+            f"editor.{name}.all.p95", "all but the audit, of what is waited for", "s", partial(_delay, 0.95, 1, name),
             turns=1,
         ),
         Benchmark(f"editor.{name}.audit", "all, as `met check`", "s", partial(_audit, name), turns=1, slow=True),

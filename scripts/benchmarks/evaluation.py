@@ -52,19 +52,19 @@ def program(arm: Arm, *, dynamic: bool = False) -> Program:
     def tick(tape: Tape) -> None:
         q, qd, tau = ([tape.read(f"{name}.{i}") for i in numbers] for name in ("q", "qd", "tau"))
         if dynamic:
-            found = solve(
+            solution = solve(
                 tree, q, qd, tau=tau, gravity=GRAVITY,
                 qdd=[tape.read(f"qdd.{i}") for i in numbers],
                 mode=[tape.read_mask(f"mode.{i}") for i in numbers],
                 rotor=[ROTOR] * len(numbers),
             )  # fmt: skip
         else:
-            found = solve(tree, q, qd, tau=tau, gravity=GRAVITY)
+            solution = solve(tree, q, qd, tau=tau, gravity=GRAVITY)
         for i in numbers:
             tape.write(f"q.{i}", q[i] + STEP * qd[i])
-            tape.write(f"qd.{i}", qd[i] + STEP * found.qdd[i])
+            tape.write(f"qd.{i}", qd[i] + STEP * solution.qdd[i])
             if dynamic:  # the torque that was asked, or the one that was found: alive, and changes no later tick
-                tape.write(f"tau.{i}", found.tau[i])
+                tape.write(f"tau.{i}", solution.tau[i])
 
     def end(tape: Tape) -> None:
         for i in numbers:
@@ -90,12 +90,12 @@ def states(arm: Arm, cases: int, *, dynamic: bool = False) -> np.ndarray:
 def _ours(arm: Arm, dynamic: bool, cpu: str | None) -> Callable[[], float]:
     if cpu is not None and platform.machine() != "x86_64":
         raise Untaken("this is no x86 processor")
-    made = kernel.compile(program(arm, dynamic=dynamic), cpu=cpu)
+    compiled = kernel.compile(program(arm, dynamic=dynamic), cpu=cpu)
     inputs, ticks = states(arm, CASES, dynamic=dynamic), TICKS[arm.name]
 
     def measure() -> float:
         begun = time.thread_time()
-        made.run(inputs, ticks - 1, record=False, threads=1)
+        compiled.run(inputs, ticks - 1, record=False, threads=1)
         return (time.thread_time() - begun) * 1e9 / (CASES * ticks)
 
     return measure

@@ -48,12 +48,12 @@ def _hybrid(mounted: str) -> Callable[[], float]:
         path = Path(folder) / "hybrid.ic"
         path.write_text(DECK.format(mounted=mounted, cases=CASES), encoding="utf-8")
         experiment = ic.compile(path, select=["gains_of_one"]).experiments[0]
-    made = kernel.compile(build(experiment))
+    compiled = kernel.compile(build(experiment))
     cases = inputs(experiment, np.arange(CASES))
 
     def measure() -> float:
         begun = time.thread_time()
-        made.run(cases, STEPS, record=False, threads=1)
+        compiled.run(cases, STEPS, record=False, threads=1)
         return (time.thread_time() - begun) * 1e9 / (CASES * STEPS)
 
     return measure

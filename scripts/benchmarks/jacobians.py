@@ -82,21 +82,21 @@ def program(arm: Arm, *, jacobian: bool) -> Program:
     )  # fmt: skip
 
 
-def _rows(of: LinearisedDynamics, n: int) -> list[list[Real]]:
+def _rows(dynamics: LinearisedDynamics, n: int) -> list[list[Real]]:
     """The derivatives of the accelerations by each q, qd and tau; a list a direction."""
     still = [0.0] * n
     units = [[float(i == k) for i in range(n)] for k in range(n)]
     moves = [move for e in units for move in ((e, still, still), (still, e, still), (still, still, e))]
-    return [of.along(*move, still)[0] for move in moves]
+    return [dynamics.along(*move, still)[0] for move in moves]
 
 
 def _dynamics(arm: Arm, jacobian: bool) -> Callable[[], float]:
-    made = kernel.compile(program(arm, jacobian=jacobian))
+    compiled = kernel.compile(program(arm, jacobian=jacobian))
     inputs = evaluation.states(arm, CASES)
 
     def measure() -> float:
         begun = time.thread_time()
-        made.run(inputs, TICKS - 1, record=False, threads=1)
+        compiled.run(inputs, TICKS - 1, record=False, threads=1)
         return (time.thread_time() - begun) * 1e9 / (CASES * TICKS)
 
     return measure
@@ -106,11 +106,11 @@ def _compiling(arm: Arm) -> Callable[[], float]:
     """CPU seconds from the recorded program to machine code, without the cache."""
     from met.backends.llvm import machine
 
-    recording, here = record(program(arm, jacobian=True)), machine.machine(None)
+    recording, this_machine = record(program(arm, jacobian=True)), machine.machine(None)
 
     def measure() -> float:
         begun = time.thread_time()
-        machine.assemble(kernel.written(recording, here)[1], here, level=None)
+        machine.assemble(kernel.written(recording, this_machine)[1], this_machine, level=None)
         return time.thread_time() - begun
 
     return measure
@@ -120,8 +120,8 @@ def _compiling(arm: Arm) -> Callable[[], float]:
 def _panda() -> engine.Prepared:
     text = f'#include "{Path(ic.__file__).parent / "decks" / "panda.ic"}"\n'
     sweep = "sweep masses of reach { sample lhs(512) { links.link7.mass = uniform(0.5, 1) kg; } }\n"
-    (found,) = ic.compile(text=text + sweep, select=["masses"]).experiments
-    return engine.prepare(found)
+    (sweep_experiment,) = ic.compile(text=text + sweep, select=["masses"]).experiments
+    return engine.prepare(sweep_experiment)
 
 
 def _period(*, abreast: bool) -> Callable[[], float]:
@@ -146,15 +146,15 @@ def _period(*, abreast: bool) -> Callable[[], float]:
 def _run(tangents: bool) -> Callable[[], float]:
     prepared = _panda()
     inputs = engine.inputs(prepared.experiment, np.arange(CASES))
-    made = prepared.kernel
+    compiled = prepared.kernel
     if tangents:
         recording = differentiated(prepared.recording, prepared.program.inputs, is_converter)
-        made = kernel.from_recording(recording)
+        compiled = kernel.from_recording(recording)
         inputs = np.hstack([inputs, np.ones_like(inputs)])
 
     def measure() -> float:
         begun = time.thread_time()
-        made.run(inputs, STEPS, record=False, threads=1)
+        compiled.run(inputs, STEPS, record=False, threads=1)
         return (time.thread_time() - begun) * 1e9 / (CASES * STEPS)
 
     return measure

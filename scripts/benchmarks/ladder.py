@@ -105,11 +105,11 @@ def _step(variant: Variant) -> Callable[[], float]:
     inputs = np.stack([coordinate.values for coordinate in experiment.cases.coordinates], axis=1)
     if experiment.cases.noise:
         raise AssertionError("the cases of a benchmark share their noise")
-    made, inputs = kernel.compile(build(experiment)), np.ascontiguousarray(inputs)
+    compiled, inputs = kernel.compile(build(experiment)), np.ascontiguousarray(inputs)
 
     def measure() -> float:
         begun = time.thread_time()
-        made.run(inputs, STEPS, record=False, threads=1)
+        compiled.run(inputs, STEPS, record=False, threads=1)
         return (time.thread_time() - begun) * 1e9 / (len(inputs) * STEPS)
 
     return measure

@@ -34,14 +34,14 @@ SAME = ("processor", "code_for", "avx512", "cores")
 """Entries that must be equal in two reports for their figures to be from one machine."""
 
 
-def told(here: dict[str, Any]) -> str:
+def in_words(facts: dict[str, Any]) -> str:
     """The machine in two lines."""
-    vectors = "AVX-512" if here["avx512"] else "no AVX-512"
-    cores = f"{here['cores']} core{'' if here['cores'] == 1 else 's'}"
-    commit = f"commit {here['commit'] or 'unknown'}{', changed since' if here['changed'] else ''}"
+    vectors = "AVX-512" if facts["avx512"] else "no AVX-512"
+    cores = f"{facts['cores']} core{'' if facts['cores'] == 1 else 's'}"
+    commit = f"commit {facts['commit'] or 'unknown'}{', changed since' if facts['changed'] else ''}"
     return (
-        f"{here['processor']} ({here['code_for']}), {cores}, {vectors}, load {here['load']:g}\n"
-        f"{here['system']}, Python {here['python']}, {here['compiler']}; {commit}"
+        f"{facts['processor']} ({facts['code_for']}), {cores}, {vectors}, load {facts['load']:g}\n"
+        f"{facts['system']}, Python {facts['python']}, {facts['compiler']}; {commit}"
     )
 
 

@@ -30,8 +30,8 @@ def pinocchio() -> Any:
 def model(arm: Arm) -> Any:
     """The arm as a Pinocchio model; bodies behind fixed joints are merged into their parents."""
     pin = pinocchio()
-    made = pin.Model()
-    made.gravity.linear = np.array(GRAVITY)
+    pin_model = pin.Model()
+    pin_model.gravity.linear = np.array(GRAVITY)
     joint_of: list[int] = []
     placed: list[Any] = []
     for body in arm.bodies():
@@ -42,43 +42,43 @@ def model(arm: Arm) -> Any:
             joint_of.append(parent)
             placed.append(place)
         else:
-            joint_of.append(made.addJoint(parent, pin.JointModelRZ(), place, body.joint))
+            joint_of.append(pin_model.addJoint(parent, pin.JointModelRZ(), place, body.joint))
             placed.append(pin.SE3.Identity())
         xx, yy, zz, xy, xz, yz = body.inertia
         inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], float)
-        made.appendBodyToJoint(
+        pin_model.appendBodyToJoint(
             joint_of[-1], pin.Inertia(float(body.mass), np.array(body.com, float), inertia), placed[-1]
         )
-    return made
+    return pin_model
 
 
 def accelerations(arm: Arm, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> np.ndarray:
     """Joint accelerations [case, joint], rad/s^2; all arguments [case, joint] in our order of joints."""
-    pin, made = pinocchio(), model(arm)
-    order = _order(made, arm)
-    pool = pin.ModelPool(made, 1)
-    found = np.empty_like(q)
-    found[:, order] = pin.abaInParallel(1, pool, *(np.asfortranarray(x[:, order].T) for x in (q, qd, tau))).T
-    return found
+    pin, pin_model = pinocchio(), model(arm)
+    order = _order(pin_model, arm)
+    pool = pin.ModelPool(pin_model, 1)
+    qdd = np.empty_like(q)
+    qdd[:, order] = pin.abaInParallel(1, pool, *(np.asfortranarray(x[:, order].T) for x in (q, qd, tau))).T
+    return qdd
 
 
 def evaluations(arm: Arm, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> Callable[[], float]:
     """A function that returns the ns of an evaluation, over this batch [case, joint], on one thread, without
     allocations."""
-    pin, made = pinocchio(), model(arm)
-    pool = pin.ModelPool(made, 1)
-    columns = [np.asfortranarray(x[:, _order(made, arm)].T) for x in (q, qd, tau)]
-    found = np.asfortranarray(np.empty_like(columns[0]))
+    pin, pin_model = pinocchio(), model(arm)
+    pool = pin.ModelPool(pin_model, 1)
+    columns = [np.asfortranarray(x[:, _order(pin_model, arm)].T) for x in (q, qd, tau)]
+    qdd = np.asfortranarray(np.empty_like(columns[0]))
 
     def measure() -> float:
         begun = time.thread_time()
-        pin.abaInParallel(1, pool, *columns, found)
+        pin.abaInParallel(1, pool, *columns, qdd)
         return (time.thread_time() - begun) * 1e9 / len(q)
 
     return measure
 
 
-def _order(made: Any, arm: Arm) -> list[int]:
+def _order(pin_model: Any, arm: Arm) -> list[int]:
     """Our joint at each place of the peer's vectors."""
-    at = {made.joints[made.getJointId(joint)].idx_v: i for i, joint in enumerate(arm.joints)}
-    return [at[i] for i in range(len(at))]
+    joint_at = {pin_model.joints[pin_model.getJointId(joint)].idx_v: i for i, joint in enumerate(arm.joints)}
+    return [joint_at[i] for i in range(len(joint_at))]

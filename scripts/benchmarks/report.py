@@ -20,9 +20,9 @@ class Unreadable(Exception):
     """Raised for a file that is not a report; the text says why."""
 
 
-def write(path: Path, here: dict[str, Any], turns: int, figures: Sequence[Figure]) -> None:
+def write(path: Path, machine_facts: dict[str, Any], turns: int, figures: Sequence[Figure]) -> None:
     """The report as JSON."""
-    data = {"format": FORMAT, "machine": here, "turns": turns, "figures": list(figures)}
+    data = {"format": FORMAT, "machine": machine_facts, "turns": turns, "figures": list(figures)}
     path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
 
 
@@ -84,17 +84,17 @@ def _bound(figure: Figure) -> str:
 # Against another
 
 
-def against(then: dict[str, Any], here: dict[str, Any], figures: Sequence[Figure]) -> list[str]:
+def against(then: dict[str, Any], machine_facts: dict[str, Any], figures: Sequence[Figure]) -> list[str]:
     """Then, now and how many times it is, by figure; what got slower and what faster, beyond noise.
 
     The margin of a figure is what noise can do: 12 %, or where it is more the distance of the median from the best,
     then and now together.
     """
     lines = [f"against commit {then['machine'].get('commit') or 'unknown'}"]
-    other = [what for what in SAME if then["machine"].get(what) != here.get(what)]
+    other = [what for what in SAME if then["machine"].get(what) != machine_facts.get(what)]
     if other:
-        told = ", ".join(f"{what} {then['machine'].get(what)}, now {here.get(what)}" for what in other)
-        lines.append(f"a different machine ({told}): the times say nothing about MET")
+        differences = ", ".join(f"{what} {then['machine'].get(what)}, now {machine_facts.get(what)}" for what in other)
+        lines.append(f"a different machine ({differences}): the times say nothing about MET")
     before = {figure["name"]: figure for figure in then["figures"]}
     rows = [["", "then", "now", "now/then", "margin", ""]]
     worse: list[str] = []

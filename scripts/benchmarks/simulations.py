@@ -47,12 +47,12 @@ def _spent(work: Callable[[], object], times: int = 1) -> Callable[[], float]:
     """The least CPU time of several runs of the work, s."""
 
     def seconds() -> float:
-        found = []
+        times_taken = []
         for _ in range(times):
             begun = time.process_time()
             work()
-            found.append(time.process_time() - begun)
-        return min(found)
+            times_taken.append(time.process_time() - begun)
+        return min(times_taken)
 
     return seconds
 

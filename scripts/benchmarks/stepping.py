@@ -40,7 +40,7 @@ OVER_TIME = (
 
 
 @cache
-def _made(arm: Arm, command: str, watched: bool = False) -> tuple[Any, np.ndarray]:
+def _kernel_and_inputs(arm: Arm, command: str, watched: bool = False) -> tuple[Any, np.ndarray]:
     """The kernel, and the inputs of all cases. watched: with requirements over time, `OVER_TIME`."""
     joints = [body.joint for body in arm.bodies() if body.kind != "fixed"]
     run = " ".join(f"require {text.format(joint)};" for joint in joints for text in OVER_TIME)
@@ -50,12 +50,12 @@ def _made(arm: Arm, command: str, watched: bool = False) -> tuple[Any, np.ndarra
 
 
 def _step(arm: Arm, command: str, watched: bool = False) -> Callable[[], float]:
-    made, inputs = _made(arm, command, watched)
+    compiled, inputs = _kernel_and_inputs(arm, command, watched)
     steps = STEPS[arm.name]
 
     def measure() -> float:
         begun = time.thread_time()
-        made.run(inputs, steps, record=False, threads=1)
+        compiled.run(inputs, steps, record=False, threads=1)
         return (time.thread_time() - begun) * 1e9 / (len(inputs) * steps)
 
     return measure
@@ -63,38 +63,40 @@ def _step(arm: Arm, command: str, watched: bool = False) -> Callable[[], float]:
 
 def _events(arm: Arm, command: str) -> Callable[[], float]:
     """Events a step and block, in just the run that is timed. An event is one loop of friction's come to and run."""
-    made, inputs = _made(arm, command)
-    program, loops = counting(made.program)
-    counter = kernel.compile(program, lanes=made.lanes)
+    compiled, inputs = _kernel_and_inputs(arm, command)
+    program, loops = counting(compiled.program)
+    counter = kernel.compile(program, lanes=compiled.lanes)
 
     def measure() -> float:
         _, outputs = counter.run(inputs, STEPS[arm.name], record=False, threads=1)
         columns = [program.outputs.index(loop.entries) for loop in loops if loop.outer and loop.cell != "again"]
-        return float(outputs[:: made.lanes, columns].sum(axis=1).mean()) / STEPS[arm.name]
+        return float(outputs[:: compiled.lanes, columns].sum(axis=1).mean()) / STEPS[arm.name]
 
     return measure
 
 
 def _hot(arm: Arm) -> Callable[[], float]:
     """One case, stepped one tick a call from Python, as a bed's loop does; us a step."""
-    made, inputs = _made(arm, "steady")
-    block = made.block(inputs[:1])
+    compiled, inputs = _kernel_and_inputs(arm, "steady")
+    block = compiled.block(inputs[:1])
     block.step(0, 0)
     count = 2000
-    at = 0
+    tick = 0
 
     def measure() -> float:
-        nonlocal at
+        nonlocal tick
         begun = time.thread_time()
-        for k in range(at + 1, at + count + 1):
+        for k in range(tick + 1, tick + count + 1):
             block.step(k, k)
-        at += count
+        tick += count
         return (time.thread_time() - begun) * 1e6 / count
 
     return measure
 
 
-def _each(kind: str, doc: str, unit: str, prepare: Callable[[Arm, str], Any], command: str, **more: Any) -> list[Any]:
+def _per_arm(
+    kind: str, doc: str, unit: str, prepare: Callable[[Arm, str], Any], command: str, **more: Any
+) -> list[Any]:
     return [Benchmark(f"{kind}.{arm.name}", doc, unit, partial(prepare, arm, command), **more)
             for arm in ARMS]  # fmt: skip
 
@@ -107,9 +109,9 @@ BENCHMARKS: tuple[Benchmark | Derived, ...] = (
         )
         for arm in ARMS
     ),
-    *_each("step.events", "events a step and block in that run", "", _events, "steady", target=Target(FEW), turns=1),
-    *_each("reversing", "all joints turn back fifty times a second", "ns", _step, "reversing"),
-    *_each("reversing.events", "events a step and block in that run", "", _events, "reversing", turns=1),
+    *_per_arm("step.events", "events a step and block in that run", "", _events, "steady", target=Target(FEW), turns=1),
+    *_per_arm("reversing", "all joints turn back fifty times a second", "ns", _step, "reversing"),
+    *_per_arm("reversing.events", "events a step and block in that run", "", _events, "reversing", turns=1),
     *(
         Derived(
             f"event.{arm.name}", "cost of an event to each case of its block", "ns",

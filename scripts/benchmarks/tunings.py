@@ -61,7 +61,7 @@ sweep loads of RUN { zip { links.upper.mass = [40, 50, 60] kg;  links.lower.mass
 """
 
 
-def _each(joints: list[str], kp: str, ki: str) -> str:
+def _gains(joints: list[str], kp: str, ki: str) -> str:
     return "".join(f"choose {joint}.servo.kp = {kp};  choose {joint}.servo.ki = {ki};  " for joint in joints)
 
 
@@ -101,7 +101,7 @@ run track like reach {{
     remove settle;  metric miss = rms {{ of = abs(slew.qd - slow) + abs(luff.qd - slow) + abs(fold.qd - slow); }}
 }}
 sweep wide of track {{ sample random(16) {{ payloads.load.mass = uniform(0.5, 25) kg; }} }}
-tune t of track {{ {_each(["slew", "luff", "fold"], KP, KI)} against wide;  minimise miss;  at_most = 3000; }}
+tune t of track {{ {_gains(["slew", "luff", "fold"], KP, KI)} against wide;  minimise miss;  at_most = 3000; }}
 """,
     "two-link arm, settling": TWO_LINK.replace("RUN", "nominal") + """
 tune t of nominal {
@@ -111,7 +111,7 @@ tune t of nominal {
 """,
     "two-link arm, four gains": TWO_LINK.replace("RUN", "track") + f"""
 tune t of track {{
-    {_each(["shoulder", "elbow"], "between(0.01, 0.1) V*s/rad", "between(0.06, 1) V/rad")}
+    {_gains(["shoulder", "elbow"], "between(0.01, 0.1) V*s/rad", "between(0.06, 1) V/rad")}
     against loads;  minimise miss;  at_most = 2000;
 }}
 """,
@@ -155,7 +155,7 @@ run fine like reach {{
 }}
 sweep wide of fine {{ sample random(8) {{ links.load.mass = uniform(0.1, 3) kg; }} }}
 tune t of fine {{
-    {_each([f"joint{n}" for n in (1, 2, 3, 4)], "logbetween(0.01, 0.3) V*s/rad", "logbetween(0.2, 10) V/rad")}
+    {_gains([f"joint{n}" for n in (1, 2, 3, 4)], "logbetween(0.01, 0.3) V*s/rad", "logbetween(0.2, 10) V/rad")}
     against wide;  minimise miss;  at_most = 1600;
 }}
 """,
@@ -172,19 +172,19 @@ def tuned(experiment: Experiment, prepared: engine.Prepared, slopes: TuningSlope
     assert search is not None
     begun, method = time.process_time(), search_method(search, slopes)
     cases, worths = [], []
-    while len(asked := method.ask()):
-        program = prepared.of_cases(with_cases(experiment, asked))
+    while len(generation := method.ask()):
+        program = prepared.of_cases(with_cases(experiment, generation))
         run = _run(program)
         goal = run.metrics[search.metric]
         done = run.status == engine.DONE
         worth = served(goal, search.largest, done, experiment.requirements, run.metrics, search.margin)
         method.tell(worth)
-        cases.append(asked)
+        cases.append(generation)
         worths.append(worth)
     seconds, table = time.process_time() - begun, np.concatenate(cases)
-    _, of, tried = np.unique(table[:, : len(search.parameters)], axis=0, return_inverse=True, return_counts=True)
+    _, candidate, tried = np.unique(table[:, : len(search.parameters)], axis=0, return_inverse=True, return_counts=True)
     worst, worth = np.full(len(tried), -np.inf), np.concatenate(worths)
-    np.maximum.at(worst, of.ravel(), worth)
+    np.maximum.at(worst, candidate.ravel(), worth)
     best = float(worst[tried == max(1, len(search.plants))].min())
     goal_there = best / (1.0 - abs(best)) if abs(best) < 1.0 else np.inf
     reached = np.sort([worth[start.best] for start in starts_of(method, search, table, worth) if start.best >= 0])
@@ -213,18 +213,18 @@ def compare(name: str, seeds: int) -> None:
     prepared.kernel  # noqa: B018  # compiled before time is taken
     first = np.array([np.asarray(coordinate.values)[:1] for coordinate in experiment.cases.coordinates]).T
     slopes.slopes(first)
-    found: dict[str, list[Tuned]] = {"off": [], "on": [], "long": []}
+    results_of: dict[str, list[Tuned]] = {"off": [], "on": [], "long": []}
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
         for way, gradients, times in (("off", False, 1), ("on", True, 1), ("long", False, 4)):
-            one = replace(search, seed=seed, gradients=gradients, at_most=times * search.at_most)
-            found[way].append(tuned(replace(experiment, search=one), prepared, slopes))
-    best = min(each[2] for rows in found.values() for each in rows)
+            variant = replace(search, seed=seed, gradients=gradients, at_most=times * search.at_most)
+            results_of[way].append(tuned(replace(experiment, search=variant), prepared, slopes))
+    best = min(result[2] for rows in results_of.values() for result in rows)
     row = [f"{len(search.parameters)} by {max(1, len(search.plants))}"]
     for way in ("off", "on", "long"):
-        off = [100.0 * (each[2] / best - 1.0) for each in found[way]]
-        cases, seconds = (median(each[n] for each in found[way]) for n in (0, 3))
+        off = [100.0 * (result[2] / best - 1.0) for result in results_of[way]]
+        cases, seconds = (median(result[n] for result in results_of[way]) for n in (0, 3))
         row += [f"{cases:,.0f}", f"{_share(median(off))} ({_share(max(off))})", f"{seconds:.2g} s"]
-    along, agree = median(each[1] for each in found["on"]), sum(each[4] for each in found["on"])
+    along, agree = median(result[1] for result in results_of["on"]), sum(result[4] for result in results_of["on"])
     print(f"| {name} | {row[0]} | " + " | ".join(row[1:]) + f" | {along:.0f} | {agree} |", flush=True)
 
 

@@ -47,14 +47,14 @@ class Used:
 def timed(command: Sequence[str | Path], directory: str | Path, *, status: Sequence[int] = (0, 1)) -> Used:
     """A process from its start to its end. status: that it may end with; another ends the benchmark. 1 is an answer: a
     requirement was missed, archives differ."""
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as output:
         begun = time.perf_counter()
-        done = subprocess.Popen(command, cwd=directory, env=ENVIRONMENT, stdout=said, stderr=said)
+        done = subprocess.Popen(command, cwd=directory, env=ENVIRONMENT, stdout=output, stderr=output)
         _, ended, used = os.wait4(done.pid, 0)
         seconds = time.perf_counter() - begun
         done.returncode = os.waitstatus_to_exitcode(ended)
-        said.seek(0)
-        text = said.read().decode()
+        output.seek(0)
+        text = output.read().decode()
     if done.returncode not in status:
         words = " ".join(["met" if word == MET else str(word) for word in command])
         raise SystemExit(f"`{words}` ended with {done.returncode}:\n{text}")
