@@ -353,32 +353,32 @@ class _SweepReader:
         return self.numbers(path, entry, names)
 
     def numbers(self, path: str, entry: Setting, names: Names) -> VariedPath:
-        found = names.evaluate(entry.value)
+        listed = names.evaluate(entry.value)
         check_constant(path, entry, names, self.paths)
-        if isinstance(found, Value):
+        if isinstance(listed, Value):
             raise Problem(
                 error(
                     "D126",
                     f"`{path}` varies over a list of values, and this is one value",
-                    found.place,
+                    listed.place,
                     help=[
                         "write `[a, b, c] UNIT`, `(a .. b by c) UNIT` or `linspace(from, to, count) UNIT`",
                         "one value that stands still belongs in the run",
                     ],
                 )
             )
-        values = [value for value in found.items if isinstance(value, Value)]
-        if len(values) != len(found.items):
+        values = [value for value in listed.items if isinstance(value, Value)]
+        if len(values) != len(listed.items):
             raise Problem(
                 error(
                     "D126",
                     "a list inside a list",
-                    found.place,
+                    listed.place,
                     help=f"a vector varies by its parts: `vary {path}.x = [...];`",
                 )
             )
         if not values:
-            raise Problem(error("D126", f"`{path}` has no values", found.place, help="one at least"))
+            raise Problem(error("D126", f"`{path}` has no values", listed.place, help="one at least"))
         first = values[0]
         for value in values[1:]:
             if not units.same(value.dimension, first.dimension):
@@ -391,7 +391,7 @@ class _SweepReader:
                         help="all must be of one dimension",
                     )
                 )
-        unit = found.unit or first.unit
+        unit = listed.unit or first.unit
         bare = all(value.bare for value in values)
         self.places[path] = [value.place for value in values]
         return varied_path(
@@ -421,16 +421,16 @@ def _is(entry: Setting, name: str) -> bool:
 
 def whole_number(definitions: Definitions, expression: Expression, what: str, *, least: int) -> int:
     """A whole number that no sweep varies. Raises Problem D113."""
-    found = evaluate_number(expression, Names(definitions, {}).find)
-    number = found.number
+    value = evaluate_number(expression, Names(definitions, {}).find)
+    number = value.number
     if (
         isinstance(number, Scalar)
-        or found.dimension != PURE
+        or value.dimension != PURE
         or not float(number).is_integer()
         or not least <= number <= 2**53
     ):
         most = "2^53" if least == 0 else f"{MOST_SWEPT}"
-        raise Problem(error("D113", f"{what} is a whole number from {least} to {most}", found.place))
+        raise Problem(error("D113", f"{what} is a whole number from {least} to {most}", value.place))
     return int(number)
 
 

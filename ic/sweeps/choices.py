@@ -82,7 +82,7 @@ def decides_structure(definitions: Definitions, path: str, values: Expression, n
         return True
     if first == "sensors" and len(rest) == 2 and rest[1] == "rate":
         return True
-    has_words = first in ("environment", "sensors", "guides") or rest[:1] in [[each] for each in OF_JOINT]
+    has_words = first in ("environment", "sensors", "guides") or rest[:1] in [[word] for word in OF_JOINT]
     return has_words and _are_words(values, names)
 
 
@@ -102,7 +102,7 @@ def word_in(listed: Expression, names: Names) -> Name | String | None:
         return len(item.path) == 1 and not known
 
     items = listed.items if isinstance(listed, List) else ()
-    return next((item for item in items if all(is_word(each) for each in items)), None)  # type: ignore[return-value]
+    return next((item for item in items if all(is_word(other) for other in items)), None)  # type: ignore[return-value]
 
 
 def refuse_words(path: str, place: Place, values: Expression, names: Names) -> None:
@@ -184,8 +184,8 @@ def choice_column(path: str, entry: Setting, names: Names) -> ChoiceColumn:
             _option(WithUnit(item, values.unit, place_of(item)), names, values.unit) for item in values.inner.items
         ]
     else:
-        found = evaluate(values, names.find) if not isinstance(values, (Name, String)) else None
-        if not isinstance(found, ValueList):
+        listed = evaluate(values, names.find) if not isinstance(values, (Name, String)) else None
+        if not isinstance(listed, ValueList):
             raise Problem(
                 error(
                     "D126",
@@ -194,7 +194,7 @@ def choice_column(path: str, entry: Setting, names: Names) -> ChoiceColumn:
                     help=f"write `vary {path} = [{spell(values)}, ...];`",
                 )
             )
-        options = [_number(item, found.unit) for item in found.items if isinstance(item, Value)]
+        options = [_number(item, listed.unit) for item in listed.items if isinstance(item, Value)]
     if not options:
         raise Problem(error("D126", f"`{path}` has no values", place_of(values), help="one at least"))
     return ChoiceColumn(path, path_place(entry), tuple(options))
@@ -205,11 +205,11 @@ def _option(item: Expression, names: Names, unit: Unit | None) -> Option:
     place = place_of(item.inner if isinstance(item, WithUnit) and unit is not None else item)
     is_model = isinstance(item, Call) and item.name.text not in FUNCTIONS
     if not is_model and not isinstance(item, String) and not (isinstance(item, Name) and not names.is_value(item)):
-        found = names.evaluate(item)
-        if isinstance(found, Value):
+        value = names.evaluate(item)
+        if isinstance(value, Value):
             if isinstance(item, WithUnit) and unit is not None:  # whose unit stands after the list
                 item = WithUnit(item.inner, replace(unit, place=place), place)
-            return Option(_number(found, unit or found.unit).text, item, place)
+            return Option(_number(value, unit or value.unit).text, item, place)
     return Option(spell(item), item, place)
 
 
@@ -225,8 +225,8 @@ def _number(value: Value, unit: Unit | None) -> Option:
         )
     measure = measure_of(unit) if unit is not None else units.ONE
     text = measure.decimal(float(value.number))
-    shown = f"{text} {unit.text}" if unit is not None else text
-    return Option(shown, Number(float(text), unit, value.place, text), value.place)
+    with_unit = f"{text} {unit.text}" if unit is not None else text
+    return Option(with_unit, Number(float(text), unit, value.place, text), value.place)
 
 
 # A run with its choices put in
@@ -253,22 +253,22 @@ def with_choices(definitions: Definitions, run: Definition, choices: Choices) ->
                         help=f"vary all of it: `vary {first}.{rest[0]} = [...];`",
                     )
                 )
-            earlier = next((each for each in servos if each.name == first), servo)
+            earlier = next((other for other in servos if other.name == first), servo)
             entry = nested_entry(in_servo(rest, definitions.block(earlier)), option.expression, column.place)
             servos = [
-                *(each for each in servos if each is not earlier),
+                *(other for other in servos if other is not earlier),
                 replace(earlier, extra_entries=(*earlier.extra_entries, entry)),
             ]
             continue
         _place(tree, keys_of(first, rest, definitions.block(run)), column, option)
-    made = definitions.replacing(*servos)
+    replaced = definitions.replacing(*servos)
     if not tree:
-        return made, run
+        return replaced, run
     body = tuple(_entries(tree))
     base = Name((Word(run.name, run.place),), run.place)
     name = f"{run.name} with {', '.join(chosen_values)}"
     group = Group((*run.group.words[:-1], Word(name, run.place)), base, None, body, run.place)
-    return made, Definition("run", name, group)
+    return replaced, Definition("run", name, group)
 
 
 def keys_of(first: str, rest: Sequence[str], run: MergedBlock | None) -> tuple[str, ...]:
@@ -287,17 +287,17 @@ def in_servo(keys: Sequence[str], block: MergedBlock | None) -> tuple[str, ...]:
     has it."""
     if len(keys) < 2 or keys[0] != SENSOR:
         return tuple(keys)
-    there = block is not None and f"{SENSOR} {keys[1]}" in block.items
-    return (keys[1] if there else f"{SENSOR} {keys[1]}", *keys[2:])
+    is_sensor = block is not None and f"{SENSOR} {keys[1]}" in block.items
+    return (keys[1] if is_sensor else f"{SENSOR} {keys[1]}", *keys[2:])
 
 
 def nested_entry(keys: Sequence[str], value: Expression, place: Place) -> Entry:
     """A value as a block writes it: `servos { elbow { rate = ...; } }`."""
     *words, name = (Word(word, place) for word in keys[-1].split())
-    made: Entry = Setting(tuple(words), (name,), "=", value, place)
+    entry: Entry = Setting(tuple(words), (name,), "=", value, place)
     for key in reversed(keys[:-1]):
-        made = _group(key, (made,), place)
-    return made
+        entry = _group(key, (entry,), place)
+    return entry
 
 
 def _group(key: str, body: tuple[Entry, ...], place: Place) -> Group:
@@ -305,15 +305,15 @@ def _group(key: str, body: tuple[Entry, ...], place: Place) -> Group:
 
 
 def _place(tree: dict[str, Any], keys: Sequence[str], column: ChoiceColumn, option: Option) -> None:
-    at = tree
+    branch = tree
     for key in keys[:-1]:
-        at = at.setdefault(key, {})
-        if not isinstance(at, dict):
-            raise _both(at[0], column)
-    there = at.get(keys[-1])
-    if there is not None:
-        raise _both(there[0] if isinstance(there, tuple) else column, column)
-    at[keys[-1]] = (column, option)
+        branch = branch.setdefault(key, {})
+        if not isinstance(branch, dict):
+            raise _both(branch[0], column)
+    taken = branch.get(keys[-1])
+    if taken is not None:
+        raise _both(taken[0] if isinstance(taken, tuple) else column, column)
+    branch[keys[-1]] = (column, option)
 
 
 def _both(earlier: ChoiceColumn, later: ChoiceColumn) -> Problem:
@@ -329,13 +329,13 @@ def _both(earlier: ChoiceColumn, later: ChoiceColumn) -> Problem:
 
 
 def _entries(tree: dict[str, Any]) -> list[Entry]:
-    made: list[Entry] = []
+    all_entries: list[Entry] = []
     for key, inner in tree.items():
         if isinstance(inner, dict):
             entries = tuple(_entries(inner))
             place = entries[0].place
-            made.append(_group(key, entries, place))
+            all_entries.append(_group(key, entries, place))
         else:
             column, option = inner
-            made.append(nested_entry((key,), option.expression, column.place))
-    return made
+            all_entries.append(nested_entry((key,), option.expression, column.place))
+    return all_entries

@@ -49,10 +49,10 @@ def check_confidences(complaints: Complaints, sweep: Sweep, experiment: Experime
             _check_draws(complaints, sweep, experiment, requirement, drawn)
     if complaints.error_count > before:
         return ()
-    each = _fewest_of_a_point(experiment)
+    fewest = _fewest_of_a_point(experiment)
     if sweep.early_axis is not None:
-        return _early_notes(complaints, wanted, each)
-    return tuple(_note(complaints, requirement, each) for requirement in wanted)
+        return _early_notes(complaints, wanted, fewest)
+    return tuple(_note(complaints, requirement, fewest) for requirement in wanted)
 
 
 def _check_draws(
@@ -113,27 +113,27 @@ def _fewest_of_a_choice(chosen: Sequence[AxisColumn]) -> int:
     """The size of the smallest design point of a long table, whose values are compared by their axes: equal ones are
     one value of an axis."""
     rows, axes = chosen[0].rows, sorted({values.axis for values in chosen})
-    found = np.zeros(math.prod(rows.sizes[axis] for axis in axes), np.int64)
+    counts = np.zeros(math.prod(rows.sizes[axis] for axis in axes), np.int64)
     for piece in blocks(rows.count):
-        here, point = np.arange(piece.start, piece.stop), np.zeros(piece.stop - piece.start, np.int64)
+        numbers, point = np.arange(piece.start, piece.stop), np.zeros(piece.stop - piece.start, np.int64)
         for axis in axes:
-            point = point * rows.sizes[axis] + rows.index(axis, here)
-        found += np.bincount(point, minlength=len(found))
-    return int(found[found > 0].min())
+            point = point * rows.sizes[axis] + rows.index(axis, numbers)
+        counts += np.bincount(point, minlength=len(counts))
+    return int(counts[counts > 0].min())
 
 
-def _note(complaints: Complaints, requirement: Requirement, each: int) -> str:
+def _note(complaints: Complaints, requirement: Requirement, fewest: int) -> str:
     assert requirement.share is not None and requirement.confidence is not None
     needed, more = (confidence.cases_needed(requirement.share, requirement.confidence, missed) for missed in (0, 1))
-    if each < needed:
+    if fewest < needed:
         complaints.remark(
             "D352",
-            f"{each:,} cases cannot show this, were it met by all of them",
+            f"{fewest:,} cases cannot show this, were it met by all of them",
             requirement.place,
             help=f"draw {needed:,} cases or more for each design point; {more:,} show it where one misses it",
         )
     return (
-        f"{OF_CASES}`{requirement.text}` needs {needed:,} if none misses it, {more:,} if one does; there are {each:,}"
+        f"{OF_CASES}`{requirement.text}` needs {needed:,} if none misses it, {more:,} if one does; there are {fewest:,}"
     )
 
 

@@ -98,13 +98,13 @@ class SampleDesign:
 
     def draw(self, number: int) -> list[CaseValues]:
         """The values of each part. number: of the sample in its sweep, from 1. Raises Problem where two are equal."""
-        found: list[CaseValues]
+        drawn: list[CaseValues]
         if self.design == "random":  # a stream for each path, so that more samples or parameters change no old value
-            found = [part.independent(self.count, self.seed, number) for part in self.parts]
+            drawn = [part.independent(self.count, self.seed, number) for part in self.parts]
         else:
             points = _points(self.design, self.count, len(self.parts), self.seed, number)
-            found = [part.values(column) for part, column in zip(self.parts, points.T, strict=True)]
-        for part, values in zip(self.parts, found, strict=True):
+            drawn = [part.values(column) for part, column in zip(self.parts, points.T, strict=True)]
+        for part, values in zip(self.parts, drawn, strict=True):
             looked_at = min(self.count, MOST_LISTED)
             different = len(distinct(values[:looked_at]))
             if 2 * different < looked_at:
@@ -117,19 +117,19 @@ class SampleDesign:
                         help=[f"values have {DIGITS} digits: draw it from a wider distribution", "or leave it out"],
                     )
                 )
-        return _saltelli(found) if self.design == "saltelli" else found
+        return _saltelli(drawn) if self.design == "saltelli" else drawn
 
 
-def _saltelli(found: Sequence[CaseValues]) -> list[CaseValues]:
+def _saltelli(drawn: Sequence[CaseValues]) -> list[CaseValues]:
     """The values of each part in the cases of Saltelli's scheme, from those at its points: all a, then all b.
 
     The cases of a pair of points stand together: a, then a with the value of the first part from b, of the second ...,
     then b.
     """
     out: list[CaseValues] = []
-    for place, values in enumerate(found):
+    for place, values in enumerate(drawn):
         a, b = np.split(np.asarray(values), 2)
-        cases = np.repeat(a[:, None], len(found) + 2, axis=1)
+        cases = np.repeat(a[:, None], len(drawn) + 2, axis=1)
         cases[:, place + 1] = cases[:, -1] = b
         out.append(cases.ravel())
     return out
@@ -263,15 +263,15 @@ def _until_shown(call: Call, definitions: Definitions) -> Place | None:
     return place_of(word)
 
 
-def _count(found: Value, most: int) -> int:
-    number = found.number
+def _count(value: Value, most: int) -> int:
+    number = value.number
     if (
         isinstance(number, Scalar)
-        or found.dimension != PURE
+        or value.dimension != PURE
         or not float(number).is_integer()
         or not 1 <= number <= most
     ):
-        raise Problem(error("D113", f"a number of samples is a whole number from 1 to {most}", found.place))
+        raise Problem(error("D113", f"a number of samples is a whole number from 1 to {most}", value.place))
     return int(number)
 
 
@@ -295,24 +295,24 @@ def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> DrawnPara
     usage = f"write `{name}({', '.join(wanted)}) UNIT`"
     if len(call.positional) != len(wanted) or call.named or call.body is not None:
         raise Problem(error("D225", f"`{name}` takes {len(wanted)} numbers, in order", call.name.place, help=usage))
-    found = [evaluate_number(in_unit(each, unit), names.find) for each in call.positional]
+    values = [evaluate_number(in_unit(argument, unit), names.find) for argument in call.positional]
     check_constant(path, entry, names, paths)
-    for other in found[1:]:
-        if not units.same(other.dimension, found[0].dimension):
+    for other in values[1:]:
+        if not units.same(other.dimension, values[0].dimension):
             raise Problem(
                 error(
                     "D063",
-                    f"`{name}` of {units.text(found[0].dimension)} and {units.text(other.dimension)}",
+                    f"`{name}` of {units.text(values[0].dimension)} and {units.text(other.dimension)}",
                     other.place,
                     help="all must be of one dimension",
                 )
             )
-    arguments = tuple(float(value.number) for value in found)
-    _check_arguments(name, arguments, found)
-    unit = unit or next((value.unit for value in found if value.unit is not None), None)
-    if unit is not None and measure_of(unit).dimension != found[0].dimension:
+    arguments = tuple(float(value.number) for value in values)
+    _check_arguments(name, arguments, values)
+    unit = unit or next((value.unit for value in values if value.unit is not None), None)
+    if unit is not None and measure_of(unit).dimension != values[0].dimension:
         unit = None
-    return DrawnParameter(path, entry.place, name, arguments, found[0], unit_of_plan(unit))
+    return DrawnParameter(path, entry.place, name, arguments, values[0], unit_of_plan(unit))
 
 
 def in_unit(expression: Expression, unit: Unit | None) -> Expression:
@@ -320,13 +320,13 @@ def in_unit(expression: Expression, unit: Unit | None) -> Expression:
     return expression if unit is None else WithUnit(expression, unit, place_of(expression))
 
 
-def _check_arguments(name: str, arguments: tuple[float, ...], found: list[Any]) -> None:
+def _check_arguments(name: str, arguments: tuple[float, ...], values: list[Any]) -> None:
     if name in ("normal", "truncated") and not arguments[1] > 0.0:
         raise Problem(
             error(
                 "D225",
                 "a standard deviation is above 0",
-                found[1].place,
+                values[1].place,
                 help="a parameter that does not vary belongs in the run",
             )
         )
@@ -335,7 +335,7 @@ def _check_arguments(name: str, arguments: tuple[float, ...], found: list[Any]) 
             error(
                 "D225",
                 f"`{name}` goes from a lower to a higher value",
-                found[-1].place,
+                values[-1].place,
                 help="change the two about, or leave the parameter out where they are equal",
             )
         )
@@ -344,7 +344,7 @@ def _check_arguments(name: str, arguments: tuple[float, ...], found: list[Any]) 
             error(
                 "D225",
                 "the ends of a loguniform are both above or both below zero",
-                found[0].place,
+                values[0].place,
                 help="`uniform` has no such limit",
             )
         )

@@ -52,7 +52,7 @@ class Effects:
                 self.met.add(path)
 
     def examine(
-        self, scope: Scope, run: Definition, made: Experiment, memo: AnalysisMemo, sweep: Sequence[Entry] = ()
+        self, scope: Scope, run: Definition, built: Experiment, memo: AnalysisMemo, sweep: Sequence[Entry] = ()
     ) -> None:
         """Look for effects in a run that was resolved without a mistake. sweep: the block of its sweep"""
         if not self.waiting or scope.complaints.errors:
@@ -62,7 +62,7 @@ class Effects:
         for path, entry in tuple(self.waiting.items()):
             kind = destination(scope.definitions, entry)
             if path == SEED_PATH:
-                used = _has_noise(scope, made)
+                used = _has_noise(scope, built)
             elif kind == "number" and path not in scope.targets:
                 used = False
             elif kind != "run" and not _decides(kind, entry) and _is_number(scope, entry):
@@ -75,25 +75,29 @@ class Effects:
         for path in _used(scope, run, numbers, memo):
             del self.waiting[path]
 
-    def report(self, complaints: Complaints, asked: Sequence[str], *, idle: bool = True) -> None:
-        """Report all settings without an effect. asked: names of runs and sweeps; idle: also known paths without an
+    def report(self, complaints: Complaints, names: Sequence[str], *, idle: bool = True) -> None:
+        """Report all settings without an effect. names: names of runs and sweeps; idle: also known paths without an
         effect"""
-        shown = [f"`{name}`" for name in asked]
-        where = ", ".join(shown[:MOST_NAMED]) + (f" and {len(shown) - MOST_NAMED} more" * (len(shown) > MOST_NAMED))
+        quoted = [f"`{name}`" for name in names]
+        where = ", ".join(quoted[:MOST_NAMED]) + (f" and {len(quoted) - MOST_NAMED} more" * (len(quoted) > MOST_NAMED))
         for path, entry in self.waiting.items():
             if self.scopes:
                 self._report_one(complaints, path, entry, where, idle)
 
     def _report_one(self, complaints: Complaints, path: str, entry: Setting, where: str, idle: bool) -> None:
-        scope = next((each for each in self.scopes if path in each.known or path in each.not_sweepable), self.scopes[0])
+        scope = next(
+            (candidate for candidate in self.scopes if path in candidate.known or path in candidate.not_sweepable),
+            self.scopes[0],
+        )
         kind = destination(scope.definitions, entry)
         inside = sorted(known for known in scope.known if known.startswith(f"{path}."))
         if any(
-            (path in each.evaluated_settings and each.evaluated_settings[path] is None) or each.depends_on_failed(path)
-            for each in self.scopes
+            (path in other.evaluated_settings and other.evaluated_settings[path] is None)
+            or other.depends_on_failed(path)
+            for other in self.scopes
         ):
             return  # already reported
-        if kind in ("let", "servo") or path in self.met or any(path in each.targets for each in self.scopes):
+        if kind in ("let", "servo") or path in self.met or any(path in other.targets for other in self.scopes):
             if idle:
                 self._report_idle(complaints, scope, path, entry, where)
         elif path in (*BLOCKS, "record"):
@@ -130,17 +134,19 @@ class Effects:
         rest = ".".join(words)
         joints = list(
             dict.fromkeys(
-                known.split(".")[1] for each in self.scopes for known in each.known if known.startswith("initial.")
+                known.split(".")[1] for other in self.scopes for known in other.known if known.startswith("initial.")
             )
         )
         servo = scope.definitions.of_kind("servo").get(first)
         also: list[Label] = []
         if rest in ("bed", "law") and first in joints:
             helps: Sequence[str] = (f"its motor is on no bed there: `substitute {first} {{ }}` puts it on one",)
-        elif servo is not None and not any(path.startswith(f"{first}.") for each in self.scopes for path in each.known):
+        elif servo is not None and not any(
+            path.startswith(f"{first}.") for other in self.scopes for path in other.known
+        ):
             helps, also = ("no joint has this servo there",), [Label(servo.place, "defined here")]
         else:
-            known = [each for one in self.scopes for each in (*one.known, *one.not_sweepable)]
+            known = [known_path for other in self.scopes for known_path in (*other.known, *other.not_sweepable)]
             known += [*scope.definitions.lets, *OF_RUN, *(f"{joint}.servo" for joint in joints)]
             helps = (
                 scope.definitions.stays_away(path)
@@ -165,28 +171,28 @@ def _decides(kind: Destination, entry: Setting) -> bool:
 def _is_number(scope: Scope, entry: Setting) -> bool:
     """Return True if this setting is a number, the same in all cases."""
     try:
-        found = scope.names.evaluate(entry.value)
+        value = scope.names.evaluate(entry.value)
     except Problem:
         return False
-    return isinstance(found, Value) and not isinstance(found.number, Scalar)
+    return isinstance(value, Value) and not isinstance(value.number, Scalar)
 
 
 def _used(scope: Scope, run: Definition, settings: Mapping[str, Setting], memo: AnalysisMemo) -> list[str]:
     """The paths of these settings from which this run computes something."""
-    there = {
+    present = {
         path: entry
         for path, entry in settings.items()
         if path in scope.targets or destination(scope.definitions, entry) != "number"
     }
-    if not there:
+    if not present:
         return []
-    found = _idle(scope, run, there, memo)
-    if found is not None:
-        return [path for path in there if path not in found]
+    idle = _idle(scope, run, present, memo)
+    if idle is not None:
+        return [path for path in present if path not in idle]
     used = []
-    for path, entry in there.items():  # one that cannot be an input decides the program; the others need not
-        one = _idle(scope, run, {path: entry}, memo)
-        if one is None or path not in one:
+    for path, entry in present.items():  # one that cannot be an input decides the program; the others need not
+        alone = _idle(scope, run, {path: entry}, memo)
+        if alone is None or path not in alone:
             used.append(path)
     return used
 
@@ -195,30 +201,33 @@ def _idle(scope: Scope, run: Definition, settings: Mapping[str, Setting], memo: 
     """The paths of these settings on which no result depends, as inputs; None if one of them cannot be an input."""
     graph = Graph()
     varied = {
-        path: replace(each, value=replace(each.value, number=graph.input(path))) for path, each in scope.varied.items()
+        path: replace(varied_path, value=replace(varied_path.value, number=graph.input(path)))
+        for path, varied_path in scope.varied.items()
     }
     for path, entry in settings.items():
-        found = scope.names.evaluate(entry.value)
-        assert isinstance(found, Value)
-        number = np.array([float(found.number)])
-        varied[path] = VariedPath(path, entry.place, number, replace(found, number=graph.input(path)), None, 1.0)
+        value = scope.names.evaluate(entry.value)
+        assert isinstance(value, Value)
+        number = np.array([float(value.number)])
+        varied[path] = VariedPath(path, entry.place, number, replace(value, number=graph.input(path)), None, 1.0)
     others = {path: entry for path, entry in scope.settings.items() if path not in settings}
     trial = Scope(scope.definitions, Complaints(), varied, graph, settings=others)
     resolved = _resolved(trial, run)
     if resolved is None:
         return None
-    cases = Cases(1, tuple(Coordinate(path, "1", 1.0, each.values[:1], ()) for path, each in varied.items()))
-    made = experiment(trial, run.name, run.place, resolved, cases)
+    cases = Cases(
+        1, tuple(Coordinate(path, "1", 1.0, varied_path.values[:1], ()) for path, varied_path in varied.items())
+    )
+    built = experiment(trial, run.name, run.place, resolved, cases)
     zero = tuple(replace(coordinate, values=np.zeros(1)) for coordinate in cases.coordinates)
-    asked = replace(made, cases=replace(cases, coordinates=zero))  # the program's answer, independent of the values
-    return memo.answer("idle settings", asked, lambda: without_effect(made))
+    zeroed = replace(built, cases=replace(cases, coordinates=zero))  # the program's answer, independent of the values
+    return memo.answer("idle settings", zeroed, lambda: without_effect(built))
 
 
 def _resolved(trial: Scope, run: Definition) -> Resolved | None:
     """The run resolved, without any report."""
     with trial.complaints.gather():
-        found = resolve_run(trial, run)
-        return found if not trial.complaints.errors else None
+        resolved = resolve_run(trial, run)
+        return resolved if not trial.complaints.errors else None
     return None
 
 
@@ -234,11 +243,11 @@ def _is_looked_at(scope: Scope, run: Definition, entry: Setting) -> bool:
     return _resolved(trial, changed) is None
 
 
-def _has_noise(scope: Scope, made: Experiment) -> bool:
+def _has_noise(scope: Scope, built: Experiment) -> bool:
     """Return True if a seed has an effect: there is noise, or a value is drawn."""
     if any(varied.drawn for varied in scope.varied.values()):
         return True
-    return SEED not in without_effect(replace(made, cases=replace(made.cases, seeds="independent")))
+    return SEED not in without_effect(replace(built, cases=replace(built.cases, seeds="independent")))
 
 
 # What a sweep's block names
@@ -247,20 +256,20 @@ def _has_noise(scope: Scope, made: Experiment) -> bool:
 def _named(definitions: Definitions, entries: Sequence[Entry]) -> set[str]:
     """Paths that a sweep's block names in its lists and conditions, including those in the values of names."""
     waiting = list(_expressions(entries))
-    found: set[str] = set()
+    paths: set[str] = set()
     while waiting:
         expression = waiting.pop()
         waiting += children(expression)
         if isinstance(expression, Call) and expression.body is not None:
             waiting += _expressions(expression.body)
-        if isinstance(expression, Name) and definitions.in_full(expression).text not in found:
+        if isinstance(expression, Name) and definitions.in_full(expression).text not in paths:
             name = definitions.in_full(expression)
-            found.add(name.text)
+            paths.add(name.text)
             let = None if name.roof else definitions.lets.get(name.path[0].text)
             if let is not None and (len(name.path) == 1 or is_row_table(let.value)):
-                found.add(let.name.text)
+                paths.add(let.name.text)
                 waiting.append(let.value)
-    return found
+    return paths
 
 
 def _expressions(entries: Sequence[Entry]) -> Iterable[Expression]:

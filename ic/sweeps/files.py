@@ -22,7 +22,7 @@ def columns_of(
 ) -> tuple[list[VariedPath | ChoiceColumn], list[Place]]:
     """The columns of the file, in its order, and the places of its rows. Raises Problem, placed in the file."""
     table = definitions.csv_files.get(named)
-    made: list[VariedPath | ChoiceColumn] = []
+    columns: list[VariedPath | ChoiceColumn] = []
     for column in table.columns:
         if not _PATH.fullmatch(column.name):
             raise Problem(
@@ -36,14 +36,14 @@ def columns_of(
         words = table.words(column)
         if words is not None:
             options = [Option(text, Name((Word(text, place),), place), place) for text, place in words]
-            made.append(ChoiceColumn(column.name, column.place, tuple(options)))
+            columns.append(ChoiceColumn(column.name, column.place, tuple(options)))
             continue
         numbers, measure = table.quantities(column)
         unit = Unit((), column.place, column.unit) if column.unit is not None else None
         value = Value(
             graph.input(column.name), measure.dimension, column.place, column.unit is None, hertz=measure.hertz
         )
-        made.append(VariedPath(column.name, column.place, np.array(numbers), value, unit, measure.scale))
+        columns.append(VariedPath(column.name, column.place, np.array(numbers), value, unit, measure.scale))
     if not table.rows:
         raise Problem(
             error(
@@ -53,4 +53,4 @@ def columns_of(
                 help="write a row of values for each case",
             )
         )
-    return made, [Place(table.file, line, 1, max(len(row), 1)) for line, row in table.rows]
+    return columns, [Place(table.file, line, 1, max(len(row), 1)) for line, row in table.rows]

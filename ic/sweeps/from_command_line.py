@@ -13,20 +13,20 @@ from met.settings import varied_name
 
 
 def command_line_sweep(
-    definitions: Definitions, asked: Sequence[Definition], entries: tuple[Setting, ...]
+    definitions: Definitions, requested: Sequence[Definition], entries: tuple[Setting, ...]
 ) -> Definition:
     """The sweep of the requested run over these entries, `vary PATH = VALUES`. Raises Problem D288."""
     place = entries[0].place
     runs = list(definitions.of_kind("run"))
-    if len(asked) != 1:
-        message = f"`--vary` varies one run, and {len(asked)} are asked for"
-        also = [Label(each.place, f"`{each.name}`") for each in asked]
+    if len(requested) != 1:
+        message = f"`--vary` varies one run, and {len(requested)} are asked for"
+        also = [Label(definition.place, f"`{definition.name}`") for definition in requested]
         raise Problem(error("D288", message, place, also=also, help=known_words("name one", runs)))
-    (run,) = asked
+    (run,) = requested
     if run.kind != "run":
         message = f"`--vary` varies a run, and `{run.name}` is {with_article(run.kind)}"
-        of = run.group.of.text if run.group.of is not None else None
-        helps = [write(of, f"name the run that it is of: `{of}`", old=run.name)] if of in runs else []
+        base = run.group.of.text if run.group.of is not None else None
+        helps = [write(base, f"name the run that it is of: `{base}`", old=run.name)] if base in runs else []
         also = [Label(run.place, "defined here")]
         raise Problem(error("D288", message, place, also=also, help=helps or known_words("name a run", runs)))
     taken = [name for kind in EXPERIMENTS for name in definitions.of_kind(kind)]

@@ -25,7 +25,7 @@ from ic.sweeps.overridden import check_overridden
 from ic.sweeps.reach import check_coordinates, check_effects, plan_coordinates
 from ic.sweeps.searches import check_goal, each_case, read_search, with_corners
 from ic.sweeps.settings import Settings
-from ic.sweeps.table import columns, kept, repeats, structures
+from ic.sweeps.table import columns, kept_rows, repeats, structures
 from ic.text.complaints import PROVISIONAL, Complaints, known_words
 from met.analysis.memo import AnalysisMemo
 from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error, leave_out, write
@@ -87,20 +87,20 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
                 own.complete = False
                 own.report(source.complaints, [run.name])
                 return []
-            made = experiment(scope, run.name, run.place, resolved, Cases(1, (), resolved.seed), allowances)
+            built = experiment(scope, run.name, run.place, resolved, Cases(1, (), resolved.seed), allowances)
             if not source.audited:
                 own.report(source.complaints, [run.name], idle=False)
                 check_overridden(scope, run, made_here)
                 source.complaints.settle(PROVISIONAL)
-                return [(made, scope)]
-            source.effects.examine(scope, run, made, source.memo)
-            own.examine(scope, run, made, source.memo)
+                return [(built, scope)]
+            source.effects.examine(scope, run, built, source.memo)
+            own.examine(scope, run, built, source.memo)
             own.report(source.complaints, [run.name])
             check_overridden(scope, run, made_here)
             if not source.complaints.errors:
-                made = check_program(scope, made, source.memo)
+                built = check_program(scope, built, source.memo)
             source.complaints.settle()
-            return [(made, scope)]
+            return [(built, scope)]
     if definition.parts:
         return _sum(source, definition, ())
     base = source.definitions.of_kind("run").get(definition.group.of.text if definition.group.of is not None else "")
@@ -145,19 +145,19 @@ class _Sweep:
         if self.complaints.error_count > before:
             return []
         self.own = Effects(made_here)
-        found = structures(sweep)
-        made: list[tuple[ScopedExperiment, SweptRows]] = []
+        by_choice = structures(sweep)
+        groups: list[tuple[ScopedExperiment, SweptRows]] = []
         dropped: dict[Place, int] = {}  # by each `exclude when`, of which a macro may bring other ones
-        for choices, rows in found:
+        for choices, rows in by_choice:
             faults = self.complaints.error_count
             noted = len(self.complaints.all)
             with self.complaints.gather():
-                one = self._group(sweep, choices, rows)
-                if one is not None:
-                    for place, count in one[1]:
+                outcome = self._group(sweep, choices, rows)
+                if outcome is not None:
+                    for place, count in outcome[1]:
                         dropped[place] = dropped.get(place, 0) + count
-                    if one[0] is not None:
-                        made.append(one[0])
+                    if outcome[0] is not None:
+                        groups.append(outcome[0])
             if self.complaints.error_count > faults:
                 self.complaints.mark(
                     noted,
@@ -165,11 +165,11 @@ class _Sweep:
                 )
                 return []
         self.own.report(self.complaints, [read.base.name], idle=False)
-        self._report_exclusions(dropped, bool(made))
-        if not made:
+        self._report_exclusions(dropped, bool(groups))
+        if not groups:
             return []
-        self._report_idle_choices(sweep, [group for group, _ in made])
-        return _numbered(sweep.name, made)
+        self._report_idle_choices(sweep, [group for group, _ in groups])
+        return _numbered(sweep.name, groups)
 
     def _report_the_rest(self, read: _Read) -> None:
         """Report mistakes in the run, and in entries of the sweep that do not depend on one that could not be read."""
@@ -177,7 +177,7 @@ class _Sweep:
         if self.source.settings != Settings():  # of which one may set what varies, already reported
             resolve_run(Scope(read.definitions, self.complaints), read.base)
             return
-        varied = {each.path: each for each in sweep.varied}
+        varied = {varied_path.path: varied_path for varied_path in sweep.varied}
         scope = Scope(read.definitions, self.complaints, varied, read.graph)
         resolved = resolve_run(scope, read.base)
         check_coordinates(scope, complete=resolved is not None)
@@ -185,7 +185,7 @@ class _Sweep:
         excludes = [exclude for exclude in sweep.excludes if not names_in(exclude.value) & lost]
         if resolved is not None and excludes and not self.complaints.is_known_to_lack(read.base.place):
             first = SweptRows(sweep.sizes, tuple(np.zeros(1, np.int64) for _ in sweep.sizes))
-            kept(scope, replace(sweep, excludes=tuple(excludes)), first, (), resolved.structure)
+            kept_rows(scope, replace(sweep, excludes=tuple(excludes)), first, (), resolved.structure)
 
     def _read(self, definitions: Definitions, definition: Definition) -> _Read:
         settings = self.source.settings
@@ -221,11 +221,11 @@ class _Sweep:
         allowances: tuple[Allowance, ...],
     ) -> tuple[tuple[ScopedExperiment, SweptRows] | None, list[tuple[Place, int]]] | None:
         """The cases of one structure, from the definitions and choices made for it."""
-        there = read.sweep
+        swept = read.sweep
         scope = Scope(
             definitions,
             self.complaints,
-            {varied.path: varied for varied in there.varied},
+            {varied.path: varied for varied in swept.varied},
             read.graph,
             settings=self.source.settings.numbers(definitions, run),
         )
@@ -236,46 +236,46 @@ class _Sweep:
         if resolved is None:
             self.complaints.settle()
             return None
-        rows, counts = kept(scope, there, rows, choices, resolved.structure)
-        dropped = [(statement.place, count) for statement, count in zip(there.excludes, counts, strict=True)]
+        rows, counts = kept_rows(scope, swept, rows, choices, resolved.structure)
+        dropped = [(statement.place, count) for statement, count in zip(swept.excludes, counts, strict=True)]
         count = rows.count
         if not count:
             return None, dropped
-        values = columns(there, rows)
-        if there.search is None:
+        values = columns(swept, rows)
+        if swept.search is None:
             scope.checks.run(values, count)
         else:
-            scope.checks.run(*with_corners(there.search, values), listed=count)
+            scope.checks.run(*with_corners(swept.search, values), listed=count)
             check_goal(
-                self.complaints, there.name, there.search, (*resolved.structure.metrics, *resolved.linear_metrics)
+                self.complaints, swept.name, swept.search, (*resolved.structure.metrics, *resolved.linear_metrics)
             )
         cases = Cases(
             count,
-            plan_coordinates(scope, there, values, _dependents(scope)),
-            resolved.seed if there.seed is None else there.seed,
-            "independent" if there.independent is not None else "common",
+            plan_coordinates(scope, swept, values, _dependents(scope)),
+            resolved.seed if swept.seed is None else swept.seed,
+            "independent" if swept.independent is not None else "common",
             tuple(Choice(column.path, option.text, option.place) for column, option in choices),
-            repeats(there, rows),
-            until_shown=0 if there.early_axis is None else there.early_axis.size,
+            repeats(swept, rows),
+            until_shown=0 if swept.early_axis is None else swept.early_axis.size,
         )
-        made = experiment(scope, there.name, there.place, resolved, cases, allowances)
-        made = replace(made, notes=(*(axis.note for axis in there.axes if axis.note), *made.notes))
-        if there.search is not None:
-            requirements, notes = each_case(made.requirements)
-            made = replace(made, search=there.search, requirements=requirements, notes=(*made.notes, *notes))
+        built = experiment(scope, swept.name, swept.place, resolved, cases, allowances)
+        built = replace(built, notes=(*(axis.note for axis in swept.axes if axis.note), *built.notes))
+        if swept.search is not None:
+            requirements, notes = each_case(built.requirements)
+            built = replace(built, search=swept.search, requirements=requirements, notes=(*built.notes, *notes))
         if not self.source.audited:
             self.complaints.settle(PROVISIONAL)
             check_overridden(scope, run, self.source.settings.of_run(read.definitions, read.base))
-            return ((made, scope), rows), dropped
+            return ((built, scope), rows), dropped
         if not self.complaints.errors:
-            check_effects(self.complaints, there, made, self.source.memo)
-            made = replace(made, notes=(*made.notes, *check_confidences(self.complaints, there, made)))
-            made = check_program(scope, made, self.source.memo)
+            check_effects(self.complaints, swept, built, self.source.memo)
+            built = replace(built, notes=(*built.notes, *check_confidences(self.complaints, swept, built)))
+            built = check_program(scope, built, self.source.memo)
         self.complaints.settle()
-        self.source.effects.examine(scope, run, made, self.source.memo, self.definition.group.body)
-        self.own.examine(scope, run, made, self.source.memo, self.definition.group.body)
+        self.source.effects.examine(scope, run, built, self.source.memo, self.definition.group.body)
+        self.own.examine(scope, run, built, self.source.memo, self.definition.group.body)
         check_overridden(scope, run, self.source.settings.of_run(read.definitions, read.base))
-        return ((made, scope), rows), dropped
+        return ((built, scope), rows), dropped
 
     def _with_macros(self, sweep: Sweep, choices: Choices) -> _Read:
         """The deck read with the chosen macros."""
@@ -323,13 +323,14 @@ class _Sweep:
         """Report a choice whose options all make the same program with the same numbers."""
         for column in sweep.chosen:
             same: dict[tuple[str, ...], list[str]] = {}
-            for made, _ in groups:
-                others = tuple(choice.value for choice in made.cases.choices if choice.path != column.path)
-                bare = replace(made.cases, choices=(), coordinates=(), repeats=None, count=1)
+            for group, _ in groups:
+                others = tuple(choice.value for choice in group.cases.choices if choice.path != column.path)
+                bare = replace(group.cases, choices=(), coordinates=(), repeats=None, count=1)
                 same.setdefault(others, []).append(
-                    keys.structure_key(made.structure, keys.inputs(made)) + keys.case_ids(replace(made, cases=bare))[0]
+                    keys.structure_key(group.structure, keys.inputs(group))
+                    + keys.case_ids(replace(group, cases=bare))[0]
                 )
-            if all(len(found) > 1 and len(set(found)) == 1 for found in same.values()):
+            if all(len(program_keys) > 1 and len(set(program_keys)) == 1 for program_keys in same.values()):
                 remedy = leave_out("with each of its values the run is the same: leave it out")
                 if column.macro:
                     remedy = Help(
@@ -347,18 +348,18 @@ def _what_varies(sweep: Sweep) -> list[list[list[str]]]:
 
 
 def _base(definitions: Definitions, definition: Definition, complaints: Complaints) -> Definition:
-    of = definition.group.of
-    assert of is not None  # a sweep without one is not a definition
-    if len(of.path) > 1:
+    base = definition.group.of
+    assert base is not None  # a sweep without one is not a definition
+    if len(base.path) > 1:
         raise Problem(
             error(
                 "D059",
-                f"`{of.text}` is a path; the name of a run is needed",
-                of.place,
-                help=write(of.path[0].text, old=of.text),
+                f"`{base.text}` is a path; the name of a run is needed",
+                base.place,
+                help=write(base.path[0].text, old=base.text),
             )
         )
-    return definitions.find_or_meant("run", Word(of.text, of.place), complaints)
+    return definitions.find_or_meant("run", Word(base.text, base.place), complaints)
 
 
 def _seed_of(definitions: Definitions, run: Definition) -> int:
@@ -373,33 +374,33 @@ def _seed_of(definitions: Definitions, run: Definition) -> int:
 
 def names_in(expression: Expression) -> set[str]:
     """The paths that a condition names."""
-    waiting, found = [expression], set()
+    waiting, names = [expression], set()
     while waiting:
         part = waiting.pop()
         waiting += children(part)
         if isinstance(part, Name):
-            found.add(part.text)
-    return found
+            names.add(part.text)
+    return names
 
 
 def _dependents(scope: Scope) -> dict[str, list[str]]:
     """Parameters whose formulas need each coordinate."""
-    found: dict[str, list[str]] = {path: [] for path in scope.varied}
+    dependents: dict[str, list[str]] = {path: [] for path in scope.varied}
     for path, settled in scope.parameters.items():
         if isinstance(settled.value, Scalar):
             for name in Formulas.of(scope.graph, [settled.value]).inputs:
-                found[name].append(path)
-    return found
+                dependents[name].append(path)
+    return dependents
 
 
-def _numbered(name: str, made: Sequence[tuple[ScopedExperiment, SweptRows]]) -> list[ScopedExperiment]:
+def _numbered(name: str, groups: Sequence[tuple[ScopedExperiment, SweptRows]]) -> list[ScopedExperiment]:
     """The groups with their names, and the positions of their cases in the sweep's table."""
-    if len(made) == 1:
-        return [made[0][0]]
-    among = _all_of([rows for _, rows in made])
-    slugs = _slugs([group for (group, _), _ in made])
+    if len(groups) == 1:
+        return [groups[0][0]]
+    among = _all_of([rows for _, rows in groups])
+    slugs = _slugs([group for (group, _), _ in groups])
     out = []
-    for ((group, scope), rows), slug in zip(made, slugs, strict=True):
+    for ((group, scope), rows), slug in zip(groups, slugs, strict=True):
         positions = listed(PositionColumn(rows, among))
         out.append(
             (replace(group, name=f"{name}.{slug}", sweep=name, cases=replace(group.cases, positions=positions)), scope)
@@ -425,9 +426,9 @@ def _slugs(groups: Sequence[Experiment]) -> list[str]:
     rows = [[choice.value for choice in group.cases.choices] for group in groups]
     differ = [n for n, column in enumerate(zip(*rows, strict=True)) if len(set(column)) > 1]
     heads = [[value.partition(" {")[0] for value in row] for row in rows]  # of a model, without its parameters
-    made = ["-".join(re.sub(r"[^\w+-]+", "_", row[n]).strip("_") or "_" for n in differ) for row in heads]
-    repeated = {slug for slug in made if made.count(slug) > 1}
-    return [f"{slug}-{n}" if slug in repeated else slug for n, slug in enumerate(made, start=1)]
+    slugs = ["-".join(re.sub(r"[^\w+-]+", "_", row[n]).strip("_") or "_" for n in differ) for row in heads]
+    repeated = {slug for slug in slugs if slugs.count(slug) > 1}
+    return [f"{slug}-{n}" if slug in repeated else slug for n, slug in enumerate(slugs, start=1)]
 
 
 # Sums
@@ -460,31 +461,33 @@ def _sum(source: DeckSource, definition: Definition, within: tuple[str, ...]) ->
             raise Problem(
                 error("D043", f"sweep `{definition.name}` is made of itself", named.place, help="leave it out")
             )
-        found = _sum(source, part, (*within, definition.name)) if part.parts else experiments_of(source, part)
-        if not found:
+        groups = _sum(source, part, (*within, definition.name)) if part.parts else experiments_of(source, part)
+        if not groups:
             return []
-        parts.append((named, found))
-    made: list[ScopedExperiment] = []
+        parts.append((named, groups))
+    summed: list[ScopedExperiment] = []
     seen: dict[str, list[tuple[np.ndarray, str]]] = {}  # by program, the ids of groups and the parts they are of
     first = 0
     names = [name.text for name in definition.parts]
     if len(set(names)) < len(names):
         twice = next(name for n, name in enumerate(definition.parts) if name.text in names[:n])
         raise Problem(error("D040", f"`{twice.text}` is in this sweep twice", twice.place, help="leave one out"))
-    for named, found in parts:
-        size = sum(group.cases.count for group, _ in found)
-        for group, scope in found:
+    for named, groups in parts:
+        size = sum(group.cases.count for group, _ in groups)
+        for group, scope in groups:
             program = keys.structure_key(group.structure)
             ids, before = keys.id_numbers(group), seen.setdefault(program, [])
             again = np.flatnonzero(
-                np.any([np.zeros(len(ids), bool), *(np.isin(ids, each) for each, _ in before)], axis=0)
+                np.any([np.zeros(len(ids), bool), *(np.isin(ids, earlier_ids) for earlier_ids, _ in before)], axis=0)
             )
             if len(again) and not source.complaints.errors:  # faulty parts may be equal until they are corrected
-                there = next(part for each, part in reversed(before) if ids[again[0]] in each)
+                earlier_part = next(part for earlier_ids, part in reversed(before) if ids[again[0]] in earlier_ids)
                 position = int(group.cases.table[again[0]])
-                message = f"case #{position} of `{named.text}` is in `{there}` too"
+                message = f"case #{position} of `{named.text}` is in `{earlier_part}` too"
                 if len(again) > 1:
-                    message = f"{len(again)} cases of `{named.text}` are in `{there}` too, the first is #{position}"
+                    message = (
+                        f"{len(again)} cases of `{named.text}` are in `{earlier_part}` too, the first is #{position}"
+                    )
                 them = "it" if len(again) == 1 else "them"
                 raise Problem(
                     error(
@@ -500,7 +503,7 @@ def _sum(source: DeckSource, definition: Definition, within: tuple[str, ...]) ->
                 )
             before.append((ids, named.text))
             positions = listed(ShiftedColumn(group.cases.table, first))
-            made.append(
+            summed.append(
                 (
                     replace(
                         group,
@@ -512,4 +515,4 @@ def _sum(source: DeckSource, definition: Definition, within: tuple[str, ...]) ->
                 )
             )
         first += size
-    return made
+    return summed

@@ -27,13 +27,15 @@ def check_overridden(scope: Scope, run: Definition, made_here: Settings) -> None
     bodies = [run.group.body, *bases]
     settled = [*scope.parameters.values(), *scope.auxiliary.values()]
     for entry in made_here.entries:
-        home = next((at for at, body in enumerate(bodies) if any(each.place == entry.place for each in body)), 0)
+        home = next(
+            (index for index, body in enumerate(bodies) if any(other.place == entry.place for other in body)), 0
+        )
         value = place_of(entry.value)
-        replaced = {place for each in settled if each.origin.place == value for place in each.origin.overrides}
+        replaced = {place for setting in settled if setting.origin.place == value for place in setting.origin.overrides}
         block = scope.definitions.block(run)
         replaced.update(_replaced_by(entry.place, block) if block is not None else ())
-        replaced -= {each.origin.place for each in settled if each.origin.place is not None}
-        for at, body in enumerate(bodies[: home + 1]):
+        replaced -= {setting.origin.place for setting in settled if setting.origin.place is not None}
+        for index, body in enumerate(bodies[: home + 1]):
             for place in replaced.intersection(_places(body)):
                 path = path_of(entry)
                 scope.complaints.error(
@@ -42,7 +44,7 @@ def check_overridden(scope: Scope, run: Definition, made_here: Settings) -> None
                     place,
                     also=[Label(entry.place, "set here")],
                     help="leave one of the two out"
-                    if at == home
+                    if index == home
                     else f"write `with {path} = ...;` here, or leave it out",
                 )
 

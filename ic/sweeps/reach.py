@@ -96,8 +96,8 @@ def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
 
 def no_scale(path: str) -> list[str]:
     """The remedy for a missing scale of a bed."""
-    joint, found, _ = path.partition(".bed.scale.")
-    return [f"its bed has no scale: `scale {{ }}` in `substitute {joint}` gives it one"] if found else []
+    joint, separator, _ = path.partition(".bed.scale.")
+    return [f"its bed has no scale: `scale {{ }}` in `substitute {joint}` gives it one"] if separator else []
 
 
 def first_words(scope: Scope) -> list[str]:
@@ -107,8 +107,8 @@ def first_words(scope: Scope) -> list[str]:
 
 def paths_ending_in(scope: Scope, path: str) -> list[str]:
     """The remedy that lists parameters with this last word: `kp` where `motor.kp` was meant."""
-    found = [known for known in scope.known if known.endswith(f".{path}")]
-    return [known_words(f"there is `{path}` of", (known.removesuffix(f".{path}") for known in found))] if found else []
+    paths = [known for known in scope.known if known.endswith(f".{path}")]
+    return [known_words(f"there is `{path}` of", (known.removesuffix(f".{path}") for known in paths))] if paths else []
 
 
 def parameters_nearby(scope: Scope, path: str) -> list[str]:
@@ -129,11 +129,11 @@ def plan_coordinates(
     dependents: dict[str, list[str]],
 ) -> tuple[Coordinate, ...]:
     """The coordinates in a plan's form. dependents: parameters whose formulas need each coordinate"""
-    made, designs = [], sweep.designs
+    coordinates, designs = [], sweep.designs
     for varied in sweep.varied:
         direct = [path for path in scope.targets.get(varied.path, ()) if path in scope.parameters]
         unit = varied.unit.text if varied.unit is not None else units.text(varied.value.dimension)
-        made.append(
+        coordinates.append(
             Coordinate(
                 varied.path,
                 unit,
@@ -144,7 +144,7 @@ def plan_coordinates(
                 designs.get(varied.path, ""),
             )
         )
-    return tuple(made)
+    return tuple(coordinates)
 
 
 def without_effect(experiment: Experiment, memo: AnalysisMemo | None = None) -> tuple[str, ...]:

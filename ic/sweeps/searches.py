@@ -92,7 +92,7 @@ def read_search(
             fresh = _fresh(against, others, confirm)
     if complaints.error_count > before or (name is not None and against is None):
         return empty
-    chosen = [each for each in reader.chosen if each.parameter.path not in fixed]
+    chosen = [choice for choice in reader.chosen if choice.parameter.path not in fixed]
     if not chosen:
         message = f"all that `{definition.name}` chooses is set, so nothing is left to choose"
         complaints.error("D361", message, definition.place, help="leave one of them out of `--set`")
@@ -102,7 +102,7 @@ def read_search(
         kind="tune" if definition.kind == "tune" else "search",
         metric=reader.metric,
         largest=reader.largest,
-        parameters=tuple(each.parameter for each in chosen),
+        parameters=tuple(choice.parameter for choice in chosen),
         at_most=reader.at_most,
         of=definition.group.of.text if definition.group.of is not None else "",
         seed=reader.seed,
@@ -119,24 +119,24 @@ def read_search(
     )
     least = len(plants) + len(fresh) + SHORTEST
     if search.kind == "tune" and search.at_most < least:
-        of = f"{len(plants)} to try the best with each case of `{search.against}`, and " if plants else ""
-        of = f"{len(fresh)} to confirm it, {of}" if fresh else of
+        uses = f"{len(plants)} to try the best with each case of `{search.against}`, and " if plants else ""
+        uses = f"{len(fresh)} to confirm it, {uses}" if fresh else uses
         complaints.error(
             "D363",
             f"{search.at_most} cases are too few to tune anything",
             reader.at_most_place,
-            help=f"{least} at least: {of}{SHORTEST} to choose among; a thousand are no luxury",
+            help=f"{least} at least: {uses}{SHORTEST} to choose among; a thousand are no luxury",
         )
         return empty
     from met.searches import search_method
 
     rows = search_method(search).ask()
     columns = []
-    for number, each in enumerate(chosen):
-        unit = unit_of_plan(each.with_unit.unit if each.with_unit is not None else each.low.unit)
-        if unit is not None and measure_of(unit).dimension != each.low.dimension:
+    for number, choice in enumerate(chosen):
+        unit = unit_of_plan(choice.with_unit.unit if choice.with_unit is not None else choice.low.unit)
+        if unit is not None and measure_of(unit).dimension != choice.low.dimension:
             unit = None
-        columns.append(varied_path(graph, each.parameter.path, each.place, rows[:, number], each.low, unit))
+        columns.append(varied_path(graph, choice.parameter.path, choice.place, rows[:, number], choice.low, unit))
     for number, column in enumerate(against.varied if against is not None else (), start=len(chosen)):
         columns.append(VariedPath(column.path, column.place, rows[:, number], column.value, column.unit, column.scale))
     axis = SweepAxis(tuple(columns))
@@ -186,7 +186,7 @@ class _SearchReader:
                 self.gradients = SWITCHED[word]
             case Setting() if words == [CHOOSE] * self.tunes:
                 self._choose(entry)
-            case Statement() if words in ([each] for each in GOALS):
+            case Statement() if words in ([goal] for goal in GOALS):
                 self._goal(entry, words[0])
             case Statement() if words in ([AGAINST], [CONFIRM]) and self.tunes:
                 [word] = words
@@ -234,29 +234,29 @@ class _SearchReader:
         if key == "seed":
             self.seed = whole_number(self.definitions, entry.value, "a seed", least=0)
             return
-        found = evaluate_number(entry.value, Names(self.definitions, {}).find)
-        number = found.number
-        plain = not isinstance(number, Scalar) and found.dimension == PURE
+        value = evaluate_number(entry.value, Names(self.definitions, {}).find)
+        number = value.number
+        plain = not isinstance(number, Scalar) and value.dimension == PURE
         if key == "margin":
             if not plain or not 0.0 <= float(number) < 1.0:
                 message = "a margin is a share of a limit, from 0 % to less than 100 %"
-                raise Problem(error("D363", message, found.place, help="write `margin = 5 %;`"))
+                raise Problem(error("D363", message, value.place, help="write `margin = 5 %;`"))
             self.margin = float(number)
             return
         if key == "least_margin":
             if not plain or not 0.0 <= float(number) < 2.0:
                 message = "a least margin is a disk margin, from 0 to less than 2"
                 helps = ["write `least_margin = 0.5;`: 0.3 is a gain of 1.35 times, 0.67 of 2 times", "0 asks for none"]
-                raise Problem(error("D363", message, found.place, help=helps))
+                raise Problem(error("D363", message, value.place, help=helps))
             self.least_margin = float(number)
             return
         if not plain or not float(number).is_integer() or not 1 <= float(number) <= MOST_SEARCHED:
             message = f"`at_most` is a whole number of cases from 1 to {MOST_SEARCHED:,}"
-            raise Problem(error("D363", message, found.place, help="write `at_most = 2000;`"))
-        self.at_most, self.at_most_place = int(number), found.place
+            raise Problem(error("D363", message, value.place, help="write `at_most = 2000;`"))
+        self.at_most, self.at_most_place = int(number), value.place
 
     def _goal(self, entry: Statement, word: str) -> None:
-        other = next((each for each in GOALS if each in self.written), None)
+        other = next((goal for goal in GOALS if goal in self.written), None)
         if other is not None:
             helps = ["leave one out", "what else matters is required in the run: `require METRIC < LIMIT;`"]
             raise Problem(
@@ -298,7 +298,7 @@ class _SearchReader:
             message = f"`{path}` decides the program, so that nothing chooses it between two ends"
             remedy = f"write a {self.definition.kind} for each, of runs that differ in it"
             raise Problem(error("D361", message, path_place(entry), help=remedy))
-        low, high = (evaluate_number(in_unit(each, unit), names.find) for each in call.positional)
+        low, high = (evaluate_number(in_unit(argument, unit), names.find) for argument in call.positional)
         check_constant(path, entry, names, self._paths)
         if not units.same(high.dimension, low.dimension):
             message = f"`{name}` of {units.text(low.dimension)} and {units.text(high.dimension)}"
@@ -314,8 +314,8 @@ class _SearchReader:
         if not np.isfinite(ends[1] - ends[0]):
             message = f"the ends of this `{name}` are too far apart: their difference is no number"
             raise Problem(error("D361", message, high.place, help="take ends that a machine could have"))
-        shown = unit_of_plan(unit or low.unit or high.unit)
-        text = shown.text if shown is not None and measure_of(shown).dimension == low.dimension else ""
+        unit_shown = unit_of_plan(unit or low.unit or high.unit)
+        text = unit_shown.text if unit_shown is not None and measure_of(unit_shown).dimension == low.dimension else ""
         parameter = SearchedParameter(path, *ends, RANGES[name], text)
         return _Chosen(parameter, path_place(entry), low, entry.value if isinstance(entry.value, WithUnit) else None)
 
@@ -323,7 +323,7 @@ class _SearchReader:
         place: Place = entry.place  # type: ignore[attr-defined]  # every entry has one
         kind, base = self.definition.kind, self.definition.group.of
         block = BLOCKS[kind]
-        known = [*(each.name for each in block.entries), *([] if self.tunes else ["PATH = between(LOW, HIGH)"])]
+        known = [*(declared.name for declared in block.entries), *([] if self.tunes else ["PATH = between(LOW, HIGH)"])]
         if isinstance(entry, Setting):
             path, value = _path(entry), entry.value
             call = value.inner if isinstance(value, WithUnit) else value
@@ -371,16 +371,16 @@ def _against(
     if name.text not in known:
         helps = [*did_you_mean(name.text, known), known_words("sweeps of this deck", known)]
         raise Problem(error("D041", f"no sweep `{name.text}`", place, help=helps))
-    found = known[name.text]
-    run, own = found.group.of, reader.definition.group.of
-    also = [Label(found.place, "written here")]
-    if found.parts or run is None or own is None or run.text != own.text:
-        of = "is made of others" if found.parts or run is None else f"is of `{run.text}`"
+    definition = known[name.text]
+    run, own = definition.group.of, reader.definition.group.of
+    also = [Label(definition.place, "written here")]
+    if definition.parts or run is None or own is None or run.text != own.text:
+        origin = "is made of others" if definition.parts or run is None else f"is of `{run.text}`"
         remedy = f"write a sweep of `{own.text if own is not None else 'RUN'}` with the cases that it must bear"
-        raise Problem(error("D364", f"sweep `{name.text}` {of}, and not of the run that is tuned", place, also=also,
+        raise Problem(error("D364", f"sweep `{name.text}` {origin}, and not of the run that is tuned", place, also=also,
                             help=remedy))  # fmt: skip
     before = complaints.error_count
-    sweep = read_sweep(definitions, complaints, found, graph, seed=seed)
+    sweep = read_sweep(definitions, complaints, definition, graph, seed=seed)
     if complaints.error_count > before or not (sweep.axes or sweep.repeated):  # that it varies nothing is reported
         return None
     cannot = [
@@ -389,13 +389,13 @@ def _against(
         *([(sweep.repeated, "it repeats cases")] if sweep.repeated is not None else []),
         *([(sweep.independent, "each of its cases has noise of its own")] if sweep.independent is not None else []),
         *([(axis.until_shown, "it runs cases until something is shown") for axis in sweep.axes if axis.until_shown]),
-        *([(found.place, "it has a seed of its own")] if sweep.seed is not None and not _draws(sweep) else []),
+        *([(definition.place, "it has a seed of its own")] if sweep.seed is not None and not _draws(sweep) else []),
     ]
     for where, why in cannot[:1]:
         remedy = "a tuning is held against a list, a product or a sample of numbers: write such a sweep for it"
         raise Problem(error("D364", f"nothing is tuned against sweep `{name.text}`: {why}", place,
                             also=[Label(where, "here")], help=remedy))  # fmt: skip
-    places = {each.parameter.path: each.place for each in reader.chosen}
+    places = {choice.parameter.path: choice.place for choice in reader.chosen}
     for column in sweep.varied:
         if column.path in places:
             message = f"`{column.path}` is chosen, and varies in `{name.text}`"
@@ -428,7 +428,7 @@ def _fresh(against: Sweep | None, drawn: Sweep | None, name: Name) -> tuple[tupl
         held = f"write a sample of {', '.join(f'`{path}`' for path in wanted)}" if wanted else "write `against SWEEP;`"
         raise Problem(error("D364", message, name.place, help=held))
     order = [paths.index(path) for path in wanted]
-    rows = tuple(tuple(row[at] for at in order) for row in _plants(drawn))
+    rows = tuple(tuple(row[column] for column in order) for row in _plants(drawn))
     if not _draws(drawn):
         message = f"nothing is drawn in `{name.text}`, so that it confirms nothing"
         raise Problem(error("D364", message, name.place, help=["write a sample in it", own]))

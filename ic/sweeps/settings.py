@@ -61,19 +61,19 @@ class Settings:
         for entry in self.for_destination(definitions, "servo"):
             name, *keys = (word.text for word in entry.path)
             servo = servos.get(name) or definitions.of_kind("servo")[name]
-            made = nested_entry(in_servo(keys, definitions.block(servo)), entry.value, entry.place)
-            servos[name] = replace(servo, extra_entries=(*servo.extra_entries, made))
+            nested = nested_entry(in_servo(keys, definitions.block(servo)), entry.value, entry.place)
+            servos[name] = replace(servo, extra_entries=(*servo.extra_entries, nested))
         return definitions.replacing(*servos.values(), lets=lets)
 
     def of_run(self, definitions: Definitions, run: Definition) -> Settings:
         """The settings that the run makes itself, or inherits, without those made here."""
-        here = {path_of(entry) for entry in self.entries}
-        return Settings(tuple(entry for entry in _made_by(definitions, run) if path_of(entry) not in here))
+        own_paths = {path_of(entry) for entry in self.entries}
+        return Settings(tuple(entry for entry in _made_by(definitions, run) if path_of(entry) not in own_paths))
 
     def _over_those_of(self, definitions: Definitions, run: Definition) -> Settings:
         """The settings made here, each with the places of those of the run that it replaces."""
-        made = {path_of(entry): entry for entry in _made_by(definitions, run)}
-        over = {path: (entry.place, *entry.overrides) for path, entry in made.items()}
+        replaced = {path_of(entry): entry for entry in _made_by(definitions, run)}
+        over = {path: (entry.place, *entry.overrides) for path, entry in replaced.items()}
         return Settings(tuple(replace(entry, overrides=over.get(path_of(entry), ())) for entry in self.entries))
 
     def in_run(self, definitions: Definitions, run: Definition) -> tuple[Definitions, Definition]:
@@ -97,7 +97,7 @@ class Settings:
     def numbers(self, definitions: Definitions, run: Definition) -> dict[str, Setting]:
         """By path, numbers that replace the run's: those set by itself, then those set here."""
         both = (self.of_run(definitions, run), self._over_those_of(definitions, run))
-        return {path_of(entry): entry for each in both for entry in each.for_destination(definitions, "number")}
+        return {path_of(entry): entry for settings in both for entry in settings.for_destination(definitions, "number")}
 
     def check_lets(self, definitions: Definitions, complaints: Complaints) -> None:
         """Report lets whose dimension would change. definitions: the deck's own"""
@@ -123,8 +123,8 @@ class Settings:
         """Report settings of a structure that the sweep chooses itself, which would have no effect."""
         for entry in self.for_destination(definitions, "run"):  # else it is a number within a choice of the sweep
             path = path_of(entry)
-            found = [column for column in sweep.chosen if path.startswith(f"{column.path}.")]
-            for column in found[:1]:
+            columns = [column for column in sweep.chosen if path.startswith(f"{column.path}.")]
+            for column in columns[:1]:
                 complaints.error(
                     "D233",
                     f"this sets `{path}`, which the sweep varies",
@@ -163,10 +163,12 @@ def check_params(definitions: Definitions, complaints: Complaints) -> None:
                     definitions.lets[name] = replace(let, value=let.default, overrides=())
 
 
-def _check_alike(complaints: Complaints, name: str, old: Value | ValueList, new: Value | ValueList, at: Place) -> None:
+def _check_alike(
+    complaints: Complaints, name: str, old: Value | ValueList, new: Value | ValueList, place: Place
+) -> None:
     """Report a value of another dimension than the one that it overrides, given at a place."""
     if isinstance(old, Value) and isinstance(new, Value) and not units.same(old.dimension, new.dimension):
-        complaints.add(*_of_another_dimension(name, old, new, at).diagnostics)
+        complaints.add(*_of_another_dimension(name, old, new, place).diagnostics)
 
 
 def _without(axis: SweepAxis, paths: Collection[str]) -> SweepAxis:
@@ -213,8 +215,10 @@ def applies_to(definitions: Definitions, run: Definition, entry: Setting) -> boo
         return True
     inside = entry.path[1].text
     if first == "environment":
-        there = block.get("environment")
-        return len(entry.path) == 2 or (there is not None and there.body is not None and inside in there.body.items)
+        environment = block.get("environment")
+        return len(entry.path) == 2 or (
+            environment is not None and environment.body is not None and inside in environment.body.items
+        )
     if inside in ("bed", "law"):
         return block.get(f"substitute {first}") is not None
     named = block.get("arm")
@@ -238,11 +242,11 @@ def _of_another_dimension(path: str, old: Value, new: Value, defined) -> Problem
             )
         )
     is_in = "a pure number" if old.dimension == PURE else f"in {wanted}"
-    found = "a pure number" if new.dimension == PURE else f"in {units.text(new.dimension)}"
+    dimension_words = "a pure number" if new.dimension == PURE else f"in {units.text(new.dimension)}"
     return Problem(
         error(
             "D061",
-            f"`{path}` is {is_in}, and this is {found}",
+            f"`{path}` is {is_in}, and this is {dimension_words}",
             new.place,
             also=also,
             help=unit_remedy(new, wanted, old.dimension),

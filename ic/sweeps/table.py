@@ -64,7 +64,7 @@ def structures(sweep: Sweep) -> list[tuple[Choices, SweptRows]]:
                 ],
             )
         )
-    made = []
+    by_choice = []
     for parts in itertools.product(*by_axis):
         chosen = tuple(
             (column, column.options[0 if places is None else int(places[0])])
@@ -72,8 +72,8 @@ def structures(sweep: Sweep) -> list[tuple[Choices, SweptRows]]:
             for column in axis.columns
             if isinstance(column, ChoiceColumn)
         )
-        made.append((chosen, SweptRows(sweep.sizes, (*parts, None))))
-    return sorted(made, key=lambda one: int(one[1].number(np.zeros(1, np.int64))[0]))
+        by_choice.append((chosen, SweptRows(sweep.sizes, (*parts, None))))
+    return sorted(by_choice, key=lambda entry: int(entry[1].number(np.zeros(1, np.int64))[0]))
 
 
 def _by_choice(axis: SweepAxis) -> list[np.ndarray | None]:
@@ -94,7 +94,7 @@ PIECE = 1 << 18
 """Number of rows for which conditions are evaluated together."""
 
 
-def kept(
+def kept_rows(
     scope: Scope, sweep: Sweep, rows: SweptRows, choices: Choices, structure: Structure
 ) -> tuple[SweptRows, list[int]]:
     """The rows that no `exclude when` drops, and the number that each drops; warns where rounding decides.
@@ -154,14 +154,14 @@ class _Truths(Truths):
         self.statement = 0
         self._seen: dict[tuple[int, int], _SeenComparison] = {}  # by statement, and by the expression
 
-    def warn(self, found: Diagnostic) -> None:
-        self.scope.complaints.add(replace(found, severity="warning"))
+    def warn(self, diagnostic: Diagnostic) -> None:
+        self.scope.complaints.add(replace(diagnostic, severity="warning"))
 
-    def look_at(self, compared: NumberComparison, left: np.ndarray, right: np.ndarray, asked: np.ndarray) -> None:
+    def look_at(self, compared: NumberComparison, left: np.ndarray, right: np.ndarray, mask: np.ndarray) -> None:
         key = self.statement, id(compared.expression)
         seen = self._seen.setdefault(key, _SeenComparison(compared))
-        seen.lost += int(np.count_nonzero(asked & (np.isnan(left) | np.isnan(right))))
-        finite = np.isfinite(left) & np.isfinite(right) & (left != right) & asked
+        seen.lost += int(np.count_nonzero(mask & (np.isnan(left) | np.isnan(right))))
+        finite = np.isfinite(left) & np.isfinite(right) & (left != right) & mask
         edge = finite.copy()
         edge[finite] = np.abs(left - right)[finite] <= ROUNDING * np.maximum(np.abs(left), np.abs(right))[finite]
         if edge.any():
@@ -174,7 +174,7 @@ class _Truths(Truths):
         """Report what was found of the comparisons of a statement, in their order. Raises Problem D066 where one has no
         value, and then nothing of those behind it."""
         cases = f"of {self.count} {'case' if self.count == 1 else 'cases'}"
-        for seen in (each for (statement, _), each in self._seen.items() if statement == number):
+        for seen in (seen for (statement, _), seen in self._seen.items() if statement == number):
             place = seen.compared.expression.place
             if seen.lost:
                 raise Problem(
@@ -189,12 +189,12 @@ class _Truths(Truths):
                     )
                 )
             if seen.close:
-                shown = zip(seen.compared.sides, seen.edge, strict=True)
+                sides = zip(seen.compared.sides, seen.edge, strict=True)
                 self.scope.complaints.remark(
                     "D127",
                     f"rounding decides this comparison in {seen.close} {cases}",
                     place,
-                    also=[Label(side.place, f"{value!r}") for side, value in shown],
+                    also=[Label(side.place, f"{value!r}") for side, value in sides],
                     help="compare with a limit between two values, not with one of them",
                 )
 
@@ -207,8 +207,8 @@ class _Truths(Truths):
         if name.text in scope.varied:
             return scope.varied[name.text].value
         paths = scope.known.get(name.text) or [name.text]
-        found = {path: settled for path in paths if (settled := scope.settled(path)) is not None}
-        numbers = {x.ref if isinstance(x := each.value, Scalar) else x for each in found.values()}
+        by_path = {path: settled for path in paths if (settled := scope.settled(path)) is not None}
+        numbers = {x.ref if isinstance(x := settled.value, Scalar) else x for settled in by_path.values()}
         if name.path[0].text in scope.definitions.of_kind("servo"):
             with suppress(Problem):  # a default, which the definition does not write
                 own = scope.names.find(name)
@@ -220,10 +220,10 @@ class _Truths(Truths):
                     "D165",
                     f"`{name.text}` is not the same wherever it is used in this sweep",
                     name.place,
-                    help=write_either(list(found)[:MOST_NAMED], "say which is meant: ", old=name.text),
+                    help=write_either(list(by_path)[:MOST_NAMED], "say which is meant: ", old=name.text),
                 )
             )
-        for settled in found.values():
+        for settled in by_path.values():
             if isinstance(settled.value, (float, int, Scalar)):
                 measure = parse_unit(settled.unit)
                 return Value(settled.value, measure.dimension, name.place, hertz=measure.hertz)
