@@ -23,15 +23,15 @@ def allowances_of(
     runs = definitions.of_kind("run")
     bodies = [runs[name].group.body for name in definitions.homes(run)[:-1]]
     bodies += [run.group.body, *([sweep.group.body] if sweep is not None else [])]
-    found: dict[str, Allowance] = {}
+    allowances: dict[str, Allowance] = {}
     for body in bodies:
-        found |= _read(body, complaints)
-    return tuple(found.values())
+        allowances |= _read(body, complaints)
+    return tuple(allowances.values())
 
 
 def _read(body: Iterable[Entry], complaints: Complaints) -> dict[str, Allowance]:
     """The allowances in the statements of one block, by code; wrong ones and duplicates are reported."""
-    found: dict[str, Allowance] = {}
+    allowances: dict[str, Allowance] = {}
     for entry in body:
         if not isinstance(entry, Statement) or entry.words[0].text != ALLOW:
             continue
@@ -46,7 +46,7 @@ def _read(body: Iterable[Entry], complaints: Complaints) -> dict[str, Allowance]
             )
         elif words[0].text not in WARNINGS:
             _refuse(words[0].text, words[0].place, complaints)
-        elif (first := found.get(words[0].text)) is not None and first.place is not None:
+        elif (first := allowances.get(words[0].text)) is not None and first.place is not None:
             complaints.error(
                 "D332",
                 f"`{first.code}` is allowed twice",
@@ -55,8 +55,8 @@ def _read(body: Iterable[Entry], complaints: Complaints) -> dict[str, Allowance]
                 help=leave_out("leave one of the two out"),
             )
         else:
-            found[words[0].text] = Allowance(words[0].text, " ".join(value.value.split()), words[0].place)
-    return found
+            allowances[words[0].text] = Allowance(words[0].text, " ".join(value.value.split()), words[0].place)
+    return allowances
 
 
 def places_of(allowances: Iterable[Allowance]) -> Mapping[str, Place]:
@@ -71,9 +71,9 @@ def silence_of_all(allowances: Sequence[tuple[Allowance, ...]], complaints: Comp
     """
     if not all(allowances):
         return
-    codes = [{each.code for each in of_one} for of_one in allowances]
+    codes = [{allowance.code for allowance in of_one} for of_one in allowances]
     places: dict[str, list[Place]] = {}
-    for allowance in (each for of_one in allowances for each in of_one):
+    for allowance in (allowance for of_one in allowances for allowance in of_one):
         if allowance.place is not None and all(allowance.code in of_one for of_one in codes):
             places.setdefault(allowance.code, []).append(allowance.place)
     complaints.silence(places)
@@ -83,8 +83,8 @@ def allowed_warnings(
     experiments: Iterable[Experiment], complaints: Complaints
 ) -> tuple[tuple[Diagnostic, Allowance], ...]:
     """The suppressed warnings, each with its allowance."""
-    found = {allowance.place: allowance for experiment in experiments for allowance in experiment.allowances}
-    return tuple((warning, found[place]) for warning, place in complaints.allowed.items() if place in found)
+    by_place = {allowance.place: allowance for experiment in experiments for allowance in experiment.allowances}
+    return tuple((warning, by_place[place]) for warning, place in complaints.allowed.items() if place in by_place)
 
 
 def warn_of_unneeded(
@@ -105,10 +105,14 @@ def warn_of_unneeded(
         return
     runs = definitions.of_kind("run")
     names = _with_parts(definitions, checked)
-    for each in (each for kind in EXPERIMENTS for each in definitions.of_kind(kind).values()):
-        sweep = each if each.kind in OF_A_RUN else None
-        run = each if sweep is None else runs.get(each.group.of.text if each.group.of is not None else "")
-        if each.name not in names and run is not None:
+    for definition in (definition for kind in EXPERIMENTS for definition in definitions.of_kind(kind).values()):
+        sweep = definition if definition.kind in OF_A_RUN else None
+        run = (
+            definition
+            if sweep is None
+            else runs.get(definition.group.of.text if definition.group.of is not None else "")
+        )
+        if definition.name not in names and run is not None:
             elsewhere = {allowance.place for allowance in allowances_of(definitions, run, Complaints(), sweep)}
             unneeded = {place: code for place, code in unneeded.items() if place not in elsewhere}
     for place, code in unneeded.items():
@@ -125,11 +129,11 @@ def _with_parts(definitions: Definitions, checked: Iterable[Definition]) -> set[
     names: set[str] = set()
     waiting = list(checked)
     while waiting:
-        each = waiting.pop()
-        if each.name not in names:
-            names.add(each.name)
+        definition = waiting.pop()
+        if definition.name not in names:
+            names.add(definition.name)
             known = {name: d for kind in EXPERIMENTS for name, d in definitions.of_kind(kind).items()}
-            waiting += (known[part.text] for part in each.parts if part.text in known)
+            waiting += (known[part.text] for part in definition.parts if part.text in known)
     return names
 
 

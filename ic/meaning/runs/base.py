@@ -114,7 +114,7 @@ def check_base(
 def _remark_held(scope: Scope, structure: Structure) -> None:
     """Warn about a base that this file makes a body where nothing weighs, and that is held since no run says `base`."""
     own = next((link for link in structure.links if link.name == BASE), None)
-    runs = [scope.definitions.block(each) for each in scope.definitions.of_kind("run").values()]
+    runs = [scope.definitions.block(definition) for definition in scope.definitions.of_kind("run").values()]
     weighs = any(load.model == "gravity" for load in structure.environment)
     mass = scope.parameters.get(f"links.{BASE}.mass")
     if (
@@ -148,8 +148,8 @@ def initial_base(scope: Scope, body: MergedBlock, base: Base | None) -> None:
             help = Help("write `base = free;`, or put the arm elsewhere: `at` and `rpy` of the joints on the base")
             if base is not None:
                 message = "a prescribed base begins where its courses do"
-                shown = ", ".join(COMPONENTS)
-                help = leave_out(f"leave it out; `base = prescribed {{ ... }}` says where it is: {shown}")
+                names = ", ".join(COMPONENTS)
+                help = leave_out(f"leave it out; `base = prescribed {{ ... }}` says where it is: {names}")
             scope.complaints.error("D255", f"{message}, so `{item.name}` has no effect", item.place, help=help)
 
 
@@ -157,13 +157,13 @@ def fixed_to(arm: ResolvedArm, payloads: Sequence[Payload]) -> dict[str, str]:
     """For each link and payload, the body to which it is permanently fixed: a moving link, or the base."""
     held = {joint.child: joint.parent for joint in arm.joints if joint.kind == "fixed"}
     held |= {payload.name: payload.link for payload in payloads if not payload.flies}
-    found = {}
+    bodies = {}
     for name in held:
         last = name
         for _ in held:  # as many steps as there can be: joints in a circle are reported already
             last = held.get(last, last)
-        found[name] = last
-    return found
+        bodies[name] = last
+    return bodies
 
 
 def remark_ground(
@@ -185,8 +185,8 @@ def remark_ground(
     if any(link not in still for link in links) or set(links) == {WORLD}:  # the latter is refused elsewhere
         return
     key, link = next((key, link) for key, link in zip(keys, links, strict=True) if link != WORLD)
-    given = (item.body or MergedBlock()).get(key)
-    place = place_of(given.value) if given is not None and given.value is not None else item.place
+    written = (item.body or MergedBlock()).get(key)
+    place = place_of(written.value) if written is not None and written.value is not None else item.place
     is_base = f"link `{link}`" + ("" if link == BASE else ", which is fixed to the base,")
     is_base += " with all that it acts upon" if len(set(links) - {link, WORLD}) else ""
     why = "moves as it is told" if base is not None else "is part of the ground"
@@ -205,8 +205,8 @@ def _free(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:
     written = None if known else scope.definitions.base_from_file(arm.name)
     if written is None:
         return _standing(scope, item, arm)
-    made = resolve_link(scope, written, scope.definitions.homes(scope.definitions.of_kind("arm")[arm.name]))
-    return replace(arm, links=(*arm.links, *(link for link in made if isinstance(link, Link))))
+    parts = resolve_link(scope, written, scope.definitions.homes(scope.definitions.of_kind("arm")[arm.name]))
+    return replace(arm, links=(*arm.links, *(link for link in parts if isinstance(link, Link))))
 
 
 def _standing(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:
@@ -231,15 +231,15 @@ def _courses(scope: Scope, item: Item, body: MergedBlock) -> tuple[Course, ...]:
     check_keys(scope, body, COMPONENTS, owner)
     if not any(name in body.items for name in COMPONENTS) and not body.items:
         scope.complaints.error("D250", "this base is prescribed, and nothing says how it moves", item.place, help=USAGE)
-    found = []
+    courses = []
     for name in COMPONENTS:
         part = body.get(name)
         if part is not None:
             with scope.complaints.gather():
                 model = _course(scope, part)
                 if model is not None:
-                    found.append(Course(name, model))
-    return tuple(found)
+                    courses.append(Course(name, model))
+    return tuple(courses)
 
 
 def _course(scope: Scope, item: Item) -> str | None:
@@ -286,7 +286,9 @@ def _course(scope: Scope, item: Item) -> str | None:
 def _check_jumps(scope: Scope, item: Item, model: str, place: Place) -> None:
     """Check that a base does not jump; where its rate does, the impulse on the arm is left out, with a warning."""
     profile, head = models.find("command", model, place), f"{BASE}.{item.name}."
-    values = {path.removeprefix(head): each.value for path, each in scope.parameters.items() if path.startswith(head)}
+    values = {
+        path.removeprefix(head): settled.value for path, settled in scope.parameters.items() if path.startswith(head)
+    }
     words: Mapping[str, object] = {name: value for name, value in values.items() if isinstance(value, str)}
     wanted = [p.name for p in profile.parameters if p.shape == "word"]
     jump = profile.jump(SimpleNamespace(**words)) if set(wanted) <= set(words) else "none"
@@ -312,19 +314,19 @@ def _check_jumps(scope: Scope, item: Item, model: str, place: Place) -> None:
 
 def _smooth() -> Iterable[str]:
     """Courses that never jump, with the word for that where one has it."""
-    found = []
-    for name, each in models.find_own("command").items():
-        words = [(p.name, word) for p in each.parameters for word in p.words]
-        known = {p.name: p.default for p in each.parameters if p.words}
-        if not callable(each.jumps):
-            found += [name] * (each.jumps == "none")
+    names = []
+    for name, command in models.find_own("command").items():
+        words = [(p.name, word) for p in command.parameters for word in p.words]
+        known = {p.name: p.default for p in command.parameters if p.words}
+        if not callable(command.jumps):
+            names += [name] * (command.jumps == "none")
         else:
-            found += [
+            names += [
                 f"{name}({key} = {word})"
                 for key, word in words
-                if each.jump(SimpleNamespace(**{**known, key: word})) == "none"
+                if command.jump(SimpleNamespace(**{**known, key: word})) == "none"
             ]
-    return sorted(found)
+    return sorted(names)
 
 
 def _example(name: str) -> str:

@@ -59,13 +59,13 @@ def _environment_use(
     if item.value is not None and is_value:
         gravity = models.find_own("environment")["gravity"]
         with scope.complaints.gather():
-            found = scope.evaluate(item)
-            if isinstance(found, Value):
-                size = "9.81" if isinstance(found.number, Scalar) else ONE.decimal(abs(found.number))
+            value = scope.evaluate(item)
+            if isinstance(value, Value):
+                size = "9.81" if isinstance(value.number, Scalar) else ONE.decimal(abs(value.number))
                 scope.complaints.error(
                     "D071",
                     "`gravity` is a list of 3 numbers",
-                    found.place,
+                    value.place,
                     help=f"write `gravity = [0, 0, -{size}] m/s^2;`",
                 )
                 return None
@@ -95,7 +95,7 @@ def _environment_use(
     if about is not None:  # the meaning of the unit words `joint` and `effort`
         kinds = {joint.name: joint.kind for joint in arm.moving}
         if about not in kinds:  # already reported: without its joint, nothing can be said of the model's units
-            check_keys(scope, body, [each.name for each in environment.written], owner)
+            check_keys(scope, body, [parameter.name for parameter in environment.written], owner)
             scope.checks.fail(owner.path)
             return EnvironmentUse(item.name, environment.name, None, item.place)
         owner = replace(owner, joint=kinds[about])
@@ -111,7 +111,7 @@ def _environment_use(
             owner,
             environment.parameters,
             body,
-            extra=[each.name for each in environment.written[len(environment.parameters) :]],
+            extra=[parameter.name for parameter in environment.written[len(environment.parameters) :]],
         )
     if values is not None:
         held = fixed_to(arm, payloads)

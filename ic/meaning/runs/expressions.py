@@ -57,7 +57,7 @@ def resolve_signals(scope: Scope, block: MergedBlock, structure: Structure, name
     names  for which the table is to have channels besides, as `met.plan.channel.channels` takes them
     """
     written = [*(item.value for item in block.of_kind("signal")), *watched(block)]
-    signals = ChannelTable(scope, structure, [each for each in written if each is not None], names)
+    signals = ChannelTable(scope, structure, [expression for expression in written if expression is not None], names)
     for item in block.of_kind("signal"):
         path = f"{SIGNALS}.{item.name}"
         signals.lost.add(path)
@@ -72,7 +72,7 @@ def resolve_signals(scope: Scope, block: MergedBlock, structure: Structure, name
 def watched(block: MergedBlock) -> list[Expression | None]:
     """The expressions for the metrics of a run to watch, as written."""
     bodies = (item.body.get("of") for item in block.of_kind("metric") if item.body is not None)
-    return [of.value for of in bodies if of is not None]
+    return [item.value for item in bodies if item is not None]
 
 
 class ChannelTable:
@@ -87,7 +87,9 @@ class ChannelTable:
         self, scope: Scope, structure: Structure, written: Iterable[Expression], names: Iterable[str] = ()
     ) -> None:
         self.scope, self.structure = scope, structure
-        self.known = channels(structure, [*(name.text for each in written for name in _names(each)), *names])
+        self.known = channels(
+            structure, [*(name.text for expression in written for name in _names(expression)), *names]
+        )
         self.lost: set[str] = set()
         self.expressions: list[SignalExpression] = []
         self._values: dict[str, Value] = {}
@@ -107,21 +109,21 @@ class ChannelTable:
             helps = "name one joint, or write `max(...)` or `min(...)` of every joint's"
             raise Problem(error("D356", message, place_of(expression), help=helps))
         value = self._number(expression_of)
-        made = self._made(path, value, expression)
-        self.expressions.append(made)
-        self.known[path] = Channel(path, made.unit, made.text, 1)
+        signal = self._signal(path, value, expression)
+        self.expressions.append(signal)
+        self.known[path] = Channel(path, signal.unit, signal.text, 1)
         self._values[path] = value
-        self.scope.keep_setting(path, made.text, item=item)
+        self.scope.keep_setting(path, signal.text, item=item)
 
     def number(self, expression: Expression, metric: Metric) -> SignalExpression:
         """The number that a metric watches; for several joints, the one that the metric declares."""
         expression_of = self._expanded(expression)
         joints = self._joints(expression_of)
         if not joints:
-            return self._made(spell(expression), self._number(expression_of), expression)
+            return self._signal(spell(expression), self._number(expression_of), expression)
         if metric.over_joints is None:
             own = models.find_own("metric").values()
-            several = [each.name for each in own if each.over_joints is not None and not each.condition]
+            several = [other.name for other in own if other.over_joints is not None and not other.condition]
             message = f"a metric `{metric.name}` watches one channel, and `{spell(expression)}` is one of each joint"
             remedies = ["name one joint", known_words("metrics that watch several", several)]
             raise Problem(error("D356", message, place_of(expression), help=remedies))
@@ -132,9 +134,9 @@ class ChannelTable:
                 also = [Label(value.place, f"{in_words(values[0])} and {in_words(value)}")]
                 helps = "watch joints of one kind, each by its name, such as `max(shoulder.q, elbow.q)`"
                 raise Problem(error("D063", message, place_of(expression), also=also, help=helps))
-        made = metric.over_joints.of([value.number for value in values])
-        value = Value(made, values[0].dimension, place_of(expression))
-        return self._made(f"{metric.over_joints.word}({spell(expression)})", value, expression)
+        number = metric.over_joints.of([value.number for value in values])
+        value = Value(number, values[0].dimension, place_of(expression))
+        return self._signal(f"{metric.over_joints.word}({spell(expression)})", value, expression)
 
     def condition(self, expression: Expression, metric: Metric) -> SignalExpression:
         """The margin of a condition; for several joints, the one that the metric declares."""
@@ -151,14 +153,14 @@ class ChannelTable:
         mixed = next((margin.mixed for margin in margins if margin.mixed), ())
         other = next((margin for margin in margins if not units.same(margin.dimension, margins[0].dimension)), None)
         if other is not None and not mixed:
-            mixed = tuple(Value(0.0, each.dimension, each.place) for each in (margins[0], other))
+            mixed = tuple(Value(0.0, margin.dimension, margin.place) for margin in (margins[0], other))
         if mixed and "of" in metric.unit:
             raise Problem(
                 error(
                     "D354",
                     f"the margin of this condition is of two units: {in_words(mixed[0])} and {in_words(mixed[1])}",
                     place_of(expression),
-                    also=[Label(each.place, in_words(each)) for each in mixed[:2]],
+                    also=[Label(margin.place, in_words(margin)) for margin in mixed[:2]],
                     help=[
                         "of `and`, write a requirement for each part",
                         "else divide each side by its limit, so that all margins are shares: `abs(x) / (2 deg/s) < 1`",
@@ -167,7 +169,7 @@ class ChannelTable:
             )
         numbers = [_truth(margin.number) for margin in margins] if mixed else [margin.number for margin in margins]
         number = metric.over_joints.of(numbers) if metric.over_joints is not None else numbers[0]
-        return self._made(
+        return self._signal(
             name, Value(number, PURE if mixed else margins[0].dimension, place_of(expression)), expression
         )
 
@@ -176,18 +178,18 @@ class ChannelTable:
     def _number(self, expression: Expression) -> Value:
         return evaluate_number(expression, self._find)
 
-    def _made(self, name: str, value: Value, expression: Expression) -> SignalExpression:
-        made = SignalExpression(
+    def _signal(self, name: str, value: Value, expression: Expression) -> SignalExpression:
+        signal = SignalExpression(
             name,
             units.text(value.dimension),
             Formulas.of(self.scope.graph, [value.number]),
             spell(expression),
             place_of(expression),
         )
-        if not made.channels:
+        if not signal.channels:
             helps = "name one of the run's: `met doc channels`"
-            raise Problem(error("D356", f"`{made.text}` is of no channel", place_of(expression), help=helps))
-        return made
+            raise Problem(error("D356", f"`{signal.text}` is of no channel", place_of(expression), help=helps))
+        return signal
 
     def _find(self, name: Name) -> Value | ValueList:
         """The value of a name: a channel, a signal, a parameter of the run, or a name that any expression may use."""
@@ -274,15 +276,17 @@ class ChannelTable:
                 if self.scope.failed_servos or self.scope.failed_parts:
                     raise Problem(())
                 has = [
-                    each for each, made in recordable(self.structure).items() if made[0].joints and each[:6] != "links."
+                    channel_name
+                    for channel_name, recorded in recordable(self.structure).items()
+                    if recorded[0].joints and channel_name[:6] != "links."
                 ]
                 helps = known_words("channels of joints", has)
                 raise Problem(error("D125", f"no joint has a channel `{rest}`", name.place, help=helps))
-        found = [joint for joint in moving if all(f"{joint}.{rest}" in self.known for rest in rests)]
-        if not found:
+        joints = [joint for joint in moving if all(f"{joint}.{rest}" in self.known for rest in rests)]
+        if not joints:
             message = f"no joint has all channels of `{spell(expression)}`"
             raise Problem(error("D125", message, place_of(expression), help="name one joint for each channel"))
-        return found
+        return joints
 
 
 def is_over_time(expression: Expression) -> bool:
@@ -299,7 +303,7 @@ def _joined(left: ConditionMargin, right: ConditionMargin, least: bool, place: P
     mixed = left.mixed or right.mixed
     if not mixed and units.same(left.dimension, right.dimension):
         return ConditionMargin(choose(left.number, right.number), left.dimension, place)
-    mixed = mixed or tuple(Value(0.0, each.dimension, each.place) for each in (left, right))
+    mixed = mixed or tuple(Value(0.0, margin.dimension, margin.place) for margin in (left, right))
     return ConditionMargin(choose(_truth(left.number), _truth(right.number)), PURE, place, mixed)
 
 

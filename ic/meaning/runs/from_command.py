@@ -45,9 +45,9 @@ def value_of_command(scope: Scope, owner: Owner, wanted: Parameter, item: Item, 
     head = f"{use.joint}.servo.command"
     if any(scope.checks.failed(f"{head}.{parameter.name}") for parameter in profile.parameters):
         return None
-    asked = {parameter.name: scope.settled(f"{head}.{parameter.name}") for parameter in profile.parameters}
-    known = {name: settled.value for name, settled in asked.items() if settled is not None}
-    if len(known) < len(asked):
+    parameters = {parameter.name: scope.settled(f"{head}.{parameter.name}") for parameter in profile.parameters}
+    known = {name: settled.value for name, settled in parameters.items() if settled is not None}
+    if len(known) < len(parameters):
         return None
     value, slope = profile.course(SimpleNamespace(**known), 0.0)
     number = slope if wanted.name == "qd" and use.command.kind == "position" else value

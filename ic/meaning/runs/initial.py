@@ -38,7 +38,7 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
         if not item.kind and item.name.partition(".")[0] in arm.failed:
             continue
         if item.kind or item.name not in (*known, *INITIAL_OF_BASE):
-            there = (*known, *of_base)
+            beginnings = (*known, *of_base)
             first = item.name.partition(".")[0]
             follows = next((joint.follows for joint in arm.moving if joint.name == first), ())
             scope.complaints.error(
@@ -47,7 +47,7 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
                 item.place,
                 help=f"`{first}` begins where {leaders_in_words(follows)} would have it: set that"
                 if follows
-                else [*did_you_mean(item.name, there), known_words("there is", there)],
+                else [*did_you_mean(item.name, beginnings), known_words("there is", beginnings)],
             )
     for name, unit in (("q", "joint"), ("qd", "joint/s")):
         wanted = Parameter(name=name, unit=unit, default=0.0, doc=f"initial {name}")
@@ -59,13 +59,13 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
             report_others(scope, name, general, alone, servos)
         elif general is not None:
             with scope.complaints.gather():
-                found = scope.evaluate(general)
-                listed = found if isinstance(found, ValueList) else None
+                general_value = scope.evaluate(general)
+                listed = general_value if isinstance(general_value, ValueList) else None
             if listed is not None and arm.failed:
                 continue
             if listed is not None and len(listed.items) != len(arm.independent):
-                given, moving = len(listed.items), len(arm.independent)
-                message = f"{given} number{'s' * (given != 1)} for {moving} joint{'s' * (moving != 1)}"
+                count, moving = len(listed.items), len(arm.independent)
+                message = f"{count} number{'s' * (count != 1)} for {moving} joint{'s' * (moving != 1)}"
                 names = ", ".join(joint.name for joint in arm.independent)
                 helps = f"one for each moving joint, in the arm's order, or one for all: {names}"
                 scope.complaints.error("D071", message, listed.place, help=helps)
@@ -140,14 +140,14 @@ def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: Re
     if len({joint.kind for joint in arm.independent}) < 2:
         return False
     with scope.complaints.gather():
-        found = scope.evaluate(general)
+        value = scope.evaluate(general)
         unit, dimension = owner.unit(wanted)
-        if isinstance(found, Value) and found.dimension != PURE and not units.same(found.dimension, dimension):
+        if isinstance(value, Value) and value.dimension != PURE and not units.same(value.dimension, dimension):
             scope.complaints.error(
                 "D061",
                 f"`{wanted.name}` of {owner.label}, which is {owner.joint}, is in {unit}, and this is in "
-                f"{units.text(found.dimension)}",
-                found.place,
+                f"{units.text(value.dimension)}",
+                value.place,
                 help=[
                     f"write it joint by joint: `{owner.path.removeprefix('initial.')}.{wanted.name} = 0 {unit};`",
                     "or leave it out: without it all joints begin at 0",

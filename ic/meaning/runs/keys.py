@@ -28,13 +28,13 @@ def _read(scope: Scope, run: Owner, block: MergedBlock, key: RunKey) -> Any:
     item = body.get(name)
     owner = Owner(BLOCKS[head].called, item.place if item is not None else run.place, head) if head else run
     if wanted.shape == "word":
-        found: Any = scope.word(owner, wanted, item)
+        value: Any = scope.word(owner, wanted, item)
     elif item is not None:
-        found = scope.constant(owner, wanted, item)
+        value = scope.constant(owner, wanted, item)
     else:
-        found = wanted.default
-        scope.auxiliary[key.path] = Settled(found, wanted.unit, Origin("default"), wanted.doc)
+        value = wanted.default
+        scope.auxiliary[key.path] = Settled(value, wanted.unit, Origin("default"), wanted.doc)
     entry = BLOCKS[head or "run"][name]
     if entry.varies == "never":
         scope.not_sweepable[key.path] = NotSweepable("is one for the whole sweep", not_sweepable.A_RUN_FOR_EACH)
-    return wanted.default if found is None else found
+    return wanted.default if value is None else value

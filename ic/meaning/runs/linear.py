@@ -52,8 +52,8 @@ def resolve_linear(scope: Scope, block: MergedBlock, structure: Structure) -> tu
         if any(block.of_kind("linear"))
         else {}
     )
-    found = (_answer(scope, item, structure, known) for item in block.of_kind("linear"))
-    return tuple(use for use in found if use is not None)
+    answers = (_answer(scope, item, structure, known) for item in block.of_kind("linear"))
+    return tuple(use for use in answers if use is not None)
 
 
 def _answer(scope: Scope, item: Item, structure: Structure, known: Mapping[str, InputSignal]) -> LinearUse | None:
@@ -64,17 +64,17 @@ def _answer(scope: Scope, item: Item, structure: Structure, known: Mapping[str, 
     before, body = scope.complaints.error_count, item.body
     owner = Owner(f"`linear {item.name}`", item.place, f"linear.{item.name}")
     check_keys(scope, body, list(LINEAR.keys), owner)
-    at, duration = body.get("at"), structure.schedule.duration
-    pose = _pose(scope, owner, at, structure) if at is not None and _is_equilibrium(at.value) else None
+    instant, duration = body.get("at"), structure.schedule.duration
+    pose = _pose(scope, owner, instant, structure) if instant is not None and _is_equilibrium(instant.value) else None
     time: float | None = 0.0
-    if at is not None and not _is_equilibrium(at.value):
-        time = scope.constant(owner, LINEAR_AT, at, instead=ONE_INSTANT.sweep)
-    for path in owner.paths(LINEAR_AT.name, () if at is None else at.homes):
+    if instant is not None and not _is_equilibrium(instant.value):
+        time = scope.constant(owner, LINEAR_AT, instant, instead=ONE_INSTANT.sweep)
+    for path in owner.paths(LINEAR_AT.name, () if instant is None else instant.homes):
         scope.not_sweepable[path] = ONE_INSTANT
-    if at is not None and time is not None and time > duration:
+    if instant is not None and time is not None and time > duration:
         message = f"t = {time:.6g} s is not in the run, which ends at {duration:.6g} s"
         helps = "ask at an instant of the run, or let it last longer"
-        scope.complaints.error("D375", message, place_of(at.value) if at.value else at.place, help=helps)
+        scope.complaints.error("D375", message, place_of(instant.value) if instant.value else instant.place, help=helps)
     signals: dict[str, tuple[str, ...]] = {}
     lost = False
     for key, field in LISTS.items():
@@ -82,7 +82,9 @@ def _answer(scope: Scope, item: Item, structure: Structure, known: Mapping[str, 
         names = [] if entry is None else list(_names(scope, entry, key))
         good = [name for name in names if _is_known(scope, name, key, structure, known)]
         lost = lost or len(good) < len(names)
-        for name in [name for place, name in enumerate(good) if name.text in {one.text for one in good[:place]}]:
+        for name in [
+            name for place, name in enumerate(good) if name.text in {earlier.text for earlier in good[:place]}
+        ]:
             scope.complaints.error("D040", f"`{name.text}` is there twice", name.place, help="leave one out")
         signals[field] = tuple(name.text for name in good)
         if entry is not None and signals[field]:
@@ -102,23 +104,23 @@ def _pose(scope: Scope, owner: Owner, item: Item, structure: Structure) -> tuple
     if refuse_values(scope, item.value, ["q"]):
         return ()
     check_keys(scope, body, ["q"], replace(owner, label=f"`{EQUILIBRIUM}` of {owner.label}"))
-    entry, found = body.get("q"), tuple[float, ...]()
+    entry, positions = body.get("q"), tuple[float, ...]()
     scope.keep_setting(owner.join("at"), EQUILIBRIUM, item=item)
     if entry is None:
         return ()
     with scope.complaints.gather():
-        given = scope.evaluate(entry)
-        values = given.items if isinstance(given, ValueList) else (given,)
+        listed = scope.evaluate(entry)
+        values = listed.items if isinstance(listed, ValueList) else (listed,)
         if len(values) != len(joints) or any(isinstance(value, ValueList) for value in values):
             message = f"`q` of an {EQUILIBRIUM} is a position of each joint that follows none, {len(joints)} in all"
             helps = f"write `q = [...] deg`, in the order {', '.join(joint.name for joint in joints)}"
-            raise Problem(error("D375", message, given.place, help=helps))
-        found = tuple(
+            raise Problem(error("D375", message, listed.place, help=helps))
+        positions = tuple(
             _position(scope, owner, joint, value)
             for joint, value in zip(joints, values, strict=True)
             if isinstance(value, Value)
         )
-    return found
+    return positions
 
 
 def _position(scope: Scope, owner: Owner, joint: Joint, value: Value) -> float:
@@ -136,11 +138,11 @@ def _position(scope: Scope, owner: Owner, joint: Joint, value: Value) -> float:
 def _names(scope: Scope, item: Item, key: str) -> Iterator[Name]:
     """The names in an entry: one, or several in brackets, including those added by `+=`."""
     for expression in (item.value, *item.appended):
-        for each in expression.items if isinstance(expression, List) else (expression,):
-            if isinstance(each, Name):
-                yield each
+        for name in expression.items if isinstance(expression, List) else (expression,):
+            if isinstance(name, Name):
+                yield name
             else:
-                place = item.place if each is None else place_of(each)
+                place = item.place if name is None else place_of(name)
                 helps = f"write `{LINEAR[key].written}`, or several in brackets"
                 scope.complaints.error("D375", f"`{key}` is a list of signals", place, help=helps)
 
@@ -156,7 +158,7 @@ def _is_known(scope: Scope, name: Name, key: str, structure: Structure, known: M
             helps = nearest_channels(name, channels, structure)
             scope.complaints.error("D125", f"no channel `{name.text}`", name.place, help=helps)
         return name.text in channels
-    places = [path for path, each in known.items() if each.is_output or key == "inputs"]
+    places = [path for path, signal in known.items() if signal.is_output or key == "inputs"]
     if name.text in places:
         return True
     what = "place to open a loop" if key == "open" else "input"
@@ -171,9 +173,9 @@ def resolve_linear_metrics(
 ) -> tuple[MetricUse, ...]:
     """The metrics of a run that are figures of linear answers."""
     figures = [item for item in block.of_kind("metric") if is_figure_metric(item)]
-    found = [_metric(scope, item, block, structure, answers) for item in figures]
-    scope.complaints.note_lost_names(*(item.name for item, use in zip(figures, found, strict=True) if use is None))
-    return tuple(use for use in found if use is not None)
+    metrics = [_metric(scope, item, block, structure, answers) for item in figures]
+    scope.complaints.note_lost_names(*(item.name for item, use in zip(figures, metrics, strict=True) if use is None))
+    return tuple(use for use in metrics if use is not None)
 
 
 def _metric(
@@ -186,10 +188,10 @@ def _metric(
     if item.value is None or refuse_values(scope, item.value, ["of"]):
         return None
     check_keys(scope, body, ["of"], Owner(f"metric `{item.name}`", item.place, f"metrics.{item.name}"))
-    of = body.get("of")
-    names = {each.name: each for each in block.of_kind("linear")}
-    if of is None or not isinstance(of.value, Name) or of.value.text not in names:
-        named = of.value.text if of is not None and isinstance(of.value, Name) else ""
+    of_item = body.get("of")
+    names = {answer.name: answer for answer in block.of_kind("linear")}
+    if of_item is None or not isinstance(of_item.value, Name) or of_item.value.text not in names:
+        named = of_item.value.text if of_item is not None and isinstance(of_item.value, Name) else ""
         message = f"no `linear {named}` in this run" if named else f"a `{figure.name}` is of a `linear` block"
         helps = [*did_you_mean(named, names), known_words("linear blocks of this run", sorted(names))]
         if not names:
@@ -198,23 +200,23 @@ def _metric(
             if "." in named:  # which is what to open
                 name = named.replace(".", "_")
                 helps = [f"write `linear {name} {{ open = {opened}; }}` in the run, and `of = {name};` here"]
-        scope.complaints.error("D376", message, _place(item, of), help=helps)
+        scope.complaints.error("D376", message, _place(item, of_item), help=helps)
         return None
-    use = next((answer for answer in answers if answer.name == of.value.text), None)
+    use = next((answer for answer in answers if answer.name == of_item.value.text), None)
     if use is None:
         return None  # it failed (already reported)
     if figure.of_loops and not use.opened:
         message = f"`linear {use.name}` opens no loop, so it has no `{figure.name}`"
         helps = [f"write `open = {places[0]};` in it"] if places else [*no_computer(structure)]
         helps += [known_words("places to open a loop", places)] if len(places) > 1 else []
-        scope.complaints.error("D376", message, _place(item, of), help=helps)
+        scope.complaints.error("D376", message, _place(item, of_item), help=helps)
         return None
     scope.keep_in_deck(f"metrics.{item.name}.model", figure.name, item)
-    scope.keep_in_deck(f"metrics.{item.name}.of", use.name, of)
+    scope.keep_in_deck(f"metrics.{item.name}.of", use.name, of_item)
     return MetricUse(item.name, figure.name, use.name, item.place)
 
 
-def _place(item: Item, of: Item | None) -> Place:
-    if of is None:
+def _place(item: Item, of_item: Item | None) -> Place:
+    if of_item is None:
         return item.place
-    return of.place if of.value is None else place_of(of.value)
+    return of_item.place if of_item.value is None else place_of(of_item.value)

@@ -44,8 +44,8 @@ def metrics_over_time(scope: Scope, block: MergedBlock) -> tuple[MergedBlock, Ma
                 name, number = f"{model}_{number}", number + 1
             unnamed[text] = name
             taken.add(name)
-        made = _figure_metric if is_figure(call) else _metric
-        items[f"metric {name}"] = made(name, call, statement)
+        make = _figure_metric if is_figure(call) else _metric
+        items[f"metric {name}"] = make(name, call, statement)
         return Name((Word(name, call.place),), call.place)
 
     for position, statement in enumerate(block.statements):
@@ -72,25 +72,25 @@ def _with_metrics(expression: Expression, statement: Statement, metric_of: Metri
     """The expression with names in place of calls of metrics; unchanged where there are none."""
     if isinstance(expression, Call) and (is_over_time(expression) or is_figure(expression)):
         return metric_of(statement, expression)
-    made = mapped(expression, lambda part: _with_metrics(part, statement, metric_of))
-    return expression if made == expression else made
+    replaced = mapped(expression, lambda part: _with_metrics(part, statement, metric_of))
+    return expression if replaced == expression else replaced
 
 
 def _of_figure(call: Call) -> str:
     """The name of a figure's linear answers. Raises D376 for other forms."""
-    of = call.positional[0] if len(call.positional) == 1 else None
-    if not isinstance(of, Name) or len(of.path) > 1 or call.named or call.body is not None:
+    name = call.positional[0] if len(call.positional) == 1 else None
+    if not isinstance(name, Name) or len(name.path) > 1 or call.named or call.body is not None:
         message = f"`{call.name.text}` takes the name of a `linear` block"
         raise Problem(error("D376", message, call.place, help=f"write `{call.name.text}(NAME)`"))
-    return of.text
+    return name.text
 
 
 def _figure_metric(name: str, call: Call, statement: Statement) -> Item:
     """The metric of a figure of linear answers. Raises D376."""
     _of_figure(call)
-    of = Item("", "of", (), call.positional[0], None, place_of(call.positional[0]))
+    of_item = Item("", "of", (), call.positional[0], None, place_of(call.positional[0]))
     return Item(
-        "metric", name, (), Name((call.name.path[0],), call.name.place), MergedBlock({"of": of}), statement.place
+        "metric", name, (), Name((call.name.path[0],), call.name.place), MergedBlock({"of": of_item}), statement.place
     )
 
 
@@ -99,9 +99,10 @@ def _metric(name: str, call: Call, statement: Statement) -> Item:
     metric: Metric = models.find("metric", call.name.text)
     order = ["of", *(parameter.name for parameter in metric.parameters if parameter.default is None)]
     if not call.positional or len(call.positional) > len(order):
-        usage = ", ".join(["CONDITION", *(each.upper() for each in order[1:])])
+        usage = ", ".join(["CONDITION", *(parameter.upper() for parameter in order[1:])])
         rest = [parameter.name for parameter in metric.parameters if parameter.default is not None]
-        helps = f"write `{metric.name}({usage})`; by name it takes {', '.join(f'`{each} = ...`' for each in rest)}"
+        by_name = ", ".join(f"`{parameter} = ...`" for parameter in rest)
+        helps = f"write `{metric.name}({usage})`; by name it takes {by_name}"
         message = f"`{metric.name}` takes {'a condition' if len(order) == 1 else f'a condition and `{order[1]}`'}"
         raise Problem(error("D355", message, call.place, help=helps))
     written = [*zip(order, call.positional, strict=False), *((word.text, value) for word, value in call.named)]

@@ -95,9 +95,9 @@ def resolve_schedule(
             )
     if dynamics is None:  # already reported: nothing is said of rates, and what does not depend on them is looked at
         ticks = {use.joint: Ticks(1, continuous=False) for use in uses}
-        return Schedule(ANY_RATE, 1, 1, ANY_RATE), ticks, dict.fromkeys((each.path for each in ticking), 1)
+        return Schedule(ANY_RATE, 1, 1, ANY_RATE), ticks, dict.fromkeys((ticker.path for ticker in ticking), 1)
     shared = rates.get("servos")
-    own = [rate for rate in (*(use.rate for use in uses), *(each.rate for each in ticking)) if rate is not None]
+    own = [rate for rate in (*(use.rate for use in uses), *(ticker.rate for ticker in ticking)) if rate is not None]
     others = [rate for rate in (shared, *own) if rate is not None and rate.hz != CONTINUOUS]
     record = rates.get("record") or dynamics
     base = base_rate([dynamics, record, *others], rates.get("base"))
@@ -139,17 +139,17 @@ def resolve_schedule(
         if continuous:
             rate = dynamics
         ticks[use.joint] = Ticks(divisor(scope.complaints, rate, base, everyone, written=written), continuous)
-    own_ticks = dict.fromkeys((each.path for each in ticking), schedule.dynamics)
-    for each in (each for each in ticking if each.ticks):
-        rate_of_own = rate_of(scope, each, shared)
+    own_ticks = dict.fromkeys((ticker.path for ticker in ticking), schedule.dynamics)
+    for ticker in (ticker for ticker in ticking if ticker.ticks):
+        rate_of_own = rate_of(scope, ticker, shared)
         if rate_of_own is not None:
             if (exact(dynamics.hz) / exact(rate_of_own.hz)).denominator > 1:
-                report_between_steps(scope, each, rate_of_own, dynamics)
+                report_between_steps(scope, ticker, rate_of_own, dynamics)
                 continue
-            own_ticks[each.path] = divisor(scope.complaints, rate_of_own, base, everyone, written=written)
-            check_instants(scope, each, own_ticks[each.path], schedule.dynamics, rate_of_own, dynamics)
-            if isinstance(each, Guiding):
-                check_period(scope, each, rate_of_own)
+            own_ticks[ticker.path] = divisor(scope.complaints, rate_of_own, base, everyone, written=written)
+            check_instants(scope, ticker, own_ticks[ticker.path], schedule.dynamics, rate_of_own, dynamics)
+            if isinstance(ticker, Guiding):
+                check_period(scope, ticker, rate_of_own)
     if record.hz > dynamics.hz:
         scope.complaints.remark(
             "D167",

@@ -62,7 +62,7 @@ def read_requirements(
     required  what statements require, by position, where a metric stands for a call (`metrics_over_time`)
     """
     written = {item.name for item in block.of_kind("metric")}
-    found = []
+    requirements = []
     for position, statement in enumerate(block.statements):
         if [word.text for word in statement.words] != ["require"]:
             continue
@@ -77,7 +77,9 @@ def read_requirements(
                     help=_write(statement, f"{spell(_over_cases(statement.value)[0])} > 95 %"),
                 )
             else:
-                found.append(WrittenRequirement(statement, comparison.text, ">=", None, share, False, confidence))
+                requirements.append(
+                    WrittenRequirement(statement, comparison.text, ">=", None, share, False, confidence)
+                )
             continue
         if any(map(is_over_time, (comparison, *children(comparison)))):
             continue  # it is reported
@@ -96,9 +98,9 @@ def read_requirements(
                 scope.complaints.error("D350", message, place_of(statement.value), help=helps)
             continue  # `resolve_step_errors` reads it
         removed = {
-            each.key.removeprefix("metric ")
-            for each in block.removed
-            if each.key.startswith("metric ") and position < each.before
+            removed_item.key.removeprefix("metric ")
+            for removed_item in block.removed
+            if removed_item.key.startswith("metric ") and position < removed_item.before
         }
         operator, metric, limit = comparison.operator, comparison.left, comparison.right
         if _is_percentile(limit) and not _is_percentile(metric):
@@ -135,10 +137,10 @@ def read_requirements(
                 f"`require {spell(comparison)}` went with the metric `{spell(metric)}`, which is removed"
             )
         else:
-            found.append(
+            requirements.append(
                 WrittenRequirement(statement, spell(metric), operator, limit, share, percentile, confidence)  # type: ignore[arg-type]
             )
-    return found
+    return requirements
 
 
 def _is_metric(expression: Expression, metrics: set[str]) -> bool:
@@ -186,32 +188,32 @@ def resolve_requirements(
     """The requirements with their limits in SI. linear: the metrics of linear answers."""
     metrics = metric_units(structure, linear)
     shares = share_metrics(structure)
-    found = []
-    for each in read:
-        if each.metric not in metrics:
+    requirements = []
+    for written in read:
+        if written.metric not in metrics:
             continue  # the metric failed (already reported)
-        owner = Owner("", each.statement.place, "require", called=f"the limit on `{each.metric}`")
-        wanted = Parameter(name="limit", unit=metrics[each.metric], doc="limit", share=each.metric in shares)
-        number = 0.0 if each.limit is None else _constant(scope, owner, wanted, each.limit)
+        owner = Owner("", written.statement.place, "require", called=f"the limit on `{written.metric}`")
+        wanted = Parameter(name="limit", unit=metrics[written.metric], doc="limit", share=written.metric in shares)
+        number = 0.0 if written.limit is None else _constant(scope, owner, wanted, written.limit)
         share = confidence = None
-        if each.share is not None:
+        if written.share is not None:
             share = _constant(
                 scope,
-                _owner(each, "share"),
-                replace(SHARE, below=1.0, at_most=None) if each.percentile else SHARE,
-                each.share,
+                _owner(written, "share"),
+                replace(SHARE, below=1.0, at_most=None) if written.percentile else SHARE,
+                written.share,
             )
-        if each.confidence is not None:
-            confidence = _constant(scope, _owner(each, "confidence"), CONFIDENCE, each.confidence)
-        if (each.share is not None and share is None) or (each.confidence is not None and confidence is None):
+        if written.confidence is not None:
+            confidence = _constant(scope, _owner(written, "confidence"), CONFIDENCE, written.confidence)
+        if (written.share is not None and share is None) or (written.confidence is not None and confidence is None):
             continue
-        if share is not None and each.percentile and each.operator.startswith(">"):
+        if share is not None and written.percentile and written.operator.startswith(">"):
             share = 1.0 - share
         if share == 1.0 and confidence is not None:
             scope.complaints.error(
                 "D350",
                 "no number of cases shows that all cases meet a requirement",
-                place_of(each.share) if each.share is not None else each.statement.place,
+                place_of(written.share) if written.share is not None else written.statement.place,
                 help="write a share below 100 %, or leave the confidence out: then all cases of the run are to meet it",
             )
             continue
@@ -219,19 +221,21 @@ def resolve_requirements(
             scope.complaints.error(
                 "D350",
                 "no campaign has the cases that show a share so near to all or none",
-                place_of(each.share) if each.share is not None else each.statement.place,
+                place_of(written.share) if written.share is not None else written.statement.place,
                 help="write a share from 0.0000001 % to 99.9999999 %, or leave the confidence out",
             )
             continue
         if number is not None:
-            text = spell(each.statement.value)
-            text = f"{each.statement.name.text}: {text}" if each.statement.name is not None else text
-            found.append(Requirement(text, each.metric, each.operator, number, each.statement.place, share, confidence))
-    return tuple(found)
+            text = spell(written.statement.value)
+            text = f"{written.statement.name.text}: {text}" if written.statement.name is not None else text
+            requirements.append(
+                Requirement(text, written.metric, written.operator, number, written.statement.place, share, confidence)
+            )
+    return tuple(requirements)
 
 
-def _owner(each: WrittenRequirement, what: str) -> Owner:
-    return Owner("", each.statement.place, "require", called=f"the {what} of the requirement on `{each.metric}`")
+def _owner(written: WrittenRequirement, what: str) -> Owner:
+    return Owner("", written.statement.place, "require", called=f"the {what} of the requirement on `{written.metric}`")
 
 
 def _constant(scope: Scope, owner: Owner, wanted: Parameter, expression: Expression) -> float | None:

@@ -104,7 +104,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     environment = resolve_environment(scope, body_of(scope, block.get("environment")), arm, base, payloads, duration)
     initial = body_of(scope, block.get("initial"))
     resolve_initial(scope, initial, arm, uses)
-    kept = resolve_run_keys(scope, run, block, Structure)
+    keys = resolve_run_keys(scope, run, block, Structure)
     initial_base(scope, initial, base)
     schedule, ticks, others = resolve_schedule(scope, run, block, rates, uses, [*guides, *sensors], duration)
     dynamics = rates.get("dynamics") if integrator is not None else None
@@ -139,7 +139,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         payloads=payloads,
         guides=tuple(guide.use(others[guide.path]) for guide in guides),
         sensors=tuple(sensor.use(others[sensor.path]) for sensor in sensors),
-        **kept,
+        **keys,
     )
     signals = resolve_signals(scope, block, structure, names_in_record(block.get("record")))
     structure = replace(structure, expressions=tuple(signals.expressions))
@@ -148,7 +148,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     structure = replace(structure, metrics=metrics, record=record, expressions=(*structure.expressions, *watched))
     linear = resolve_linear(scope, block, structure)
     linear_metrics = resolve_linear_metrics(scope, block, structure, linear)
-    scope.keep_setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
+    scope.keep_setting("record", ", ".join(recorded.name for recorded in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure, linear_metrics)
     step_errors = resolve_step_errors(scope, block, structure, linear_metrics)
     check_run(
@@ -254,7 +254,9 @@ def _inside(block: MergedBlock, key: str) -> list[str]:
     item = block.get(key)
     body = item.body if item is not None and item.value is None else None
     return [
-        each.name for each in (body or MergedBlock()).items.values() if isinstance(each.value, Call | Name) or each.body
+        entry.name
+        for entry in (body or MergedBlock()).items.values()
+        if isinstance(entry.value, Call | Name) or entry.body
     ]
 
 
@@ -267,8 +269,8 @@ def _arm(scope: Scope, run: Owner, item: Item | None) -> ResolvedArm | None:
         return None
     name = scope.definitions.definition_named(item.value) or word_of(item.value)
     if name is None or not isinstance(item.value, Name):
-        at = place_of(item.value) if item.value is not None else item.place
-        scope.complaints.error("D112", "the name of an arm is needed here", at, help="write `arm = ARM;`")
+        place = place_of(item.value) if item.value is not None else item.place
+        scope.complaints.error("D112", "the name of an arm is needed here", place, help="write `arm = ARM;`")
         return None
     if item.body is not None:
         scope.complaints.error(

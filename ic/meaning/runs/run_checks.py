@@ -116,7 +116,7 @@ def _check_steps(run: RunParts) -> None:
             x = fastest_rate(scope, use.servo, use.parameters, f"{use.joint}.servo", continuous=continuous)
             if x is not None:
                 fastest.append((use, x))
-    for use, x in sorted(fastest, key=lambda each: -scope.checks.first(each[1])):  # the worst is reported
+    for use, x in sorted(fastest, key=lambda pair: -scope.checks.first(pair[1])):  # the worst is reported
         check_stability(scope, f"servo `{use.definition}`", x, schedule, integrator, dynamics, f"{use.joint}.servo")
     for sensor in run.sensors:
         if sensor.values:

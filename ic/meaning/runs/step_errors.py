@@ -43,7 +43,7 @@ def resolve_step_errors(
 ) -> tuple[StepErrorLimit, ...]:
     """The limits in SI, or as shares, in the order in which they are written. structure: with its metrics; linear:
     those of linear answers."""
-    found: list[StepErrorLimit] = []
+    limits: list[StepErrorLimit] = []
     written = {item.name for item in block.of_kind("metric")}
     units = metric_units(structure)
     for position, statement in enumerate(block.statements):
@@ -65,12 +65,12 @@ def resolve_step_errors(
             scope.complaints.error("D313", message, place_of(comparison), help=WRITE)
             continue
         name = metric.text
-        if any(each.key == f"metric {name}" and position < each.before for each in block.removed):
+        if any(removed.key == f"metric {name}" and position < removed.before for removed in block.removed):
             scope.notes.append(f"`require {spell(comparison)}` went with the metric `{name}`, which is removed")
         elif name not in written:
             helps = [*did_you_mean(name, written), known_words("metrics of this run", sorted(written))]
             scope.complaints.error("D132", f"no metric `{name}`", metric.place, help=helps)
-        elif any(name == each.name for each in linear):
+        elif any(name == use.name for use in linear):
             message = f"`{name}` is of linear answers, of which no error by the step is computed"
             scope.complaints.error(
                 "D313", message, metric.place, help="leave it out: it is of metrics of the run itself"
@@ -81,9 +81,9 @@ def resolve_step_errors(
             number, share = _limit(scope, owner, limit, units[name])
             if number is not None:
                 text = spell(comparison)
-                if all(each.text != text for each in found):
-                    found.append(StepErrorLimit(text, name, operator, number, share, statement.place))  # type: ignore[arg-type]
-    return tuple(found)
+                if all(known_limit.text != text for known_limit in limits):
+                    limits.append(StepErrorLimit(text, name, operator, number, share, statement.place))  # type: ignore[arg-type]
+    return tuple(limits)
 
 
 def _limit(scope: Scope, owner: Owner, limit: Expression, unit: str) -> tuple[float | None, bool]:

@@ -35,8 +35,8 @@ def resolve_tolerances(
             help="it belongs to a run or a sweep",
         )
     known = tolerable(structure, linear)
-    found = (_tolerance(scope, item, structure, known) for item in body.items.values())
-    return tuple(each for each in found if each is not None)
+    tolerances = (_tolerance(scope, item, structure, known) for item in body.items.values())
+    return tuple(tolerance for tolerance in tolerances if tolerance is not None)
 
 
 def _tolerance(scope: Scope, item: Item, structure: Structure, known: dict[str, tuple[str, ...]]) -> Tolerance | None:
@@ -54,7 +54,12 @@ def _tolerance(scope: Scope, item: Item, structure: Structure, known: dict[str, 
             )
         return None
     if len(known[name]) > 1:
-        parts = [path for each in structure.record if each.name == name for path in joint_parts(name, each.joints)]
+        parts = [
+            path
+            for recorded in structure.record
+            if recorded.name == name
+            for path in joint_parts(name, recorded.joints)
+        ]
         scope.complaints.error(
             "D238",
             f"`{name}` is in {' and in '.join(known[name])}",
@@ -73,32 +78,32 @@ def _tolerance(scope: Scope, item: Item, structure: Structure, known: dict[str, 
     )
     size = scope.number(owner, wanted, item, record=False)
     if isinstance(size, Scalar):
-        at = scope.varied[path].place if path in scope.varied else place_of(item.value)
+        place = scope.varied[path].place if path in scope.varied else place_of(item.value)
         scope.complaints.error(
             "D122",
             f"the tolerance of `{name}` varies with the sweep",
-            at,
+            place,
             help="it is the same for all cases: write a number that stands still",
         )
         return None
     if size is None:
         return None
     scope.keep_setting(path, float(size), known[name][0], item=item)
-    given = scope.evaluated_settings.get(path)
-    if given is not None:
-        scope.auxiliary[path].origin = given.overriding(scope.auxiliary[path].origin)
-    return Tolerance(name, float(size), spell(given.expression if given else item.value), item.place)
+    setting = scope.evaluated_settings.get(path)
+    if setting is not None:
+        scope.auxiliary[path].origin = setting.overriding(scope.auxiliary[path].origin)
+    return Tolerance(name, float(size), spell(setting.expression if setting else item.value), item.place)
 
 
 def _nearest(item: Item, structure: Structure, known: dict[str, tuple[str, ...]]) -> list[str]:
     """The remedy for a tolerance of an unknown quantity: the syntax, or a similar name."""
     name = item.name
-    found = recordable(structure).get(name, ())
-    variables = [each.name for each in found]
+    recorded = recordable(structure).get(name, ())
+    variables = [variable.name for variable in recorded]
     if len(variables) > 1 and any(variable in known for variable in variables):
         return [known_words(f"`{name}` is several signals", variables)]
     inherited = f", or `remove {name};` here" if len(item.homes) > 1 else ""
-    record = [f"only what is recorded can differ: `record += [{name}];`{inherited}"] if found else []
-    parts = {part for each in structure.record for part in joint_parts(each.name, each.joints)}
-    shown = [each for each in known if each not in parts and each not in OF_ALL]
-    return [*(record or did_you_mean(name, known)), known_words("signals and metrics here", shown)]
+    record = [f"only what is recorded can differ: `record += [{name}];`{inherited}"] if recorded else []
+    parts = {part for variable in structure.record for part in joint_parts(variable.name, variable.joints)}
+    offered = [known_name for known_name in known if known_name not in parts and known_name not in OF_ALL]
+    return [*(record or did_you_mean(name, known)), known_words("signals and metrics here", offered)]
