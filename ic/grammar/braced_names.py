@@ -52,26 +52,26 @@ def _may_touch(first: Token, second: Token) -> bool:
     return first.source.text[first.end : second.offset].strip() != ""
 
 
-def braces_length(tokens: Sequence[Token], at: int, *, touching: bool = False) -> int:
-    """The number of tokens of the braces at token `at` that belong to a name; 0 where there are none, or a block.
+def braces_length(tokens: Sequence[Token], position: int, *, touching: bool = False) -> int:
+    """The number of tokens of the braces at token `position` that belong to a name; 0 where there are none, or a block.
 
     touching  whether the opening brace touches what follows it
     """
-    if tokens[at].text != "{" or at + 2 >= len(tokens):
+    if tokens[position].text != "{" or position + 2 >= len(tokens):
         return 0
-    if touching and not _may_touch(tokens[at], tokens[at + 1]):
+    if touching and not _may_touch(tokens[position], tokens[position + 1]):
         return 0
-    end = at + 1
+    end = position + 1
     while end < len(tokens) and (tokens[end].kind in (NAME, WHOLE) or tokens[end].text in _SIGNS):
         end += 1
-    closed = at + 1 < end < len(tokens) and tokens[end].text == "}"
-    return end + 1 - at if closed else 0
+    closed = position + 1 < end < len(tokens) and tokens[end].text == "}"
+    return end + 1 - position if closed else 0
 
 
-def name_length(tokens: Sequence[Token], at: int) -> int:
-    """The number of tokens of the name that begins at token `at`, braces included; 0 where none begins there."""
-    end = at + (1 if tokens[at].kind == NAME else _leading_length(tokens, at))
-    while at < end < len(tokens):
+def name_length(tokens: Sequence[Token], position: int) -> int:
+    """The number of tokens of the name that begins at token `position`, braces included; 0 where none begins there."""
+    end = position + (1 if tokens[position].kind == NAME else _leading_length(tokens, position))
+    while position < end < len(tokens):
         before, token = tokens[end - 1 : end + 1]
         more = braces_length(tokens, end) if _may_touch(before, token) else 0
         if before.text == "}" and token.kind in (NAME, WHOLE) and adjacent(before, token):
@@ -79,30 +79,30 @@ def name_length(tokens: Sequence[Token], at: int) -> int:
         if not more:
             break
         end += more
-    return end - at
+    return end - position
 
 
-def _leading_length(tokens: Sequence[Token], at: int) -> int:
-    """The number of tokens of the braces at token `at` that a name begins with; 0 where a block begins."""
-    length = braces_length(tokens, at)
-    if length and at and tokens[at - 1].text == "." and adjacent(tokens[at - 1], tokens[at]):
+def _leading_length(tokens: Sequence[Token], position: int) -> int:
+    """The number of tokens of the braces at token `position` that a name begins with; 0 where a block begins."""
+    length = braces_length(tokens, position)
+    if length and position and tokens[position - 1].text == "." and adjacent(tokens[position - 1], tokens[position]):
         return length  # `bodies.{ side }.mass`: behind a point stands a name
-    if length and at + length < len(tokens):
-        before, after = tokens[at + length - 1 : at + length + 1]
+    if length and position + length < len(tokens):
+        before, after = tokens[position + length - 1 : position + length + 1]
         if after.kind in (NAME, WHOLE) and adjacent(before, after):
             return length
-    return braces_length(tokens, at, touching=True)
+    return braces_length(tokens, position, touching=True)
 
 
 def filled(tokens: Sequence[Token], known: Mapping[str, str]) -> str:
     """The name of these tokens, with indices replaced by their values in `known`. Raises NotWhole, NoName."""
-    text, at = "", 0
-    while at < len(tokens):
-        length = braces_length(tokens, at)
+    text, position = "", 0
+    while position < len(tokens):
+        length = braces_length(tokens, position)
         if not length:
-            text, at = text + tokens[at].text, at + 1
+            text, position = text + tokens[position].text, position + 1
             continue
-        inside = tokens[at + 1 : at + length]
+        inside = tokens[position + 1 : position + length]
         if len(inside) == 2 and _NAME.fullmatch(known.get(inside[0].text, "")):
             text += known[inside[0].text]
         else:
@@ -110,27 +110,27 @@ def filled(tokens: Sequence[Token], known: Mapping[str, str]) -> str:
             if end != len(inside) - 1:
                 raise NotWhole(inside[end], f"`{inside[end].text}` does not belong here")
             text += str(number)
-        at += length
+        position += length
     if len(text) > LONGEST_NAME or not _NAME.fullmatch(text):
         raise NoName(text)
     return text
 
 
-def whole(tokens: Sequence[Token], at: int, known: Mapping[str, str], depth: int = 0) -> tuple[int, int]:
-    """The whole number that begins at token `at`, and where it ends; there is a token behind it. Raises NotWhole."""
-    value, at = _product(tokens, at, known, depth)
-    while tokens[at].text in ("+", "-"):
-        sign = tokens[at]
-        other, at = _product(tokens, at + 1, known, depth)
+def whole(tokens: Sequence[Token], position: int, known: Mapping[str, str], depth: int = 0) -> tuple[int, int]:
+    """The whole number that begins at token `position`, and where it ends; a token is behind it. Raises NotWhole."""
+    value, position = _product(tokens, position, known, depth)
+    while tokens[position].text in ("+", "-"):
+        sign = tokens[position]
+        other, position = _product(tokens, position + 1, known, depth)
         value = _bounded(value + other if sign.text == "+" else value - other, sign)
-    return value, at
+    return value, position
 
 
-def _product(tokens: Sequence[Token], at: int, known: Mapping[str, str], depth: int) -> tuple[int, int]:
-    value, at = _factor(tokens, at, known, depth)
-    while tokens[at].text in ("*", "/", "%"):
-        sign = tokens[at]
-        other, at = _factor(tokens, at + 1, known, depth)
+def _product(tokens: Sequence[Token], position: int, known: Mapping[str, str], depth: int) -> tuple[int, int]:
+    value, position = _factor(tokens, position, known, depth)
+    while tokens[position].text in ("*", "/", "%"):
+        sign = tokens[position]
+        other, position = _factor(tokens, position + 1, known, depth)
         if sign.text == "*":
             value = _bounded(value * other, sign)
         elif other == 0:
@@ -141,29 +141,29 @@ def _product(tokens: Sequence[Token], at: int, known: Mapping[str, str], depth: 
             raise NotWhole(sign, f"{value}/{other} is not a whole number", "`%` is the rest of a division")
         else:
             value //= other
-    return value, at
+    return value, position
 
 
-def _factor(tokens: Sequence[Token], at: int, known: Mapping[str, str], depth: int) -> tuple[int, int]:
-    token = tokens[at]
+def _factor(tokens: Sequence[Token], position: int, known: Mapping[str, str], depth: int) -> tuple[int, int]:
+    token = tokens[position]
     if depth > CONDITION_NESTING:
         raise NotWhole(token, f"signs and brackets go deeper than {CONDITION_NESTING} here")
     if token.text in ("-", "+"):
-        value, at = _factor(tokens, at + 1, known, depth + 1)
-        return -value if token.text == "-" else value, at
+        value, position = _factor(tokens, position + 1, known, depth + 1)
+        return -value if token.text == "-" else value, position
     if token.text == "(":
-        value, at = whole(tokens, at + 1, known, depth + 1)
-        if tokens[at].text != ")":
-            raise NotWhole(tokens[at], "a `)` is missing before this")
-        return value, at + 1
+        value, position = whole(tokens, position + 1, known, depth + 1)
+        if tokens[position].text != ")":
+            raise NotWhole(tokens[position], "a `)` is missing before this")
+        return value, position + 1
     if token.kind == WHOLE and token.text.isdigit() and len(token.text) <= len(str(LARGEST)):
-        return _bounded(int(token.text), token), at + 1
+        return _bounded(int(token.text), token), position + 1
     text = known.get(token.text) if token.kind == NAME else None
     if text is None:
         raise NotWhole(token, "")
     if _NAME.fullmatch(text):
         raise NotWhole(token, f"`{token.text}` is a name here, `{text}`, and a whole number is needed")
-    return int(text), at + 1
+    return int(text), position + 1
 
 
 def _bounded(value: int, token: Token) -> int:

@@ -51,7 +51,7 @@ class Cursor:
         # looking two tokens ahead never needs a check
         self.tokens = [*tokens, last, last]
         self.findings = findings
-        self.at = 0
+        self.position = 0
         self.open: list[Token] = []
         self.operators = 0
         self.peak = 0
@@ -65,20 +65,20 @@ class Cursor:
 
     @property
     def token(self) -> Token:
-        return self.tokens[self.at]
+        return self.tokens[self.position]
 
     @property
     def following(self) -> Token:
-        return self.tokens[self.at + 1]
+        return self.tokens[self.position + 1]
 
     @property
     def previous(self) -> Token:
-        return self.tokens[max(0, self.at - 1)]
+        return self.tokens[max(0, self.position - 1)]
 
     def advance(self) -> Token:
-        token = self.tokens[self.at]
+        token = self.tokens[self.position]
         if token.kind != END:
-            self.at += 1
+            self.position += 1
         return token
 
     # complaints
@@ -87,24 +87,26 @@ class Cursor:
         self,
         code: str,
         message: str,
-        at: Token | Place | Label,
+        place: Token | Place | Label,
         *,
         also: Iterable[Label] = (),
         help: str | Iterable[str] = (),
     ) -> None:
-        self.findings.error(code, message, at.place if isinstance(at, Token) else at, also=also, help=help or ())
+        self.findings.error(
+            code, message, place.place if isinstance(place, Token) else place, also=also, help=help or ()
+        )
 
     def fail(
         self,
         code: str,
         message: str,
-        at: Token | Place | Label,
+        place: Token | Place | Label,
         *,
         also: Iterable[Label] = (),
         help: str | Iterable[str] = (),
     ) -> NoReturn:
         if self.token.kind != BAD:  # such a token has been reported
-            self.tell(code, message, at, also=also, help=help)
+            self.tell(code, message, place, also=also, help=help)
         raise Unreadable
 
     def unexpected(self, wanted: str, help: str | Iterable[str] = ()) -> NoReturn:
@@ -172,19 +174,19 @@ class Cursor:
             return use.file, use.line
         return token.source.name, token.line
 
-    def on_new_line(self, at: int) -> bool:
-        return at > 0 and self.line_of(self.tokens[at]) != self.line_of(self.tokens[at - 1])
+    def on_new_line(self, position: int) -> bool:
+        return position > 0 and self.line_of(self.tokens[position]) != self.line_of(self.tokens[position - 1])
 
-    def begins_entry(self, at: int) -> bool:
+    def begins_entry(self, position: int) -> bool:
         """Return True if a new line begins here, and looks like an entry: the one before lacks its semicolon."""
-        if self.tokens[at].kind != NAME:
+        if self.tokens[position].kind != NAME:
             return False
-        behind = at + 1
+        behind = position + 1
         while self.tokens[behind].text == "." and self.tokens[behind + 1].kind == NAME:  # a path
             behind += 2
         after = self.tokens[behind]
         looks_like_one = after.text in ("=", "+=", "{", ".") or (after.kind == NAME and after.text not in ("and", "or"))
-        return looks_like_one and self.on_new_line(at)
+        return looks_like_one and self.on_new_line(position)
 
     def begins_value(self) -> bool:
         token = self.token
@@ -218,7 +220,7 @@ class Cursor:
             elif text == ";" and braces == 0:
                 self.advance()
                 return
-            elif braces == 0 and rounds <= 0 and self.at > start and self.begins_entry(self.at):
+            elif braces == 0 and rounds <= 0 and self.position > start and self.begins_entry(self.position):
                 return
             self.advance()
         self.unbalanced = True

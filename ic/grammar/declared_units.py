@@ -32,24 +32,24 @@ DEEPEST = 64  # units that need units
 def declarations(tokens: Sequence[Token]) -> dict[str, int]:
     """Positions of the names that `unit NAME =` declares outside of blocks, in files whose edition has it; of a name
     that is declared twice, the first."""
-    found: dict[str, int] = {}
+    positions: dict[str, int] = {}
     depth = 0
-    for at, token in enumerate(tokens):
+    for position, token in enumerate(tokens):
         if token.text == "{":
             depth += 1
         elif token.text == "}":
             depth = max(depth - 1, 0)  # a bracket that closes none is only reported
-        elif token.text == UNIT and depth == 0 and is_declaration(tokens, at) and token.source.edition > 1:
-            found.setdefault(tokens[at + 1].text, at + 1)
-    return found
+        elif token.text == UNIT and depth == 0 and is_declaration(tokens, position) and token.source.edition > 1:
+            positions.setdefault(tokens[position + 1].text, position + 1)
+    return positions
 
 
-def is_declaration(tokens: Sequence[Token], at: int) -> bool:
+def is_declaration(tokens: Sequence[Token], position: int) -> bool:
     """Return True if `unit NAME =` stands at this position, where an entry begins."""
     return (
-        at + 2 < len(tokens)
-        and (tokens[at].text, tokens[at + 1].kind, tokens[at + 2].text) == (UNIT, NAME, "=")
-        and (at == 0 or tokens[at - 1].text in (";", "}", "{"))
+        position + 2 < len(tokens)
+        and (tokens[position].text, tokens[position + 1].kind, tokens[position + 2].text) == (UNIT, NAME, "=")
+        and (position == 0 or tokens[position - 1].text in (";", "}", "{"))
     )
 
 
@@ -73,8 +73,8 @@ def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) 
         token, size = sizes[name]
         if name in within:
             loop = [*within[within.index(name) :], name]
-            message = f"unit `{name}` needs itself: " + " needs ".join(f"`{each}`" for each in loop)
-            labels = [Label(sizes[each][0].place, f"`{each}`") for each in loop[1:-1]]
+            message = f"unit `{name}` needs itself: " + " needs ".join(f"`{needed}`" for needed in loop)
+            labels = [Label(sizes[needed][0].place, f"`{needed}`") for needed in loop[1:-1]]
             raise Problem(
                 error("D394", message, token.place, also=labels, help="write one of them in units of the language")
             )
@@ -82,9 +82,9 @@ def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) 
             message = f"unit `{name}` is at the end of a chain of {DEEPEST} units"
             raise Problem(error("D394", message, token.place, help="write it in units of the language"))
         _check_name(token)
-        made = _measure(size, lambda each: find(each, (*within, name)))
-        known[name] = made
-        return made
+        measure = _measure(size, lambda other: find(other, (*within, name)))
+        known[name] = measure
+        return measure
 
     for name in sizes:
         try:
@@ -136,23 +136,23 @@ def _measure(size: Expression, find: Callable[[str], Measure]) -> Measure:
     raise Problem(error("D394", f"{what} unit is made of numbers and units, with `*` and `/`", place, help=USAGE))
 
 
-def _product(one: Measure, other: Measure, place: Place) -> Measure:
+def _product(measure: Measure, other: Measure, place: Place) -> Measure:
     """The product, if it is not too large for numbers. Raises Problem D394."""
-    made = one * other
-    if made.over == 0:
+    product = measure * other
+    if product.over == 0:
         raise Problem(error("D394", "a unit has a size above 0", place, help=USAGE))
-    if max(made.over.bit_length(), made.under.bit_length()) <= MOST_BITS and abs(made.turns) <= DEEPEST:
+    if max(product.over.bit_length(), product.under.bit_length()) <= MOST_BITS and abs(product.turns) <= DEEPEST:
         try:
-            if made.scale > 0.0:
-                return made
+            if product.scale > 0.0:
+                return product
         except OverflowError:
             pass
     raise Problem(error("D394", "this unit is beyond what a number can hold", place, help=USAGE))
 
 
 def _of_unit(unit: Unit, find: Callable[[str], Measure]) -> Measure:
-    made = ONE
+    measure = ONE
     for word, power in unit.factors:
         known = units.ALL_UNITS.get(word.text)
-        made = _product(made, (known.measure if known is not None else find(word.text)) ** power, unit.place)
-    return made
+        measure = _product(measure, (known.measure if known is not None else find(word.text)) ** power, unit.place)
+    return measure

@@ -52,32 +52,32 @@ class EditionDifferences(Cursor):
 
     def as_edition_2(self, token: Token, why: str) -> Help:
         """The help that says to change the file of a token to edition 2."""
-        source, found = token.source, token.source.heading
+        source, edition_line = token.source, token.source.heading
         text = f"{why}: write `{EDITION_WORD} 2;` as its first line"
-        if found is None:
+        if edition_line is None:
             return write(f"{EDITION_WORD} 2;\n", text, at=Place(source.name, 1, 1, 0), where="before")
-        start, end = found.number
+        start, end = edition_line.number
         return write("2", text, at=source.place(start, end - start))
 
     def not_a_value_too(self, taken: Sequence[Token]) -> None:
         """Refuse `2 m/s` in a file of edition 2 that calls a value `s`. taken: the tokens of the unit"""
         if len(taken) == 1 or self.units_alone:
             return
-        at = 2 if taken[0].kind in NUMBERS else 0  # `15 1/s`
+        start = 2 if taken[0].kind in NUMBERS else 0  # `15 1/s`
         depth = 0
-        while at < len(taken):  # text in brackets after the number consists of units only
-            depth += {"(": 1, ")": -1}.get(taken[at].text, 0)
-            at += 1
+        while start < len(taken):  # text in brackets after the number consists of units only
+            depth += {"(": 1, ")": -1}.get(taken[start].text, 0)
+            start += 1
             if depth == 0:
                 break
-        for n, token in enumerate(taken[at:], at):
+        for n, token in enumerate(taken[start:], start):
             named = self.values_of_files.get((token.source.name, token.text)) if token.kind == NAME else None
             if named is None or token.source.edition == 1:
                 continue
-            unit = "".join(each.text for each in taken)
+            unit = "".join(part.text for part in taken)
             sign = max(i for i in range(n) if taken[i].text in ("*", "/"))
-            before = "".join(each.text for each in taken[:sign])
-            number = self.tokens[self.tokens.index(taken[0], max(0, self.at - len(taken))) - 1]
+            before = "".join(part.text for part in taken[:sign])
+            number = self.tokens[self.tokens.index(taken[0], max(0, self.position - len(taken))) - 1]
             quantity = f"{number.text} {before}" if number.kind in NUMBERS else f"... {before}"
             first = number if number.kind in NUMBERS else taken[0]
             value = f"for the value write `({quantity}) {taken[sign].text} {token.text}`"
@@ -100,7 +100,7 @@ class EditionDifferences(Cursor):
             or named.kind != NAME
             or named.text not in units.FURTHER_UNITS
             or named.source.edition > 1
-            or self.tokens[self.at + 2].text in ("(", "{", ".")
+            or self.tokens[self.position + 2].text in ("(", "{", ".")
         ):
             return
         quantity = first.source.text[first.offset : self.previous.end]
@@ -126,9 +126,9 @@ class EditionDifferences(Cursor):
         helps = [write(f"({quantity})", f"write `.../({quantity})`", at=span(under, last))]
         if above and first.offset < under.offset and not first.expansions:
             fraction = f"({above}) {right.unit.text}"
-            shown = f"{under.source.text[first.offset : under.offset]}({quantity})"
+            in_brackets = f"{under.source.text[first.offset : under.offset]}({quantity})"
             helps = [
-                write(f"({quantity})", f"for what it is in edition 1 write `{shown}`", at=span(under, last)),
+                write(f"({quantity})", f"for what it is in edition 1 write `{in_brackets}`", at=span(under, last)),
                 write(fraction, f"for the fraction of a unit write `{fraction}`", at=span(first, last)),
             ]
         if under.source.edition > 1:

@@ -29,9 +29,9 @@ class EditionEntries(Loops):
         """Find the units that the deck declares anywhere, before it is parsed."""
         self.take_misplaced_editions()
         self.unsized.update(
-            self.tokens[at + 1].text
-            for at, token in enumerate(self.tokens)
-            if token.text == UNIT and token.source.edition == 1 and is_declaration(self.tokens, at)
+            self.tokens[position + 1].text
+            for position, token in enumerate(self.tokens)
+            if token.text == UNIT and token.source.edition == 1 and is_declaration(self.tokens, position)
         )
         positions = declarations(self.tokens)
         if not positions:
@@ -39,16 +39,16 @@ class EditionEntries(Loops):
         self.declared = {**self.declared, **dict.fromkeys(positions, ONE)}
         sizes: dict[str, tuple[Token, Expression]] = {}
         self.units_alone = True
-        for name, at in positions.items():
-            self.at = at + 2
+        for name, position in positions.items():
+            self.position = position + 2
             with suppress(Unreadable):
-                sizes[name] = (self.tokens[at], self.value())
+                sizes[name] = (self.tokens[position], self.value())
             self.operators, self.peak = 0, 0
             self.open.clear()
         known = measures(sizes, self.findings)
         self.declared = {**self.declared, **known}
         self.unsized.update(positions.keys() - known.keys())
-        self.at, self.units_alone = 0, False
+        self.position, self.units_alone = 0, False
 
     def take_misplaced_editions(self) -> None:
         """Read a file with a misplaced `deck 2;`, which is reported, in that edition: the rest may be right."""
@@ -58,7 +58,7 @@ class EditionEntries(Loops):
 
     def step_over_unit(self) -> None:
         """Step over `unit NAME = SIZE;`, which has been read, and refuse it where it is not allowed."""
-        start, (word, name) = self.at, self.tokens[self.at : self.at + 2]
+        start, (word, name) = self.position, self.tokens[self.position : self.position + 2]
         depth = len(self.open)
         try:
             if word.source.edition == 1:
@@ -73,7 +73,7 @@ class EditionEntries(Loops):
             if first != start + 1:
                 also = (Label(self.tokens[first].place, "the first"),)
                 self.fail("D394", f"unit `{name.text}` is declared twice", name, also=also, help="leave one out")
-            self.at += 3
+            self.position += 3
             self.units_alone = True
             self.semicolon(self.value())
             self.units_alone = False
@@ -85,14 +85,14 @@ class EditionEntries(Loops):
         """Report a `deck 2;` that does not set the edition, at its number."""
         number = self.token
         heading = word.source.heading
-        said = f"{word.text} {number.text};"
+        edition_entry = f"{word.text} {number.text};"
         if heading is not None:
             place = word.source.place(heading.first, heading.last - heading.first)
             label = Label(place, "it is said here")
             help = leave_out("leave one of the two out", word.place)
             self.fail("D391", "a file says its edition once", span(word, number), also=(label,), help=help)
-        known = " or ".join(f"`{EDITION_WORD} {each};`" for each in EDITIONS)
+        known = " or ".join(f"`{EDITION_WORD} {edition};`" for edition in EDITIONS)
         if number.text not in map(str, EDITIONS) or self.following.text != ";":
             self.fail("D391", "this is no edition", span(word, number), help=f"write {known} in the file's first line")
         message = "a file says its edition before all else but comments"
-        self.fail("D391", message, span(word, number), help=f"make `{said}` the first line of the file")
+        self.fail("D391", message, span(word, number), help=f"make `{edition_entry}` the first line of the file")

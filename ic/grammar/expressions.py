@@ -49,7 +49,7 @@ class Expressions(Quantities):
     def value(self) -> Expression:
         """A separate expression: an entry's value, a list's item, a call's argument."""
         before = self.operators
-        if self.begins_entry(self.at):
+        if self.begins_entry(self.position):
             self.fail("D020", "expected a value", self.behind(self.previous))
         result = self.ranged(self.expression())
         self.peak = max(self.peak, self.operators)
@@ -83,7 +83,7 @@ class Expressions(Quantities):
         while True:
             token = self.token
             level = _LEVEL.get(token.text)
-            if level is None or level < least or self.begins_entry(self.at):
+            if level is None or level < least or self.begins_entry(self.position):
                 return left
             self.count_operator()
             self.advance()
@@ -137,7 +137,7 @@ class Expressions(Quantities):
     def operand(self) -> Expression:
         token = self.token
         if token.kind == NAME and token.text in self.indices:
-            token = self.tokens[self.at] = self.stand_in(token)
+            token = self.tokens[self.position] = self.stand_in(token)
         if token.kind in NUMBERS:
             return self.number()
         if token.kind == NAME or (token.text == EVERY_JOINT and self.following.text == "."):
@@ -219,7 +219,7 @@ class Expressions(Quantities):
             return self.indexed(name, parts[0])
         token = self.token
         known = units.is_unit(token.text) or token.text in self.declared or token.text in self.unsized
-        if known and token.kind == NAME and not self.begins_entry(self.at):
+        if known and token.kind == NAME and not self.begins_entry(self.position):
             if self.is_reserved(parts[0]) and len(parts) == 1:
                 self.fail(
                     "D025",
@@ -266,7 +266,7 @@ class Expressions(Quantities):
             "/",
             "^",
         ):
-            number = self.tokens[self.at - 2]
+            number = self.tokens[self.position - 2]
             factor = before == "*" and number.kind in NUMBERS  # `2 * m`
             self.fail(
                 "D025",
@@ -309,11 +309,11 @@ class Expressions(Quantities):
 
     def refuse_braces(self) -> None:
         """Refuse `seg_{i}` outside of a loop, at the brace."""
-        length = braces_length(self.tokens, self.at)
+        length = braces_length(self.tokens, self.position)
         if length and adjacent(self.previous, self.token):
-            first, start = self.token, self.at - 1
-            written = "".join(token.text for token in self.tokens[self.at : self.at + length])
-            self.at = start + name_length(self.tokens, start)
+            first, start = self.token, self.position - 1
+            written = "".join(token.text for token in self.tokens[self.position : self.position + length])
+            self.position = start + name_length(self.tokens, start)
             place = span(first, self.tokens[start + length])
             self.fail("D285", f"`{written[:SHOWN]}` within a name stands in a loop alone", place, help=USAGE)
 
@@ -350,7 +350,7 @@ class Expressions(Quantities):
             self.tell("D024", "`;` between items", token, help=write(","))
             self.advance()
             return True
-        if self.begins_value() and not self.begins_entry(self.at) and token.kind != BAD:
+        if self.begins_value() and not self.begins_entry(self.position) and token.kind != BAD:
             self.tell("D024", f"a `,` is missing before {token_in_words(token)}", self.behind(self.previous))
             return True
         if token.text == "=":
@@ -361,4 +361,4 @@ class Expressions(Quantities):
     def ends_entry(self) -> bool:
         """Return True if the semicolon here ends the entry, so that only the closing bracket is missing."""
         after = self.following
-        return after.text == "}" or after.kind == "END" or self.begins_entry(self.at + 1)
+        return after.text == "}" or after.kind == "END" or self.begins_entry(self.position + 1)

@@ -53,7 +53,7 @@ class Loops(Expressions):
         """Return True if a loop begins here, or text that was meant for one."""
         if self.token.text != "for":
             return False
-        behind = self.tokens[self.at + 2].text
+        behind = self.tokens[self.position + 2].text
         return self.following.text == "(" or (self.following.kind == NAME and behind in ("in", "=", ":", "from"))
 
     def loop(self, into: list[Entry]) -> None:
@@ -69,11 +69,11 @@ class Loops(Expressions):
             self.fail(
                 "D283", f"expected the block of the loop, found {token_in_words(self.token)}", self.token, help=USAGE
             )
-        opening, start = self.token, self.at + 1
-        closing = self.closing(self.at)
+        opening, start = self.token, self.position + 1
+        closing = self.closing(self.position)
         if self.tokens[closing].kind == END:
             self.enter()
-            self.at = closing
+            self.position = closing
             self.never_closed()
         self.enter()
         pieces = self.pieces(start, closing)
@@ -95,7 +95,7 @@ class Loops(Expressions):
             known = {**self.indices, index.text: value}
             tokens = self.tokens_of(pieces, Expansion(index.text, use, value), known)
             self.read_turn([*tokens, self.tokens[closing]], opening, known, into)
-        self.at = closing
+        self.position = closing
         self.leave()
 
     def read_turn(self, tokens: Sequence[Token], opening: Token, known: Mapping[str, str], into: list[Entry]) -> None:
@@ -123,19 +123,19 @@ class Loops(Expressions):
             message = f"`{index.text}` is the index of a loop around this one"
             self.tell("D283", message, index, help="give one of the two another name")
 
-    def closing(self, at: int) -> int:
-        """The position of the brace that closes the one at `at`, or that of the end."""
+    def closing(self, position: int) -> int:
+        """The position of the brace that closes the one at `position`, or that of the end."""
         depth = 0
-        while self.tokens[at].kind != END:
-            depth += {"{": 1, "}": -1}.get(self.tokens[at].text, 0)
+        while self.tokens[position].kind != END:
+            depth += {"{": 1, "}": -1}.get(self.tokens[position].text, 0)
             if depth == 0:
                 break
-            at += 1
-        return at
+            position += 1
+        return position
 
     def counted(self) -> Sequence[str]:
         """The iterations of `1 .. 6 by 2`: both ends are among them where the steps meet the last."""
-        start = self.at
+        start = self.position
         first = self.whole()
         if self.token.text != "..":
             self.fail("D283", f"expected `..`, found {token_in_words(self.token)}", self.token, help=USAGE)
@@ -182,14 +182,14 @@ class Loops(Expressions):
     def whole(self, help: str = _ENDS) -> int:
         """The whole number that begins here. help: what to write where there is none."""
         try:
-            value, self.at = whole(self.tokens, self.at, self.indices)
+            value, self.position = whole(self.tokens, self.position, self.indices)
         except NotWhole as reason:
-            self.at = max(self.at, self.tokens.index(reason.token, self.at))
-            found = token_in_words(reason.token)
+            self.position = max(self.position, self.tokens.index(reason.token, self.position))
+            token_words = token_in_words(reason.token)
             near = did_you_mean(reason.token.text, () if reason.message else self.indices)
             self.fail(
                 "D283",
-                reason.message or f"expected a whole number, found {found}",
+                reason.message or f"expected a whole number, found {token_words}",
                 reason.token,
                 help=[*near, reason.help or help],
             )
@@ -232,52 +232,58 @@ class Loops(Expressions):
 
     def pieces(self, start: int, end: int) -> list[tuple[Token, ...]]:
         """The tokens of a loop's block, with a name with braces as one piece; inner loops are not changed."""
-        found: list[tuple[Token, ...]] = []
-        at = start
-        while at < end:
-            token = self.tokens[at]
+        pieces: list[tuple[Token, ...]] = []
+        position = start
+        while position < end:
+            token = self.tokens[position]
             length = 1
-            if token.text == "for" and self.tokens[at + 1].kind == NAME and self.tokens[at + 2].text == "in":
-                inner = at
+            if (
+                token.text == "for"
+                and self.tokens[position + 1].kind == NAME
+                and self.tokens[position + 2].text == "in"
+            ):
+                inner = position
                 while inner < end and self.tokens[inner].text != "{":
                     inner += 1
                 inner = min(end, self.closing(inner) + 1) if inner < end else end
-                found += ((each,) for each in self.tokens[at:inner])
-                at = inner
+                pieces += ((inner_token,) for inner_token in self.tokens[position:inner])
+                position = inner
                 continue
             if token.kind == NAME or token.text == "{":
-                length = max(1, name_length(self.tokens, at))
-            found.append(tuple(self.tokens[at : at + length]))
-            at += length
-        return found
+                length = max(1, name_length(self.tokens, position))
+            pieces.append(tuple(self.tokens[position : position + length]))
+            position += length
+        return pieces
 
-    def tokens_of(self, pieces: Sequence[tuple[Token, ...]], at: Expansion, known: dict[str, str]) -> list[Token]:
-        """The tokens of the iteration `at`."""
+    def tokens_of(
+        self, pieces: Sequence[tuple[Token, ...]], iteration: Expansion, known: dict[str, str]
+    ) -> list[Token]:
+        """The tokens of an iteration."""
         through: dict[int, tuple[Expansion, ...]] = {}  # by identity, as of macros
-        made: list[Token] = []
+        tokens: list[Token] = []
         for piece in pieces:
             first = piece[0]
             came = first.expansions
             if id(came) not in through:
                 count = macro_count(came)
-                through[id(came)] = (*came[:count], at, *came[count:])
+                through[id(came)] = (*came[:count], iteration, *came[count:])
             token = Token(first.kind, first.text, first.source, first.offset, piece[-1].end - first.offset)
             token.expansions = through[id(came)]
             if len(piece) > 1:
                 self.fill(token, piece, known)
-            made.append(token)
-        return made
+            tokens.append(token)
+        return tokens
 
     def fill(self, token: Token, piece: Sequence[Token], known: dict[str, str]) -> None:
         """Replace a piece with braces by the name that it stands for; if there is none, that is reported."""
-        written = "".join(each.text for each in piece)
+        written = "".join(part.text for part in piece)
         try:
             token.kind, token.text = NAME, filled(piece, known)
         except NotWhole as reason:
-            at = reason.token
-            place = at.source.place(at.offset, at.length, token.expansions)
-            near = did_you_mean(at.text, known) if at.kind == NAME and not reason.message else []
-            message = reason.message or f"no index {token_in_words(at)} in `{written}`"
+            wrong = reason.token
+            place = wrong.source.place(wrong.offset, wrong.length, token.expansions)
+            near = did_you_mean(wrong.text, known) if wrong.kind == NAME and not reason.message else []
+            message = reason.message or f"no index {token_in_words(wrong)} in `{written}`"
             self.tell(
                 "D285",
                 message,
@@ -320,7 +326,7 @@ class Loops(Expressions):
         heads = [[self.advance()]] if self.token.text == EVERY_JOINT else self.heads()
         tail: list[Token] = []
         if self.token.text == ".":
-            self.at -= 1
+            self.position -= 1
             tail = self.path()[1:]
         operator = self.token
         if operator.text == "{":
@@ -337,7 +343,7 @@ class Loops(Expressions):
         return [
             Setting(
                 (),
-                tuple(Word(each.text, each.place) for each in (*head, *tail)),
+                tuple(Word(part.text, part.place) for part in (*head, *tail)),
                 operator.text,
                 value,
                 span(head[0], head[-1]),
@@ -348,4 +354,4 @@ class Loops(Expressions):
 
 def _indices(known: Mapping[str, str]) -> str:
     """The indices in words: `i`, or `i` or `j`."""
-    return " or ".join(f"`{each}`" for each in known)
+    return " or ".join(f"`{index}`" for index in known)

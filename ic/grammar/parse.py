@@ -108,11 +108,11 @@ def parse_expression(
     parser = _Parser(tokens, findings)
     parser.declared = declared
     with suppress(GiveUp, EndedInsideBlock, Unreadable):
-        found = parser.value()
+        expression = parser.value()
         if parser.token.kind != END:
             helps = {"=": "`==` compares", "&": "`and` joins conditions", "|": "`or` joins conditions"}
             parser.unexpected("the end of the line", helps.get(parser.token.text, ()))
-        return found
+        return expression
     return None
 
 
@@ -136,10 +136,10 @@ class _Parser(Uses):
             if token.text == ";":
                 self.advance()
                 continue
-            if token.text == UNIT and is_declaration(self.tokens, self.at):
+            if token.text == UNIT and is_declaration(self.tokens, self.position):
                 self.step_over_unit()
                 continue
-            start = self.at
+            start = self.position
             try:
                 operators = self.operators
                 if self.at_loop():
@@ -158,7 +158,7 @@ class _Parser(Uses):
 
     def note_unreadable(self, start: int) -> list[Entry]:
         """Note that an entry could not be read, with the known part: the name that it sets, to an unknown value."""
-        tokens = self.tokens[start : max(self.at, start + 1)]
+        tokens = self.tokens[start : max(self.position, start + 1)]
         names = list(takewhile(lambda token: token.kind == NAME, tokens))
         behind = len(names)
         while behind + 1 < len(tokens) and tokens[behind].text == "." and tokens[behind + 1].kind == NAME and names:
@@ -167,7 +167,7 @@ class _Parser(Uses):
         first, last = tokens[0], tokens[-1]
         sets = bool(names) and behind < len(tokens) and tokens[behind].text in ("=", "+=")
         end = last.place.macros[-1].use if last.place.macros else last.place
-        at = first.place.macros[-1].use if first.place.macros else first.place
+        place = first.place.macros[-1].use if first.place.macros else first.place
         known = [name.text for name in names[1:] or names]
         if len(names) == 1 and behind == 1 and tokens[behind:] and tokens[behind].text == "(":  # likewise, misspelt
             known += [token.text for token in tokens if token.kind == NAME]
@@ -176,7 +176,7 @@ class _Parser(Uses):
                 r"[A-Za-z_]\w*", last.source.rest_of_line(first.offset if first.source is last.source else last.offset)
             )
         self.unreadable.append(
-            UnreadableStretch(at, (end.line, end.column + end.length), tuple(known), None if sets else self.within)
+            UnreadableStretch(place, (end.line, end.column + end.length), tuple(known), None if sets else self.within)
         )
         if not sets:
             return []
@@ -193,7 +193,7 @@ class _Parser(Uses):
         self.entries(body)
         self.end_items(outer)
         closing = self.leave()
-        on_lines = [self.line_of(each) for each in (opening, self.tokens[self.at - 2], closing)]
+        on_lines = [self.line_of(bracket) for bracket in (opening, self.tokens[self.position - 2], closing)]
         if not self.open and on_lines[0] != on_lines[1] == on_lines[2] and not closing.expansions:
             self.closed_within_line = closing
         if self.misindented is None and not (opening.expansions or closing.expansions):
@@ -234,7 +234,7 @@ class _Parser(Uses):
     # entries
 
     def entry(self) -> Entry:
-        start = self.at
+        start = self.position
         first = self.token
         if first.kind != NAME:
             self.not_an_entry()
@@ -247,7 +247,7 @@ class _Parser(Uses):
             self.file_without_quotes(names)
         tail: list[Token] = []
         if self.token.text == ".":
-            self.at -= 1
+            self.position -= 1
             tail = self.path()[1:]
         text = self.token.text
         if len(names) == 1 and first.text == EDITION_WORD and self.token.kind in NUMBERS:
@@ -285,8 +285,8 @@ class _Parser(Uses):
 
     def file_without_quotes(self, names: list[Token]) -> None:
         """`arm panda from robots/panda.urdf { }`, with or without `urdf` before the name."""
-        first = self.at if len(names) == 3 else self.at - 1
-        last = self.at
+        first = self.position if len(names) == 3 else self.position - 1
+        last = self.position
         while (
             self.tokens[last + 1].text not in ("{", ";", ")")
             and self.tokens[last + 1].kind != END
@@ -303,7 +303,7 @@ class _Parser(Uses):
 
     def line_break_in(self, names: list[Token]) -> bool:
         """Return True if a new line breaks a run of names that cannot be one entry: `q` and, below it, `mass = 3;`."""
-        return self.begins_entry(self.at) and self.following.text in ("=", "+=")
+        return self.begins_entry(self.position) and self.following.text in ("=", "+=")
 
     def not_an_entry(self) -> None:
         token = self.token
@@ -319,7 +319,7 @@ class _Parser(Uses):
         self.unexpected("an entry, such as `name = value;`")
 
     def begins_value_on_this_line(self) -> bool:
-        return self.begins_value() and not self.on_new_line(self.at)
+        return self.begins_value() and not self.on_new_line(self.position)
 
     def no_brace(self, names: list[Token]) -> None:
         """`servo light like strong` without the `{` of its block; its entries are skipped where they follow."""
@@ -355,7 +355,7 @@ class _Parser(Uses):
         name = names[1]
         if tail:
             message = f"`{names[0].text}` gives a value to one name, without points"
-            path = ".".join(each.text for each in (name, *tail))
+            path = ".".join(part.text for part in (name, *tail))
             help = f"a value of a deck that is used is set in a run: `with {path} = ...;`"
             self.fail("D020", message, span(name, tail[-1]), help=help)
         if self.is_reserved(name):
@@ -427,7 +427,7 @@ class _Parser(Uses):
             self.fail(
                 "D032", f"`{words[-2].text}` and `from` both name a base", names[-2], help="there is one base only"
             )
-        closing, depth = self.at + 1, 1
+        closing, depth = self.position + 1, 1
         while depth and self.tokens[closing].kind != END:
             depth += {"(": 1, ")": -1}.get(self.tokens[closing].text, 0)
             closing += 1
@@ -452,7 +452,7 @@ class _Parser(Uses):
         count = _words_before_value(names, bool(tail), token)
         if count == 0 or (count == len(names) and not (self.begins_value() or token.text in ("-", "+", "!"))):
             self.no_statement([*names, *tail], token)
-        self.at = start + count
+        self.position = start + count
         words = names[:count]
         value = self.value()
         if words[0].text == "sample" and self.token.text == "{":
@@ -472,7 +472,7 @@ class _Parser(Uses):
     def over_cases(self, comparison: Expression) -> Expression:
         """Read `in SHARE of cases` and `with CONFIDENCE confidence`, one of them or both, after an optional
         comparison."""
-        if self.token.text not in ("in", "with") or self.on_new_line(self.at):
+        if self.token.text not in ("in", "with") or self.on_new_line(self.position):
             return comparison
         first = self.token
         share = confidence = None
@@ -496,7 +496,7 @@ class _Parser(Uses):
     def no_statement(self, names: list[Token], token: Token) -> None:
         last = names[-1]
         wanted = "`=`, `{` or a value"
-        if self.on_new_line(self.at) or token.kind == END or token.text in (";", "}"):
+        if self.on_new_line(self.position) or token.kind == END or token.text in (";", "}"):
             if token.kind == BAD:
                 raise Unreadable
             self.fail("D020", f"expected {wanted} after `{last.text[:40]}`", self.behind(last))
@@ -515,11 +515,11 @@ class _Parser(Uses):
             raise Unreadable
         if may_open and isinstance(value, Name):
             self.unopened.append(self.behind(self.previous))
-        if token.text == "}" or token.kind == END or self.on_new_line(self.at):
+        if token.text == "}" or token.kind == END or self.on_new_line(self.position):
             self.tell("D021", "expected `;`", self.behind(self.previous), help=write(";", _SEMICOLON, where="before"))
             return
-        another = self.following.kind == NAME and self.tokens[self.at + 2].text in ("=", "+=")
-        if token.text == "," and (another or self.on_new_line(self.at + 1) or self.following.text == "}"):
+        another = self.following.kind == NAME and self.tokens[self.position + 2].text in ("=", "+=")
+        if token.text == "," and (another or self.on_new_line(self.position + 1) or self.following.text == "}"):
             self.tell("D024", "`,` at the end of an entry", token, help=write(";"))
             self.advance()
             return
@@ -544,10 +544,10 @@ class _Parser(Uses):
         whole, part = self.previous, self.following
         if not (whole.kind == part.kind == WHOLE and whole.end == self.token.offset and self.token.end == part.offset):
             return ""
-        said = f"a number has a decimal point: `{whole.text}.{part.text}`"
+        remedy = f"a number has a decimal point: `{whole.text}.{part.text}`"
         if len(part.text) == 3 and whole.text != "0":
-            said += f"; thousands have no mark: `{whole.text}{part.text}`"
-        return said
+            remedy += f"; thousands have no mark: `{whole.text}{part.text}`"
+        return remedy
 
 
 def _word(token: Token) -> Word:
@@ -560,8 +560,8 @@ def _words(tokens: Sequence[Token]) -> tuple[Word, ...]:
 
 def _base_at(names: Sequence[Token]) -> int | None:
     """The position of `like X` or `of X` at the end of a definition's names, behind kind and name; None without one."""
-    at = len(names) - 2
-    return at if at >= 2 and names[at].text in ("like", "of") else None
+    position = len(names) - 2
+    return position if position >= 2 and names[position].text in ("like", "of") else None
 
 
 def _made_from(names: Sequence[Token], tail: Sequence[Token]) -> bool:
@@ -592,6 +592,6 @@ def _words_before_value(names: Sequence[Token], dotted: bool, following: Token) 
 def _without_points(names: list[Token], tail: list[Token]) -> str:
     """The remedy for `linear shoulder.servo { }`, whose name may be any, and for `shoulder.servo { }`."""
     if len(names) > 1 and names[0].text not in DEFINED_IN_PARTS:
-        name = "_".join(each.text for each in (names[-1], *tail))
+        name = "_".join(part.text for part in (names[-1], *tail))
         return write(name, f"give it a name without points, such as `{name}`")
     return f"write `{names[-1].text} {{ {tail[0].text} {{ ... }} }}`"

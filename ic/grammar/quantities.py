@@ -50,7 +50,7 @@ class Quantities(EditionDifferences):
 
     def not_a_second_number(self, first: Token) -> None:
         token = self.token
-        if token.kind not in NUMBERS or self.on_new_line(self.at) or (self.open and self.open[-1].text != "{"):
+        if token.kind not in NUMBERS or self.on_new_line(self.position) or (self.open and self.open[-1].text != "{"):
             return
         if token.offset == first.end and token.text.startswith("."):
             self.fail("D027", f"`{first.text}{token.text}` is not a number", span(first, token))
@@ -61,10 +61,10 @@ class Quantities(EditionDifferences):
         token = self.token
         over = None
         if token.kind == WHOLE and token.text == "1" and self.following.text == "/":
-            over = self.unit_factor(self.at + 2, -1, 0)
-            named = self.tokens[self.at + 2]
-            named_unit = self.reads_as_unit(self.at + 2)
-            if over is None and named.kind == NAME and not named_unit and not self.on_new_line(self.at):
+            over = self.unit_factor(self.position + 2, -1, 0)
+            named = self.tokens[self.position + 2]
+            named_unit = self.reads_as_unit(self.position + 2)
+            if over is None and named.kind == NAME and not named_unit and not self.on_new_line(self.position):
                 self.fail(
                     "D028",
                     f"`{named.text}` is not a unit",
@@ -73,17 +73,17 @@ class Quantities(EditionDifferences):
                 )
         if token.kind != NAME and token.text not in ("%", "(") and over is None:
             return None
-        if self.begins_entry(self.at) or self.is_word_of_requirement():
+        if self.begins_entry(self.position) or self.is_word_of_requirement():
             return None
-        if over is None and token.text != "(" and not self.reads_as_unit(self.at, first=True):
+        if over is None and token.text != "(" and not self.reads_as_unit(self.position, first=True):
             self.unknown_unit()
             return None
-        start = self.at
+        start = self.position
         product = self.unit_product(start, 1, 0, over)
         self.not_joined_otherwise(start if product is None else product[1] - 1, start)
         if product is None:  # a path or a block begins with this name
             return None
-        factors, self.at = product
+        factors, self.position = product
         if self.token.text == "^":
             self.fail(
                 "D030",
@@ -96,26 +96,26 @@ class Quantities(EditionDifferences):
         if not self.units_alone and any(word.text in self.unsized for word, _ in factors):
             raise Unreadable
         self.not_a_second_unit(start)
-        taken = self.tokens[start : self.at]
+        taken = self.tokens[start : self.position]
         self.not_a_value_too(taken)
         declared = [(word.text, self.declared[word.text]) for word, _ in factors if word.text in self.declared]
         text = "".join(t.text for t in taken)
         return Unit(tuple(factors), span(taken[0], taken[-1]), text, tuple(declared))
 
-    def reads_as_unit(self, at: int, *, first: bool = False) -> bool:
-        """Return True if the name at token `at`, which follows a number or a unit, is a unit.
+    def reads_as_unit(self, position: int, *, first: bool = False) -> bool:
+        """Return True if the name at token `position`, which follows a number or a unit, is a unit.
 
         first  it stands behind the number, where no other name may stand
         """
-        name = self.tokens[at].text
+        name = self.tokens[position].text
         if name in self.unsized:
             return True
-        if self.tokens[at].source.edition > 1:
+        if self.tokens[position].source.edition > 1:
             return name in units.ALL_UNITS or name in self.declared
         if name not in units.FURTHER_UNITS:
             return units.is_unit(name)
         if first:
-            return not self.on_new_line(at) and self.tokens[at + 1].text not in ("=", "+=", "{", "(")
+            return not self.on_new_line(position) and self.tokens[position + 1].text not in ("=", "+=", "{", "(")
         return name not in self.names_of_units
 
     def is_word_of_requirement(self) -> bool:
@@ -126,61 +126,61 @@ class Quantities(EditionDifferences):
         return (text == "of" and following.text == "cases") or text == "confidence"
 
     def unit_product(
-        self, at: int, sign: int, depth: int, first: tuple[list[tuple[Word, int]], int] | None = None
+        self, position: int, sign: int, depth: int, first: tuple[list[tuple[Word, int]], int] | None = None
     ) -> tuple[list[tuple[Word, int]], int] | None:
-        """The factors from token `at` on, and the token after them; None where no unit begins there. first: True for
-        the first factor"""
-        first = self.unit_factor(at, sign, depth, first=at == self.at) if first is None else first
+        """The factors from token `position` on, and the token after them; None where no unit begins there. first: True
+        for the first factor"""
+        first = self.unit_factor(position, sign, depth, first=position == self.position) if first is None else first
         if first is None:
             return None
-        factors, at = first
-        while self.tokens[at].text in ("*", "/"):
-            more = self.unit_factor(at + 1, sign if self.tokens[at].text == "*" else -sign, depth)
+        factors, position = first
+        while self.tokens[position].text in ("*", "/"):
+            more = self.unit_factor(position + 1, sign if self.tokens[position].text == "*" else -sign, depth)
             if more is None:
                 break
             factors = factors + more[0]
-            at = more[1]
-        return factors, at
+            position = more[1]
+        return factors, position
 
     def unit_factor(
-        self, at: int, sign: int, depth: int, *, first: bool = False
+        self, position: int, sign: int, depth: int, *, first: bool = False
     ) -> tuple[list[tuple[Word, int]], int] | None:
-        token = self.tokens[at]
+        token = self.tokens[position]
         if token.text == "(" and depth < _UNIT_DEPTH:
-            inner = self.unit_product(at + 1, sign, depth + 1)
+            inner = self.unit_product(position + 1, sign, depth + 1)
             if inner is None or self.tokens[inner[1]].text != ")":
                 return None
-            factors, at = inner[0], inner[1] + 1
+            factors, position = inner[0], inner[1] + 1
         elif (
             token.kind != STRING
-            and self.tokens[at + 1].text not in ("{", ".")
-            and not (token.text == "min" and self.tokens[at + 1].text == "(" and not first)  # the function
-            and self.reads_as_unit(at, first=first)
+            and self.tokens[position + 1].text not in ("{", ".")
+            and not (token.text == "min" and self.tokens[position + 1].text == "(" and not first)  # the function
+            and self.reads_as_unit(position, first=first)
         ):
-            factors, at = [(Word(token.text, token.place), sign)], at + 1
+            factors, position = [(Word(token.text, token.place), sign)], position + 1
         else:
             return None
-        if self.tokens[at].text == "^":
-            exponent = self.exponent(at + 1)
+        if self.tokens[position].text == "^":
+            exponent = self.exponent(position + 1)
             if exponent is not None:
                 factors = [(word, power * exponent[0]) for word, power in factors]
-                at = exponent[1]
-        return factors, at
+                position = exponent[1]
+        return factors, position
 
-    def exponent(self, at: int) -> tuple[int, int] | None:
-        bracketed = self.tokens[at].text == "("
-        at += bracketed
-        sign = -1 if self.tokens[at].text == "-" else 1
-        at += self.tokens[at].text in ("-", "+")
-        digit = self.tokens[at]
-        if digit.kind != WHOLE or len(digit.text) != 1 or (bracketed and self.tokens[at + 1].text != ")"):
+    def exponent(self, position: int) -> tuple[int, int] | None:
+        bracketed = self.tokens[position].text == "("
+        position += bracketed
+        sign = -1 if self.tokens[position].text == "-" else 1
+        position += self.tokens[position].text in ("-", "+")
+        digit = self.tokens[position]
+        if digit.kind != WHOLE or len(digit.text) != 1 or (bracketed and self.tokens[position + 1].text != ")"):
             return None
-        return sign * int(digit.text), at + 1 + bracketed
+        return sign * int(digit.text), position + 1 + bracketed
 
     def not_a_second_unit(self, start: int) -> None:
         token = self.token
-        if token.kind == NAME and token.text in units.ALL_UNITS and not self.on_new_line(self.at):
-            written = "".join(t.text for t in self.tokens[start : self.at])
+        if token.kind == NAME and token.text in units.ALL_UNITS and not self.on_new_line(self.position):
+            written = "".join(t.text for t in self.tokens[start : self.position])
             helps = self.write(f"{written}*{token.text}", self.tokens[start], token)
             self.fail("D030", "units are multiplied with `*`", token, help=helps)
         operator, named = token, self.following
@@ -195,28 +195,31 @@ class Quantities(EditionDifferences):
         if (
             near
             and named.text not in ("n", "k", "v", "M", "S", *self.names_of_units)
-            and self.tokens[self.at + 2].text in (";", ",", ")", "]")
+            and self.tokens[self.position + 2].text in (";", ",", ")", "]")
         ):
             # `rad/sec`: said here, since after a unit this is what was meant more often than a name of one's own
             self.fail("D028", f"`{named.text}` is not a unit", named, help=write(near, f"did you mean `{near}`?"))
 
-    def not_joined_otherwise(self, at: int, start: int) -> None:
-        """Refuses `N.m` and `N-m`, and `s-1`, whose last unit before the sign is token `at`, of a unit from `start` on.
+    def not_joined_otherwise(self, position: int, start: int) -> None:
+        """Refuses `N.m` and `N-m`, and `s-1`, whose last unit before the sign is token `position`, of a unit from
+        `start` on.
 
         Without a space these are meant as a unit, and no number can continue so: names of units are of units alone, and
         nothing but a pure number is added to one.
         """
-        unit, sign, more = self.tokens[at : at + 3] if at + 3 <= len(self.tokens) else (self.token,) * 3
+        unit, sign, more = (
+            self.tokens[position : position + 3] if position + 3 <= len(self.tokens) else (self.token,) * 3
+        )
         if sign.text not in (".", "-") or sign.offset != unit.end or more.offset != sign.end or unit.text == "%":
             return
         if unit.kind != NAME or not units.is_unit(unit.text):
             return
-        before = "".join(token.text for token in self.tokens[start : at + 1])
+        before = "".join(token.text for token in self.tokens[start : position + 1])
         near = more.text if units.is_unit(more.text) else other_units.suggest(more.text)
         if more.kind == NAME and near is not None:
             helps = self.write(f"{before}*{near}", self.tokens[start], more)
             self.fail("D030", "units are multiplied with `*`", more, help=helps)
-        if more.kind == WHOLE and sign.text == "-" and len(more.text) == 1 and at + 3 < len(self.tokens):
+        if more.kind == WHOLE and sign.text == "-" and len(more.text) == 1 and position + 3 < len(self.tokens):
             self.fail(
                 "D030",
                 "a unit's exponent stands behind `^`",
@@ -228,7 +231,7 @@ class Quantities(EditionDifferences):
         """Report a name after a number that is not a unit, and treat it as one."""
         token = self.token
         if (
-            self.on_new_line(self.at)
+            self.on_new_line(self.position)
             or token.text in ("and", "or", "by")
             or self.following.text in ("=", "+=", "{", "(")
         ):

@@ -51,7 +51,7 @@ def under_roof(entries: Iterable[Entry], roof: str, left: Collection[str]) -> tu
 
     left  kinds of definitions that stay away
     """
-    made: list[Entry] = []
+    renamed: list[Entry] = []
     stayed: dict[str, str] = {}
 
     def within(name: Name) -> Name:
@@ -66,17 +66,17 @@ def under_roof(entries: Iterable[Entry], roof: str, left: Collection[str]) -> tu
             continue
         entry = _changed(entry, within, tuple)
         if isinstance(entry, Let):
-            made.append(replace(entry, name=_full(entry.name, roof)))
+            renamed.append(replace(entry, name=_full(entry.name, roof)))
         elif isinstance(entry, Group) and len(words) > 1:
-            at = 2 if words[0].text == "default" and len(words) > 2 else 1
-            words[at] = _full(words[at], roof)
+            index = 2 if words[0].text == "default" and len(words) > 2 else 1
+            words[index] = _full(words[index], roof)
             like = entry.like
             if like is not None:
                 like = replace(like, path=(_full(like.path[0], roof), *like.path[1:]), roof="")
-            made.append(replace(entry, words=tuple(words), like=like))
+            renamed.append(replace(entry, words=tuple(words), like=like))
         else:
-            made.append(entry)
-    return tuple(made), stayed
+            renamed.append(entry)
+    return tuple(renamed), stayed
 
 
 def _full(word: Word, roof: str) -> Word:
@@ -93,21 +93,21 @@ def _changed(entry: Entry, name: Callable[[Name], Name], path: Callable[[tuple[W
             case Indexed():
                 return replace(expression, name=name(expression.name), index=value(expression.index))
             case Call(body=body):
-                made = mapped(expression, value)
-                assert isinstance(made, Call)
+                changed = mapped(expression, value)
+                assert isinstance(changed, Call)
                 inside = None if body is None else tuple(block(body))
-                return replace(made, name=name(expression.name), body=inside)
+                return replace(changed, name=name(expression.name), body=inside)
         return mapped(expression, value)
 
     def block(entries: Iterable[Entry]) -> Iterator[Entry]:
-        return (_changed(each, name, path) for each in entries)
+        return (_changed(inner, name, path) for inner in entries)
 
     match entry:
         case Let() | Statement():
             return replace(entry, value=value(entry.value))
         case Setting():
             return replace(entry, path=path(entry.path), value=value(entry.value))
-    like, of = (None if each is None else name(each) for each in (entry.like, entry.of))
+    like, of = (None if base is None else name(base) for base in (entry.like, entry.of))
     made_from = None if entry.made_from is None else value(entry.made_from)
     assert made_from is None or isinstance(made_from, Call)
     return replace(entry, like=like, of=of, body=tuple(block(entry.body)), made_from=made_from)

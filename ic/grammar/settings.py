@@ -40,25 +40,25 @@ def read_settings(
     source = Text(COMMAND_LINE, command_line(texts, before).text)
     source.edition = edition
     findings = Findings()
-    made: dict[str, Setting] = {}
-    at = len(before)
+    settings: dict[str, Setting] = {}
+    offset = len(before)
     for text in map(_one_line, texts):
         try:
             with findings.gather():
-                entry = _read(source, at, text, findings, units)
+                entry = _read(source, offset, text, findings, units)
                 path = path_of(entry)
-                if path in made:
-                    twice = "is set twice" if not made[path].words and not entry.words else "is set, and varied"
-                    if made[path].words and entry.words:
+                if path in settings:
+                    twice = "is set twice" if not settings[path].words and not entry.words else "is set, and varied"
+                    if settings[path].words and entry.words:
                         twice = "is varied twice"
                     raise Problem(error("D232", f"`{path}` {twice}", entry.place, help="leave one of the two out"))
-                made[path] = entry
+                settings[path] = entry
         except GiveUp:
             break
-        at += len(text) + 1
+        offset += len(text) + 1
     if findings.errors:
         raise Problem(findings.all)
-    return tuple(made.values())
+    return tuple(settings.values())
 
 
 def read_expression(text: str) -> Expression:
@@ -67,10 +67,10 @@ def read_expression(text: str) -> Expression:
     source, findings = Text(COMMAND_LINE, f"{text}\n"), Findings()
     source.edition = LATEST
     tokens = [*_tokens(source, 0, text, findings), Token(END, "", source, len(text.rstrip()), 1)]
-    found = None if findings.errors else parse_expression(tokens, findings)
-    if found is None or findings.errors:
+    expression = None if findings.errors else parse_expression(tokens, findings)
+    if expression is None or findings.errors:
         raise Problem(findings.all, {COMMAND_LINE: command_line([text]).text})
-    return found
+    return expression
 
 
 def path_of(entry: Setting) -> str:
@@ -82,9 +82,9 @@ def _one_line(text: str) -> str:
     return " ".join(text.splitlines())
 
 
-def _read(source: Text, at: int, text: str, findings: Findings, units: Mapping[str, Measure]) -> Setting:
-    """The one entry of a line that begins at `at`. Raises Problem."""
-    place = source.place(at, max(len(text), 1))
+def _read(source: Text, offset: int, text: str, findings: Findings, units: Mapping[str, Measure]) -> Setting:
+    """The one entry of a line that begins at `offset`. Raises Problem."""
+    place = source.place(offset, max(len(text), 1))
     varies = is_varied(text)
     path, equals, value = text.removeprefix(f"{VARY} ").partition("=")
     example = VARY_EXAMPLE if varies else EXAMPLE
@@ -95,12 +95,18 @@ def _read(source: Text, at: int, text: str, findings: Findings, units: Mapping[s
         message = f"this {'varies' if varies else 'sets'} nothing: no path stands before the `=`"
         raise Problem(error("D231", message, place, help=example))
     before = len(findings.errors)
-    tokens = [*_tokens(source, at, text, findings), Token(END, "", source, at + len(text.rstrip()), 1)]
+    tokens = [*_tokens(source, offset, text, findings), Token(END, "", source, offset + len(text.rstrip()), 1)]
     inner = Findings()
     entries, _ = parse(tokens, inner, units)
-    end = tokens[-2].end if len(tokens) > 1 else at
+    end = tokens[-2].end if len(tokens) > 1 else offset
     lacking = source.place(end, 1)  # no `;` ends it
-    findings.add(*(each for each in inner.all if each.code != "D021" or each.at is None or each.at.place != lacking))
+    findings.add(
+        *(
+            diagnostic
+            for diagnostic in inner.all
+            if diagnostic.code != "D021" or diagnostic.at is None or diagnostic.at.place != lacking
+        )
+    )
     if len(findings.errors) > before:
         raise Problem(())
     entry = entries[0] if len(entries) == 1 else None
@@ -122,13 +128,13 @@ def _remedy(words: list[str], example: str) -> list[str]:
     return [example]
 
 
-def _tokens(source: Text, at: int, text: str, findings: Findings) -> Iterator[Token]:
+def _tokens(source: Text, offset: int, text: str, findings: Findings) -> Iterator[Token]:
     """The tokens of a line, without white space, as tokens of the whole text."""
     for line in logical_lines(Text("", text)):
         for token in line:
             if token.kind == SPACE:
                 continue
-            token.source, token.offset = source, at + token.offset
+            token.source, token.offset = source, offset + token.offset
             if token.kind in (BAD, CHARACTER) or token.text[:1] == "#":
                 complain_of_stray(token, findings)
                 token.kind, token.text = BAD, ""

@@ -210,11 +210,11 @@ def mapped(expression: Expression, change: Callable[[Expression], Expression]) -
         case Binary(left=left, right=right):
             return replace(expression, left=change(left), right=change(right))
         case OverCases(comparison=comparison, share=share, confidence=confidence):
-            share, confidence = (change(each) if each is not None else None for each in (share, confidence))
+            share, confidence = (change(part) if part is not None else None for part in (share, confidence))
             return replace(expression, comparison=change(comparison), share=share, confidence=confidence)
         case Call(positional=positional, named=named):
-            made = tuple((word, change(value)) for word, value in named)
-            return replace(expression, positional=tuple(map(change, positional)), named=made)
+            arguments = tuple((word, change(value)) for word, value in named)
+            return replace(expression, positional=tuple(map(change, positional)), named=arguments)
     return expression
 
 

@@ -27,11 +27,11 @@ class Uses(EditionEntries):
             return False
         if self.following.text == "<" or self.following.kind == STRING:
             return True
-        at = self.at + 1  # `use panda.ic as panda;`
-        while self.tokens[at].kind == NAME or self.tokens[at].text in (".", "/", "-"):
-            if self.tokens[at].text == AS and at > self.at + 1:
+        position = self.position + 1  # `use panda.ic as panda;`
+        while self.tokens[position].kind == NAME or self.tokens[position].text in (".", "/", "-"):
+            if self.tokens[position].text == AS and position > self.position + 1:
                 return True
-            at += 1
+            position += 1
         return False
 
     def use(self) -> None:
@@ -42,26 +42,26 @@ class Uses(EditionEntries):
             self.fail("D395", f"expected a file, found {token_in_words(self.token)}", self.token, help=USAGE)
         first = self.token
         name = first.text[1:-1]
-        at = first.place
+        place = first.place
         if first.text == "<":
             written = first.source.rest_of_line(first.offset)
             end = written.find(">")
             if end < 0:
                 self.fail("D395", "`use <` without its `>`", first, help=USAGE)
-            name, at = written[1:end], first.source.place(first.offset, end + 1, first.expansions)
+            name, place = written[1:end], first.source.place(first.offset, end + 1, first.expansions)
             while self.token.source is first.source and first.offset <= self.token.offset <= first.offset + end:
                 self.advance()
         else:
             self.advance()
         if not name.strip():
-            self.fail("D395", "`use` needs a file, and this name is empty", at, help=USAGE)
+            self.fail("D395", "`use` needs a file, and this name is empty", place, help=USAGE)
         if self.token.text != AS:
             self.fail("D395", f"expected `as`, found {token_in_words(self.token)}", self.token, help=USAGE)
         self.advance()
         roof = self.token
         if roof.kind != NAME:
-            found = token_in_words(roof)
-            self.fail("D395", f"expected a name for the roof, found {found}", roof, help=USAGE)
+            words = token_in_words(roof)
+            self.fail("D395", f"expected a name for the roof, found {words}", roof, help=USAGE)
         self.advance()
         self.semicolon(Broken(roof.place))
-        self.uses.append(UseEntry(name, first.text == "<", Word(roof.text, roof.place), at, first.source.name))
+        self.uses.append(UseEntry(name, first.text == "<", Word(roof.text, roof.place), place, first.source.name))
