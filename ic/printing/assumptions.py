@@ -26,8 +26,8 @@ def print_assumptions(compiled: Compiled) -> list[str]:
 def _row(assumption: Assumption) -> tuple[str, ...]:
     size = ""
     if assumption.size is not None:
-        at = f" at `{assumption.at}`" if assumption.at not in assumption.subject else ""
-        size = f"{quantity(float(f'{assumption.size:.3g}'), assumption.unit)}{at}"
+        where = f" at `{assumption.at}`" if assumption.at not in assumption.subject else ""
+        size = f"{quantity(float(f'{assumption.size:.3g}'), assumption.unit)}{where}"
     return assumption.subject, assumption.assumed, size, assumption.meaning
 
 

@@ -32,8 +32,8 @@ def print_cases(groups: Sequence[Experiment], *, everything: bool = False) -> It
         yield from _structures(groups)
         yield ""
     else:
-        each = groups[0].structure.history_bytes
-        yield title + (f", {size(each)} of histories each" if each and total > 1 else "")
+        case_bytes = groups[0].structure.history_bytes
+        yield title + (f", {size(case_bytes)} of histories each" if case_bytes and total > 1 else "")
     if (search := groups[0].search) is not None and not search.complete:
         yield f"  the first ones of a {search.kind}, {budget(search)}: what they give decides those behind them"
     for note in dict.fromkeys(note for group in groups for note in group.notes if note.startswith((SAMPLED, OF_CASES))):
@@ -45,7 +45,7 @@ def print_cases(groups: Sequence[Experiment], *, everything: bool = False) -> It
     heads = ["", "id", *rows.choices, *(path for path, _ in rows.coordinates), *([REPEAT] if rows.repeated else [])]
     units = ["", "", *("" for _ in rows.choices), *(unit for _, unit in rows.coordinates), *([""] * rows.repeated)]
     table = [heads, units] if any(units) else [heads]
-    table += [[f"#{position}", short[n], *rows.shown(n)] for n, position in enumerate(positions)]
+    table += [[f"#{position}", short[n], *rows.cells(n)] for n, position in enumerate(positions)]
     first = 2 + len(rows.choices)
     lines = columns(table, right=(0, *range(first, len(heads))))
     if cut:
@@ -74,7 +74,7 @@ class _Rows:
         self.experiments = groups
         self.groups = np.concatenate([np.full(len(own), n) for n, own in enumerate(rows)])[order]
         self.rows = np.concatenate(rows)[order]
-        ids = [each for group, own in zip(groups, rows, strict=True) for each in keys.case_ids(group, own)]
+        ids = [case_id for group, own in zip(groups, rows, strict=True) for case_id in keys.case_ids(group, own)]
         self.ids = [ids[n] for n in order]
         self.choices = list(dict.fromkeys(choice.path for group in groups for choice in group.cases.choices))
         named = (coordinate for group in groups for coordinate in group.cases.coordinates)
@@ -95,12 +95,12 @@ class _Rows:
         repeats = self.experiments[self.groups[position]].cases.repeats
         return 0 if repeats is None else int(repeats[self.rows[position]])
 
-    def shown(self, position: int) -> list[str]:
+    def cells(self, position: int) -> list[str]:
         """Cells of the row after its id."""
-        made = [self.chosen(position).get(path, "") for path in self.choices]
-        found = [(self.value(position, path), unit) for path, unit in self.coordinates]
-        made += ["" if value is None else decimals([value], unit)[0] for value, unit in found]
-        return [*made, *([str(self.repeat(position))] if self.repeated else [])]
+        cells = [self.chosen(position).get(path, "") for path in self.choices]
+        values = [(self.value(position, path), unit) for path, unit in self.coordinates]
+        cells += ["" if value is None else decimals([value], unit)[0] for value, unit in values]
+        return [*cells, *([str(self.repeat(position))] if self.repeated else [])]
 
 
 def _rows_at(group: Experiment, positions: Sequence[int]) -> np.ndarray:
@@ -114,15 +114,15 @@ def cases_json(groups: Sequence[Experiment]) -> dict[str, Any]:
     rows = _Rows(groups)
     first = {c.path: c for group in reversed(groups) for c in group.cases.coordinates}
     paths = list(first)
-    made = []
+    cases = []
     for position, case_id in enumerate(rows.ids):
-        found = [rows.value(position, path) for path in paths]
-        case: dict[str, Any] = {"position": position, "id": case_id, "values": found}
+        values = [rows.value(position, path) for path in paths]
+        case: dict[str, Any] = {"position": position, "id": case_id, "values": values}
         if len(groups) > 1:
             case["group"] = groups[rows.groups[position]].name
         if rows.repeated:
             case["repeat"] = rows.repeat(position)
-        made.append(case)
+        cases.append(case)
     return {
         "experiment": groups[0].name_in_deck,
         "count": len(rows.ids),
@@ -136,7 +136,7 @@ def cases_json(groups: Sequence[Experiment]) -> dict[str, Any]:
             for group in groups
         ],
         "coordinates": [{"path": c.path, "deck_unit": c.unit, "scale": c.scale} for c in first.values()],
-        "cases": made,
+        "cases": cases,
     }
 
 
@@ -151,7 +151,7 @@ def _short(groups: Sequence[Experiment], ids: list[str]) -> list[str]:
     apart = numbers[1:] ^ numbers[:-1]
     least = int(apart[apart > 0].min(initial=2**64 - 1))  # of the two with the longest common beginning
     shared = (64 - least.bit_length()) // 4
-    return [each[: max(SHORTEST, 1 + shared)] for each in ids]
+    return [case_id[: max(SHORTEST, 1 + shared)] for case_id in ids]
 
 
 def prefixes(names: list[str]) -> list[str]:

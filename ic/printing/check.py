@@ -35,7 +35,7 @@ def verdict(plan: Plan, diagnostics: Sequence[Diagnostic], allowed: int = 0) -> 
     experiments, for a search the most that it may run. allowed: number of suppressed warnings"""
     varying = [experiment for experiment in plan.experiments if experiment.varies]
     sweeps = len({experiment.name_in_deck for experiment in varying if experiment.search is None})
-    kinds = [each.search.kind for each in varying if each.search is not None]
+    kinds = [experiment.search.kind for experiment in varying if experiment.search is not None]
     runs = sum(1 for experiment in plan.experiments if not experiment.varies)
     parts = [count(runs, "run")] if runs else []
     parts += [count(sweeps, "sweep")] if sweeps else []

@@ -79,7 +79,7 @@ def description() -> dict[str, Any]:
         "distributions": sweeps.distributions_page().records,
         "directives": list(DIRECTIVES),
         "taken_names": _taken_names(FIRST),
-        "editions": [{"edition": each, "taken_names": _taken_names(each)} for each in EDITIONS],
+        "editions": [{"edition": edition, "taken_names": _taken_names(edition)} for edition in EDITIONS],
         "diagnostics": [
             {"code": code, "title": title, "may_be_allowed": code in WARNINGS}
             for code, title in sorted(codes.titles().items())

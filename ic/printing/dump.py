@@ -67,11 +67,11 @@ def find_stage(name: str) -> Stage:
     return stage
 
 
-def tokens(asked: DumpRequest) -> Iterator[str]:
+def tokens(request: DumpRequest) -> Iterator[str]:
     """Tokens after the preprocessor: place, kind, text, and the macros that a token came through."""
     from ic.text.preprocess import preprocess
 
-    read = preprocess(asked.deck, asked.include_dirs, asked.defines)
+    read = preprocess(request.deck, request.include_dirs, request.defines)
     if not read.complete or any(diagnostic.severity == "error" for diagnostic in read.diagnostics):
         raise Problem(read.diagnostics, {source.name: source.text for source in read.sources})
     for token in read.tokens:
@@ -80,15 +80,15 @@ def tokens(asked: DumpRequest) -> Iterator[str]:
         yield f"{place!s:32} {token.kind:14} {token.text}{through}"
 
 
-def syntax(asked: DumpRequest) -> Iterator[str]:
+def syntax(request: DumpRequest) -> Iterator[str]:
     """The syntax tree, entry by entry."""
     from ic.read import read
 
-    for entry in read(asked.deck, asked.include_dirs, asked.defines).entries:
+    for entry in read(request.deck, request.include_dirs, request.defines).entries:
         yield from _entry(entry, "")
 
 
-def model(asked: DumpRequest) -> Iterator[str]:
+def model(request: DumpRequest) -> Iterator[str]:
     """Definitions with `like`, overrides, `+=` and `remove` carried out, each entry with the places it overrode."""
     from ic.grammar.spell import spell
     from ic.language import DEFINITIONS
@@ -96,7 +96,7 @@ def model(asked: DumpRequest) -> Iterator[str]:
     from ic.read import read
     from ic.text.complaints import Complaints
 
-    deck = read(asked.deck, asked.include_dirs, asked.defines)
+    deck = read(request.deck, request.include_dirs, request.defines)
     complaints = Complaints(deck.warnings)
     definitions = Definitions(deck, complaints)
     for name, let in definitions.lets.items():
@@ -119,14 +119,14 @@ def model(asked: DumpRequest) -> Iterator[str]:
         raise Problem(complaints.all, {source.name: source.text for source in deck.sources})
 
 
-def plan(asked: DumpRequest) -> Iterator[str]:
+def plan(request: DumpRequest) -> Iterator[str]:
     """The run plan, as `met plan -o` writes it, its case tables inside; with a line for each value on a terminal."""
     import json
     import sys
 
     from met.plan import file as plan_file
 
-    text = plan_file.dumps(asked.plan()).rstrip("\n")
+    text = plan_file.dumps(request.plan()).rstrip("\n")
     yield json.dumps(json.loads(text), indent=1) if sys.stdout.isatty() else text
 
 
@@ -150,9 +150,9 @@ def _entry(entry: Entry, indent: str) -> Iterator[str]:
         case tree.Group():
             words = " ".join(word.text for word in entry.words)
             like = f" like {entry.like.text}" if entry.like is not None else ""
-            of = f" of {entry.of.text}" if entry.of is not None else ""
-            made = f" from {spell(entry.made_from)}" if entry.made_from is not None else ""
-            yield f"{indent}Group {words}{like}{of}{made}{_written(entry.place)}"
+            of_base = f" of {entry.of.text}" if entry.of is not None else ""
+            from_file = f" from {spell(entry.made_from)}" if entry.made_from is not None else ""
+            yield f"{indent}Group {words}{like}{of_base}{from_file}{_written(entry.place)}"
             yield from _entries(entry.body, indent)
 
 
@@ -189,7 +189,7 @@ def _block(block: MergedBlock, indent: str) -> Iterator[str]:
 def _item(item: Item, indent: str) -> Iterator[str]:
     words = " ".join([*([item.kind] if item.kind else []), item.name, *(word.text for word in item.detail)])
     value = "" if item.value is None else f" = {_value(item.value, item.body is not None)[0]}"
-    more = "".join(f" += {_value(each)[0]}" for each in item.appended)
+    more = "".join(f" += {_value(addition)[0]}" for addition in item.appended)
     opens = " {" if item.body is not None else ""
     overrides = "".join(f", overrides {place}" for place in item.overrides)
     yield f"{indent}{words}{value}{more}{opens}{_written(item.place)}{overrides}"

@@ -29,7 +29,7 @@ from met.plan.columns import span
 from met.substitution import bed_scale
 from met.unit_parser import decimals, written
 
-SAID = {
+ORIGIN_WORDS = {
     "deck": "written here",
     "case": "a sweep varies it, here",
     "default": "the default",
@@ -86,16 +86,16 @@ def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[st
                 help=[f"`met plan DECK {path}` prints it", f"paths begin with {', '.join(heads)}"],
             )
         )
-    follow = [name for each, names in also.items() if each.startswith(f"{path}.") for name in names if name in known]
+    follow = [name for owner, names in also.items() if owner.startswith(f"{path}.") for name in names if name in known]
     if follow:
         return list(dict.fromkeys(follow))
     definition, _, rest = path.partition(".")
     joints = [use.joint for use in experiment.structure.servos if use.definition == definition]
-    found = [name for joint in joints for name in (f"{joint}.servo.{rest}",) if name in known]
+    paths = [name for joint in joints for name in (f"{joint}.servo.{rest}",) if name in known]
     if not rest:
-        found = [name for name in known for joint in joints if name.startswith(f"{joint}.servo.")]
-    if found:
-        return found
+        paths = [name for name in known for joint in joints if name.startswith(f"{joint}.servo.")]
+    if paths:
+        return paths
     if path in recordable(experiment.structure, [path]):
         raise Problem(
             error(
@@ -105,7 +105,10 @@ def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[st
             )
         )
     driven = {use.joint for use in experiment.structure.servos}
-    if rest.partition(".")[0] == "servo" and definition in {each.name for each in experiment.structure.moving} - driven:
+    if (
+        rest.partition(".")[0] == "servo"
+        and definition in {moving.name for moving in experiment.structure.moving} - driven
+    ):
         raise Problem(
             error(
                 "D170",
@@ -147,15 +150,15 @@ def _is_run(path: str, also: Mapping[str, Sequence[str]]) -> bool:
 
     An arm, too, stands before whole paths, but among them are its links; a servo's `gearbox.kp` is `elbow.servo.kp`.
     """
-    reached = {each.removeprefix(f"{path}."): names for each, names in also.items() if each.startswith(f"{path}.")}
+    reached = {head.removeprefix(f"{path}."): names for head, names in also.items() if head.startswith(f"{path}.")}
     whole = any(rest in names for rest, names in reached.items())
     return whole and not any(rest.startswith("links.") for rest in reached)
 
 
 def _three_nearest(path: str, known: Iterable[str]) -> list[str]:
     near: list[str] = []
-    while len(near) < 3 and (found := nearest(path, [name for name in known if name not in near])) is not None:
-        near.append(found)
+    while len(near) < 3 and (near_path := nearest(path, [name for name in known if name not in near])) is not None:
+        near.append(near_path)
     return near
 
 
@@ -181,12 +184,12 @@ def print_explain(
         return
     if _is_vector(experiment, names):
         used = dict.fromkeys(label for name in names for label in names_of(name))
-        yield from _one(experiment, names, sources, tuple(used))
+        yield from _parameter_lines(experiment, names, sources, tuple(used))
         return
     for position, name in enumerate(names):
         if position:
             yield ""
-        yield from _one(experiment, [name], sources, names_of(name))
+        yield from _parameter_lines(experiment, [name], sources, names_of(name))
 
 
 def explain_json(
@@ -195,30 +198,32 @@ def explain_json(
     """The explanations for programs, values in SI."""
     records = []
     for name in find_paths(experiment, path, also):
-        found = experiment.parameters[name]
-        varied = isinstance(found.value, Formula)
+        parameter = experiment.parameters[name]
+        varied = isinstance(parameter.value, Formula)
         records.append(
             {
                 "path": name,
-                "value": experiment.column(found.value).tolist() if isinstance(found.value, Formula) else found.value,
+                "value": experiment.column(parameter.value).tolist()
+                if isinstance(parameter.value, Formula)
+                else parameter.value,
                 "varies": varied,
-                "unit": found.unit,
-                "origin": found.origin.kind,
-                "note": found.origin.note,
-                "place": _place_json(found.origin.place),
-                "overrides": [_place_json(place) for place in found.origin.overrides],
+                "unit": parameter.unit,
+                "origin": parameter.origin.kind,
+                "note": parameter.origin.note,
+                "place": _place_json(parameter.origin.place),
+                "overrides": [_place_json(place) for place in parameter.origin.overrides],
             }
         )
     return records
 
 
 def _in_short(experiment: Experiment, name: str) -> tuple[str, ...]:
-    found = experiment.parameters[name]
-    place = found.origin.place
-    said = _note(found.origin) or SAID[found.origin.kind].removesuffix(" here").rstrip(",")
-    if place is None and found.origin.kind == "deck":
-        said = IN_PLAN
-    return name, f"= {_shown(experiment, found)}", said, "" if place is None else str(shown_place(place))
+    parameter = experiment.parameters[name]
+    place = parameter.origin.place
+    remark = _note(parameter.origin) or ORIGIN_WORDS[parameter.origin.kind].removesuffix(" here").rstrip(",")
+    if place is None and parameter.origin.kind == "deck":
+        remark = IN_PLAN
+    return name, f"= {_value_words(experiment, parameter)}", remark, "" if place is None else str(shown_place(place))
 
 
 def _note(origin: Origin) -> str:
@@ -228,24 +233,24 @@ def _note(origin: Origin) -> str:
 
 def _is_vector(experiment: Experiment, names: list[str]) -> bool:
     """Return True if these are the three parts of a vector that was written as one."""
-    found = [experiment.parameters[name] for name in names]
+    quantities = [experiment.parameters[name] for name in names]
     together = [name.rpartition(".")[2] for name in names] == ["x", "y", "z"]
-    return together and all(isinstance(q.value, float) and q.origin == found[0].origin for q in found)
+    return together and all(isinstance(q.value, float) and q.origin == quantities[0].origin for q in quantities)
 
 
-def _one(
+def _parameter_lines(
     experiment: Experiment, names: list[str], sources: Mapping[str, str], used: tuple[Label, ...]
 ) -> Iterator[str]:
     """A parameter, or the three of a vector."""
     name = names[0]
-    found = experiment.parameters[name]
-    origin = found.origin
+    first = experiment.parameters[name]
+    origin = first.origin
     if len(names) > 1:
-        parts = [experiment.parameters[each].value for each in names]
+        parts = [experiment.parameters[part].value for part in names]
         numbers = [part for part in parts if isinstance(part, float)]
-        yield f"{name.rpartition('.')[0]} = {vector(numbers, found.unit, computed=origin.kind == 'derived')}"
+        yield f"{name.rpartition('.')[0]} = {vector(numbers, first.unit, computed=origin.kind == 'derived')}"
     else:
-        yield f"{name} = {_shown(experiment, found)}"
+        yield f"{name} = {_value_words(experiment, first)}"
     parameter, owner = _declaration(experiment, name)
     if parameter is not None:
         yield f"  {parameter.doc} ({owner})"
@@ -253,14 +258,14 @@ def _one(
         unit = "" if coordinate.unit == "1" else f" {coordinate.unit}"
         yield f"  varied by {coordinate.path}: {_series_of(coordinate)}{unit}"
     note = _note(origin)
-    said = note if note in (ON_COMMAND_LINE, *NOTES) else SAID[origin.kind] + (f": {note}" if note else "")
+    remark = note if note in (ON_COMMAND_LINE, *NOTES) else ORIGIN_WORDS[origin.kind] + (f": {note}" if note else "")
     if origin.place is None and origin.kind == "deck":
-        said = IN_PLAN
+        remark = IN_PLAN
     if origin.place is None:
-        yield f"  {said}"
+        yield f"  {remark}"
         return
     also = (*used, *(Label(place, f"overrides {_written_at(place, sources)}") for place in origin.overrides))
-    yield from _with_source(origin.place, said, also, sources)
+    yield from _with_source(origin.place, remark, also, sources)
 
 
 def _written_at(place: Place, sources: Mapping[str, str]) -> str:
@@ -279,48 +284,49 @@ def _written_at(place: Place, sources: Mapping[str, str]) -> str:
 def _end(rest: str) -> int:
     """The end of an expression in a line: before a semicolon, a comment, or the bracket or comma around it."""
     depth = 0
-    for at, character in enumerate(rest):
+    for index, character in enumerate(rest):
         if character in "([":
             depth += 1
         elif character in ")]":
             depth -= 1
-        if depth < 0 or character in ";}" or (character == "," and depth == 0) or rest.startswith("//", at):
-            return at
+        if depth < 0 or character in ";}" or (character == "," and depth == 0) or rest.startswith("//", index):
+            return index
     return len(rest)
 
 
-def _with_source(place: Place, said: str, also: tuple[Label, ...], sources: Mapping[str, str]) -> Iterator[str]:
+def _with_source(place: Place, remark: str, also: tuple[Label, ...], sources: Mapping[str, str]) -> Iterator[str]:
     """The place with its line, macros and includes, in the form of a diagnostic without head and count."""
-    text = render.render([Diagnostic("", "", Label(place, said), also, severity="note")], sources)
+    text = render.render([Diagnostic("", "", Label(place, remark), also, severity="note")], sources)
     yield from text.splitlines()[1:-2]
 
 
-def _shown(experiment: Experiment, found: Quantity) -> str:
-    computed = found.origin.kind == "derived"  # nobody writes it
-    match found.value:
+def _value_words(experiment: Experiment, parameter: Quantity) -> str:
+    computed = parameter.origin.kind == "derived"  # nobody writes it
+    match parameter.value:
         case str():
-            return found.value
-        case tuple() if len(found.value) > MOST_LISTED:
-            return f"{_series(np.array(found.value), found.unit)}{'' if found.unit == '1' else f' {found.unit}'}"
+            return parameter.value
+        case tuple() if len(parameter.value) > MOST_LISTED:
+            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+            return f"{_series(np.array(parameter.value), parameter.unit)}{unit}"
         case tuple():
-            return vector(found.value, found.unit, computed=computed)
+            return vector(parameter.value, parameter.unit, computed=computed)
         case Formula():
-            low, high = span(experiment.column(found.value))
+            low, high = span(experiment.column(parameter.value))
             if computed:
-                return f"{number(low)} to {quantity(high, found.unit)}, varies with the case"
-            return f"{decimals([low], found.unit)[0]} to {written(high, found.unit)}, varies with the case"
+                return f"{number(low)} to {quantity(high, parameter.unit)}, varies with the case"
+            return f"{decimals([low], parameter.unit)[0]} to {written(high, parameter.unit)}, varies with the case"
         case float() | int():
-            return quantity(found.value, found.unit) if computed else _written(found.value, found.unit)
-    raise AssertionError(found)
+            return quantity(parameter.value, parameter.unit) if computed else _written(parameter.value, parameter.unit)
+    raise AssertionError(parameter)
 
 
 def _written(value: float, unit: str) -> str:
     """A value of a deck, which someone may write again; in 15 digits where arithmetic left more, as in `70 g + 3 g`,
     which is 0.07300000000000001 kg."""
     text = written(value, unit)
-    number, blank, of = text.partition(" ")
+    number, blank, unit_text = text.partition(" ")
     digits = re.sub(r"e.*|\D", "", number).strip("0")
-    return text if len(digits) <= 15 else f"{float(number):.15g}{blank}{of}"
+    return text if len(digits) <= 15 else f"{float(number):.15g}{blank}{unit_text}"
 
 
 def _varied_by(experiment: Experiment, name: str) -> list[Coordinate]:
@@ -338,9 +344,13 @@ def _series_of(coordinate: Coordinate) -> str:
 
 def _series(values: np.ndarray, unit: str) -> str:
     """SI values as numbers of a unit; of many, the first and the last."""
-    found = list(dict.fromkeys(values.tolist()))
-    shown = decimals(found if len(found) <= 8 else [*found[:2], found[-1]], unit)
-    return ", ".join(shown) if len(found) <= 8 else f"{shown[0]}, {shown[1]} ... {shown[2]} ({len(found)} values)"
+    distinct = list(dict.fromkeys(values.tolist()))
+    numbers = decimals(distinct if len(distinct) <= 8 else [*distinct[:2], distinct[-1]], unit)
+    return (
+        ", ".join(numbers)
+        if len(distinct) <= 8
+        else f"{numbers[0]}, {numbers[1]} ... {numbers[2]} ({len(distinct)} values)"
+    )
 
 
 def _declaration(experiment: Experiment, name: str) -> tuple[Parameter | None, str]:
@@ -355,7 +365,7 @@ def _declaration(experiment: Experiment, name: str) -> tuple[Parameter | None, s
             model, own = models.find("servo", use.model), words[len(use.joint.split(".")) + 1]
     for on_bed in structure.substitutions:
         if name.startswith(f"{on_bed.joint}.bed.scale."):
-            return next((each for each in bed_scale.PARAMETERS if each.name == words[3]), None), "scale"
+            return next((parameter for parameter in bed_scale.PARAMETERS if parameter.name == words[3]), None), "scale"
         if name.startswith(f"{on_bed.joint}.bed."):
             model, own = models.find("bed", on_bed.bed), words[2]
         elif name.startswith(f"{on_bed.joint}.law."):
@@ -384,9 +394,15 @@ def _place_json(place: Place | None) -> dict[str, Any] | None:
     if place is None:
         return None
     steps = [{"macro": step.macro, "use": _place_json(step.use)} for step in place.macros]
-    made = {"file": place.file, "line": place.line, "column": place.column, "length": place.length, "expansions": steps}
+    record = {
+        "file": place.file,
+        "line": place.line,
+        "column": place.column,
+        "length": place.length,
+        "expansions": steps,
+    }
     if place.iterations:
-        made["iterations"] = [
+        record["iterations"] = [
             {"index": step.macro, "value": step.iteration, "loop": _place_json(step.use)} for step in place.iterations
         ]
-    return made
+    return record

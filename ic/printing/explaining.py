@@ -39,36 +39,36 @@ class ExplainedExperiment:
     def names_of(self, path: str) -> tuple[Label, ...]:
         if self.compiled is None:
             return ()
-        return next((found.names for found in explanations_of(self.compiled, path)), ())
+        return next((explained.names for explained in explanations_of(self.compiled, path)), ())
 
 
 def print_explained(sources: Sources, path: str) -> Iterator[str]:
     """The explanation line by line; once where all experiments agree. Raises Problem where none has the path."""
-    said: dict[tuple[str, ...], list[ExplainedExperiment]] = {}
-    for found in _found(sources, path):
-        texts = {source.name: source.text for source in found.plan.sources}
-        lines = tuple(print_explain(found.experiment, path, texts, found.names_of, found.known))
-        said.setdefault(lines, []).append(found)
-    for position, (lines, where) in enumerate(said.items()):
+    by_lines: dict[tuple[str, ...], list[ExplainedExperiment]] = {}
+    for explained in _explained(sources, path):
+        texts = {source.name: source.text for source in explained.plan.sources}
+        lines = tuple(print_explain(explained.experiment, path, texts, explained.names_of, explained.known))
+        by_lines.setdefault(lines, []).append(explained)
+    for position, (lines, where) in enumerate(by_lines.items()):
         if position:
             yield ""
-        if len(said) > 1 or not where[0].alone:
-            yield f"in {', '.join(found.experiment.name for found in where)}:"
+        if len(by_lines) > 1 or not where[0].alone:
+            yield f"in {', '.join(explained.experiment.name for explained in where)}:"
         yield from lines
 
 
 def explained_json(sources: Sources, path: str) -> list[dict[str, Any]]:
     """The explanations for programs; with several experiments each names its own."""
-    found = _found(sources, path)
-    several = len(found) > 1 or not found[0].alone
+    all_explained = _explained(sources, path)
+    several = len(all_explained) > 1 or not all_explained[0].alone
     return [
-        {"experiment": each.experiment.name, **record} if several else record
-        for each in found
-        for record in explain_json(each.experiment, path, each.known)
+        {"experiment": explained.experiment.name, **record} if several else record
+        for explained in all_explained
+        for record in explain_json(explained.experiment, path, explained.known)
     ]
 
 
-def _found(sources: Sources, path: str) -> list[ExplainedExperiment]:
+def _explained(sources: Sources, path: str) -> list[ExplainedExperiment]:
     problem: Problem | None = None
     for n, source in enumerate(sources):
         try:
@@ -77,19 +77,19 @@ def _found(sources: Sources, path: str) -> list[ExplainedExperiment]:
             if problem is not None:  # another run has other mistakes
                 raise problem from None
             raise
-        made = []
+        all_explained = []
         for number, experiment in enumerate(plan.experiments):
             whole = with_settings(experiment if compiled is None else with_all_settings(compiled, number))
-            found = ExplainedExperiment(whole, plan, compiled, number, True)
+            explained = ExplainedExperiment(whole, plan, compiled, number, True)
             try:
-                find_paths(whole, path, found.known)
-            except Problem as one:
-                problem = problem or _of_unit(path, compiled) or one
+                find_paths(whole, path, explained.known)
+            except Problem as unknown:
+                problem = problem or _of_unit(path, compiled) or unknown
             else:
-                made.append(found)
-        if made:
-            alone = n == 0 and len(made) == len(plan.experiments)
-            return [replace(each, alone=alone) for each in made]
+                all_explained.append(explained)
+        if all_explained:
+            alone = n == 0 and len(all_explained) == len(plan.experiments)
+            return [replace(explained, alone=alone) for explained in all_explained]
     assert problem is not None  # each source has an experiment, and none had the path
     raise problem
 

@@ -22,19 +22,19 @@ def entries() -> dict[str, tuple[str, str]]:
     """
     if not PAGE.is_file():
         return {}
-    found: dict[str, tuple[str, str]] = {}
+    rows: dict[str, tuple[str, str]] = {}
     for row in _ROW.finditer(PAGE.read_text(encoding="utf-8")):
         words, meaning = row[1].strip(), row[2].strip()
         if words == "word" or set(words) == {"-"}:
             continue
         row_of_all = (in_plain_text(words), in_plain_text(meaning))
         for word in (*words.replace("the wire", "wire").split(", "), *re.findall(r"\*\*(.+?)\*\*", meaning)):
-            found.setdefault(in_plain_text(word), row_of_all)
-    return found
+            rows.setdefault(in_plain_text(word), row_of_all)
+    return rows
 
 
 def meaning(word: str) -> Iterator[str]:
     """Return the glossary's meaning of a word, in one line; empty for an unknown word."""
-    found = entries().get(word) or entries().get(word.removesuffix("s"))
-    if found is not None:
-        yield f"{found[0]}: {found[1]}"
+    row = entries().get(word) or entries().get(word.removesuffix("s"))
+    if row is not None:
+        yield f"{row[0]}: {row[1]}"

@@ -35,15 +35,15 @@ class _Values:
 
     def array(self, path: str) -> np.ndarray | None:
         """The value; three values of a varied parameter; None where the plan has no number of that name."""
-        found = self._parameters.get(path)
-        if found is None or isinstance(found.value, (str, tuple)):
+        setting = self._parameters.get(path)
+        if setting is None or isinstance(setting.value, (str, tuple)):
             return None
-        if isinstance(found.value, Formula):
-            column = self._experiment.column(found.value)
+        if isinstance(setting.value, Formula):
+            column = self._experiment.column(setting.value)
             return np.array([column[0], *span(column)] if len(column) else [])
-        return np.asarray(found.value, dtype=float)
+        return np.asarray(setting.value, dtype=float)
 
-    def shown(self, path: str) -> str:
+    def text(self, path: str) -> str:
         """The value with its unit, or its range over the cases."""
         values = self.array(path)
         if values is None or values.size == 0:
@@ -114,8 +114,8 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
         yield "Set by the run, and not the default"
         rows = []
         for key, value in chosen:
-            shown = value if isinstance(value, str) else written(value, key.parameter.unit)
-            rows.append((key.path, shown, key.parameter.doc))
+            text = value if isinstance(value, str) else written(value, key.parameter.unit)
+            rows.append((key.path, text, key.parameter.doc))
         yield from columns(rows)
     yield ""
     yield from _channels(structure)
@@ -148,7 +148,7 @@ def _arm(experiment: Experiment) -> Iterator[str]:
     rows: list[tuple[str, ...]] = [("joint", "moves", "at", "rpy", "link", "mass", "servo"), (BASE,)]
     if any(link.name == BASE for link in structure.links):
         kind = structure.base.kind if structure.base is not None else "fixed"
-        rows[-1] = (BASE, kind, "", "", "", values.shown(f"links.{BASE}.mass"))
+        rows[-1] = (BASE, kind, "", "", "", values.text(f"links.{BASE}.mass"))
 
     children: dict[str, list[Joint]] = {}
     for joint in structure.joints:
@@ -160,20 +160,20 @@ def _arm(experiment: Experiment) -> Iterator[str]:
         use = servos.get(joint.name)
         servo = "" if joint.kind == "fixed" else "passive"
         if use is not None:
-            asked = f": {use.command.kind}, {use.command.model or use.command.guide}" if use.command else ""
-            servo = f"{use.definition} ({use.model}){asked}"
+            command = f": {use.command.kind}, {use.command.model or use.command.guide}" if use.command else ""
+            servo = f"{use.definition} ({use.model}){command}"
         if joint.follows:
-            ratios = [f"{values.shown(path)} {leader}" for leader, path in joint.ratio_paths.items()]
+            ratios = [f"{values.text(path)} {leader}" for leader, path in joint.ratio_paths.items()]
             servo = f"follows {', '.join(ratios)}" + (f"; {servo}" if use is not None else "")
-        at = values.vector(f"{joint.name}.at")
-        place = "varies" if at is None else vector(at, "m") if any(at) else ""
-        mass = values.shown(f"links.{joint.child}.mass")
+        position = values.vector(f"{joint.name}.at")
+        place = "varies" if position is None else vector(position, "m") if any(position) else ""
+        mass = values.text(f"links.{joint.child}.mass")
         branch = f"{stem}{'└─' if last else '├─'} {joint.name}"
         turned = values.vector(f"{joint.name}.rpy")
         turn = "varies" if turned is None else vector(turned, "deg") if any(turned) else ""
         link = joint.child
         if link in bends:
-            link += f" (boom, {count(sum(each.kind != 'fixed' for each in bends[link]), 'spring')})"
+            link += f" (boom, {count(sum(spring.kind != 'fixed' for spring in bends[link]), 'spring')})"
         rows.append((branch, _moves(joint, values), place, turn, link, mass, servo))
         waiting += [(child, stem + ("   " if last else "│  ")) for child in reversed(children.get(joint.child, []))]
     moving = f"{count(len(structure.moving), 'joint')} that move{'s' if len(structure.moving) == 1 else ''}"
@@ -193,7 +193,7 @@ def _bodies(experiment: Experiment) -> Iterator[str]:
         rows.append(
             (
                 link.name,
-                values.shown(f"links.{link.name}.mass"),
+                values.text(f"links.{link.name}.mass"),
                 "varies" if com is None else vector(com, "m", computed=values.is_computed(f"{head}.com.x")),
                 "varies"
                 if moments is None
@@ -210,10 +210,10 @@ def _base(experiment: Experiment, base: Base) -> Iterator[str]:
         yield "Base: moves freely, at the start with"
         rows = []
         for name, unit in OF_FREE_BASE:
-            found = values.vector(f"initial.{BASE}.{name}")
-            if found is not None and unit.startswith("rad"):
+            components = values.vector(f"initial.{BASE}.{name}")
+            if components is not None and unit.startswith("rad"):
                 unit = unit.replace("rad", "deg")
-            rows.append((name, "varies" if found is None else vector(found, unit)))
+            rows.append((name, "varies" if components is None else vector(components, unit)))
         yield from columns(rows)
         return
     yield "Base: moves as it is told; its other components stay 0"
@@ -223,7 +223,7 @@ def _base(experiment: Experiment, base: Base) -> Iterator[str]:
                 course.component,
                 course.model,
                 ", ".join(
-                    _given(experiment, f"{BASE}.{course.component}", models.find("command", course.model).parameters)
+                    _settings(experiment, f"{BASE}.{course.component}", models.find("command", course.model).parameters)
                 ),
             )
             for course in base.courses
@@ -238,25 +238,25 @@ def _payloads(experiment: Experiment) -> Iterator[str]:
     rows: list[tuple[str, ...]] = [("payload", "mass", "link", "grappled", "released")]
     for payload in experiment.structure.payloads:
         head = f"payloads.{payload.name}"
-        grappled = values.shown(f"{head}.grapple") if payload.grappled else "held from the start"
-        released = values.shown(f"{head}.release") if payload.released else "never"
-        rows.append((payload.name, values.shown(f"{head}.mass"), payload.link, grappled, released))
+        grappled = values.text(f"{head}.grapple") if payload.grappled else "held from the start"
+        released = values.text(f"{head}.release") if payload.released else "never"
+        rows.append((payload.name, values.text(f"{head}.mass"), payload.link, grappled, released))
     yield from columns(rows)
 
 
-def _given(experiment: Experiment, prefix: str, parameters: Iterable[Parameter]) -> list[str]:
+def _settings(experiment: Experiment, prefix: str, parameters: Iterable[Parameter]) -> list[str]:
     """The parameters of a model in use, each as `name = value`."""
-    values, shown = _Values(experiment), []
+    values, words = _Values(experiment), []
     for parameter in parameters:
         path = f"{prefix}.{parameter.name}"
         if parameter.shape == "vector":
-            found = values.vector(path)
-            shown.append(f"{parameter.name} = {'varies' if found is None else vector(found, parameter.unit)}")
+            components = values.vector(path)
+            words.append(f"{parameter.name} = {'varies' if components is None else vector(components, parameter.unit)}")
         elif path in experiment.parameters:
-            given = experiment.parameters[path].value
-            text = f"{len(given)} numbers" if isinstance(given, tuple) else values.shown(path)
-            shown.append(f"{parameter.name} = {given if isinstance(given, str) else text}")
-    return shown
+            value = experiment.parameters[path].value
+            text = f"{len(value)} numbers" if isinstance(value, tuple) else values.text(path)
+            words.append(f"{parameter.name} = {value if isinstance(value, str) else text}")
+    return words
 
 
 def passive(structure: Structure) -> list[str]:
@@ -326,22 +326,22 @@ def _substitutions(experiment: Experiment) -> Iterator[str]:
             chosen = []
             for parameter in model.parameters:
                 path, of_servo = f"{use.joint}.{kind}.{parameter.name}", f"{use.joint}.servo.{parameter.of_servo}"
-                found, servos = parameters.get(path), parameters.get(of_servo)
-                if found is None or found.origin.kind in ("default", "derived"):
+                setting, servos = parameters.get(path), parameters.get(of_servo)
+                if setting is None or setting.origin.kind in ("default", "derived"):
                     continue
-                if servos is None or (found.origin.place, values.shown(path)) != (
+                if servos is None or (setting.origin.place, values.text(path)) != (
                     servos.origin.place,
-                    values.shown(of_servo),
+                    values.text(of_servo),
                 ):
-                    chosen.append(f"{parameter.name} = {values.shown(path)}")
-            whole = ", ".join(each.replace(" ", FIXED_SPACE) for each in chosen)
+                    chosen.append(f"{parameter.name} = {values.text(path)}")
+            whole = ", ".join(choice.replace(" ", FIXED_SPACE) for choice in chosen)
             first, *more = textwrap.wrap(whole, CHOSEN, break_on_hyphens=False) or [""]
             lines = [(joint, kind, model.name, first), *(("", "", "", line) for line in more)]
             rows += [tuple(cell.replace(FIXED_SPACE, " ") for cell in line) for line in lines]
         if use.scaled:
-            names = [each.name for each in bed_scale.PARAMETERS]
-            shown = (f"{name} = {values.shown(f'{use.joint}.bed.scale.{name}')}" for name in names)
-            rows.append(("", "scale", "", f"{', '.join(shown)}; the servo's is over it"))
+            names = [declared.name for declared in bed_scale.PARAMETERS]
+            scales = (f"{name} = {values.text(f'{use.joint}.bed.scale.{name}')}" for name in names)
+            rows.append(("", "scale", "", f"{', '.join(scales)}; the servo's is over it"))
     yield from columns(rows)
 
 
@@ -351,11 +351,15 @@ def _guides(experiment: Experiment) -> Iterator[str]:
     rows: list[tuple[str, ...]] = []
     for use in experiment.structure.guides:
         guide, head = models.find("guide", use.model, use.place), f"guides.{use.name}"
-        rows.append((use.name, use.model, ", ".join(_given(experiment, head, guide.parameters))))
-        rows += [("", joint, ", ".join(_given(experiment, f"{head}.{joint}", guide.of_joint))) for joint in use.joints]
+        rows.append((use.name, use.model, ", ".join(_settings(experiment, head, guide.parameters))))
+        rows += [
+            ("", joint, ", ".join(_settings(experiment, f"{head}.{joint}", guide.of_joint))) for joint in use.joints
+        ]
         for course in use.courses:
-            given = _given(experiment, f"{head}.{course.component}", models.find("command", course.model).parameters)
-            rows.append(("", course.component, ", ".join([course.model, *given])))
+            settings = _settings(
+                experiment, f"{head}.{course.component}", models.find("command", course.model).parameters
+            )
+            rows.append(("", course.component, ", ".join([course.model, *settings])))
     yield from columns(rows)
 
 
@@ -364,8 +368,8 @@ def _sensors(experiment: Experiment) -> Iterator[str]:
     yield "Sensors of links"
     rows = []
     for use in experiment.structure.sensors:
-        given = _given(experiment, f"sensors.{use.name}", sensor_parts(use, "parameters"))
-        rows.append((use.name, use.model, ", ".join(given)))
+        settings = _settings(experiment, f"sensors.{use.name}", sensor_parts(use, "parameters"))
+        rows.append((use.name, use.model, ", ".join(settings)))
     yield from columns(rows)
 
 
@@ -377,10 +381,10 @@ def _environment(experiment: Experiment) -> Iterator[str]:
     )
     rows: list[tuple[str, str, str]] = []
     for use, (prefix, declared) in zip(structure.environment, of_environment(experiment), strict=True):
-        shown = _given(experiment, prefix, declared)
-        rows.append((use.name, use.model, ", ".join(shown)))
+        settings = _settings(experiment, prefix, declared)
+        rows.append((use.name, use.model, ", ".join(settings)))
     if all(name == model for name, model, _ in rows):
-        yield from columns([(name, shown) for name, _, shown in rows])
+        yield from columns([(name, settings) for name, _, settings in rows])
     else:
         yield from columns(rows)
 
@@ -407,8 +411,8 @@ def _linear(experiment: Experiment) -> Iterator[str]:
     rows = []
     for use in experiment.linear:
         parts = [("of", use.inputs), ("to", use.outputs), ("open at", use.opened)]
-        told = "; ".join(f"{word} {', '.join(paths)}" for word, paths in parts if paths)
-        rows.append((use.name, use.where, told))
+        answers = "; ".join(f"{word} {', '.join(paths)}" for word, paths in parts if paths)
+        rows.append((use.name, use.where, answers))
     yield from columns(rows)
 
 
@@ -427,22 +431,22 @@ def _cases(experiment: Experiment) -> Iterator[str]:
     if experiment.search is not None and not experiment.search.complete:
         yield from search_lines(experiment, experiment.search)
         return
-    each = experiment.structure.history_bytes
-    kept = f"{size(cases.count * each)} of histories" if each else "metrics alone are written"
-    yield f"Cases: {'at most ' * (cases.until_shown > 0)}{cases.count}, {kept}"
+    case_bytes = experiment.structure.history_bytes
+    histories = f"{size(cases.count * case_bytes)} of histories" if case_bytes else "metrics alone are written"
+    yield f"Cases: {'at most ' * (cases.until_shown > 0)}{cases.count}, {histories}"
     rows = [(choice.path, choice.value) for choice in cases.choices]
     for coordinate in cases.coordinates:
         if not cases.count:
             continue
         many = coordinate.design == "random" and cases.count > COUNTED
-        found = span(coordinate.values) if many else different(coordinate.values)
-        shown = decimals(found if len(found) <= 4 else (found[0], found[-1]), coordinate.unit)
+        values = span(coordinate.values) if many else different(coordinate.values)
+        numbers = decimals(values if len(values) <= 4 else (values[0], values[-1]), coordinate.unit)
         if many:
-            several = f"drawn, from {shown[0]} to {shown[-1]}"
-        elif len(found) <= 4:
-            several = ", ".join(shown)
+            several = f"drawn, from {numbers[0]} to {numbers[-1]}"
+        elif len(values) <= 4:
+            several = ", ".join(numbers)
         else:
-            several = f"{len(found)} values from {shown[0]} to {shown[-1]}"
+            several = f"{len(values)} values from {numbers[0]} to {numbers[-1]}"
         rows.append((coordinate.path, f"{several} {coordinate.unit}" if coordinate.unit != "1" else several))
     if cases.repeats is not None:
         rows.append(("repeat", f"{different(cases.repeats).size} times each"))

@@ -25,7 +25,7 @@ def print_scales(compiled: Compiled) -> list[str]:
         by_kind: dict[str, list[Scale]] = {}
         for scale in scope.scales:
             by_kind.setdefault(scale.what, []).append(scale)
-        nearest = [max(scales, key=lambda each: each.nearness) for scales in by_kind.values()]
+        nearest = [max(scales, key=lambda number: number.nearness) for scales in by_kind.values()]
         counts = (f"{len(scales)}" for scales in by_kind.values())
         table = columns([HEADINGS, *map(_row, nearest, counts)], right=(1, 2))
         lines += [*([""] if lines else []), experiment.name, *(() if lines else LEGEND), table[0]]

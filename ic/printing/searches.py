@@ -17,8 +17,8 @@ def budget(search: Search) -> str:
 
 def search_lines(experiment: Experiment, search: Search) -> Iterator[str]:
     """The search in lines: its goal and its parameters."""
-    each = experiment.structure.history_bytes
-    histories = f"; {size(each)} of histories a case" if each else ""
+    case_bytes = experiment.structure.history_bytes
+    histories = f"; {size(case_bytes)} of histories a case" if case_bytes else ""
     yield f"{search.kind.capitalize()}: {budget(search)}{histories}"
     rows = []
     units = {coordinate.path: coordinate.unit for coordinate in experiment.cases.coordinates}

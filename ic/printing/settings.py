@@ -18,13 +18,13 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
     """The settings by path, from the plan alone, which keeps the places of some of them."""
     structure = experiment.structure
     schedule = structure.schedule
-    made: dict[str, Quantity] = {}
+    quantities: dict[str, Quantity] = {}
 
     def word(path: str, text: str, place: Place | None = None) -> None:
-        made[path] = Quantity(text, "", Origin("deck", place))
+        quantities[path] = Quantity(text, "", Origin("deck", place))
 
     def number(path: str, value: float, unit: str, note: str = "") -> None:
-        made[path] = Quantity(value, unit, Origin("derived" if note else "deck", note=note))
+        quantities[path] = Quantity(value, unit, Origin("derived" if note else "deck", note=note))
 
     word("arm", structure.arm)
     if structure.base is not None:
@@ -60,7 +60,7 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
     for environment in structure.environment:
         word(f"environment.{environment.name}.model", environment.model, environment.place)
     for key, value in kept_keys(experiment):
-        made[key.path] = Quantity(value, "" if isinstance(value, str) else key.parameter.unit, Origin("deck"))
+        quantities[key.path] = Quantity(value, "" if isinstance(value, str) else key.parameter.unit, Origin("deck"))
     number("rates.base", schedule.base_hz, "Hz")
     number("rates.dynamics", schedule.base_hz / schedule.dynamics, "Hz", f"{schedule.dynamics} base ticks a step")
     number("rates.record", schedule.base_hz / schedule.record, "Hz", f"{schedule.record} base ticks a row")
@@ -68,16 +68,16 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
     number("duration", schedule.duration, "s", f"{schedule.ticks} base ticks")
     word("record", ", ".join(recorded.name for recorded in structure.record) or "none")
     number("seed", float(experiment.cases.seed), "1")
-    for asked in experiment.linear:
-        head = f"linear.{asked.name}"
-        if asked.pose is None:
-            number(f"{head}.at", asked.at, "s")
+    for answer in experiment.linear:
+        head = f"linear.{answer.name}"
+        if answer.pose is None:
+            number(f"{head}.at", answer.at, "s")
         else:
-            word(f"{head}.at", "equilibrium", asked.place)
-        for entry, paths in (("inputs", asked.inputs), ("outputs", asked.outputs), ("open", asked.opened)):
+            word(f"{head}.at", "equilibrium", answer.place)
+        for entry, paths in (("inputs", answer.inputs), ("outputs", answer.outputs), ("open", answer.opened)):
             if paths:
-                word(f"{head}.{entry}", ", ".join(paths), asked.place)
+                word(f"{head}.{entry}", ", ".join(paths), answer.place)
     for metric in experiment.metrics:
         word(f"metrics.{metric.name}.model", metric.model, metric.place)
         word(f"metrics.{metric.name}.of", metric.of, metric.place)
-    return made
+    return quantities

@@ -57,12 +57,12 @@ def channels() -> list[dict[str, str]]:
     axis = channel.JOINT_AXIS
     return [
         *(row(JOINT, name, unit, doc, (), axis) for name, unit, doc in channel.MOTION),
-        *(row(JOINT, *each) for each in channel.OF_JOINT),
-        *(row(LINK, *each) for each in channel.OF_LINK),
-        *(row(BOOM, *each) for each in channel.OF_BOOM),
+        *(row(JOINT, *channel_row) for channel_row in channel.OF_JOINT),
+        *(row(LINK, *channel_row) for channel_row in channel.OF_LINK),
+        *(row(BOOM, *channel_row) for channel_row in channel.OF_BOOM),
         *(row(LINK, name, unit, doc, channel.XYZ, channel.WORLD_AXES) for name, unit, doc in channel.JACOBIAN),
-        *(row(PAYLOAD, *each) for each in channel.OF_PAYLOAD),
-        *(row("", *each) for each in channel.OF_ARM),
+        *(row(PAYLOAD, *channel_row) for channel_row in channel.OF_PAYLOAD),
+        *(row("", *channel_row) for channel_row in channel.OF_ARM),
     ]
 
 
@@ -109,12 +109,13 @@ def dh_page() -> Page:
         parts=(
             Table(
                 head=("name", "unit", "default", "meaning"),
-                rows=[(each.name, each.unit, default(each), each.doc) for each in dh.NUMBERS],
+                rows=[(parameter.name, parameter.unit, default(parameter), parameter.doc) for parameter in dh.NUMBERS],
                 caption="Numbers",
             ),
         ),
         records=[
-            {"name": each.name, "unit": each.unit, "doc": each.doc, "default": each.default} for each in dh.NUMBERS
+            {"name": parameter.name, "unit": parameter.unit, "doc": parameter.doc, "default": parameter.default}
+            for parameter in dh.NUMBERS
         ],
     )
 
@@ -166,11 +167,11 @@ def linear_page() -> Page:
     page = block_page(BLOCKS["linear"])
     table = Table(
         head=("figure", "unit", "meaning"),
-        rows=[(each.name, each.unit, each.doc) for each in FIGURES.values()],
+        rows=[(figure.name, figure.unit, figure.doc) for figure in FIGURES.values()],
         headed=False,
         caption="Figures for `metric NAME = FIGURE { of = LINEAR; }` and `require FIGURE(LINEAR) > LIMIT;`",
     )
-    figures = [{"figure": each.name, "unit": each.unit, "doc": each.doc} for each in FIGURES.values()]
+    figures = [{"figure": figure.name, "unit": figure.unit, "doc": figure.doc} for figure in FIGURES.values()]
     return replace(page, parts=(*page.parts, table), records=[*page.records, *figures])
 
 

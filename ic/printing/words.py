@@ -96,10 +96,10 @@ def _that_use(word: str) -> Sequence[Row]:
     whole = re.compile(rf"(?<![\w.]){re.escape(word)}(?!\w)", re.IGNORECASE)
     rows = [row for _, row in (*_of_blocks(), *_of_values())] if word else []
     glossary = [(words, "", meaning) for words, meaning in entries().values()] if word else []
-    for among, at, most in ((rows, 0, len(rows)), (rows, 2, MOST_MEANINGS), (glossary, 2, MOST_MEANINGS)):
-        found = [*dict.fromkeys(row for row in among if whole.search(row[at]))]
-        if 0 < len(found) <= most:
-            return found
+    for among, column, most in ((rows, 0, len(rows)), (rows, 2, MOST_MEANINGS), (glossary, 2, MOST_MEANINGS)):
+        matches = [*dict.fromkeys(row for row in among if whole.search(row[column]))]
+        if 0 < len(matches) <= most:
+            return matches
     return []
 
 
@@ -134,12 +134,14 @@ def _of_values() -> Iterator[tuple[str, Row]]:
 
 def _of_models(word: str) -> Iterator[Row]:
     """The parameters of this name, and those that may be this word, each with the models that declare it alike."""
-    found: dict[tuple[str, str, str], list[str]] = {}
+    models_by_entry: dict[tuple[str, str, str], list[str]] = {}
     for kind in KINDS:
         for name, model in models.available(kind).items():
-            for each in models.written(model):
-                if each.name == word or word in each.words:
-                    value = word if each.name != word else "..." if each.unit == "1" else f"... {each.unit}"
-                    found.setdefault((kind, f"{each.name} = {value}", each.doc), []).append(name)
-    for (of_kind, written, doc), names in found.items():
+            for parameter in models.written(model):
+                if parameter.name == word or word in parameter.words:
+                    value = (
+                        word if parameter.name != word else "..." if parameter.unit == "1" else f"... {parameter.unit}"
+                    )
+                    models_by_entry.setdefault((kind, f"{parameter.name} = {value}", parameter.doc), []).append(name)
+    for (of_kind, written, doc), names in models_by_entry.items():
         yield written, f"{of_kind} {', '.join(names)}", doc
