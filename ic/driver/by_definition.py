@@ -39,7 +39,7 @@ class KnownFindings:
     arm  of an arm's definition: the arm itself as runs share it, pickled; nothing where they cannot
     """
 
-    found: DefinitionFindings
+    findings: DefinitionFindings
     allowances: tuple[tuple[Allowance, ...], ...] = ()
     arm: bytes = b""
 
@@ -62,12 +62,12 @@ class DefinitionChecks:
         self._units = list(self._all())
         keys = _Keys(deck, self._definitions, self._complaints)
         self._keys = [keys.of(definition) for definition, _ in self._units]
-        self._found = {n: known[key] for n, key in enumerate(self._keys) if key is not None and key in known}
-        for n, each in self._found.items():
-            bring_arm(self._definitions, self._units[n][0].name, each.arm)
+        self._findings = {n: known[key] for n, key in enumerate(self._keys) if key is not None and key in known}
+        for n, findings in self._findings.items():
+            bring_arm(self._definitions, self._units[n][0].name, findings.arm)
         order = sorted(range(len(self._units)), key=lambda n: self._units[n][0].kind in EXPERIMENTS)
         self._waiting = [
-            n for n in order if n not in self._found
+            n for n in order if n not in self._findings
         ]  # arms and servos first: runs have their mistakes too
 
     @property
@@ -89,24 +89,26 @@ class DefinitionChecks:
             )
         definition = self._units[n][0]
         arm = packed_arm(self._definitions, definition.name) if definition.kind == "arm" else b""
-        self._found[n] = KnownFindings(complaints.findings(), allowances, arm)
+        self._findings[n] = KnownFindings(complaints.findings(), allowances, arm)
 
     @property
     def findings(self) -> Known:
         """The findings to keep for the next check. Empty where files are searched whose texts are in no key."""
         if self._definitions.csv_files.asked or self._definitions.robot_files.asked:
             return {}
-        return {key: self._found[n] for n, key in enumerate(self._keys) if key is not None and n in self._found}
+        return {key: self._findings[n] for n, key in enumerate(self._keys) if key is not None and n in self._findings}
 
     def diagnostics(self) -> tuple[tuple[Diagnostic, ...], Mapping[str, str]]:
         """All findings so far, in the order of the text, and every file's text by name."""
         complaints = self._complaints.copied()
-        found = [self._found[n] for n in range(len(self._units)) if n in self._found]
-        for each in found:
-            complaints.take(each.found)
+        all_findings = [self._findings[n] for n in range(len(self._units)) if n in self._findings]
+        for known_findings in all_findings:
+            complaints.take(known_findings.findings)
         if not complaints.errors and not self._waiting:
             complaints.admit_remarks()
-            silence_of_all([one for each in found for one in each.allowances], complaints)
+            silence_of_all(
+                [allowances for known_findings in all_findings for allowances in known_findings.allowances], complaints
+            )
         files = self._definitions
         sources = (*self._deck.sources, *files.csv_files.sources, *files.robot_files.sources)
         return in_order(complaints.all, sources), {source.name: source.text for source in sources}
@@ -145,7 +147,7 @@ class DefinitionChecks:
         self, definition: Definition, definitions: Definitions, complaints: Complaints
     ) -> tuple[tuple[Allowance, ...], ...]:
         source = DeckSource(definitions, complaints, partial(read_again, self._deck), audited=False)
-        return tuple(made.allowances for made, _ in experiments_of(source, definition))
+        return tuple(experiment.allowances for experiment, _ in experiments_of(source, definition))
 
 
 def _arm(
@@ -170,20 +172,32 @@ class _Keys:
     """Digests of everything on which a definition's findings depend."""
 
     def __init__(self, deck: Deck, definitions: Definitions, complaints: Complaints) -> None:
-        self._known = {name: each for kind in EXPERIMENTS for name, each in definitions.of_kind(kind).items()}
+        self._known = {
+            name: definition for kind in EXPERIMENTS for name, definition in definitions.of_kind(kind).items()
+        }
         self._of_kind = {kind: definitions.of_kind(kind) for kind in ("run", "arm", "servo")}
-        everything = [each for kind in (*EXPERIMENTS, "arm", "servo") for each in definitions.of_kind(kind).values()]
-        self._chooses = {id(each): _chooses_macros(each.group.body) for each in everything if each.kind in EXPERIMENTS}
-        self._own = {id(each): pickle.dumps((each.group, each.default, each.parts)) for each in everything}
-        names = [(each.kind, each.name, each.default, each.place) for each in everything]
+        everything = [
+            definition for kind in (*EXPERIMENTS, "arm", "servo") for definition in definitions.of_kind(kind).values()
+        ]
+        self._chooses = {
+            id(definition): _chooses_macros(definition.group.body)
+            for definition in everything
+            if definition.kind in EXPERIMENTS
+        }
+        self._own = {
+            id(definition): pickle.dumps((definition.group, definition.default, definition.parts))
+            for definition in everything
+        }
+        names = [(definition.kind, definition.name, definition.default, definition.place) for definition in everything]
         lets = list(definitions.lets.values())
         blocks = [definitions.block(run) for run in definitions.of_kind("run").values()]
         loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
         before, *sets = complaints.known_before
-        told = [before, *(sorted(map(repr, each)) for each in sets)]  # type: ignore[call-overload]
-        shared = (deck.file, deck.defines, names, lets, told, loaded, sorted(deck.roofs.items()))
+        reported = [before, *(sorted(map(repr, group)) for group in sets)]  # type: ignore[call-overload]
+        shared = (deck.file, deck.defines, names, lets, reported, loaded, sorted(deck.roofs.items()))
         arms, servos = (
-            {name: self._own[id(each)] for name, each in definitions.of_kind(kind).items()} for kind in ("arm", "servo")
+            {name: self._own[id(definition)] for name, definition in definitions.of_kind(kind).items()}
+            for kind in ("arm", "servo")
         )
         told_of, values = pickle.dumps(shared), [pickle.dumps(lets), *arms.values()]
         plain = {name: name.rpartition(".")[2].encode() for name in servos}  # as its own deck calls it
@@ -199,18 +213,18 @@ class _Keys:
         seen: dict[int, bytes] = {}
         waiting = [definition]
         while waiting:
-            each = waiting.pop()
-            body = self._own[id(each)]
-            if id(each) in seen:
+            dependence = waiting.pop()
+            body = self._own[id(dependence)]
+            if id(dependence) in seen:
                 continue
-            if self._chooses.get(id(each)):
+            if self._chooses.get(id(dependence)):
                 return None
-            seen[id(each)] = body
-            like, of = each.group.like, each.group.of
-            kind = "run" if each.kind in EXPERIMENTS else each.kind
+            seen[id(dependence)] = body
+            like, of = dependence.group.like, dependence.group.of
+            kind = "run" if dependence.kind in EXPERIMENTS else dependence.kind
             for name, among in (
                 *((name, self._of_kind[kind]) for name in (like, of)),
-                *((p, self._known) for p in each.parts),
+                *((p, self._known) for p in dependence.parts),
             ):
                 if name is not None and name.text not in among:
                     return None
@@ -229,7 +243,7 @@ def _chooses_macros(entries: Iterable[Entry]) -> bool:
 
 
 def _digest(parts: Iterable[bytes]) -> bytes:
-    made = hashlib.sha256()
+    digest = hashlib.sha256()
     for part in parts:
-        made.update(len(part).to_bytes(8, "big") + part)
-    return made.digest()
+        digest.update(len(part).to_bytes(8, "big") + part)
+    return digest.digest()

@@ -109,7 +109,7 @@ def compile_deck(
     deck, entries = _with_settings(deck, settings, complaints)
     definitions = Definitions(deck, complaints)
     varied = tuple(entry for entry in entries if entry.words)
-    given = Settings(tuple(entry for entry in entries if not entry.words))
+    overrides = Settings(tuple(entry for entry in entries if not entry.words))
     written = definitions
     selected = (select,) if isinstance(select, str) else tuple(dict.fromkeys(select or ()))
     sweep: Definition | None = None
@@ -125,15 +125,17 @@ def compile_deck(
             definitions = definitions.replacing(sweep)
             select = "all" if select == "all" else (sweep.name,)
             selected = (select,) if isinstance(select, str) else select
-    definitions = given.in_definitions(definitions)
+    definitions = overrides.in_definitions(definitions)
     memo = memo if memo is not None else AnalysisMemo()
-    source = DeckSource(definitions, complaints, partial(read_again, deck), given, Effects(given), sweep, memo=memo)
-    asked: list[Definition] = []
+    source = DeckSource(
+        definitions, complaints, partial(read_again, deck), overrides, Effects(overrides), sweep, memo=memo
+    )
+    requested: list[Definition] = []
     experiments: list[Experiment] = []
     scopes: list[Scope] = []
     try:
         check_params(written, complaints)
-        given.check_lets(written, complaints)
+        overrides.check_lets(written, complaints)
         complaints.add(
             *(d for problem in Scope(definitions, complaints).names.check_lets() for d in problem.diagnostics)
         )
@@ -141,17 +143,17 @@ def compile_deck(
         for kind in ("arm", "servo", "run"):
             for definition in definitions.of_kind(kind).values():
                 definitions.block(definition)
-        asked = asked_definitions(definitions, complaints, select)
-        for definition in asked:
+        requested = asked_definitions(definitions, complaints, select)
+        for definition in requested:
             groups: list[ScopedExperiment] = []
             with complaints.gather():
                 groups = experiments_of(source, definition)
             source.effects.complete &= bool(groups)
-            experiments += (made for made, _ in groups)
+            experiments += (experiment for experiment, _ in groups)
             scopes += (scope for _, scope in groups)
-        if not varied and len(asked) == 1 and asked[0] is _own_choice(definitions):
+        if not varied and len(requested) == 1 and requested[0] is _own_choice(definitions):
             selected = ()  # as where no name is given
-        source.effects.report(complaints, [definition.name for definition in asked])
+        source.effects.report(complaints, [definition.name for definition in requested])
         blocks = [definitions.block(definition) for definition in definitions.of_kind("run").values()]
         loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
         for arm in definitions.of_kind("arm").values():  # with a payload its joints may move a mass
@@ -178,11 +180,14 @@ def compile_deck(
         if select == "all":
             _remark_unused_rows(definitions, scopes, complaints)
         if not settings and not defines:  # which make another deck of it
-            warn_of_unneeded(definitions, asked, experiments, complaints)
+            warn_of_unneeded(definitions, requested, experiments, complaints)
     else:
         return Compiled(None, in_order(complaints.all, sources), texts)
     decks = {source.name: source.edition for source in deck.sources if source.name != COMMAND_LINE}
-    files = tuple(File(each.name, each.text, each.sha256, decks.get(each.name, FIRST)) for each in sources)
+    files = tuple(
+        File(source_file.name, source_file.text, source_file.sha256, decks.get(source_file.name, FIRST))
+        for source_file in sources
+    )
     return Compiled(
         Plan(deck.file, tuple(experiments), files, tuple(defines), selected, tuple(settings)),
         in_order(complaints.all, sources),
@@ -197,9 +202,9 @@ def _remark_unused_rows(definitions: Definitions, scopes: Iterable[Scope], compl
     """Warn about rows of tables that no run uses, in tables whose deck says that all should be used."""
     used = {path for scope in scopes for path in scope.names.cells}
     for name, let in definitions.lets.items():
-        found = definitions.row_table(let.value).unused(name, used) if is_row_table(let.value) else None
-        if found is not None:
-            complaints.add(found)
+        unused = definitions.row_table(let.value).unused(name, used) if is_row_table(let.value) else None
+        if unused is not None:
+            complaints.add(unused)
 
 
 def _with_settings(deck: Deck, settings: Sequence[str], complaints: Complaints) -> tuple[Deck, tuple[Setting, ...]]:
@@ -220,7 +225,7 @@ def _own_choice(definitions: Definitions, kinds: Collection[str] = EXPERIMENTS) 
     several."""
     known = [definition for kind in kinds for definition in definitions.of_kind(kind).values()]
     own = [definition for definition in known if definitions.writes(definition)]
-    default = definitions.default() if not own or any(each.default for each in own) else None
+    default = definitions.default() if not own or any(definition.default for definition in own) else None
     if default is not None and default.kind in kinds:
         return default
     known = own or known

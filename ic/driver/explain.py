@@ -67,8 +67,8 @@ def explain(
     compiled = check(path, include_dirs=tuple(include_dirs), defines=tuple(defines), select=select)
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)
-    found = tuple(explanations_of(compiled, target))
-    if not found:
+    explanations = tuple(explanations_of(compiled, target))
+    if not explanations:
         known = list(
             dict.fromkeys(
                 path for scope in compiled.scopes for path in (*scope.parameters, *scope.auxiliary, *scope.known)
@@ -78,7 +78,7 @@ def explain(
         runs = ", ".join(f"`{experiment.name}`" for experiment in compiled.plan.experiments)
         helps = [f"there are: {', '.join(inside[:24])}"] if inside else list(did_you_mean(target, known))
         raise Problem(error("D163", f"nothing is called `{target}` in {runs}", help=helps), compiled.sources)
-    return found
+    return explanations
 
 
 def with_all_settings(compiled: Compiled, number: int = 0) -> Experiment:
@@ -128,11 +128,11 @@ def _let(scope: Scope, name: str) -> Settled | None:
     origin = written_origin(place_of(let.value), let.overrides)
     if varied is not None:
         origin = Origin("case", varied.place, (let.given_at, *let.overrides), origin.note)
-    found = scope.names.find(Name((let.name,), let.name.place))
-    if isinstance(found, Value):
-        return Settled(found.number, units.text(found.dimension), origin, "", let.value)
-    numbers = [value for value in found.items if isinstance(value, Value) and not isinstance(value.number, Scalar)]
-    if not numbers or len(numbers) < len(found.items):
+    let_value = scope.names.find(Name((let.name,), let.name.place))
+    if isinstance(let_value, Value):
+        return Settled(let_value.number, units.text(let_value.dimension), origin, "", let.value)
+    numbers = [value for value in let_value.items if isinstance(value, Value) and not isinstance(value.number, Scalar)]
+    if not numbers or len(numbers) < len(let_value.items):
         return None
     unit = units.text(numbers[0].dimension)
     return Settled(tuple(float(value.number) for value in numbers), unit, origin, "", let.value)
@@ -143,10 +143,12 @@ def _cells(scope: Scope, path: str) -> Settled | None:
     cells, table = scope.names.cells.get(path), scope.names.row_table(scope.definitions.split(path)[0])
     if cells is None or table is None:
         return None
-    found = [table.csv.quantity(cell) for cell in cells]
+    quantities = [table.csv.quantity(cell) for cell in cells]
     origin = Origin("deck", cells[0].place, (), f"row and column of {table.csv.file}")
-    unit = units.text(found[0][1].dimension)
-    return Settled(found[0][0] if len(found) == 1 else tuple(number for number, _ in found), unit, origin)
+    unit = units.text(quantities[0][1].dimension)
+    return Settled(
+        quantities[0][0] if len(quantities) == 1 else tuple(number for number, _ in quantities), unit, origin
+    )
 
 
 def _explanation(experiment: Experiment, scope: Scope, path: str, settled: Settled) -> Explanation:
@@ -180,8 +182,8 @@ def _names(scope: Scope, expression: Expression) -> Iterator[Label]:
     level = [expression]
     for _ in range(DEEPEST):
         below = []
-        for each in level:
-            for name in map(scope.definitions.in_full, names_in(each)):
+        for part in level:
+            for name in map(scope.definitions.in_full, names_in(part)):
                 cells = scope.names.cells.get(name.text)
                 if cells is not None and name.text not in seen:
                     seen.add(name.text)
@@ -198,10 +200,10 @@ def _names(scope: Scope, expression: Expression) -> Iterator[Label]:
 
 def names_in(expression: Expression) -> Iterable[Name]:
     """The names that an expression uses."""
-    stack, found = [expression], []
+    stack, names = [expression], []
     while stack:
         expression = stack.pop()
         if isinstance(expression, Name):
-            found.append(expression)
+            names.append(expression)
         stack.extend(reversed(children(expression)))
-    return found
+    return names

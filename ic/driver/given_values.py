@@ -54,9 +54,9 @@ class VariedRun:
 
     def check(self, columns: Mapping[str, CaseValues], count: int) -> None:
         """Raise Problem where one of `count` cases has a value that its parameter cannot have. columns: SI, by path"""
-        found = () if self.checks is None else self.checks.errors(columns, count)
-        if found:
-            raise Problem(found, self.sources)
+        errors = () if self.checks is None else self.checks.errors(columns, count)
+        if errors:
+            raise Problem(errors, self.sources)
 
     def broken(self, columns: Mapping[str, np.ndarray], count: int) -> np.ndarray:
         """A truth for each of `count` cases: whether `check` refuses it, [n]."""
@@ -84,8 +84,8 @@ class GivenRun:
 
     def unit(self, path: str) -> str | None:
         """The SI unit of a path's value, `gearbox.kp` or a `let`; None for an unknown path, "" for a word."""
-        found = next(explanations_of(self.compiled, path), None)
-        return None if found is None else found.unit if not isinstance(found.value, str) else ""
+        explanation = next(explanations_of(self.compiled, path), None)
+        return None if explanation is None else explanation.unit if not isinstance(explanation.value, str) else ""
 
     def written_in(self, path: str) -> tuple[str, Measure]:
         """The unit in which the deck writes a parameter or a `let`: the first of its dimension in its value or in the
@@ -111,7 +111,7 @@ class GivenRun:
     def vary_most(self, values: Mapping[str, tuple[float | str, str]]) -> tuple[VariedRun, tuple[str, ...]]:
         """The run over as many of these paths as can vary together, and those left out, since they have no effect, or
         decide the program. Raises Problem where the deck has a mistake."""
-        kept: dict[str, tuple[float | str, str]] = {}
+        together: dict[str, tuple[float | str, str]] = {}
         run = VariedRun(self.experiment, None, self.compiled.sources)
         waiting = [dict(values)]
         while waiting:
@@ -119,18 +119,18 @@ class GivenRun:
             if not more:
                 continue
             try:
-                run = self.vary({**kept, **more})
+                run = self.vary({**together, **more})
             except Problem as problem:
-                blamed = _given_paths(problem.diagnostics, {**kept, **more}) & more.keys()
+                blamed = _given_paths(problem.diagnostics, {**together, **more}) & more.keys()
                 if blamed:
-                    waiting.append({path: each for path, each in more.items() if path not in blamed})
+                    waiting.append({path: value for path, value in more.items() if path not in blamed})
                 elif len(more) > 1:
                     paths = list(more)
                     halves = paths[: len(paths) // 2], paths[len(paths) // 2 :]
                     waiting += [{path: more[path] for path in half} for half in reversed(halves)]
                 continue
-            kept.update(more)
-        return run, tuple(path for path in values if path not in kept)
+            together.update(more)
+        return run, tuple(path for path in values if path not in together)
 
     def sets(self, path: str) -> bool:
         """True where the settings contain exactly this path."""
@@ -157,13 +157,13 @@ class GivenRun:
             name += "_"
         varied = [
             *((path, word, "1") for path, word in words.items()),
-            *((path, *each) for path, each in values.items()),
+            *((path, *value) for path, value in values.items()),
         ]
         text = _sweep(f"{name} of {self.name}", varied, repeat)
         deck = replace(
             self.deck,
             entries=(*self.deck.entries, *with_full_names(_entries(text), self.deck.roofs)),
-            sources=(*self.deck.sources, SourceFile(GIVEN, _shown(text), "")),
+            sources=(*self.deck.sources, SourceFile(GIVEN, _without_vary(text), "")),
         )
         compiled = compile_deck(deck, select=name, defines=self.defines, settings=settings)
         if compiled.plan is None:
@@ -200,7 +200,7 @@ def given_run(
     """A run of a deck. run: None for the deck's only one, else the one that it marks `default`. Raises Problem."""
     deck = read(Path(path), [Path(include_dir) for include_dir in include_dirs], tuple(defines), text=text)
     definitions = Definitions(deck, Complaints(deck.warnings))
-    return _given(deck, _name_of(definitions, run, deck), tuple(defines), tuple(settings))
+    return _run_of_deck(deck, _name_of(definitions, run, deck), tuple(defines), tuple(settings))
 
 
 def swept_run(
@@ -215,16 +215,16 @@ def swept_run(
     deck = read(Path(path), [Path(include_dir) for include_dir in include_dirs], tuple(defines))
     sweep = Definitions(deck, Complaints(deck.warnings)).of_kind("sweep").get(name)
     run = name if sweep is None else _run_of(sweep) or name
-    given = given_run(path, run, include_dirs=include_dirs, defines=defines, settings=settings)
+    base_run = given_run(path, run, include_dirs=include_dirs, defines=defines, settings=settings)
     if sweep is None:
-        return given, (given.experiment,)
-    compiled = compile_deck(given.deck, select=name, defines=defines, settings=settings)
+        return base_run, (base_run.experiment,)
+    compiled = compile_deck(base_run.deck, select=name, defines=defines, settings=settings)
     if compiled.plan is None:
         raise Problem(_errors(compiled), compiled.sources)
-    return given, compiled.plan.experiments
+    return base_run, compiled.plan.experiments
 
 
-def _given(deck: Deck, name: str, defines: tuple[str, ...], settings: tuple[str, ...]) -> GivenRun:
+def _run_of_deck(deck: Deck, name: str, defines: tuple[str, ...], settings: tuple[str, ...]) -> GivenRun:
     compiled = compile_deck(deck, select=name, defines=defines, settings=settings)
     if compiled.plan is None:
         raise Problem(_errors(compiled), compiled.sources)
@@ -236,10 +236,14 @@ def _name_of(definitions: Definitions, run: str | None, deck: Deck) -> str:
     runs, sweeps = definitions.of_kind("run"), definitions.of_kind("sweep")
     sources = {source.name: source.text for source in deck.sources}
     if run is None:
-        own = {name: each for name, each in runs.items() if definitions.writes(each)} or dict(runs)
+        own = {name: definition for name, definition in runs.items() if definitions.writes(definition)} or dict(runs)
         if len(own) == 1:
             return next(iter(own))
-        ours = [each for each in (*runs.values(), *sweeps.values()) if each.name in own or definitions.writes(each)]
+        ours = [
+            definition
+            for definition in (*runs.values(), *sweeps.values())
+            if definition.name in own or definitions.writes(definition)
+        ]
         default = next((run_or_sweep for run_or_sweep in ours if run_or_sweep.default), None)
         if default is None or default.name not in own:
             why = f"it marks a sweep, `{default.name}`, `default`" if default else "none is marked `default`"
@@ -248,10 +252,10 @@ def _name_of(definitions: Definitions, run: str | None, deck: Deck) -> str:
             raise Problem(error("E433", message, help=helps), sources)
         return default.name
     if run in sweeps:
-        of = _run_of(sweeps[run])
+        base = _run_of(sweeps[run])
         message = f"`{run}` is a sweep, and a simulation is of one run, whose values are given"
         raise Problem(
-            error("E433", message, sweeps[run].place, help=f'`run="{of}"` is the run that it varies' if of else ()),
+            error("E433", message, sweeps[run].place, help=f'`run="{base}"` is the run that it varies' if base else ()),
             sources,
         )
     if run not in runs:
@@ -283,36 +287,38 @@ def _names(deck: Deck) -> set[str]:
 
 def _sweep(head: str, varied: Iterable[tuple[str, float | str, str]], repeat: int) -> str:
     """The text of a sweep over paths with these values and units. A caller's texts are on lines of their own, since
-    messages show lines; `_shown` removes `VARY`, which is not the caller's."""
+    messages show lines; `_without_vary` removes `VARY`, which is not the caller's."""
     lines = [f"sweep {head} {{"]
     for path, value, unit in varied:
-        shown = value if isinstance(value, str) else repr(value)
-        lines += [f"{VARY}{path}", "= [", shown, f"]{f' {unit}' if unit != '1' else ''};"]
+        text = value if isinstance(value, str) else repr(value)
+        lines += [f"{VARY}{path}", "= [", text, f"]{f' {unit}' if unit != '1' else ''};"]
     lines += ["repeat", str(repeat), ";"] if repeat > 1 else []
     return "\n".join([*lines, "}", ""])
 
 
-def _shown(text: str) -> str:
+def _without_vary(text: str) -> str:
     """The text of such a sweep for messages, each word at its place."""
     return re.sub(f"^{VARY}", " " * len(VARY), text, flags=re.MULTILINE)
 
 
 def _without_parts(errors: Sequence[Diagnostic], words: Mapping[str, str], text: str) -> list[Diagnostic]:
     """The errors without those of values that are parts of a word with an error of its own, from which they follow."""
-    lines = _shown(text).split("\n")
+    lines = _without_vary(text).split("\n")
 
-    def line(found: Diagnostic) -> str:
-        at = found.at
-        return lines[at.place.line - 1].strip() if at is not None and at.place.file == GIVEN else ""
+    def line(diagnostic: Diagnostic) -> str:
+        label = diagnostic.at
+        return lines[label.place.line - 1].strip() if label is not None and label.place.file == GIVEN else ""
 
-    wrong = tuple(f"{path}." for path, word in words.items() if any(line(each) == word for each in errors))
-    return [each for each in errors if not line(each).startswith(wrong)]
+    wrong = tuple(f"{path}." for path, word in words.items() if any(line(diagnostic) == word for diagnostic in errors))
+    return [diagnostic for diagnostic in errors if not line(diagnostic).startswith(wrong)]
 
 
 def _given_paths(errors: Iterable[Diagnostic], values: Mapping[str, tuple[float | str, str]]) -> set[str]:
     """The paths in whose lines of `_sweep` these errors stand."""
-    lines = _shown(_sweep("", ((path, *each) for path, each in values.items()), 1)).split("\n")
-    places = [found.at.place for found in errors if found.at is not None and found.at.place.file == GIVEN]
+    lines = _without_vary(_sweep("", ((path, *value) for path, value in values.items()), 1)).split("\n")
+    places = [
+        diagnostic.at.place for diagnostic in errors if diagnostic.at is not None and diagnostic.at.place.file == GIVEN
+    ]
     return {lines[place.line - 1].strip() for place in places if place.line <= len(lines)} & values.keys()
 
 
@@ -320,7 +326,7 @@ def _entries(text: str) -> tuple[Entry, ...]:
     """The entries of a text without preprocessor lines. Raises Problem."""
     source = Text(GIVEN, text)
     tokens = [token for line in logical_lines(source) for token in line if token.kind != SPACE]
-    entries, found = parse([*tokens, Token(END, "", source, len(text.rstrip()), 1)])
-    if found:
-        raise Problem(found, {GIVEN: _shown(text)})
+    entries, diagnostics = parse([*tokens, Token(END, "", source, len(text.rstrip()), 1)])
+    if diagnostics:
+        raise Problem(diagnostics, {GIVEN: _without_vary(text)})
     return entries

@@ -30,58 +30,62 @@ def import_with_remarks(path: str, mimic: Treatment = "follow") -> tuple[str, li
     others. Raises Problem, with the file's text."""
     files = Files()
     try:
-        found = FoundFile(path, os.path.normpath(path))
-        made = load(found.name, files.text(found, kind=KIND, most=MOST_URDF_BYTES))
+        file = FoundFile(path, os.path.normpath(path))
+        arm = load(file.name, files.text(file, kind=KIND, most=MOST_URDF_BYTES))
         if mimic != "follow":
-            made = arm_entries(without_mimics(made.robot, mimic))
-        made = _checked(made)
+            arm = arm_entries(without_mimics(arm.robot, mimic))
+        arm = _checked(arm)
     except Problem as problem:
         sources = tuple(files.read_so_far.values())
-        raise Problem(in_order(problem.diagnostics, sources), {each.name: each.text for each in sources}) from None
+        raise Problem(
+            in_order(problem.diagnostics, sources), {source.name: source.text for source in sources}
+        ) from None
     (source,) = files.read_so_far.values()
     option = f" --mimic {mimic}" if mimic != "follow" else ""
     name = os.path.basename(path)
     title = f"made by `met import {name}{option}` from a file with the SHA-256 {source.sha256[:16]}..."
-    lines = print_deck(made, title)
-    return "\n".join(lines) + "\n", list(remarks(made))
+    lines = print_deck(arm, title)
+    return "\n".join(lines) + "\n", list(remarks(arm))
 
 
-def _checked(made: ArmEntries) -> ArmEntries:
+def _checked(arm: ArmEntries) -> ArmEntries:
     """The entries, without the base if only this is of no body: it does not count while the base is fixed. Raises
     Problem where they do not make an arm."""
     try:
-        _check(made)
+        _check(arm)
     except Problem as problem:
-        if made.base is None:
+        if arm.base is None:
             raise
         first = problem.diagnostics[0]
         why = first.at.text if first.at is not None and first.at.text else first.message
-        made = replace(made, base=None, no_body=why)
-        _check(made)
-    return made
+        arm = replace(arm, base=None, no_body=why)
+        _check(arm)
+    return arm
 
 
-def _check(made: ArmEntries) -> None:
+def _check(arm: ArmEntries) -> None:
     """Raise Problem where these entries do not make an arm."""
-    place = made.robot.root.name.place
-    words = (Word("arm", place), Word(arm_name(made), place))
+    place = arm.robot.root.name.place
+    words = (Word("arm", place), Word(arm_name(arm), place))
     complaints = Complaints()
-    entries = (*([made.base.entry] if made.base is not None else []), *made.entries)
-    definitions = Definitions(Deck(made.robot.file, (Group(words, None, None, entries, place),), ()), complaints)
-    definitions.robot_files.take(made)
+    entries = (*([arm.base.entry] if arm.base is not None else []), *arm.entries)
+    definitions = Definitions(Deck(arm.robot.file, (Group(words, None, None, entries, place),), ()), complaints)
+    definitions.robot_files.take(arm)
     for definition in definitions.of_kind("arm").values():
         check_arm(Scope(definitions, complaints), definition)
     if complaints.errors:
         raise Problem(_mended(complaints.errors))
 
 
-def _mended(found: tuple[Diagnostic, ...]) -> list[Diagnostic]:
+def _mended(diagnostics: tuple[Diagnostic, ...]) -> list[Diagnostic]:
     """The errors with the remedies of `met import` in place of those for a deck."""
     follow = (
         "`--mimic free` lets such joints move by themselves, `--mimic fixed` holds them where they are at the start"
     )
-    made = [replace(each, help=(follow,)) if each.code == "D213" else each for each in found]
-    if made[-1].code != "D213":
+    mended = [
+        replace(diagnostic, help=(follow,)) if diagnostic.code == "D213" else diagnostic for diagnostic in diagnostics
+    ]
+    if mended[-1].code != "D213":
         other = 'write a deck with `arm NAME from urdf("FILE") { ... }`: its block can change what the file says'
-        made[-1] = replace(made[-1], help=(*made[-1].help, other))
-    return made
+        mended[-1] = replace(mended[-1], help=(*mended[-1].help, other))
+    return mended

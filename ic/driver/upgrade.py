@@ -56,17 +56,17 @@ class Upgrades:
 
 def upgrades(paths: Sequence[str]) -> Upgrades:
     """The texts that `met fmt --upgrade` makes of these files, without those of the latest edition."""
-    found: dict[str, str] = {}
+    text_of: dict[str, str] = {}
     before: dict[str, Compiled] = {}
     refused: dict[str, Problem] = {}
     for path in paths:
         try:
-            found[path] = Files().text(FoundFile(path, os.path.normpath(path)))
+            text_of[path] = Files().text(FoundFile(path, os.path.normpath(path)))
         except Problem as problem:
             refused[path] = problem
             continue
         before[path] = _compiled(path)
-    old = {os.path.realpath(path): text for path, text in found.items() if edition_of(text) < LATEST}
+    old = {os.path.realpath(path): text for path, text in text_of.items() if edition_of(text) < LATEST}
     new = {path: _rewritten(path, text, before.values()) for path, text in old.items()}
     proved: set[str] = set()
     wrong: dict[str, Problem] = {}
@@ -81,7 +81,7 @@ def upgrades(paths: Sequence[str]) -> Upgrades:
             proved |= files
         else:
             wrong.update(dict.fromkeys(files, difference))
-    for path in _decks_beside(proved - wrong.keys(), {os.path.realpath(each) for each in found}):
+    for path in _decks_beside(proved - wrong.keys(), {os.path.realpath(named) for named in text_of}):
         compiled = _compiled(path)
         files = {os.path.realpath(name) for name in compiled.sources} & proved - wrong.keys()
         parts = ", ".join(sorted(os.path.relpath(file) for file in files))
@@ -89,7 +89,7 @@ def upgrades(paths: Sequence[str]) -> Upgrades:
         if difference is not None:
             wrong.update(dict.fromkeys(files, difference))
     texts: dict[str, str] = {}
-    for path in found:
+    for path in text_of:
         real = os.path.realpath(path)
         if real in wrong:
             refused[path] = wrong[real]
@@ -110,7 +110,7 @@ def _decks_beside(reals: Iterable[str], named: Collection[str]) -> Iterator[str]
     The files' folders and those around and inside of these are searched.
     """
     folders = {os.path.dirname(path) for path in reals}
-    around = sorted({*folders, *map(os.path.dirname, folders), *(each for f in folders for each in _folders_in(f))})
+    around = sorted({*folders, *map(os.path.dirname, folders), *(folder for f in folders for folder in _folders_in(f))})
     texts: dict[str, str] = {}
     for path in (os.path.join(folder, name) for folder in around for name in sorted(os.listdir(folder))):
         if path.endswith(DECK) and len(texts) < MOST_BESIDE:
@@ -119,10 +119,12 @@ def _decks_beside(reals: Iterable[str], named: Collection[str]) -> Iterator[str]
             except Problem:
                 continue
     wanted = {os.path.basename(path) for path in reals}
-    includes = {path: {os.path.basename(each) for each in _INCLUDED.findall(text)} for path, text in texts.items()}
+    includes = {
+        path: {os.path.basename(include) for include in _INCLUDED.findall(text)} for path, text in texts.items()
+    }
     waiting = dict.fromkeys(path for path in texts if os.path.realpath(path) not in named)
-    while found := [path for path in waiting if includes[path] & wanted]:
-        for path in found:
+    while including := [path for path in waiting if includes[path] & wanted]:
+        for path in including:
             del waiting[path]
             wanted.add(os.path.basename(path))
             yield path
@@ -139,18 +141,18 @@ def _folders_in(folder: str) -> Iterator[str]:
 def _rewritten(real: str, text: str, compiled: Iterable[Compiled]) -> str:
     """The text of a file with brackets where the editions differ, and with its line."""
     stretches: set[tuple[int, int]] = set()
-    starts = [0, *(each.end() for each in re.finditer("\n", text))]
-    for each in compiled:
-        for warning in (*each.diagnostics, *(allowed for allowed, _ in each.allowed)):
-            first = next(edits(warning, each.sources), None) if warning.code == CODE else None
+    starts = [0, *(line_end.end() for line_end in re.finditer("\n", text))]
+    for checked in compiled:
+        for warning in (*checked.diagnostics, *(allowed for allowed, _ in checked.allowed)):
+            first = next(edits(warning, checked.sources), None) if warning.code == CODE else None
             if first is not None and os.path.realpath(first[1].file) == real:
                 edit = first[1]
                 start, end = starts[edit.line - 1] + edit.column - 1, starts[edit.end_line - 1] + edit.end_column - 1
                 if edit.text == f"({text[start:end]})":
                     stretches.add((start, end))
     marks = sorted([(end, 0, ")") for _, end in stretches] + [(start, 1, "(") for start, _ in stretches], reverse=True)
-    for at, _, mark in marks:
-        text = text[:at] + mark + text[at:]
+    for offset, _, mark in marks:
+        text = text[:offset] + mark + text[offset:]
     return _with_line(text)
 
 
@@ -162,14 +164,14 @@ def _with_line(text: str) -> str:
         return f"{text[:start]}{LATEST}{text[end:]}"
     tokens = (token for line in logical_lines(source) for token in line)
     first = next((token.offset for token in tokens if token.kind != SPACE), len(text))
-    at = text.rfind("\n", 0, first) + 1
-    above = text[:at].rstrip(" \t").rpartition("\n\n")
+    offset = text.rfind("\n", 0, first) + 1
+    above = text[:offset].rstrip(" \t").rpartition("\n\n")
     if above[1] and above[0].strip() and above[2].strip():  # a comment of its own, below that of the file
-        at = len(above[0]) + len(above[1])
-    elif text[:at].strip() and not text[:at].endswith("\n\n"):
+        offset = len(above[0]) + len(above[1])
+    elif text[:offset].strip() and not text[:offset].endswith("\n\n"):
         line = f"\n{line}"
-    behind = "" if text[at:].startswith("\n") or not text[at:] else "\n"
-    return f"{text[:at]}{line}\n{behind}{text[at:]}"
+    behind = "" if text[offset:].startswith("\n") or not text[offset:] else "\n"
+    return f"{text[:offset]}{line}\n{behind}{text[offset:]}"
 
 
 # The proof
@@ -191,32 +193,36 @@ def _difference(path: str, before: Compiled, new: Mapping[str, str], parts: str 
     if not all"""
     after = _compiled(path, new)
     if after.plan is None:
-        found = next(diagnostic for diagnostic in after.diagnostics if diagnostic.severity == "error")
-        return Problem(_left(path, f"{found.code}, {found.message}", found, parts=parts), after.sources)
+        first_error = next(diagnostic for diagnostic in after.diagnostics if diagnostic.severity == "error")
+        return Problem(
+            _left(path, f"{first_error.code}, {first_error.message}", first_error, parts=parts), after.sources
+        )
     assert before.plan is not None
     olds, news = before.plan.experiments, after.plan.experiments
-    for old, made in zip(olds, news, strict=False):
-        if _meaning(old) != _meaning(made):
+    for old, upgraded in zip(olds, news, strict=False):
+        if _meaning(old) != _meaning(upgraded):
             return Problem(_left(path, f"`{old.name}` would not have the same plan", parts=parts))
     same = len(olds) == len(news) and placeless(read(path).entries) == placeless(read(path, unsaved=new).entries)
     return None if same else Problem(_left(path, "it would not have the same entries", parts=parts))
 
 
-def _left(path: str, why: str, found: Diagnostic | None = None, *, parts: str = "") -> Diagnostic:
+def _left(path: str, why: str, diagnostic: Diagnostic | None = None, *, parts: str = "") -> Diagnostic:
     message = f"`{parts or path}` stays in its edition: " + (f"in `{path}`, which includes it, " * bool(parts)) + why
-    if found is None and parts:
+    if diagnostic is None and parts:
         return error("E346", message, help=f"`met check {path}` may warn of what the editions read otherwise (D392)")
-    if found is None:
+    if diagnostic is None:
         help = "does it count lines, by `__LINE__`? The file has one more; else please report it together with the deck"
         return error("E346", message, help=help)
-    at = Label(found.at.place, "in the new edition") if found.at is not None else None
-    return error("E346", message, at, help=[*found.help, "write it so that both editions read it alike"])
+    label = Label(diagnostic.at.place, "in the new edition") if diagnostic.at is not None else None
+    return error("E346", message, label, help=[*diagnostic.help, "write it so that both editions read it alike"])
 
 
 def _not_proved(path: str, compiled: Compiled) -> Problem:
     """The reason why a file that no deck proves is not changed: it cannot be read, does not compile, or has no run."""
     first = next((diagnostic for diagnostic in compiled.diagnostics if diagnostic.severity == "error"), None)
-    at = Label(first.at.place, f"{first.code}, {first.message}") if first is not None and first.at is not None else None
+    label = (
+        Label(first.at.place, f"{first.code}, {first.message}") if first is not None and first.at is not None else None
+    )
     include = "name a deck that includes it, too: `met fmt --upgrade DECK PART`; or write the line by hand"
     why, helps = "it does not compile by itself", ["what it means cannot be compared before and after", include]
     if first is None:
@@ -224,7 +230,7 @@ def _not_proved(path: str, compiled: Compiled) -> Problem:
         helps = [include]
     elif not _is_readable(path):
         why, helps = "it cannot be read", ["mend it first: `met check` shows all that is wrong"]
-    return Problem(error("E346", f"`{path}` stays in its edition: {why}", at, help=helps), compiled.sources)
+    return Problem(error("E346", f"`{path}` stays in its edition: {why}", label, help=helps), compiled.sources)
 
 
 def _is_readable(path: str) -> bool:
@@ -254,7 +260,7 @@ def placeless(value: Any) -> Any:
     if is_dataclass(value):
         return type(value).__name__, *(placeless(getattr(value, field.name)) for field in fields(value))
     if isinstance(value, Mapping):
-        return {name: placeless(each) for name, each in value.items()}
+        return {name: placeless(part) for name, part in value.items()}
     if isinstance(value, list | tuple):
-        return [placeless(each) for each in value]
+        return [placeless(part) for part in value]
     return value

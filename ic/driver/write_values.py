@@ -81,9 +81,9 @@ def with_values(
             after = _written_in(copy, after, value, run, remark)
         if laid_out:
             after = formatted(name, after)
-        found = copy.compiled(after, runs)
-        changed = [each for each in runs if each != run and _meaning(before, each) != _meaning(found, each)]
-    if _meaning(wanted, run) != _meaning(found, run):
+        rewritten = copy.compiled(after, runs)
+        changed = [other for other in runs if other != run and _meaning(before, other) != _meaning(rewritten, other)]
+    if _meaning(wanted, run) != _meaning(rewritten, run):
         raise _by_hand(values[0], "the deck with it would not mean the same as with `--set`")
     return DeckWithValues(after, run, tuple(changed), before.sources)
 
@@ -100,11 +100,11 @@ class _Copy:
     def compiled(self, text: str, select: Select, settings: Sequence[str] = ()) -> Compiled:
         """The deck of this text. Raises Problem E397 where it has errors."""
         self.write(text)
-        found = check(self.path, include_dirs=(self.folder,), defines=self.defines, select=select, settings=settings)
-        if found.plan is None:
-            first = next(diagnostic for diagnostic in found.diagnostics if diagnostic.severity == "error")
+        compiled = check(self.path, include_dirs=(self.folder,), defines=self.defines, select=select, settings=settings)
+        if compiled.plan is None:
+            first = next(diagnostic for diagnostic in compiled.diagnostics if diagnostic.severity == "error")
             raise Problem(error("E397", f"the deck cannot be compiled: {first.code}, {first.message}"))
-        return found
+        return compiled
 
     def read(self) -> Deck:
         return read(self.path, (self.folder,), self.defines)
@@ -122,10 +122,10 @@ def _run_of(deck: Deck, name: str) -> str:
     for _ in groups:
         if name in groups and _word(groups[name]) == "run":
             return name
-        of = groups[name].of if name in groups else None
-        if of is None:
+        base = groups[name].of if name in groups else None
+        if base is None:
             break
-        name = of.text
+        name = base.text
     message = f"`{name}` is no sweep of one run, so no run can be given its values"
     raise Problem(error("E397", message, help="`met best` of one of the sweeps that it is made of has a run"))
 
@@ -137,7 +137,10 @@ def _meaning(compiled: Compiled, run: str) -> object:
         (
             structure_key(experiment.structure),
             {path: (quantity.value, quantity.unit) for path, quantity in experiment.parameters.items()},
-            [(one.text, one.comparison, one.limit, one.share, one.confidence) for one in experiment.requirements],
+            [
+                (requirement.text, requirement.comparison, requirement.limit, requirement.share, requirement.confidence)
+                for requirement in experiment.requirements
+            ],
         )
         for experiment in compiled.plan.experiments
         if experiment.name == run
@@ -147,9 +150,9 @@ def _meaning(compiled: Compiled, run: str) -> object:
 def _written_in(copy: _Copy, text: str, value: WrittenValue, run: str, remark: str) -> str:
     """The text with one more value; unchanged where the run has that value already."""
     compiled = copy.compiled(text, (run,))
-    found = list(explanations_of(compiled, value.path))
-    places = {each.place for each in found}
-    if found and all(each.value == value.si for each in found):
+    explanations = list(explanations_of(compiled, value.path))
+    places = {explanation.place for explanation in explanations}
+    if explanations and all(explanation.value == value.si for explanation in explanations):
         return text  # the run has the value already, in its author's words
     if not places:
         raise _by_hand(value, f"`{run}` has no such parameter")
@@ -161,7 +164,7 @@ def _written_in(copy: _Copy, text: str, value: WrittenValue, run: str, remark: s
         first, last = _extent(source, owner)
         if place is not None and copy.is_own(place) and first <= _offset(source, place) < last:
             return _replaced(source, place, value, remark)
-    blocks = [each for each in owners if isinstance(each, Group) and _word(each) == "servo"]
+    blocks = [block for block in owners if isinstance(block, Group) and _word(block) == "servo"]
     if blocks and rest.isidentifier():
         first, last = _extent(source, blocks[0])
         uses = [expansion.use for expansion in place.expansions] if place is not None else []
@@ -232,13 +235,13 @@ def _extent(source: Text, entry: Entry) -> tuple[int, int]:
 def _replaced(source: Text, place: Place, value: WrittenValue, remark: str) -> str:
     text, first = source.text, _offset(source, place)
     last = first + place.length
-    found = _LITERAL.fullmatch(text[first:last])
-    own = (found["unit"] or "") if found else ""
+    literal = _LITERAL.fullmatch(text[first:last])
+    own = (literal["unit"] or "") if literal else ""
     outside = None if own else _UNIT_OF_LIST.match(text, last)
-    made = _in_unit(value, outside["unit"] if outside else own)
+    new_text = _in_unit(value, outside["unit"] if outside else own)
     if outside:
-        made = made.removesuffix(f" {outside['unit']}")
-    return _with_remark(text[:first] + made + text[last:], first, remark)
+        new_text = new_text.removesuffix(f" {outside['unit']}")
+    return _with_remark(text[:first] + new_text + text[last:], first, remark)
 
 
 def _in_unit(value: WrittenValue, unit: str) -> str:
@@ -247,10 +250,10 @@ def _in_unit(value: WrittenValue, unit: str) -> str:
         measure, own = parse_unit(unit or "1"), parse_unit(value.unit or "1")
     except ValueError:
         return value.text
-    made = written(value.si, unit)
-    number = made.split(" ")[0]
+    text = written(value.si, unit)
+    number = text.split(" ")[0]
     same = measure.dimension == own.dimension and measure.to_si(float(number), number.lstrip("-")) == value.si
-    return made if same else value.text
+    return text if same else value.text
 
 
 def _added(source: Text, brace: int, parameter: str, value: WrittenValue, remark: str) -> str:
@@ -266,13 +269,13 @@ def _added(source: Text, brace: int, parameter: str, value: WrittenValue, remark
     return _with_remark(f"{text[:line]}{indent}{entry}\n{text[line:]}", line, remark)
 
 
-def _with_remark(text: str, at: int, remark: str) -> str:
+def _with_remark(text: str, offset: int, remark: str) -> str:
     """The text with the remark at the end of the line at an offset, or on a line above it where that is too long,
     replacing an earlier remark. A line that has another comment, or that a backslash joins, is not changed."""
-    first, end = text.rfind("\n", 0, at) + 1, text.find("\n", at)
+    first, end = text.rfind("\n", 0, offset) + 1, text.find("\n", offset)
     end = len(text) if end < 0 else end
     line, mark, _ = text[first:end].partition(REMARK)
-    if not remark or line.rstrip().endswith("\\") or (not mark and any(each in line for each in _COMMENTS)):
+    if not remark or line.rstrip().endswith("\\") or (not mark and any(comment in line for comment in _COMMENTS)):
         return text
     line = line.rstrip()
     above = text.rfind("\n", 0, max(first - 1, 0)) + 1
