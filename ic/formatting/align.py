@@ -48,14 +48,14 @@ class Groups:
             self._leaders[node] = node = self._leaders[self._leaders[node]]
         return node
 
-    def join(self, one: Node, other: Node, anchor: Anchor) -> None:
+    def join(self, piece: Node, other: Node, anchor: Anchor) -> None:
         """Aligns two pieces by this anchor, unless one is aligned by another anchor already."""
-        if any(self.anchors.get(node, anchor) != anchor for node in (one, other)):
+        if any(self.anchors.get(node, anchor) != anchor for node in (piece, other)):
             return
-        for node in (one, other):
+        for node in (piece, other):
             if node not in self.anchors:
                 self.anchors[node], self._leaders[node] = anchor, node
-        first, second = self.group(one), self.group(other)
+        first, second = self.group(piece), self.group(other)
         assert first is not None and second is not None
         self._leaders[second] = first
 
@@ -67,29 +67,29 @@ def offset(piece: RowPiece, anchor: Anchor) -> int:
     return len(piece.text) if anchor == "end" else len(piece.text.partition(".")[0])
 
 
-def aligned(found: Sequence[Row], *, paragraphs: bool) -> Groups:
+def aligned(all_rows: Sequence[Row], *, paragraphs: bool) -> Groups:
     """The groups of all rows. paragraphs: whether a `=` that is alone in its wide gap moves the others"""
     groups = Groups()
-    separators = {at: sign for at, row in enumerate(found) if (sign := _separator(row)) is not None}
+    separators = {index: sign for index, row in enumerate(all_rows) if (sign := _separator(row)) is not None}
     paragraph: dict[int, int] = {}  # rows that have a separator, by the first of their paragraph
-    for rows in _paragraphs(found, separators) if paragraphs else ():
-        if len(rows) > 1 and any(_is_wide(found[at].pieces, separators[at]) for at in rows):
-            for at in rows:
-                paragraph[at] = rows[0]
-                groups.join((rows[0], separators[rows[0]]), (at, separators[at]), "start")
-    lines = lines_of(found)
-    pairs = [pair for pair in neighbours(found) if _may_meet(lines[pair[0]], lines[pair[1]])]
+    for rows in _paragraphs(all_rows, separators) if paragraphs else ():
+        if len(rows) > 1 and any(_is_wide(all_rows[index].pieces, separators[index]) for index in rows):
+            for index in rows:
+                paragraph[index] = rows[0]
+                groups.join((rows[0], separators[rows[0]]), (index, separators[index]), "start")
+    lines = lines_of(all_rows)
+    pairs = [pair for pair in neighbours(all_rows) if _may_meet(lines[pair[0]], lines[pair[1]])]
     for pair in pairs:
         for signed, bare in (pair, pair[::-1]):
-            groups.unsigned |= {(bare, at) for at in _unsigned(lines[signed].lists, lines[bare].lists)}
+            groups.unsigned |= {(bare, index) for index in _unsigned(lines[signed].lists, lines[bare].lists)}
     for anchor in ANCHORS:
-        for one, other in pairs:
-            together = one in paragraph and paragraph[one] == paragraph.get(other)
-            for first, second in meeting(lines[one], lines[other], anchor):
-                if together and _side(first, separators[one]) != _side(second, separators[other]):
+        for above, other in pairs:
+            together = above in paragraph and paragraph[above] == paragraph.get(other)
+            for first, second in meeting(lines[above], lines[other], anchor):
+                if together and _side(first, separators[above]) != _side(second, separators[other]):
                     continue
-                groups.join((one, first), (other, second), anchor)
-                groups.met |= {(one, first), (other, second)}
+                groups.join((above, first), (other, second), anchor)
+                groups.met |= {(above, first), (other, second)}
     return groups
 
 
@@ -107,27 +107,31 @@ class AlignedLine:
 
     def __init__(self, pieces: Sequence[RowPiece]) -> None:
         self.pieces = pieces
-        self.wide = {at for at in range(1, len(pieces)) if _is_wide(pieces, at)}
+        self.wide = {index for index in range(1, len(pieces)) if _is_wide(pieces, index)}
         self.families = list(_families(pieces))
-        self.entries = {at for at in range(1, len(pieces)) if pieces[at - 1].text == ";"}
-        self.lists = [(pieces[at - 3].text, at, pieces[at]) for at in range(3, len(pieces)) if _begins_list(pieces, at)]
+        self.entries = {index for index in range(1, len(pieces)) if pieces[index - 1].text == ";"}
+        self.lists = [
+            (pieces[index - 3].text, index, pieces[index])
+            for index in range(3, len(pieces))
+            if _begins_list(pieces, index)
+        ]
         self._columns: dict[Anchor, dict[int, int]] = {}
 
     def columns(self, anchor: Anchor) -> dict[int, int]:
         if anchor not in self._columns:
-            found: dict[int, int] = {}
+            columns: dict[int, int] = {}
             start = self.pieces[0].column
-            for at, piece in enumerate(self.pieces):
-                if at and (anchor != "point" or piece.kind == "number"):
+            for index, piece in enumerate(self.pieces):
+                if index and (anchor != "point" or piece.kind == "number"):
                     inside = piece.written if anchor == "end" else offset(piece, anchor)
-                    found[piece.column - start + inside] = at
-            self._columns[anchor] = found
+                    columns[piece.column - start + inside] = index
+            self._columns[anchor] = columns
         return self._columns[anchor]
 
 
-def lines_of(found: Sequence[Row]) -> dict[int, AlignedLine]:
+def lines_of(all_rows: Sequence[Row]) -> dict[int, AlignedLine]:
     """The lines whose pieces may be aligned, by the position of their row."""
-    return {at: AlignedLine(row.pieces) for at, row in enumerate(found) if row.kind == CODE and not row.exact}
+    return {index: AlignedLine(row.pieces) for index, row in enumerate(all_rows) if row.kind == CODE and not row.exact}
 
 
 def _families(pieces: Sequence[RowPiece]) -> Iterator[tuple[int, str]]:
@@ -149,40 +153,40 @@ def _family(piece: RowPiece) -> str:
     return piece.kind if piece.kind in ("unit", "close", "stop", "comment") else "value"
 
 
-def _begins_list(pieces: Sequence[RowPiece], at: int) -> bool:
-    return pieces[at].kind == "number" and pieces[at - 1].text == "[" and pieces[at - 2].text in ("=", "+=")
+def _begins_list(pieces: Sequence[RowPiece], index: int) -> bool:
+    return pieces[index].kind == "number" and pieces[index - 1].text == "[" and pieces[index - 2].text in ("=", "+=")
 
 
 def _unsigned(lists: Sequence[tuple[str, int, RowPiece]], others: Sequence[tuple[str, int, RowPiece]]) -> Iterator[int]:
     """Numbers of `others` with a blank before them, where a list of the same name in `lists` has a sign."""
     signed = {name for name, _, number in lists if number.text[0] in "+-"}
-    for name, at, number in others:
+    for name, index, number in others:
         if name in signed and number.gap == 1 and number.text[0] not in "+-":
-            yield at
+            yield index
 
 
-def _may_meet(one: AlignedLine, other: AlignedLine) -> bool:
-    return bool(one.wide or other.wide or (one.entries and other.entries))
+def _may_meet(line: AlignedLine, other: AlignedLine) -> bool:
+    return bool(line.wide or other.wide or (line.entries and other.entries))
 
 
-def meeting(one: AlignedLine, other: AlignedLine, anchor: Anchor) -> Iterator[tuple[int, int]]:
+def meeting(line: AlignedLine, other: AlignedLine, anchor: Anchor) -> Iterator[tuple[int, int]]:
     """Pieces of two lines whose anchors meet, one of them set apart. Behind the first word they may be of any family.
 
     Entries of one name also meet where one of them has two blanks before it, as where one blank is thought enough.
     """
-    above = one.columns(anchor)
-    for column, at in other.columns(anchor).items():
+    above = line.columns(anchor)
+    for column, index in other.columns(anchor).items():
         met = above.get(column)
-        if met is None or (one.families[met] != other.families[at] and not met == at == 1):
+        if met is None or (line.families[met] != other.families[index] and not met == index == 1):
             continue
-        if met in one.wide or at in other.wide or (anchor == "start" and _is_one_entry(one, met, other, at)):
-            yield met, at
+        if met in line.wide or index in other.wide or (anchor == "start" and _is_one_entry(line, met, other, index)):
+            yield met, index
 
 
-def _is_one_entry(one: AlignedLine, first: int, other: AlignedLine, second: int) -> bool:
+def _is_one_entry(line: AlignedLine, first: int, other: AlignedLine, second: int) -> bool:
     """Return True if two pieces begin entries of one name, with different blanks before them."""
-    above, below = one.pieces[first], other.pieces[second]
-    entries = first in one.entries and second in other.entries
+    above, below = line.pieces[first], other.pieces[second]
+    entries = first in line.entries and second in other.entries
     return entries and above.text == below.text and above.gap != below.gap
 
 
@@ -194,25 +198,25 @@ def _separator(row: Row) -> int | None:
     """The position of the piece between an entry's name and the rest; None where there is none."""
     if row.kind != CODE or row.exact or row.closes is not None:
         return None
-    for at, piece in enumerate(row.pieces):
-        if piece.text in ("=", "+=") or (piece.text == "{" and at == 1):
-            return at or None
-        if piece.kind not in ("name", "word") and (at or piece.text != "*"):
+    for index, piece in enumerate(row.pieces):
+        if piece.text in ("=", "+=") or (piece.text == "{" and index == 1):
+            return index or None
+        if piece.kind not in ("name", "word") and (index or piece.text != "*"):
             return None
     return None
 
 
-def _paragraphs(found: Sequence[Row], separators: Mapping[int, int]) -> Iterator[list[int]]:
+def _paragraphs(all_rows: Sequence[Row], separators: Mapping[int, int]) -> Iterator[list[int]]:
     """Neighbouring similar entries: with equally many words before the separator, the first one the same."""
     rows: list[int] = []
-    for at, row in enumerate(found):
+    for index, row in enumerate(all_rows):
         if row.kind == REMARK:
             continue
-        if at in separators:
-            if rows and not _alike(found[rows[-1]], found[at], separators[rows[-1]], separators[at]):
+        if index in separators:
+            if rows and not _alike(all_rows[rows[-1]], all_rows[index], separators[rows[-1]], separators[index]):
                 yield rows
                 rows = []
-            rows.append(at)
+            rows.append(index)
         elif rows:
             yield rows
             rows = []
@@ -220,28 +224,28 @@ def _paragraphs(found: Sequence[Row], separators: Mapping[int, int]) -> Iterator
         yield rows
 
 
-def _alike(one: Row, other: Row, first: int, second: int) -> bool:
-    alike = one.parent == other.parent and first == second
-    alike = alike and goes_on(one) == goes_on(other) and stands_below(one) == stands_below(other)
-    return alike and (first == 1 or one.pieces[0].text == other.pieces[0].text)
+def _alike(row: Row, other: Row, first: int, second: int) -> bool:
+    alike = row.parent == other.parent and first == second
+    alike = alike and goes_on(row) == goes_on(other) and stands_below(row) == stands_below(other)
+    return alike and (first == 1 or row.pieces[0].text == other.pieces[0].text)
 
 
-def neighbours(found: Sequence[Row]) -> Iterator[tuple[int, int]]:
+def neighbours(all_rows: Sequence[Row]) -> Iterator[tuple[int, int]]:
     """Positions of rows that stand below each other in one bracket, at most REACH apart."""
     last: dict[tuple[int, int], dict[tuple[bool, bool], list[int]]] = {}  # by bracket, and by how the row begins
-    for at, row in enumerate(found):
+    for index, row in enumerate(all_rows):
         bracket = (id(row.parent[0]), row.parent[1]) if row.parent else (0, 0)
         if row.kind == BLANK:
             last.pop(bracket, None)
         elif row.kind == CODE and not row.exact and row.closes is None:
             block, how = last.setdefault(bracket, {}), (goes_on(row), stands_below(row))
-            yield from ((other, at) for other in block.get(how, ()))
-            block[how] = [*block.get(how, ())[1 - REACH :], at]
+            yield from ((other, index) for other in block.get(how, ()))
+            block[how] = [*block.get(how, ())[1 - REACH :], index]
 
 
-def _is_wide(pieces: Sequence[RowPiece], at: int) -> bool:
+def _is_wide(pieces: Sequence[RowPiece], index: int) -> bool:
     """Return True if this piece is set apart. After a `[` one blank is enough, as in `[ 90, 5]` below `[-90, 5]`."""
-    before, piece = pieces[at - 1], pieces[at]
+    before, piece = pieces[index - 1], pieces[index]
     needed = blanks_between(before, piece)
     least = 1 if before.text == "[" or (before.kind == "open" and piece.kind == "number") else 2
-    return at > 0 and piece.kind != "stop" and piece.gap > needed and piece.gap >= least
+    return index > 0 and piece.kind != "stop" and piece.gap > needed and piece.gap >= least

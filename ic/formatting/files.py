@@ -52,18 +52,18 @@ def decks(paths: Sequence[str]) -> list[str]:
     A file that is named twice, or by a link too, is taken once. Raises Problem E341 where a folder has none, OSError
     where one cannot be looked into.
     """
-    found: list[str] = []
+    files: list[str] = []
     for path in paths:
         if path != STDIN and os.path.isdir(path):
             inside = sorted(_inside(path))
             if not inside:
                 help = "a deck's name ends in `.ic`; a file of another name is formatted where it is named"
                 raise Problem(error("E341", f"there is no deck in the folder `{path}`", help=help))
-            found += inside
+            files += inside
         else:
-            found.append(path)
+            files.append(path)
     by_file: dict[str, str] = {}
-    for path in found:
+    for path in files:
         by_file.setdefault(path if path == STDIN else os.path.realpath(path), path)
     return list(by_file.values())
 
@@ -72,9 +72,9 @@ def _inside(folder: str) -> Iterator[str]:
     def refuse(reason: OSError) -> None:
         raise reason
 
-    for at, folders, files in os.walk(folder, onerror=refuse):
+    for path, folders, files in os.walk(folder, onerror=refuse):
         folders[:] = [name for name in folders if not name.startswith(".")]
-        yield from (os.path.normpath(os.path.join(at, name)) for name in files if name.endswith(".ic"))
+        yield from (os.path.normpath(os.path.join(path, name)) for name in files if name.endswith(".ic"))
 
 
 def lay_out(path: str, text: str | None = None) -> LaidOut:

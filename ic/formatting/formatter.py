@@ -31,12 +31,12 @@ def formatted(name: str, text: str, making_strings: Collection[str] = ()) -> str
 def prove(name: str, before: str, after: str) -> None:
     """Raise Problem E340 where two texts do not have the same tokens, line by line, and the same comments."""
     old, new = _lines(Text(name, before)), _lines(Text(name, after))
-    at = next((i for i, (one, other) in enumerate(zip(old, new, strict=False)) if one[0] != other[0]), None)
-    if at is None and len(old) != len(new):
-        at = min(len(old), len(new))
-    if at is None and _characters(before) == _characters(after):
+    index = next((i for i, (line, other) in enumerate(zip(old, new, strict=False)) if line[0] != other[0]), None)
+    if index is None and len(old) != len(new):
+        index = min(len(old), len(new))
+    if index is None and _characters(before) == _characters(after):
         return
-    place = old[min(at or 0, len(old) - 1)][1] if old else Place(name, 1, 1)
+    place = old[min(index or 0, len(old) - 1)][1] if old else Place(name, 1, 1)
     message = "laying out this deck would change what it says, so it is left as it is: a defect of MET"
     raise Problem(error("E340", message, place, help="please report it together with the deck"), {name: before})
 
@@ -48,16 +48,16 @@ def _characters(text: str) -> str:
 
 def _lines(source: Text) -> list[tuple[list[str], Place]]:
     """The words of each line that is not blank, comments included, and where the line begins."""
-    found = []
+    lines = []
     for line in logical_lines(source):
-        said = [each for token in line if (each := _said(token))]
-        if said:
-            first = next(token for token in line if _said(token))
-            found.append((said, first.place))
-    return found
+        words = [word for token in line if (word := _token_word(token))]
+        if words:
+            first = next(token for token in line if _token_word(token))
+            lines.append((words, first.place))
+    return lines
 
 
-def _said(token: Token) -> str:
+def _token_word(token: Token) -> str:
     """A token as written, a comment without the blanks at the ends of its lines; empty for white space."""
     text = written(token)
     text = Text("", text).joined if "\\" in text else text

@@ -22,20 +22,20 @@ MOST_WORK = 3_000_000  # columns looked at; a deck by hand takes some thousand
 MOST_BLANK = 2  # lines at the top level; within a bracket it is one
 
 
-def laid_out(found: Sequence[Row]) -> str:
+def laid_out(rows: Sequence[Row]) -> str:
     """The formatted text of these rows."""
-    columns = _columns(found)
-    tails = _tails(found, columns)
-    keep = any(token.text == "__LINE__" for row in found for token in row.tokens)  # which counts blank lines too
+    columns = _columns(rows)
+    tails = _tails(rows, columns)
+    keep = any(token.text == "__LINE__" for row in rows for token in row.tokens)  # which counts blank lines too
     lines: list[str] = []
     blank, above = 0, None
-    for at, row in enumerate(found):
+    for index, row in enumerate(rows):
         if row.kind == BLANK and not row.exact:
             blank += 1
             continue
         lines += [""] * (blank if keep else min(blank, _most_blank(above, row)))
         blank, above = 0, row
-        lines.append(_text(row, columns[at], tails[at]))
+        lines.append(_text(row, columns[index], tails[index]))
     return "".join(f"{line}\n" for line in lines)
 
 
@@ -71,66 +71,66 @@ def _remark(row: Row, column: int) -> str:
     return "\n".join(lines)
 
 
-def _columns(found: Sequence[Row]) -> list[list[int]]:
+def _columns(rows: Sequence[Row]) -> list[list[int]]:
     """The column of each piece of each row; for a comment row, that of the comment.
 
     Columns of the author's are consistent with each other. Those of a paragraph that is to be aligned need not be, and
     a generated deck may have more of either than time allows: then less is aligned.
     """
     for paragraphs in (True, False):
-        columns = _settled(found, aligned(found, paragraphs=paragraphs))
+        columns = _settled(rows, aligned(rows, paragraphs=paragraphs))
         if columns is not None:
             return columns
-    columns = _settled(found, Groups())
+    columns = _settled(rows, Groups())
     assert columns is not None, "rows that are aligned with nothing move once"
     return columns
 
 
-def _settled(found: Sequence[Row], groups: Groups) -> list[list[int]] | None:
+def _settled(rows: Sequence[Row], groups: Groups) -> list[list[int]] | None:
     """The columns with these alignments, None where they do not settle."""
-    columns = [_as_written(row) for row in found]
+    columns = [_as_written(row) for row in rows]
     reached: dict[Node, int] = {}  # by group: the column of its anchors
-    positions = {id(row): at for at, row in enumerate(found)}
+    positions = {id(row): index for index, row in enumerate(rows)}
     free = [
-        (at, row, stands_below(row), TAB * goes_on(row))
-        for at, row in enumerate(found)
+        (index, row, stands_below(row), TAB * goes_on(row))
+        for index, row in enumerate(rows)
         if row.kind in (CODE, REMARK) and not row.exact
     ]
-    steps = {at: _steps(at, row, groups) for at, row, _, _ in free}
-    for at, _, _, _ in free:
-        columns[at] = [0] * max(1, len(steps[at]))
+    steps = {index: _steps(index, row, groups) for index, row, _, _ in free}
+    for index, _, _, _ in free:
+        columns[index] = [0] * max(1, len(steps[index]))
     work, moved = 0, True
     while moved:
         if work > MOST_WORK:
             return None
         moved = False
-        for at, row, below, further in free:
-            old = columns[at]
+        for index, row, below, further in free:
+            old = columns[index]
             column = start = _indentation(row, positions, columns, below) + further
             new = [start]
-            for distance, group, inside, own in steps[at][1:]:
+            for distance, group, inside, own in steps[index][1:]:
                 column += distance
                 if group is not None:
                     column = max(column, start + own, reached.get(group, 0) - inside)
                     reached[group] = column + inside
                 new.append(column)
             if new != old:
-                columns[at] = new
+                columns[index] = new
                 moved = True
             work += len(new)
     return columns
 
 
-def _steps(at: int, row: Row, groups: Groups) -> list[tuple[int, Node | None, int, int]]:
+def _steps(index: int, row: Row, groups: Groups) -> list[tuple[int, Node | None, int, int]]:
     """For each piece: the smallest distance of its column from the one before; its group, the anchor's offset in it,
     and the smallest distance from the row's beginning."""
     steps: list[tuple[int, Node | None, int, int]] = [(0, None, 0, 0)] if row.pieces else []
     for i in range(1, len(row.pieces)):
         before, piece = row.pieces[i - 1 : i + 1]
-        group = groups.group((at, i))
+        group = groups.group((index, i))
         inside = offset(piece, groups.anchors[group]) if group is not None else 0
-        distance = len(before.text) + blanks_between(before, piece) + ((at, i) in groups.unsigned)
-        own = piece.column - row.pieces[0].column if (at, i) in groups.met else 0
+        distance = len(before.text) + blanks_between(before, piece) + ((index, i) in groups.unsigned)
+        own = piece.column - row.pieces[0].column if (index, i) in groups.met else 0
         steps.append((distance, group, inside, own))
     return steps
 
@@ -150,41 +150,41 @@ def _indentation(row: Row, positions: dict[int, int], columns: Sequence[Sequence
     return columns[positions[id(outer)]][opener + 1 if below else 0] + TAB * (not below)
 
 
-def _tails(found: Sequence[Row], columns: Sequence[Sequence[int]]) -> list[int]:
+def _tails(rows: Sequence[Row], columns: Sequence[Sequence[int]]) -> list[int]:
     """The column of each comment at the end of a line, and of those that continue one below; -1 for all others."""
-    tails = [-1] * len(found)
+    tails = [-1] * len(rows)
     paragraph: list[int] = []
-    for at, row in enumerate([*found, None]):
+    for index, row in enumerate([*rows, None]):
         if row is None or row.kind == BLANK:
-            _settle(found, columns, paragraph, tails)
+            _settle(rows, columns, paragraph, tails)
             paragraph = []
         elif row.kind == CODE and row.tail is not None and not row.exact:
-            paragraph.append(at)
+            paragraph.append(index)
     written = -1
-    for at, row in enumerate(found):
+    for index, row in enumerate(rows):
         if row.tail is not None:
             written = row.tail.column
-            tails[at] = written if row.exact else tails[at]
-        elif row.kind == REMARK and not row.exact and at and row.column(row.whole[0].offset) == written:
-            tails[at] = tails[at - 1]
+            tails[index] = written if row.exact else tails[index]
+        elif row.kind == REMARK and not row.exact and index and row.column(row.whole[0].offset) == written:
+            tails[index] = tails[index - 1]
         else:
             written = -1
     return tails
 
 
-def _settle(found: Sequence[Row], columns: Sequence[Sequence[int]], paragraph: Sequence[int], tails: list[int]) -> None:
+def _settle(rows: Sequence[Row], columns: Sequence[Sequence[int]], paragraph: Sequence[int], tails: list[int]) -> None:
     """Give the comments of a paragraph's rows one column where they were below each other."""
     places: dict[int, list[int]] = {}
-    for at in paragraph:
-        tail = found[at].tail
+    for index in paragraph:
+        tail = rows[index].tail
         assert tail is not None
-        places.setdefault(tail.column, []).append(at)
+        places.setdefault(tail.column, []).append(index)
     for column, together in places.items():
-        ends = [columns[at][-1] + len(found[at].pieces[-1].text) for at in together]
-        row = found[together[0]]
+        ends = [columns[index][-1] + len(rows[index].pieces[-1].text) for index in together]
+        row = rows[together[0]]
         if len(together) == 1:  # alone: as far from its line as before
             written = row.column(row.whole[-2].end)
             column = ends[0] + column - written
         column = max(column, max(ends) + BEFORE_COMMENT)
-        for at in together:
-            tails[at] = column
+        for index in together:
+            tails[index] = column

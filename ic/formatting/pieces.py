@@ -37,10 +37,10 @@ def cut(rows: Iterable[Row]) -> None:
         return
     parser = Expressions([*tokens, Token(END, "", tokens[-1].source, tokens[-1].end, 1)], Findings())
     parser.declared = dict.fromkeys(_declared_units(tokens), ONE)
-    at = 0
+    position = 0
     for row in code:
-        row.pieces = _cut(row, at, parser)
-        at += len(row.tokens)
+        row.pieces = _cut(row, position, parser)
+        position += len(row.tokens)
 
 
 def _declared_units(tokens: Sequence[Token]) -> Iterator[str]:
@@ -52,11 +52,11 @@ def _declared_units(tokens: Sequence[Token]) -> Iterator[str]:
                 yield token.text
 
 
-def _cut(row: Row, at: int, parser: Expressions) -> list[RowPiece]:
-    """The pieces of one row, whose first token is the parser's token `at`."""
-    found: list[RowPiece] = []
+def _cut(row: Row, position: int, parser: Expressions) -> list[RowPiece]:
+    """The pieces of one row, whose first token is the parser's token `position`."""
+    pieces: list[RowPiece] = []
     line = row.whole[: len(row.whole) - (row.tail is not None)]
-    operand = at > 0 and _ends_operand(parser.tokens[at - 1])
+    operand = position > 0 and _ends_operand(parser.tokens[position - 1])
     i = end = 0
     comments = [k for k, token in enumerate(line) if token.kind == SPACE]
     while i < len(line):
@@ -65,41 +65,41 @@ def _cut(row: Row, at: int, parser: Expressions) -> list[RowPiece]:
         count = 1
         if first.kind != SPACE:
             free = (comments[0] if comments else len(line)) - i
-            kind, count = _piece(parser, at, free, found[-1] if found else None, operand)
+            kind, count = _piece(parser, position, free, pieces[-1] if pieces else None, operand)
             operand = kind in _OPERANDS and first.text != "}"
-            at += count
+            position += count
         else:
             comments.pop(0)
-        text = "".join(each.source.text[each.offset : each.end] for each in line[i : i + count])
+        text = "".join(token.source.text[token.offset : token.end] for token in line[i : i + count])
         if kind == "string":  # the name of a file may have blanks
             text = first.source.text[first.offset : line[i + count - 1].end]
         column, last = row.column(first.offset), row.column(line[i + count - 1].end)
-        before = column - end if found else 0
-        found.append(RowPiece(kind, text, column, last - column, before, tuple(line[i : i + count])))
+        before = column - end if pieces else 0
+        pieces.append(RowPiece(kind, text, column, last - column, before, tuple(line[i : i + count])))
         i += count
         end = last
-    return found
+    return pieces
 
 
 def _ends_operand(token: Token) -> bool:
     return (token.kind in (NAME, STRING, *NUMBERS) and token.text not in WORDS) or token.text in (")", "]", "%")
 
 
-def _piece(parser: Expressions, at: int, free: int, before: RowPiece | None, operand: bool) -> tuple[Kind, int]:
-    """The kind of the piece at the parser's token `at`, and its number of tokens, at most `free`."""
-    token = parser.tokens[at]
+def _piece(parser: Expressions, position: int, free: int, before: RowPiece | None, operand: bool) -> tuple[Kind, int]:
+    """The kind of the piece at the parser's token `position`, and its number of tokens, at most `free`."""
+    token = parser.tokens[position]
     text = token.text
-    if before is not None and operand and (length := _unit(parser, at, before)) and length <= free:
+    if before is not None and operand and (length := _unit(parser, position, before)) and length <= free:
         return "unit", length
-    if token.kind == NAME or 1 < name_length(parser.tokens, at) <= free:
-        length = _path(parser, at, free)
+    if token.kind == NAME or 1 < name_length(parser.tokens, position) <= free:
+        length = _path(parser, position, free)
         return ("word" if length == 1 and text in WORDS else "name"), length
     if token.kind in NUMBERS:
-        return "number", _number(parser, at, free)
+        return "number", _number(parser, position, free)
     if token.kind == STRING:
         return "string", 1
-    if text == "<" and _is_used(parser.tokens[max(0, at - 2) : at]):
-        closed = (n for n, each in enumerate(parser.tokens[at : at + free]) if each.text == ">")
+    if text == "<" and _is_used(parser.tokens[max(0, position - 2) : position]):
+        closed = (n for n, part in enumerate(parser.tokens[position : position + free]) if part.text == ">")
         return ("string", 1 + length) if (length := next(closed, 0)) else ("operator", 1)
     if text in OPENING:
         return "open", 1
@@ -108,10 +108,10 @@ def _piece(parser: Expressions, at: int, free: int, before: RowPiece | None, ope
     if text in (";", ","):
         return "stop", 1
     if text in _SIGNS and not operand:
-        if text != "!" and free > 1 and parser.tokens[at + 1].kind in NUMBERS:
-            return "number", 1 + _number(parser, at + 1, free - 1)
-        if text != "!" and free > 1 and parser.tokens[at + 1].kind == NAME:
-            return "name", 1 + _path(parser, at + 1, free - 1)
+        if text != "!" and free > 1 and parser.tokens[position + 1].kind in NUMBERS:
+            return "number", 1 + _number(parser, position + 1, free - 1)
+        if text != "!" and free > 1 and parser.tokens[position + 1].kind == NAME:
+            return "name", 1 + _path(parser, position + 1, free - 1)
         return "sign", 1
     return ("operator" if text in OPERATORS else "other"), 1
 
@@ -121,43 +121,43 @@ def _is_used(before: Sequence[Token]) -> bool:
     return before[-1:] != [] and before[-1].text == USE and (len(before) == 1 or before[0].text in (";", "}"))
 
 
-def _path(parser: Expressions, at: int, free: int) -> int:
+def _path(parser: Expressions, position: int, free: int) -> int:
     """The number of tokens of the path that begins here."""
     tokens = parser.tokens
-    length = _name(tokens, at, free)
-    while length + 2 <= free and tokens[at + length].text == ".":
-        more = _name(tokens, at + length + 1, free - length - 1)
+    length = _name(tokens, position, free)
+    while length + 2 <= free and tokens[position + length].text == ".":
+        more = _name(tokens, position + length + 1, free - length - 1)
         if not more:
             break
         length += 1 + more
     return length
 
 
-def _name(tokens: Sequence[Token], at: int, free: int) -> int:
+def _name(tokens: Sequence[Token], position: int, free: int) -> int:
     """The number of tokens of the name that begins here, `seg_{i}` among them; 0 where none does."""
-    length = name_length(tokens, at)
-    return length if length <= free else int(tokens[at].kind == NAME)
+    length = name_length(tokens, position)
+    return length if length <= free else int(tokens[position].kind == NAME)
 
 
-def _number(parser: Expressions, at: int, free: int) -> int:
+def _number(parser: Expressions, position: int, free: int) -> int:
     """The number of tokens of the number that begins here: three where it is written as a fraction, `1/3`."""
-    number, line, below = parser.tokens[at : at + 3]
+    number, line, below = parser.tokens[position : position + 3]
     fraction = free > 2 and line.text == "/" and below.kind in NUMBERS
     return 3 if fraction and number.end == line.offset and line.end == below.offset else 1
 
 
-def _unit(parser: Expressions, at: int, before: RowPiece) -> int:
+def _unit(parser: Expressions, position: int, before: RowPiece) -> int:
     """The number of tokens of the unit that begins after this piece; 0 where none does."""
-    token, following = parser.tokens[at], parser.tokens[at + 1]
+    token, following = parser.tokens[position], parser.tokens[position + 1]
     over = None
     if token.kind == WHOLE and token.text == "1" and following.text == "/":
-        over = parser.unit_factor(at + 2, -1, 0)
+        over = parser.unit_factor(position + 2, -1, 0)
     if over is None and not ((token.kind == NAME or token.text == "%") and _is_unit(token, parser)):
         return 0
     if before.kind == "name" and following.text not in ("*", "/", "^"):  # a macro's name, perhaps: `TEETH V*s/rad`
         return 0
-    product = parser.unit_product(at, 1, 0, over)
-    return 0 if product is None else product[1] - at
+    product = parser.unit_product(position, 1, 0, over)
+    return 0 if product is None else product[1] - position
 
 
 def _is_unit(token: Token, parser: Expressions) -> bool:

@@ -118,11 +118,11 @@ class Row:
         """By character, its distance in the row; None where no tab makes this differ from its position."""
         if "\t" not in self.raw:
             return None
-        at, column = [0], 0
+        distances, column = [0], 0
         for character in self.raw:
             column = 0 if character == "\n" else column + (self.tab - column % self.tab if character == "\t" else 1)
-            at.append(column)
-        return at
+            distances.append(column)
+        return distances
 
 
 def written(token: Token) -> str:

@@ -28,7 +28,7 @@ def rows(source: Text, making_strings: Collection[str] = (), tab: int = TAB) -> 
     tab             how far apart the tab stops are
     """
     findings = Findings()
-    found: list[Row] = []
+    all_rows: list[Row] = []
     count = start = 0
     for line in logical_lines(source):
         count += len(line)
@@ -39,21 +39,21 @@ def rows(source: Text, making_strings: Collection[str] = (), tab: int = TAB) -> 
             place = source.place(start + LONGEST_LINE, 1)
             findings.error("D018", f"a line has at most {LONGEST_LINE} characters", place)
             break
-        found.append(Row(source, start, line, tab))
+        all_rows.append(Row(source, start, line, tab))
         start = line[-1].offset + 1
         if len(line) > 1 and line[-2].kind == BAD and line[-2].text == "/*":  # where the lexer has stopped
             complain_of_stray(line[-2], findings)
     if start < len(source.text):  # a backslash at the end
-        found.append(Row(source, start, [Token(SPACE, "\n", source, len(source.text), 1)], tab))
+        all_rows.append(Row(source, start, [Token(SPACE, "\n", source, len(source.text), 1)], tab))
     if not findings.errors:
-        _match_all(found, findings)
+        _match_all(all_rows, findings)
     if findings.errors:
         raise Problem(findings.all, {source.name: source.text})
     if making_strings:
-        _keep_uses(found, making_strings)
-    cut(row for row in found if row.kind == CODE and not row.opaque)
-    _nest(found)
-    return found
+        _keep_uses(all_rows, making_strings)
+    cut(row for row in all_rows if row.kind == CODE and not row.opaque)
+    _nest(all_rows)
+    return all_rows
 
 
 class _OpenBracket:
@@ -70,28 +70,28 @@ class _OpenBracket:
 class _OpenConditional:
     """A conditional that is open: where it begins, the brackets open before it and behind each of its parts."""
 
-    __slots__ = ("at", "broken", "ends", "otherwise", "start")
+    __slots__ = ("broken", "ends", "index", "otherwise", "start")
 
-    def __init__(self, at: int, start: list[_OpenBracket]) -> None:
-        self.at = at
+    def __init__(self, index: int, start: list[_OpenBracket]) -> None:
+        self.index = index
         self.start = start
         self.ends: list[list[_OpenBracket]] = []
         self.otherwise = False
         self.broken = False
 
 
-def _match_all(found: list[Row], findings: Findings) -> None:
+def _match_all(all_rows: list[Row], findings: Findings) -> None:
     """Match the brackets; text surrounded by `#if` is made opaque where they do not match, elsewhere that is
     reported."""
     stack: list[_OpenBracket] = []
     ifs: list[_OpenConditional] = []
-    for at, row in enumerate(found):
+    for index, row in enumerate(all_rows):
         word = row.directive
         if word in ("if", "ifdef", "ifndef"):
             if len(ifs) >= CONDITION_DEPTH:
                 findings.error("D018", f"`#if` goes deeper than {CONDITION_DEPTH}", row.tokens[1].place)
                 return
-            ifs.append(_OpenConditional(at, list(stack)))
+            ifs.append(_OpenConditional(index, list(stack)))
         elif word not in CONDITIONALS:
             complaint = _match(row, stack) if row.kind == CODE and not (ifs and ifs[-1].broken) else None
             if complaint is None:
@@ -107,8 +107,8 @@ def _match_all(found: list[Row], findings: Findings) -> None:
         elif word == "endif":
             closed = ifs.pop()
             ends = [*closed.ends, stack, *([] if closed.otherwise else [closed.start])]
-            if closed.broken or len({"".join(each.token.text for each in end) for end in ends}) > 1:
-                for inside in found[closed.at : at + 1]:
+            if closed.broken or len({"".join(bracket.token.text for bracket in end) for end in ends}) > 1:
+                for inside in all_rows[closed.index : index + 1]:
                     inside.opaque = inside.exact = True
                 stack = closed.start
             else:
@@ -118,7 +118,7 @@ def _match_all(found: list[Row], findings: Findings) -> None:
             ifs[-1].otherwise = ifs[-1].otherwise or word == "else"
             stack = list(ifs[-1].start)
     for left in ifs[-1:]:
-        token = found[left.at].tokens[1]
+        token = all_rows[left.index].tokens[1]
         help = f"`{token.source.name}` ends without its `#endif`"
         findings.error("D008", f"`#{token.text}` is not closed", token.place, help=help)
         return
@@ -152,10 +152,10 @@ def _match(row: Row, stack: list[_OpenBracket]) -> Diagnostic | None:
     return None
 
 
-def _keep_uses(found: Sequence[Row], names: Collection[str]) -> None:
+def _keep_uses(all_rows: Sequence[Row], names: Collection[str]) -> None:
     """Make the rows exact in which these names are used with arguments."""
     named, depth = False, 0
-    for row in found:
+    for row in all_rows:
         if row.kind != CODE or row.opaque:
             continue
         row.exact = row.exact or depth > 0
@@ -166,12 +166,12 @@ def _keep_uses(found: Sequence[Row], names: Collection[str]) -> None:
             named = not depth and token.text in names
 
 
-def _nest(found: list[Row]) -> None:
+def _nest(all_rows: list[Row]) -> None:
     """Tell every row the bracket that it begins in. All brackets that count are known to match."""
     stack: list[_OpenBracket] = []
     ifs: list[tuple[list[_OpenBracket], list[list[_OpenBracket]]]] = []
     behind: Token | None = None
-    for row in found:
+    for row in all_rows:
         word = "" if row.opaque else row.directive
         if word in ("if", "ifdef", "ifndef"):
             ifs.append((list(stack), []))

@@ -17,18 +17,18 @@ _INCLUDE = re.compile(r'\s*#\s*include\s*(?:"([^"\n]*)"|<([^>\n]*)>)')
 def making_strings(text: str, file: FoundFile) -> frozenset[str]:
     """Names of such macros that this text or a file that it includes defines."""
     files = Files()
-    found: set[str] = set()
+    names: set[str] = set()
     waiting, seen = [(text, file)], {file.identity}
     while waiting and len(seen) < MOST_INCLUDES:
         text, file = waiting.pop()
         if "#" not in text:
             continue
-        found.update(_defined(Text(file.name, text)))
+        names.update(_defined(Text(file.name, text)))
         for included in _included(text, file, files):
             if included.identity not in seen:
                 seen.add(included.identity)
                 waiting.append((_text(included), included))
-    return frozenset(found)
+    return frozenset(names)
 
 
 def _defined(source: Text) -> Iterator[str]:

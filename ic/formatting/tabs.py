@@ -18,29 +18,29 @@ def rows_as_seen(source: Text, making_strings: Collection[str] = ()) -> list[Row
 
     Raises Problem as `rows` does.
     """
-    found = rows(source, making_strings)
-    if not any(row.tabbed for row in found if row.kind == CODE and not row.exact):
-        return found
-    return max((found, *(rows(source, making_strings, tab) for tab in OTHER_STOPS)), key=_met)
+    all_rows = rows(source, making_strings)
+    if not any(row.tabbed for row in all_rows if row.kind == CODE and not row.exact):
+        return all_rows
+    return max((all_rows, *(rows(source, making_strings, tab) for tab in OTHER_STOPS)), key=_met)
 
 
-def _met(found: Sequence[Row]) -> int:
+def _met(all_rows: Sequence[Row]) -> int:
     """A score of tab stops: the number of pieces exactly below those with which they may have been aligned."""
-    lines = lines_of(found)
+    lines = lines_of(all_rows)
     met = {
-        (one, first, other, second)
-        for one, other in neighbours(found)
-        if found[one].tabbed or found[other].tabbed
+        (above, first, other, second)
+        for above, other in neighbours(all_rows)
+        if all_rows[above].tabbed or all_rows[other].tabbed
         for anchor in ANCHORS
-        for first, second in meeting(lines[one], lines[other], anchor)
+        for first, second in meeting(lines[above], lines[other], anchor)
     }
-    return len(met) + sum(stands_below(row) for row in found if row.tabbed) + _comments_met(found)
+    return len(met) + sum(stands_below(row) for row in all_rows if row.tabbed) + _comments_met(all_rows)
 
 
-def _comments_met(found: Sequence[Row]) -> int:
+def _comments_met(all_rows: Sequence[Row]) -> int:
     """The number of comments below one that ends a line of the same paragraph."""
     met, above = 0, -1
-    for row in found:
+    for row in all_rows:
         if row.kind == BLANK:
             above = -1
         elif row.tail is not None:
