@@ -189,7 +189,7 @@ def _filled_in(element: Element, attribute: str) -> str:
 def _numbers(element: Element, attribute: str, known: Attribute) -> Numbers:
     """The numbers of an attribute. Raises Problem D203, D206."""
     words, place = _filled_in(element, attribute).split(), element.place_of(attribute)
-    found = [_number(word, attribute, place, known, count=len(words)) for word in words]
+    numbers = [_number(word, attribute, place, known, count=len(words)) for word in words]
     if len(words) != known.count:
         wanted = "one number is" if known.count == 1 else f"{known.count} numbers are"
         raise Problem(
@@ -200,9 +200,9 @@ def _numbers(element: Element, attribute: str, known: Attribute) -> Numbers:
                 help="spaces part the numbers" if known.count > 1 else "write one, without a unit",
             )
         )
-    if known.not_negative and min(found) < 0.0:
+    if known.not_negative and min(numbers) < 0.0:
         raise Problem(error("D206", f"`{attribute}` is below 0", place, help="write 0, or a number above it"))
-    return Numbers(tuple(found), place)
+    return Numbers(tuple(numbers), place)
 
 
 def _number(text: str, attribute: str, place: Place, known: Attribute, *, count: int) -> float:

@@ -31,7 +31,7 @@ def print_deck(body: ArmEntries, title: str) -> Iterator[str]:
     yield f"{EDITION_WORD} {LATEST};"
     yield ""
     yield f"arm {arm} {{"
-    changed = {(each.kind, each.name): each.written.text for each in body.names.changed}
+    changed = {(change.kind, change.name): change.written.text for change in body.names.changed}
     for part in (*([body.base] if body.base is not None else []), *body.links):
         yield from _block(part, _link_notes(part, changed))
     yield ""
@@ -102,7 +102,11 @@ def _rows(settings: list[tuple[str, str]]) -> list[list[tuple[str, str]]]:
     ends = [setting for setting in settings if setting[0] in ("parent", "child")]
     others = [[setting] for setting in settings if setting not in ends and setting not in limited]
     short = sum(len(f"  {key} = {value}") for key, value in limited) <= WIDE
-    return [*([ends] if ends else []), *others, *([limited] if limited and short else [[each] for each in limited])]
+    return [
+        *([ends] if ends else []),
+        *others,
+        *([limited] if limited and short else [[setting] for setting in limited]),
+    ]
 
 
 def _link_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> list[str]:
@@ -130,9 +134,9 @@ def _following(joint: Joint, mimic: Mimic) -> str:
     """A note on a joint that follows another in the file."""
     law = {"multiplier": (mimic.multiplier, 1.0), "offset": (mimic.offset, 0.0)}
     shown_law = ", ".join(f"{name} {spelled(value)}" for name, (value, default) in law.items() if value != default)
-    here = f"here it is held at {spelled(joint.held)}" if joint.type.text == "fixed" else "here it moves by itself"
-    here += f", beyond {joint.beyond}" if joint.beyond else ""
-    return f"follows `{shown(mimic.joint.text)}` in the file{f' ({shown_law})' if shown_law else ''}; {here}"
+    in_deck = f"here it is held at {spelled(joint.held)}" if joint.type.text == "fixed" else "here it moves by itself"
+    in_deck += f", beyond {joint.beyond}" if joint.beyond else ""
+    return f"follows `{shown(mimic.joint.text)}` in the file{f' ({shown_law})' if shown_law else ''}; {in_deck}"
 
 
 def _called(part: RobotEntry, kind: str, changed: Mapping[tuple[str, str], str]) -> list[str]:
@@ -166,12 +170,12 @@ def _runs(body: ArmEntries, arm: str) -> Iterator[str]:
     yield "    servos      {"
     driven = [name for name, joint in joints.items() if joint.mimic is None]
     for name in driven:
-        servo, at = slide if name in slides else held, _at(poses[name], name in slides)
-        own = f" {{ command = position({at}); }}" if poses[name] else ""
+        servo, position = slide if name in slides else held, _position_text(poses[name], name in slides)
+        own = f" {{ command = position({position}); }}" if poses[name] else ""
         yield f"        {name} = {servo}{own};" + ("  // the middle of its range, which 0 is not in" if own else "")
     yield "    }"
-    moved = [f"{name}.q = {_at(poses[name], name in slides)};" for name in driven if poses[name]]
-    yield from (["    initial {", *(f"        {each}" for each in moved), "    }"] if moved else [])
+    moved = [f"{name}.q = {_position_text(poses[name], name in slides)};" for name in driven if poses[name]]
+    yield from (["    initial {", *(f"        {entry}" for entry in moved), "    }"] if moved else [])
     yield "    environment { gravity = [0, 0, -9.81] m/s^2; }"
     yield "    rates       { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }"
     yield "    duration    = 1 s;"
@@ -189,9 +193,9 @@ def _fall(
     yield "// The joints let go, with the damping and friction of the file."
     for name in joints:
         damping, friction = ("N*s/m", "N") if name in slides else ("N*m*s/rad", "N*m")
-        found = rubbing[name].friction if name in rubbing else {}
+        coefficients = rubbing[name].friction if name in rubbing else {}
         units = {"damping": damping, "friction": friction}
-        keys = "".join(f"  {key} = {spelled(value)} {units[key]};" for key, value in found.items() if value)
+        keys = "".join(f"  {key} = {spelled(value)} {units[key]};" for key, value in coefficients.items() if value)
         yield f"servo {free(f'{name}_bearing')} {{ model = passive;{keys} }}"
     yield ""
     yield "run fall like hold {"
@@ -202,7 +206,7 @@ def _fall(
     yield "}"
 
 
-def _at(value: float, slides: bool) -> str:
+def _position_text(value: float, slides: bool) -> str:
     return f"{spelled(value)} {'m' if slides else 'rad'}"
 
 

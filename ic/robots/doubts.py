@@ -49,22 +49,24 @@ def _power_of_ten(value: float) -> bool:
     return math.log10(abs(value)).is_integer()
 
 
-def _turned(rpy: Numbers | None, of: str) -> Iterator[Label]:
+def _turned(rpy: Numbers | None, owner: str) -> Iterator[Label]:
     largest = max(rpy.values, key=abs) if rpy is not None else 0.0
     if rpy is not None and abs(largest) > 2.0 * math.pi + 0.01:
-        yield _degrees(rpy, largest, f"`rpy` of {of}")
+        yield _degrees(rpy, largest, f"`rpy` of {owner}")
 
 
-def _degrees(found: Numbers, value: float, what: str) -> Label:
+def _degrees(numbers: Numbers, value: float, what: str) -> Label:
     turns = f"{abs(value) / (2.0 * math.pi):.1f} turns"
-    return Label(found.place, f"{what} is {spelled(value)} rad, {turns}: is it in degrees?")
+    return Label(numbers.place, f"{what} is {spelled(value)} rad, {turns}: is it in degrees?")
 
 
 def incomplete(robot: Robot) -> Iterator[str]:
     """A line on each inertia that leaves numbers out."""
     for link in robot.links:
         if link.inertial is not None:
-            found = link.inertial.moments
-            missing = [f"`{each}`" for each, at in zip(MOMENTS, found.each, strict=True) if at == found.place]
+            moments = link.inertial.moments
+            missing = [
+                f"`{moment}`" for moment, place in zip(MOMENTS, moments.each, strict=True) if place == moments.place
+            ]
             if missing:
                 yield f"the inertia of link `{shown(link.name.text)}` has no {', '.join(missing)}: taken as 0"

@@ -85,13 +85,13 @@ def arm_entries(robot: Robot) -> ArmEntries:
 
 def _notes(robot: Robot) -> Iterator[tuple[Place, str]]:
     for link in robot.links:
-        found = link.inertial
-        if found is None:
+        inertial = link.inertial
+        if inertial is None:
             yield link.name.place, LEFT_OUT
-        elif found.is_turned:
-            yield found.moments.place, TURNED
+        elif inertial.is_turned:
+            yield inertial.moments.place, TURNED
         else:
-            yield found.moments.place, LEFT_OUT if any(found.moments.values[3:]) else ZERO
+            yield inertial.moments.place, LEFT_OUT if any(inertial.moments.values[3:]) else ZERO
     for joint in robot.joints:
         if joint.axis is None:
             yield joint.name.place, LEFT_OUT
@@ -100,35 +100,35 @@ def _notes(robot: Robot) -> Iterator[tuple[Place, str]]:
 
 
 def _link(link: Link, name: str) -> Group:
-    found = link.inertial
-    if found is None:
+    inertial = link.inertial
+    if inertial is None:
         settings = [_setting("mass", _number(0.0, "kg", link.name.place), link.name.place)]
     else:
-        settings = [_setting("mass", _number(found.mass.values[0], "kg", found.mass.place), found.mass.place)]
-        if found.com is not None and not found.com.nothing:
-            settings.append(_vector("com", found.com, "m"))
-        if found.mass.values[0] != 0.0 or not found.moments.nothing:
-            settings.append(_vector("inertia", moments(found), "kg*m^2"))
+        settings = [_setting("mass", _number(inertial.mass.values[0], "kg", inertial.mass.place), inertial.mass.place)]
+        if inertial.com is not None and not inertial.com.nothing:
+            settings.append(_vector("com", inertial.com, "m"))
+        if inertial.mass.values[0] != 0.0 or not inertial.moments.nothing:
+            settings.append(_vector("inertia", moments(inertial), "kg*m^2"))
     return _group("link", name, None, settings, link.name.place)
 
 
 def moments(inertial: Inertial) -> Numbers:
     """xx, yy, zz in the link's axes, and xy, xz, yz where one of them is not zero."""
-    found = inertial.moments
+    numbers = inertial.moments
     if inertial.rpy is not None and inertial.is_turned:
-        found = Numbers(_turned(found.values, inertial.rpy.values), found.place)  # each of them made of all
-    return found if any(found.values[3:]) else Numbers(found.values[:3], found.place, found.each[:3])
+        numbers = Numbers(_turned(numbers.values, inertial.rpy.values), numbers.place)  # each of them made of all
+    return numbers if any(numbers.values[3:]) else Numbers(numbers.values[:3], numbers.place, numbers.each[:3])
 
 
-def _turned(found: tuple[float, ...], rpy: tuple[float, ...]) -> tuple[float, ...]:
+def _turned(values: tuple[float, ...], rpy: tuple[float, ...]) -> tuple[float, ...]:
     """R I R' with R = Rz(yaw) Ry(pitch) Rx(roll): the same inertia in axes rotated back."""
-    xx, yy, zz, xy, xz, yz = found
+    xx, yy, zz, xy, xz, yz = values
     inertia = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
     R = rotation(*rpy)
     half = [[sum(R[i][k] * inertia[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
-    made = [[sum(half[i][k] * R[j][k] for k in range(3)) for j in range(3)] for i in range(3)]
-    off = [(made[i][j] + made[j][i]) / 2.0 + 0.0 for i, j in ((0, 1), (0, 2), (1, 2))]
-    return (made[0][0], made[1][1], made[2][2], *off)
+    product = [[sum(half[i][k] * R[j][k] for k in range(3)) for j in range(3)] for i in range(3)]
+    off = [(product[i][j] + product[j][i]) / 2.0 + 0.0 for i, j in ((0, 1), (0, 2), (1, 2))]
+    return (product[0][0], product[1][1], product[2][2], *off)
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> tuple[tuple[float, float, float], ...]:
@@ -183,11 +183,11 @@ def limits(joint: Joint) -> dict[str, Numbers]:
     if joint.type.text not in MOVING or joint.limits_at is None:
         return {}
     left_out = Numbers((0.0,), joint.limits_at)
-    found = {name: joint.limits.get(name, left_out) for name in LIMITS}
-    ranges = joint.type.text != "continuous" and not (found["lower"].nothing and found["upper"].nothing)
+    ends = {name: joint.limits.get(name, left_out) for name in LIMITS}
+    ranges = joint.type.text != "continuous" and not (ends["lower"].nothing and ends["upper"].nothing)
     return {
         name: limit
-        for name, limit in found.items()
+        for name, limit in ends.items()
         if math.isfinite(limit.values[0]) and (ranges if name in ("lower", "upper") else not limit.nothing)
     }
 
@@ -220,7 +220,7 @@ def _setting(key: str, value: Expression, place: Place) -> Setting:
 def _vector(key: str, numbers: Numbers, unit: str) -> Setting:
     place = numbers.place
     places = numbers.each or (place,) * len(numbers.values)
-    items = tuple(_bare(value, each) for value, each in zip(numbers.values, places, strict=True))
+    items = tuple(_bare(value, spot) for value, spot in zip(numbers.values, places, strict=True))
     return _setting(key, WithUnit(List(items, place), _unit(unit, place), place), place)
 
 

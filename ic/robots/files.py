@@ -28,11 +28,11 @@ class RobotFiles(NamedFiles["ArmEntries"]):
     @property
     def roots(self) -> set[str]:
         """Names of the links that are called `base` in arms."""
-        return {each.robot.root.name.text for each in self.loaded}
+        return {entries.robot.root.name.text for entries in self.loaded}
 
-    def take(self, made: ArmEntries) -> None:
+    def take(self, entries: ArmEntries) -> None:
         """Let a robot that was read elsewhere count as one of these files."""
-        self._read[made.robot.file] = made
+        self._read[entries.robot.file] = entries
 
     def hold(self, place: Place) -> bool:
         """Return True if a place is in one of these files, which a deck can override, but not change."""
@@ -40,7 +40,7 @@ class RobotFiles(NamedFiles["ArmEntries"]):
 
     def note_at(self, place: Place) -> str:
         """A note on a place whose text is not the number from there, empty elsewhere."""
-        return next((note for each in self.loaded if (note := each.notes.get(place)) is not None), "")
+        return next((note for entries in self.loaded if (note := entries.notes.get(place)) is not None), "")
 
     def arm_entries(self, made_from: Call) -> ArmEntries:
         """The robot of `urdf("FILE")`. Raises Problem."""
@@ -73,7 +73,7 @@ def _file_named(made_from: Call) -> String:
                 help=[*did_you_mean(name, MODELS), known_words("an arm is made from", MODELS)],
             )
         )
-    given = made_from.positional[0] if len(made_from.positional) == 1 and not made_from.named else None
-    if not isinstance(given, String):
+    file_name = made_from.positional[0] if len(made_from.positional) == 1 and not made_from.named else None
+    if not isinstance(file_name, String):
         raise Problem(error("D214", "`urdf` takes the name of one file, in quotes", made_from.place, help=USAGE))
-    return given
+    return file_name

@@ -27,8 +27,8 @@ def without_mimics(robot: Robot, treatment: Treatment) -> Robot:
         free = replace(joint, mimic=None, followed=joint.mimic)
         if treatment == "free":
             return free
-        at = position(joint, known)
-        return replace(_fixed(free, at), beyond=_beyond(joint, at))
+        held_at = position(joint, known)
+        return replace(_fixed(free, held_at), beyond=_beyond(joint, held_at))
 
     return replace(robot, joints=tuple(changed(joint) for joint in robot.joints))
 
@@ -45,19 +45,19 @@ def position(joint: Joint, known: dict[str, Joint]) -> float:
     return value + 0.0
 
 
-def _beyond(joint: Joint, at: float) -> str:
+def _beyond(joint: Joint, value: float) -> str:
     """The limits that a position is beyond, in words: `its limits, -1.5 to 1.5`; "" within them."""
-    found = {name: limit.values[0] for name, limit in limits(joint).items()}
-    lower, upper = found.get("lower", -math.inf), found.get("upper", math.inf)
-    return "" if lower <= at <= upper else f"its limits, {spelled(lower)} to {spelled(upper)}"
+    ends = {name: limit.values[0] for name, limit in limits(joint).items()}
+    lower, upper = ends.get("lower", -math.inf), ends.get("upper", math.inf)
+    return "" if lower <= value <= upper else f"its limits, {spelled(lower)} to {spelled(upper)}"
 
 
 def hold_position(joint: Joint) -> float:
     """The position at which a deck's first run holds a joint: 0, or the middle of its range where that excludes 0."""
     if joint.type.text not in MOVING:
         return 0.0
-    found = {name: limit.values[0] for name, limit in limits(joint).items()}
-    lower, upper = found.get("lower", -math.inf), found.get("upper", math.inf)
+    ends = {name: limit.values[0] for name, limit in limits(joint).items()}
+    lower, upper = ends.get("lower", -math.inf), ends.get("upper", math.inf)
     if lower <= 0.0 <= upper or not lower < upper < math.inf:  # else the arm is refused
         return 0.0
     middle = lower / 2.0 + upper / 2.0  # the sum might overflow
@@ -65,26 +65,26 @@ def hold_position(joint: Joint) -> float:
     return short if lower <= short <= upper else middle
 
 
-def _fixed(joint: Joint, at: float) -> Joint:
+def _fixed(joint: Joint, value: float) -> Joint:
     """The joint fixed at a position, its child where it is there."""
     fixed = replace(joint, type=replace(joint.type, text="fixed"), axis=None)
-    if joint.type.text not in MOVING or at == 0.0:
+    if joint.type.text not in MOVING or value == 0.0:
         return fixed
     axis = (1.0, 0.0, 0.0) if joint.axis is None else joint.axis.values
     length = math.hypot(*axis)
     if length == 0.0:  # no direction to move in
         return fixed
-    x, y, z = (each / length for each in axis)
+    x, y, z = (component / length for component in axis)
     place = joint.name.place
     rpy = (0.0, 0.0, 0.0) if joint.rpy is None else joint.rpy.values
     if joint.type.text == "prismatic":
         R = rotation(*rpy)
-        moved = (sum(row[k] * at * (x, y, z)[k] for k in range(3)) for row in R)
+        moved = (sum(row[k] * value * (x, y, z)[k] for k in range(3)) for row in R)
         start = (0.0, 0.0, 0.0) if joint.at is None else joint.at.values
-        there = tuple(a + b for a, b in zip(start, moved, strict=True))
-        return replace(fixed, at=Numbers(there, place if joint.at is None else joint.at.place), held=at)
-    turned = _turned(rpy, (x, y, z), at)
-    return replace(fixed, rpy=Numbers(turned, place if joint.rpy is None else joint.rpy.place), held=at)
+        origin = tuple(a + b for a, b in zip(start, moved, strict=True))
+        return replace(fixed, at=Numbers(origin, place if joint.at is None else joint.at.place), held=value)
+    turned = _turned(rpy, (x, y, z), value)
+    return replace(fixed, rpy=Numbers(turned, place if joint.rpy is None else joint.rpy.place), held=value)
 
 
 def _turned(rpy: tuple[float, ...], axis: tuple[float, float, float], angle: float) -> tuple[float, float, float]:

@@ -50,31 +50,31 @@ def deck_names(robot: Robot) -> DeckNames:
     links = {robot.root.name.text: "base"}
     links |= _named([link.name for link in robot.carried], "link", {"base"})
     joints = _named([joint.name for joint in robot.joints], "joint", set(links.values()))
-    changed = [ChangedName("link", each.name, links[each.name.text]) for each in robot.carried]
+    changed = [ChangedName("link", link.name, links[link.name.text]) for link in robot.carried]
     changed += [ChangedName("joint", joint.name, joints[joint.name.text]) for joint in robot.joints]
-    return DeckNames(links, joints, tuple(each for each in changed if each.name != each.written.text))
+    return DeckNames(links, joints, tuple(change for change in changed if change.name != change.written.text))
 
 
 def word(text: str, kind: str) -> str:
     """A single name: rules 1 and 2."""
-    made = _OTHER.sub("_", text)[:LONGEST]
-    made = made if _PLAIN.fullmatch(made) else f"_{made}"
-    return f"{made}_{kind}" if _means_something(made, kind) else made
+    name = _OTHER.sub("_", text)[:LONGEST]
+    name = name if _PLAIN.fullmatch(name) else f"_{name}"
+    return f"{name}_{kind}" if _means_something(name, kind) else name
 
 
 def _named(written: Sequence[Written], kind: str, taken: set[str]) -> dict[str, str]:
     """taken: names of other kinds."""
     names: dict[str, str] = {}
     others, taken = taken, set(taken)
-    for each in sorted(written, key=lambda name: word(name.text, kind) != name.text):  # unchanged ones first
-        made = word(each.text, kind)
-        if made in others and kind == "joint":
-            made = f"{made}_joint"
-        base, n = made, 2
-        while made in taken:
-            made, n = f"{base}_{n}", n + 1
-        names[each.text] = made
-        taken.add(made)
+    for element in sorted(written, key=lambda name: word(name.text, kind) != name.text):  # unchanged ones first
+        new_name = word(element.text, kind)
+        if new_name in others and kind == "joint":
+            new_name = f"{new_name}_joint"
+        base, n = new_name, 2
+        while new_name in taken:
+            new_name, n = f"{base}_{n}", n + 1
+        names[element.text] = new_name
+        taken.add(new_name)
     return names
 
 

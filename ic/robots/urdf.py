@@ -84,66 +84,66 @@ def _within(root: Element) -> Iterator[Element]:
         stack.extend(reversed(element.children))
 
 
-def _link(found: Found) -> Link:
-    inertial = found.inside.get("inertial")
-    return Link(found.words["name"], None if inertial is None else _inertial(inertial))
+def _link(element: Found) -> Link:
+    inertial = element.inside.get("inertial")
+    return Link(element.words["name"], None if inertial is None else _inertial(inertial))
 
 
-def _inertial(found: Found) -> Inertial:
-    inertia = found.inside["inertia"]
-    moments = [inertia.numbers.get(each) for each in MOMENTS]
+def _inertial(element: Found) -> Inertial:
+    inertia = element.inside["inertia"]
+    moments = [inertia.numbers.get(name) for name in MOMENTS]
     values = tuple(0.0 if moment is None else moment.values[0] for moment in moments)
-    each = tuple(inertia.place if moment is None else moment.place for moment in moments)
-    com, rpy = _origin(found)
-    mass = found.inside["mass"].numbers["value"]
-    return Inertial(mass, com, rpy, Numbers(values, inertia.place, each), found.place)
+    places = tuple(inertia.place if moment is None else moment.place for moment in moments)
+    com, rpy = _origin(element)
+    mass = element.inside["mass"].numbers["value"]
+    return Inertial(mass, com, rpy, Numbers(values, inertia.place, places), element.place)
 
 
-def _origin(found: Found) -> tuple[Numbers | None, Numbers | None]:
+def _origin(element: Found) -> tuple[Numbers | None, Numbers | None]:
     """xyz and rpy of the `<origin>` inside."""
-    origin = found.inside.get("origin")
+    origin = element.inside.get("origin")
     return (None, None) if origin is None else (origin.numbers.get("xyz"), origin.numbers.get("rpy"))
 
 
-def _joint(found: Found) -> Joint:
-    at, rpy = _origin(found)
-    axis, limit, dynamics = (found.inside.get(tag) for tag in ("axis", "limit", "dynamics"))
-    friction = {} if dynamics is None else {name: each.values[0] for name, each in dynamics.numbers.items()}
+def _joint(element: Found) -> Joint:
+    position, rpy = _origin(element)
+    axis, limit, dynamics = (element.inside.get(tag) for tag in ("axis", "limit", "dynamics"))
+    friction = {} if dynamics is None else {name: numbers.values[0] for name, numbers in dynamics.numbers.items()}
     return Joint(
-        found.words["name"],
-        found.words["type"],
-        found.inside["parent"].words["link"],
-        found.inside["child"].words["link"],
-        at,
+        element.words["name"],
+        element.words["type"],
+        element.inside["parent"].words["link"],
+        element.inside["child"].words["link"],
+        position,
         rpy,
         None if axis is None else axis.numbers["xyz"],
         {} if limit is None else limit.numbers,
         None if limit is None else limit.place,
         friction,
         None if dynamics is None or not any(friction.values()) else dynamics.place,
-        _mimic(found.inside.get("mimic")),
+        _mimic(element.inside.get("mimic")),
     )
 
 
-def _mimic(found: Found | None) -> Mimic | None:
-    if found is None:
+def _mimic(element: Found | None) -> Mimic | None:
+    if element is None:
         return None
-    given = {name: each.values[0] for name, each in found.numbers.items()}
-    return Mimic(found.words["joint"], given.get("multiplier", 1.0), given.get("offset", 0.0))
+    law = {name: numbers.values[0] for name, numbers in element.numbers.items()}
+    return Mimic(element.words["joint"], law.get("multiplier", 1.0), law.get("offset", 0.0))
 
 
 def _check_names(named: Sequence[Link] | Sequence[Joint], kind: str, complaints: Complaints) -> None:
     first: dict[str, Place] = {}
-    for each in named:
-        if each.name.text in first:
+    for element in named:
+        if element.name.text in first:
             complaints.error(
                 "D204",
-                f"{kind} `{shown(each.name.text)}` is there twice",
-                Label(each.name.place, "again"),
-                also=[Label(first[each.name.text], "first")],
+                f"{kind} `{shown(element.name.text)}` is there twice",
+                Label(element.name.place, "again"),
+                also=[Label(first[element.name.text], "first")],
                 help="give one of the two another name",
             )
-        first.setdefault(each.name.text, each.name.place)
+        first.setdefault(element.name.text, element.name.place)
 
 
 def _check_ends(links: Sequence[Link], joints: Sequence[Joint], complaints: Complaints) -> None:
@@ -178,12 +178,12 @@ def _check_mimics(joints: Sequence[Joint], complaints: Complaints) -> None:
                 help=[*did_you_mean(leader.text, followed), known_words("joints", map(shown, sorted(followed)))],
             )
         name = joint.name.text
-        at: Mimic | None = joint.mimic
+        mimic: Mimic | None = joint.mimic
         chain = {name: True}
-        while at is not None and at.joint.text not in chain and at.joint.text in followed:
-            chain[at.joint.text] = True
-            at = followed[at.joint.text]
-        if at is not None and at.joint.text == name and not in_circles.intersection(chain):
+        while mimic is not None and mimic.joint.text not in chain and mimic.joint.text in followed:
+            chain[mimic.joint.text] = True
+            mimic = followed[mimic.joint.text]
+        if mimic is not None and mimic.joint.text == name and not in_circles.intersection(chain):
             in_circles.update(chain)
             complaints.error(
                 "D213",

@@ -40,8 +40,8 @@ def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
     changed = body.names.changed
     if changed:
         also = tuple(
-            Label(each.written.place, f"{each.kind} `{shown(each.written.text)}` is `{each.name}`")
-            for each in changed[:MOST_NAMED]
+            Label(change.written.place, f"{change.kind} `{shown(change.written.text)}` is `{change.name}`")
+            for change in changed[:MOST_NAMED]
         )
         more = f", and {len(changed) - MOST_NAMED} more" if len(changed) > MOST_NAMED else ""
         what = f"{_count(len(changed), 'name')} of `{body.robot.file}`"

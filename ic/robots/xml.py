@@ -46,17 +46,17 @@ class XmlSource:
 class Element:
     """An element: its tag, the text of its attributes, and its contents, in order."""
 
-    __slots__ = ("_at", "_source", "attributes", "children", "tag")
+    __slots__ = ("_offset", "_source", "attributes", "children", "tag")
 
-    def __init__(self, tag: str, attributes: dict[str, str], source: XmlSource, at: int) -> None:
+    def __init__(self, tag: str, attributes: dict[str, str], source: XmlSource, offset: int) -> None:
         self.tag, self.attributes = tag, attributes
         self.children: list[Element] = []
-        self._source, self._at = source, at
+        self._source, self._offset = source, offset
 
     @property
     def place(self) -> Place:
         """The `<tag` of its beginning."""
-        return self._source.place(self._at, self._at + 1 + len(self.tag.encode()))
+        return self._source.place(self._offset, self._offset + 1 + len(self.tag.encode()))
 
     def place_of(self, attribute: str) -> Place:
         """The text of an attribute's value, without the quotes."""
@@ -70,11 +70,11 @@ class Element:
         return self._source.place(*self._written(attribute).span(1))
 
     def _written(self, attribute: str) -> re.Match[bytes]:
-        at = self._at + 1 + len(self.tag.encode())
-        while (match := _ATTRIBUTE.search(self._source.data, at)) is not None:
+        offset = self._offset + 1 + len(self.tag.encode())
+        while (match := _ATTRIBUTE.search(self._source.data, offset)) is not None:
             if match[1] == attribute.encode():
                 return match
-            at = match.end()
+            offset = match.end()
         raise AssertionError(attribute)
 
     def all(self, tag: str) -> Iterator[Element]:
@@ -117,9 +117,14 @@ def parse(name: str, text: str) -> Element:
 
     def document_type(*_: object) -> None:
         begin = b"<!DOCTYPE"
-        at = max(0, source.data.rfind(begin, 0, parser.CurrentByteIndex + len(begin)))
+        offset = max(0, source.data.rfind(begin, 0, parser.CurrentByteIndex + len(begin)))
         raise Problem(
-            error("D201", "a document type and entities are not read", source.place(at, at + len(begin)), help=_REMEDY)
+            error(
+                "D201",
+                "a document type and entities are not read",
+                source.place(offset, offset + len(begin)),
+                help=_REMEDY,
+            )
         )
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
@@ -131,10 +136,10 @@ def parse(name: str, text: str) -> Element:
     return root[0]
 
 
-def _not_xml(source: XmlSource, at: int, code: int, open_: list[Element]) -> Diagnostic:
+def _not_xml(source: XmlSource, offset: int, code: int, open_: list[Element]) -> Diagnostic:
     """The diagnostic for an error that expat found, with a remedy."""
-    at = max(0, min(at, len(source.data) - 1))
-    place = source.place(at, at + 1)
+    offset = max(0, min(offset, len(source.data) - 1))
+    place = source.place(offset, offset + 1)
     why = expat.ErrorString(code) or "it cannot be read"
     name = f"`{open_[-1].tag[:SHOWN]}`" if open_ else ""
     helps = {
@@ -144,9 +149,9 @@ def _not_xml(source: XmlSource, at: int, code: int, open_: list[Element]) -> Dia
         "mismatched tag": f"{name} is open here: it is to be closed first",
         "junk after document element": "a file has one outermost element, `<robot>`",
         "unclosed token": "`<!--` begins a comment, which `-->` ends"
-        if source.data.startswith(b"<!--", at)
+        if source.data.startswith(b"<!--", offset)
         else "a `<` begins a tag, which `>` ends",
-        "not well-formed (invalid token)": _of_token(source.data, at),
+        "not well-formed (invalid token)": _of_token(source.data, offset),
         "duplicate attribute": "an attribute stands once in a tag",
         "undefined entity": "five have a meaning: &lt; &gt; &amp; &quot; &apos;",
         "unbound prefix": 'declare it in `<robot xmlns:PREFIX="...">`',
@@ -161,14 +166,14 @@ def _not_xml(source: XmlSource, at: int, code: int, open_: list[Element]) -> Dia
     )
 
 
-def _of_token(data: bytes, at: int) -> str:
+def _of_token(data: bytes, offset: int) -> str:
     """The remedy for a misplaced token."""
-    if data.rfind(b"<!--", 0, at) > data.rfind(b"-->", 0, at):
+    if data.rfind(b"<!--", 0, offset) > data.rfind(b"-->", 0, offset):
         return "`--` stands in a comment at its end only, as `-->`"
-    if re.search(rb"&\w*\Z", data[max(0, at - SHOWN) : at]):
+    if re.search(rb"&\w*\Z", data[max(0, offset - SHOWN) : offset]):
         return "`&` is written `&amp;`"
-    if data[at : at + 1] == b"<":
+    if data[offset : offset + 1] == b"<":
         return 'in a value `<` is written `&lt;`; else a `"` or a `>` is missing before it'
-    if data.rfind(b"<", 0, at) > data.rfind(b">", 0, at):
+    if data.rfind(b"<", 0, offset) > data.rfind(b">", 0, offset):
         return 'within a tag stands `NAME="..."`, in quotes, with a blank before it'
     return _NO_URDF
