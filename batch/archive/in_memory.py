@@ -57,26 +57,26 @@ class DatasetMaker:
         experiment  that of `prepared`, with these cases
         """
         count = len(run.case)
-        found = self._laid_out(count, frozenset(signals))
-        values = values_of_cases(experiment, found.layout, run, self._id_head)
+        dataset_layout = self._laid_out(count, frozenset(signals))
+        values = values_of_cases(experiment, dataset_layout.layout, run, self._id_head)
         if signals:
-            values |= {each.name: values[each.source] for each in found.layout.role("recorded")}
-            values |= {each.name: run.signals[each.key] for each in found.layout.role("signal")}
-        made = found.template.copy(deep=False)  # with variables of its own
-        variables = made.variables
-        for name in found.moving:
+            values |= {variable.name: values[variable.source] for variable in dataset_layout.layout.role("recorded")}
+            values |= {variable.name: run.signals[variable.key] for variable in dataset_layout.layout.role("signal")}
+        dataset = dataset_layout.template.copy(deep=False)  # with variables of its own
+        variables = dataset.variables
+        for name in dataset_layout.moving:
             variables[name].data = _plain(values[name], count)
-        return made
+        return dataset
 
     def _lay_out(self, count: int, signals: frozenset[str]) -> DatasetLayout:
         import xarray
 
         prepared, experiment = self._prepared, self._prepared.experiment
         layout = archive_layout.layout(experiment, count, count if signals else 0)
-        left_out = {each.name for each in layout.role("signal") if each.name not in signals}
-        variables = [each for each in layout.variables if each.name not in left_out]
-        used = {dim for each in variables if each.role != "dimension" for dim in each.dims}
-        variables = [each for each in variables if each.role != "dimension" or each.name in used]
+        left_out = {variable.name for variable in layout.role("signal") if variable.name not in signals}
+        variables = [variable for variable in layout.variables if variable.name not in left_out]
+        used = {dim for variable in variables if variable.role != "dimension" for dim in variable.dims}
+        variables = [variable for variable in variables if variable.role != "dimension" or variable.name in used]
         fixed = values_of_dimensions(experiment) | {"case": np.arange(count), "recorded_case": np.arange(count)}
         fixed["time"] = times_of(experiment)
         coordinates, laid = {}, {}
@@ -126,15 +126,17 @@ class GroupInMemory(ArchiveGroup):
         """The group of the cases of a run."""
         count = len(run.case)
         values = values_of_cases(experiment, archive_layout.layout(experiment, count, 0), run)
-        return cls(experiment, count, {name: _plain(each, count) for name, each in values.items()})
+        return cls(experiment, count, {name: _plain(column, count) for name, column in values.items()})
 
     @classmethod
     def of_metrics(
         cls, experiment: Experiment, rows: np.ndarray, status: np.ndarray, metrics: Mapping[str, np.ndarray]
     ) -> GroupInMemory:
         """The group of these rows of the case table, with only their status and metrics."""
-        names = {each.key: each.name for each in archive_layout.layout(experiment, len(rows), 0).role("metric")}
-        values = {names[name]: each for name, each in metrics.items()}
+        names = {
+            variable.key: variable.name for variable in archive_layout.layout(experiment, len(rows), 0).role("metric")
+        }
+        values = {names[name]: column for name, column in metrics.items()}
         return cls(experiment, len(rows), {"case": experiment.cases.table[rows], "status": status, **values})
 
     @cached_property
@@ -166,8 +168,8 @@ class GroupInMemory(ArchiveGroup):
 
 
 def _stored(variable: archive_layout.Variable) -> Stored:
-    told = _as_read(variable.attributes)
-    return Stored(variable.name, variable.dims, variable.role, variable.unit, (), variable.long_name, told)
+    attributes = _as_read(variable.attributes)
+    return Stored(variable.name, variable.dims, variable.role, variable.unit, (), variable.long_name, attributes)
 
 
 def _as_read(attributes: Mapping[str, Any]) -> dict[str, Any]:
@@ -178,10 +180,10 @@ def _as_read(attributes: Mapping[str, Any]) -> dict[str, Any]:
 def _as_opened(attributes: Mapping[str, Any]) -> dict[str, Any]:
     """Attributes as xarray gives them for an opened archive: those of coordinates are left out, and a list of one item
     is that item."""
-    found = {name: value for name, value in attributes.items() if name != "coordinates"}
+    plain = {name: value for name, value in attributes.items() if name != "coordinates"}
     return {
         name: value[0] if isinstance(value, list | np.ndarray) and len(value) == 1 else value
-        for name, value in found.items()
+        for name, value in plain.items()
     }
 
 

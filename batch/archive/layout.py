@@ -147,10 +147,10 @@ class Layout:
 
     @cached_property
     def _by_role(self) -> dict[str, tuple[Variable, ...]]:
-        found: dict[str, list[Variable]] = {}
+        by_role: dict[str, list[Variable]] = {}
         for variable in self.variables:
-            found.setdefault(variable.role, []).append(variable)
-        return {role: tuple(those) for role, those in found.items()}
+            by_role.setdefault(variable.role, []).append(variable)
+        return {role: tuple(those) for role, those in by_role.items()}
 
     def role(self, role: Role) -> tuple[Variable, ...]:
         return self._by_role.get(role, ())
@@ -190,25 +190,25 @@ def layout(experiment: Experiment, cases: int, recorded: int, single: bool = Fal
             Variable("time", "float64", ("time",), "dimension", "time", "s"),
         ]
         repeated = _recorded(experiment, variables) if experiment.cases.coordinates else []
-        told = {"coordinates": " ".join(v.name for v in repeated)}
-        variables += [*repeated, *_signals(experiment, sizes, "float32" if single else "float64", told)]
+        attributes = {"coordinates": " ".join(v.name for v in repeated)}
+        variables += [*repeated, *_signals(experiment, sizes, "float32" if single else "float64", attributes)]
     return Layout(sizes, tuple(variables), _attributes(experiment, variables))
 
 
 def joint_dimensions(experiment: Experiment) -> dict[tuple[str, ...], str]:
     """The dimensions of joints, by the joints' names."""
     moving = tuple(joint.name for joint in experiment.structure.moving)
-    found = {moving: "joint"}
+    dimensions = {moving: "joint"}
     for recorded in experiment.structure.record:
-        if recorded.joints and recorded.joints not in found:
+        if recorded.joints and recorded.joints not in dimensions:
             owner = recorded.name.partition(".jacobian.")[0]  # both jacobians of a link have the same joints
-            found[recorded.joints] = "joint_of_" + re.sub(r"\W", "_", owner)
-    return found
+            dimensions[recorded.joints] = "joint_of_" + re.sub(r"\W", "_", owner)
+    return dimensions
 
 
 def component_dimensions(experiment: Experiment) -> dict[tuple[str, ...], str]:
     """The dimensions of recorded vectors' components, by the components' names."""
-    recorded = [each.components for each in experiment.structure.record if each.components]
+    recorded = [recording.components for recording in experiment.structure.record if recording.components]
     return {components: DIMENSIONS[components] for components in recorded}
 
 
@@ -267,19 +267,19 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         *([variable("bed_limited", "int64", LIMITED)] if experiment.structure.substitutions else []),
     ]
     taken |= set(names.values())
-    for each in (*_limits(experiment), *_grapples(experiment)):
-        name = _apart(each.name, "limits", taken, ())
+    for limit_variable in (*_limits(experiment), *_grapples(experiment)):
+        name = _apart(limit_variable.name, "limits", taken, ())
         taken.add(name)
-        out.append(replace(each, name=name, source=each.name))
+        out.append(replace(limit_variable, name=name, source=limit_variable.name))
     units = metric_units(experiment.structure, experiment.linear_metrics)
     named: dict[str, str] = {}
     for use in experiment.metrics:
         name = _apart(use.name, "metrics", taken, list(units))
         unit = units[use.name]
         words = f"{use.model} of {use.of}"
-        shown, scale = limits.deck_unit(use.name, unit, experiment.requirements)
-        told = {"model": use.model, "of": use.of, "deck_unit": shown, "deck_scale": scale}
-        out.append(Variable(name, "float64", ("case",), "metric", words, unit, told, use.name))
+        deck_word, scale = limits.deck_unit(use.name, unit, experiment.requirements)
+        attributes = {"model": use.model, "of": use.of, "deck_unit": deck_word, "deck_scale": scale}
+        out.append(Variable(name, "float64", ("case",), "metric", words, unit, attributes, use.name))
         named[use.name] = name
     if experiment.requirements:
         words = "the requirement, as the deck wrote it"
@@ -307,7 +307,7 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
 def _limits(experiment: Experiment) -> list[Variable]:
     """Variables of shares of time at limits, largest excesses, and limits at extremes, by their own names."""
     limits = limits_of(experiment.structure, experiment.parameters)
-    found = [
+    variables = [
         Variable(
             AT_LIMIT + use.path,
             "float64",
@@ -322,16 +322,16 @@ def _limits(experiment: Experiment) -> list[Variable]:
     for use in limits:
         if use.bound:
             unit, words = experiment.parameters[use.path].unit, f"largest excess over {use.path}"
-            found.append(Variable(EXCESS + use.path, "float64", ("case",), "excess", words, unit, {"of": use.path}))
+            variables.append(Variable(EXCESS + use.path, "float64", ("case",), "excess", words, unit, {"of": use.path}))
     for metric, uses in extremes(experiment).items():
-        told = {
+        attributes = {
             "of": metric,
             "flag_values": np.arange(len(uses) + 1),
             "flag_meanings": " ".join(["none", *(use.path for use in uses)]),
         }
         words = f"limit that was reached where {metric} took its value"
-        found.append(Variable(EXTREME_AT + metric, "int64", ("case",), "extreme", words, "", told))
-    return found
+        variables.append(Variable(EXTREME_AT + metric, "int64", ("case",), "extreme", words, "", attributes))
+    return variables
 
 
 def _grapples(experiment: Experiment) -> list[Variable]:
@@ -349,14 +349,14 @@ def _grapples(experiment: Experiment) -> list[Variable]:
 def _over_cases(experiment: Experiment) -> dict[str, np.ndarray]:
     """Share and confidence of each requirement, not-a-number where it has none; nothing where no requirement has
     any."""
-    found = experiment.requirements
-    if all(requirement.share is None for requirement in found):
+    requirements = experiment.requirements
+    if all(requirement.share is None for requirement in requirements):
         return {}
     return {
         name: np.array([math.nan if value is None else value for value in values])
         for name, values in (
-            ("share", [requirement.share for requirement in found]),
-            ("confidence", [requirement.confidence for requirement in found]),
+            ("share", [requirement.share for requirement in requirements]),
+            ("confidence", [requirement.confidence for requirement in requirements]),
         )
     }
 
@@ -400,8 +400,8 @@ def _recorded(experiment: Experiment, variables: list[Variable]) -> list[Variabl
     return out
 
 
-def _signals(experiment: Experiment, sizes: dict[str, int], kind: Kind, told: Mapping[str, str]) -> list[Variable]:
-    """Variables of signals. told: attributes of every signal; empty ones are left out."""
+def _signals(experiment: Experiment, sizes: dict[str, int], kind: Kind, common: Mapping[str, str]) -> list[Variable]:
+    """Variables of signals. common: attributes of every signal; empty ones are left out."""
     joint_dims, component_dims = joint_dimensions(experiment), component_dimensions(experiment)
     out = []
     for joints, dim in joint_dims.items():
@@ -419,7 +419,7 @@ def _signals(experiment: Experiment, sizes: dict[str, int], kind: Kind, told: Ma
         unit, attributes = _signal_unit(recorded)
         frame = known[recorded.channels[0]].frame
         inner = [joint for joint in recorded.joints if joint in experiment.structure.springs]
-        attributes |= {name: value for name, value in {"frame": frame, "springs": inner, **told}.items() if value}
+        attributes |= {name: value for name, value in {"frame": frame, "springs": inner, **common}.items() if value}
         out.append(Variable(recorded.name, kind, tuple(dims), "signal", recorded.doc, unit, attributes))
     return out
 

@@ -19,8 +19,8 @@ _COMPARED = re.compile(r"[<>]=?\s*\(?[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*([A-Za-z][\w
 def deck_unit(metric: str, unit: str, requirements: Iterable[Requirement]) -> tuple[str, float]:
     """Unit and scale (shown = SI value / scale) of the first requirement of a metric that has one, else its SI unit."""
     for requirement in requirements:
-        if requirement.metric == metric and (found := written_unit(requirement.text, unit)) is not None:
-            return found
+        if requirement.metric == metric and (unit_and_scale := written_unit(requirement.text, unit)) is not None:
+            return unit_and_scale
     return unit, 1.0
 
 

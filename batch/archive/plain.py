@@ -76,26 +76,26 @@ def _wrong(root: Any, raw: BufferedReader) -> Iterator[tuple[str, str]]:
 
 def _links(group: Any) -> list[tuple[bytes, int]]:
     """The names of a group's links, with their kinds."""
-    found: list[tuple[bytes, int]] = []
+    links: list[tuple[bytes, int]] = []
 
     def take(name: bytes, about: Any) -> None:
-        found.append((name, about.type))
+        links.append((name, about.type))
 
     group.links.iterate(take, info=True)
-    return found
+    return links
 
 
 def _dataset(node: Any) -> str:
     """The reason why a dataset cannot be an archive's; empty where it can. Its values and size are not read before it
     is known where they are."""
     module = h5py()
-    made = node.get_create_plist()
-    if made.get_layout() == module.h5d.VIRTUAL:
+    creation = node.get_create_plist()
+    if creation.get_layout() == module.h5d.VIRTUAL:
         return "is put together from other files (a virtual dataset)"
-    if made.get_external_count():
+    if creation.get_external_count():
         return "has its values in another file (external storage)"
     own = (module.h5z.FILTER_DEFLATE, module.h5z.FILTER_SHUFFLE, module.h5z.FILTER_FLETCHER32)
-    for code in (made.get_filter(number)[0] for number in range(made.get_nfilters())):
+    for code in (creation.get_filter(number)[0] for number in range(creation.get_nfilters())):
         if code not in own:
             return f"is packed by other people's code (HDF5's filter {code})"
     kind = node.get_type()

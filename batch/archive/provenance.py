@@ -47,14 +47,14 @@ class Revision:
         if self._process is None:
             return UNKNOWN, UNKNOWN
         try:
-            said = self._process.communicate(timeout=10)[0].strip()
+            revision = self._process.communicate(timeout=10)[0].strip()
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.communicate()
             return UNKNOWN, UNKNOWN
-        if self._process.returncode != 0 or not said:
+        if self._process.returncode != 0 or not revision:
             return UNKNOWN, UNKNOWN
-        commit, _, dirty = said.partition("-")
+        commit, _, dirty = revision.partition("-")
         return commit, "yes" if dirty else "no"
 
     def close(self) -> None:

@@ -66,7 +66,7 @@ class ArchiveGroup:
 
     def allows(self, code: str) -> bool:
         """Return True if a warning with this code was allowed."""
-        return any(each.startswith(f"{code},") for each in self.allowed)
+        return any(allowance.startswith(f"{code},") for allowance in self.allowed)
 
     @cached_property
     def variables(self) -> dict[str, Stored]:
@@ -78,7 +78,7 @@ class ArchiveGroup:
     def single(self) -> bool:
         """True if histories are kept in single precision."""
         with reading(self.path):
-            return any(self._node[each.name].dtype.itemsize == 4 for each in self.role("signal"))
+            return any(self._node[variable.name].dtype.itemsize == 4 for variable in self.role("signal"))
 
     def role(self, role: str) -> tuple[Stored, ...]:
         return tuple(variable for variable in self.variables.values() if variable.role == role)
@@ -220,16 +220,16 @@ def found_cases(wanted: str, rows: np.ndarray, ids: np.ndarray, name: str, remed
     E321, E322."""
     row = row_of(wanted)
     if row is not None:
-        found = np.flatnonzero(rows == row)
+        places = np.flatnonzero(rows == row)
     else:
-        found = np.flatnonzero([case_id.startswith(wanted) for case_id in ids])
-    if len(found) == 0:
+        places = np.flatnonzero([case_id.startswith(wanted) for case_id in ids])
+    if len(places) == 0:
         helps = [_cases_here(distinct(rows)), *([remedy] if remedy else [])]
         raise Problem(error("E321", f"no case `{wanted}` in `{name}`", help=helps))
-    if row is None and len(found) > 1:
-        some = ", ".join(ids[found[:4]]) + (" ..." if len(found) > 4 else "")
-        raise Problem(error("E322", f"case `{wanted}` may be any of {len(found)}: {some}", help="give more of its id"))
-    return found
+    if row is None and len(places) > 1:
+        some = ", ".join(ids[places[:4]]) + (" ..." if len(places) > 4 else "")
+        raise Problem(error("E322", f"case `{wanted}` may be any of {len(places)}: {some}", help="give more of its id"))
+    return places
 
 
 def _cases_here(rows: np.ndarray) -> str:
@@ -379,7 +379,11 @@ def check_signature(path: Path) -> None:
         if isinstance(reason, FileNotFoundError):
             helps = deck
         elif isinstance(reason, IsADirectoryError):
-            inside = sorted(each.name for each in path.iterdir() if each.suffix in ARCHIVES and each.name.isprintable())
+            inside = sorted(
+                inside_path.name
+                for inside_path in path.iterdir()
+                if inside_path.suffix in ARCHIVES and inside_path.name.isprintable()
+            )
             helps = f"archives in it: {', '.join(inside[:8])}" if inside else "there is no archive in it"
         raise Problem(error("E301", f"cannot read the archive {path}: {why}", help=helps)) from reason
     if begins != SIGNATURE:

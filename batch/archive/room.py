@@ -51,11 +51,11 @@ def check_heaps(raw: BufferedReader, size: int) -> None:
         return
     with mmap.mmap(raw.fileno(), 0, access=mmap.ACCESS_READ) as data:
         for first, last in {(0, min(size, SEARCHED)), (max(0, size - SEARCHED), size)}:
-            at = data.find(HEAP, first, last)
-            while at >= 0:
-                if _endless(data, at, size):
+            heap_start = data.find(HEAP, first, last)
+            while heap_start >= 0:
+                if _endless(data, heap_start, size):
                     raise Unlike("its strings are not where they should be")
-                at = data.find(HEAP, at + 1, last)
+                heap_start = data.find(HEAP, heap_start + 1, last)
 
 
 def _endless(data: mmap.mmap, start: int, size: int) -> bool:
@@ -63,13 +63,13 @@ def _endless(data: mmap.mmap, start: int, size: int) -> bool:
     if start + 16 > size:
         return False
     end = min(size, start + int.from_bytes(data[start + 8 : start + 16], "little"))
-    at = start + 16
-    while at + 16 <= end:
-        used = data[at : at + 2] != b"\0\0"
-        length = int.from_bytes(data[at + 8 : at + 16], "little")
+    entry_start = start + 16
+    while entry_start + 16 <= end:
+        used = data[entry_start : entry_start + 2] != b"\0\0"
+        length = int.from_bytes(data[entry_start + 8 : entry_start + 16], "little")
         if not used and not length:
             return True
-        at += 16 + -(-length // 8) * 8 if used else length
+        entry_start += 16 + -(-length // 8) * 8 if used else length
     return False
 
 
@@ -107,19 +107,19 @@ class _Overfull(Exception):
 
 def _packers(node: Any) -> list[int]:
     """HDF5's numbers of the filters of a dataset, in the order in which they compress."""
-    made = node.get_create_plist()
-    return [made.get_filter(number)[0] for number in range(made.get_nfilters())]
+    creation = node.get_create_plist()
+    return [creation.get_filter(number)[0] for number in range(creation.get_nfilters())]
 
 
 def _stored(node: Any, packers: list[int], file: int, width: int) -> Iterator[bytes]:
     """The bytes of a dataset's values as the file has them, unpacked, part by part. width: of a value, in bytes."""
     module = h5py()
-    made = node.get_create_plist()
-    layout = made.get_layout()
+    creation = node.get_create_plist()
+    layout = creation.get_layout()
     if layout == module.h5d.CONTIGUOUS:
         offset, size = node.get_offset(), node.get_storage_size()
-        for at in range(0, size, PIECE) if offset is not None else ():
-            piece = os.pread(file, min(PIECE, size - at), offset + at)
+        for start in range(0, size, PIECE) if offset is not None else ():
+            piece = os.pread(file, min(PIECE, size - start), offset + start)
             if not piece:  # the file ends before its declared end
                 break
             yield piece
@@ -128,7 +128,7 @@ def _stored(node: Any, packers: list[int], file: int, width: int) -> Iterator[by
         for place in np.ndindex(node.shape):
             yield np.array((len(read[place]), 0, 0), REFERENCE).tobytes()
     elif layout == module.h5d.CHUNKED:
-        full = math.prod(made.get_chunk()) * width
+        full = math.prod(creation.get_chunk()) * width
         places: list[tuple[tuple[int, ...], int]] = []
 
         def take(chunk: Any) -> None:

@@ -56,7 +56,7 @@ STEPS = {"equal": False, "ratios": True}
 
 def attributes(search: Search, metric: str) -> dict[str, Any]:
     """The attributes of a group. metric: the goal's variable."""
-    told: dict[str, Any] = {
+    attrs: dict[str, Any] = {
         "search": search.kind,
         "search_of": search.of,
         "search_goal": f"{'maximise' if search.largest else 'minimise'} {metric}",
@@ -64,42 +64,46 @@ def attributes(search: Search, metric: str) -> dict[str, Any]:
         "search_seed": search.seed,
     }
     if search.kind == "tune":
-        told |= {"search_margin": search.margin, "search_least_margin": search.least_margin}
-        told["search_steers"] = int(search.steers)
-        told["search_starts"] = json.dumps(encode(Starts, search.starts))
+        attrs |= {"search_margin": search.margin, "search_least_margin": search.least_margin}
+        attrs["search_steers"] = int(search.steers)
+        attrs["search_starts"] = json.dumps(encode(Starts, search.starts))
         if search.judged:
-            told["search_judged"] = json.dumps(encode(Judged, search.judged))
+            attrs["search_judged"] = json.dumps(encode(Judged, search.judged))
         if search.confirmation:
-            told["search_confirmation"] = json.dumps(encode(Confirmed, search.confirmation))
+            attrs["search_confirmation"] = json.dumps(encode(Confirmed, search.confirmation))
         if search.gradients:
-            told |= {"search_along_slopes": search.along_slopes, "search_without_slopes": search.without_slopes}
+            attrs |= {"search_along_slopes": search.along_slopes, "search_without_slopes": search.without_slopes}
     if search.against:
-        told |= {
+        attrs |= {
             "search_against": search.against,
             "search_plants": len(search.plants),
             "search_drawn_with": search.drawn_with,
         }
-    return told
+    return attrs
 
 
 def of_coordinate(search: Search | None, path: str) -> dict[str, Any]:
     """The attributes of a coordinate that a search chooses; none for any other."""
-    for each in search.parameters if search is not None else ():
-        if each.path == path:
-            return {"low": each.low, "high": each.high, "steps": "ratios" if each.logarithmic else "equal"}
+    for parameter in search.parameters if search is not None else ():
+        if parameter.path == path:
+            return {
+                "low": parameter.low,
+                "high": parameter.high,
+                "steps": "ratios" if parameter.logarithmic else "equal",
+            }
     return {}
 
 
 def why_unsound(group: StoredGroup) -> str:
     """The reason why a group's data about a search is invalid; empty where it is valid or absent. The group's cases
     must rise, and there must be some."""
-    told = group.attributes
-    if "search" not in told:
+    attrs = group.attributes
+    if "search" not in attrs:
         return ""
-    if told["search"] not in ("search", "tune"):
+    if attrs["search"] not in ("search", "tune"):
         return "attribute `search` is no kind of a search"
-    word, _, metric = str(told.get("search_goal", "")).partition(" ")
-    if word not in GOALS or metric not in {each.name for each in group.role("metric")}:
+    word, _, metric = str(attrs.get("search_goal", "")).partition(" ")
+    if word not in GOALS or metric not in {variable.name for variable in group.role("metric")}:
         return "attribute `search_goal` is no goal"
     for name, least, most in (
         ("search_at_most", 1, MOST_SEARCHED),
@@ -109,26 +113,29 @@ def why_unsound(group: StoredGroup) -> str:
         ("search_along_slopes", 0, MOST_SEARCHED),
         ("search_steers", 0, 1),
     ):
-        value = told.get(name, 1 if name != "search_at_most" else None)
+        value = attrs.get(name, 1 if name != "search_at_most" else None)
         if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
             return f"attribute `{name}` is no number of it"
-    if ("search_along_slopes" in told) != ("search_without_slopes" in told):
+    if ("search_along_slopes" in attrs) != ("search_without_slopes" in attrs):
         return "attribute `search_along_slopes` is missing, or its other half"
-    margin = told.get("search_margin", 0.0)
+    margin = attrs.get("search_margin", 0.0)
     if not isinstance(margin, float) or not 0.0 <= margin < 1.0:
         return "attribute `search_margin` is no share"
-    least_margin = told.get("search_least_margin", 0.0)
+    least_margin = attrs.get("search_least_margin", 0.0)
     if not isinstance(least_margin, float) or not 0.0 <= least_margin < 2.0:
         return "attribute `search_least_margin` is no disk margin"
-    cases = told["cases_in_table"]
+    cases = attrs["cases_in_table"]
     try:
-        if not all(0 <= each.case < cases for each in _decoded(told, "search_judged", Judged)):
+        if not all(0 <= judged_case.case < cases for judged_case in _decoded(attrs, "search_judged", Judged)):
             return "attribute `search_judged` is no list of judged designs"
-        if not are_starts(_decoded(told, "search_starts", Starts), cases):
+        if not are_starts(_decoded(attrs, "search_starts", Starts), cases):
             return "attribute `search_starts` is not of its cases"
-        confirmed = _decoded(told, "search_confirmation", Confirmed)
-        for each in confirmed:
-            if min(each.failed, each.missed) < 0 or not each.failed + each.missed <= each.cases <= MOST_PLANTS:
+        confirmed = _decoded(attrs, "search_confirmation", Confirmed)
+        for confirmation in confirmed:
+            if (
+                min(confirmation.failed, confirmation.missed) < 0
+                or not confirmation.failed + confirmation.missed <= confirmation.cases <= MOST_PLANTS
+            ):
                 return "attribute `search_confirmation` counts what it cannot"
     except (ValueError, RecursionError, Damaged) as reason:
         return f"an attribute of its search is no list of what it should be: {reason}"
@@ -141,7 +148,7 @@ def why_unsound(group: StoredGroup) -> str:
     if group.variables[GENERATION].dims != ("case",):
         return f"variable `{GENERATION}` is not over cases"
     return (
-        _why_not_against(told, more=len(coordinates) - len(chosen))
+        _why_not_against(attrs, more=len(coordinates) - len(chosen))
         or _why_not_asked(group)
         or _why_not_in(group, chosen)
     )
@@ -154,16 +161,16 @@ def _decoded(attributes: Mapping[str, Any], name: str, kind: Any) -> Any:
     return decode(kind, json.loads(text), name) if text else ()
 
 
-def _why_not_against(told: Mapping[str, Any], *, more: int) -> str:
+def _why_not_against(attrs: Mapping[str, Any], *, more: int) -> str:
     """The reason why a search cannot be judged against the stored plants. more: coordinates that are not chosen"""
-    against, plants, tunes = told.get("search_against", ""), told.get("search_plants", 0), told["search"] == "tune"
+    against, plants, tunes = attrs.get("search_against", ""), attrs.get("search_plants", 0), attrs["search"] == "tune"
     if not bool(against) == bool(plants) == (more > 0):
         return "attribute `search_plants` is not of its coordinates"
     of_tunings = ("search_along_slopes", "search_least_margin", "search_steers", *LISTS)
-    if not tunes and (plants or told.get("search_margin", 0.0) or not told.keys().isdisjoint(of_tunings)):
+    if not tunes and (plants or attrs.get("search_margin", 0.0) or not attrs.keys().isdisjoint(of_tunings)):
         return "a tuning alone is held against something"
-    least = max(plants + SHORTEST if tunes else 1, told["cases_in_table"])
-    return "" if told["search_at_most"] >= least else "attribute `search_at_most` is less than its cases"
+    least = max(plants + SHORTEST if tunes else 1, attrs["cases_in_table"])
+    return "" if attrs["search_at_most"] >= least else "attribute `search_at_most` is less than its cases"
 
 
 def _why_not_asked(group: StoredGroup) -> str:
@@ -180,10 +187,10 @@ def _why_not_asked(group: StoredGroup) -> str:
 
 def _why_not_in(group: StoredGroup, chosen: Sequence[Stored]) -> str:
     """The reason why a coordinate that a search chooses cannot have its values, or so many of them."""
-    columns = [group.values(each.name) for each in chosen]
-    for each, values in zip(chosen, columns, strict=True):
-        if not ((values >= each.attributes["low"]) & (values <= each.attributes["high"])).all():
-            return f"variable `{each.name}` has a value that it cannot have"
+    columns = [group.values(variable.name) for variable in chosen]
+    for variable, values in zip(chosen, columns, strict=True):
+        if not ((values >= variable.attributes["low"]) & (values <= variable.attributes["high"])).all():
+            return f"variable `{variable.name}` has a value that it cannot have"
     if plants := group.attributes.get("search_plants", 0):
         order = np.lexsort(columns)
         new = np.any([np.diff(values[order]) != 0.0 for values in columns], axis=0)
@@ -209,35 +216,37 @@ def is_search(group: StoredGroup) -> bool:
 def search_of(group: StoredGroup) -> Search | None:
     """The search whose cases are a group's; its goal is a variable's name, and its plants are only counted. None where
     there is no search, or the group has only some of its cases."""
-    told: Mapping[str, Any] = group.attributes
-    if "search" not in told or group.shape("case")[0] < told["cases_in_table"]:
+    attrs: Mapping[str, Any] = group.attributes
+    if "search" not in attrs or group.shape("case")[0] < attrs["cases_in_table"]:
         return None
-    word, _, metric = str(told["search_goal"]).partition(" ")
+    word, _, metric = str(attrs["search_goal"]).partition(" ")
     parameters = [
-        SearchedParameter(each.path, each.attributes["low"], each.attributes["high"], STEPS[each.attributes["steps"]])
-        for each in group.role("coordinate")
-        if "low" in each.attributes
+        SearchedParameter(
+            variable.path, variable.attributes["low"], variable.attributes["high"], STEPS[variable.attributes["steps"]]
+        )
+        for variable in group.role("coordinate")
+        if "low" in variable.attributes
     ]
-    confirmation = _decoded(told, "search_confirmation", Confirmed)
+    confirmation = _decoded(attrs, "search_confirmation", Confirmed)
     return Search(
-        kind=told["search"],
+        kind=attrs["search"],
         metric=metric,
         largest=GOALS[word],
         parameters=tuple(parameters),
-        at_most=told["search_at_most"],
-        of=str(told.get("search_of", "")),
-        seed=told.get("search_seed", 0),
-        against=str(told.get("search_against", "")),
-        plants=((),) * int(told.get("search_plants", 0)),
-        drawn_with=told.get("search_drawn_with", 0),
-        margin=told.get("search_margin", 0.0),
-        least_margin=told.get("search_least_margin", 0.0),
-        steers=told.get("search_steers", 0) == 1,
-        judged=_decoded(told, "search_judged", Judged),
-        starts=_decoded(told, "search_starts", Starts),
-        fresh=((),) * sum(each.cases for each in confirmation[:1]),
+        at_most=attrs["search_at_most"],
+        of=str(attrs.get("search_of", "")),
+        seed=attrs.get("search_seed", 0),
+        against=str(attrs.get("search_against", "")),
+        plants=((),) * int(attrs.get("search_plants", 0)),
+        drawn_with=attrs.get("search_drawn_with", 0),
+        margin=attrs.get("search_margin", 0.0),
+        least_margin=attrs.get("search_least_margin", 0.0),
+        steers=attrs.get("search_steers", 0) == 1,
+        judged=_decoded(attrs, "search_judged", Judged),
+        starts=_decoded(attrs, "search_starts", Starts),
+        fresh=((),) * sum(confirmation_.cases for confirmation_ in confirmation[:1]),
         confirmation=confirmation[:1],
-        gradients="search_along_slopes" in told,
-        along_slopes=told.get("search_along_slopes", 0),
-        without_slopes=told.get("search_without_slopes", ""),
+        gradients="search_along_slopes" in attrs,
+        along_slopes=attrs.get("search_along_slopes", 0),
+        without_slopes=attrs.get("search_without_slopes", ""),
     )

@@ -134,7 +134,7 @@ def _attributes(attributes: dict[str, Any]) -> None:
 
 def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
     """Check that a variable's type and dimensions match its role. types: of all variables, in numpy's notation"""
-    kinds = {name: each[1] for name, each in types.items()}
+    kinds = {name: dtype[1] for name, dtype in types.items()}
     name, dims = variable.name, variable.dims
     wanted = OF_ROLES.get(variable.role, NUMBERS + WORDS)
     if kinds[name] not in wanted and types[name] not in wanted:
@@ -163,7 +163,7 @@ def _requirements(group: StoredGroup) -> None:
     count = group.shape("requirement")[0]
     if count and "met" not in group.variables:
         raise Unlike("variable `met` is missing or of another type")
-    told = group.variables["requirement"].attributes
+    attributes = group.variables["requirement"].attributes
     for name, types in (
         ("metric", str),
         ("comparison", str),
@@ -171,13 +171,13 @@ def _requirements(group: StoredGroup) -> None:
         ("share", float),
         ("confidence", float),
     ):
-        values = told.get(name, [])
+        values = attributes.get(name, [])
         values = values if isinstance(values, list) else [values]
-        if name in told and (len(values) != count or not all(isinstance(value, types) for value in values)):
+        if name in attributes and (len(values) != count or not all(isinstance(value, types) for value in values)):
             raise Unlike(f"attribute `{name}` of `requirement` is not of each")
         if name in ("share", "confidence") and not all(0.0 < value <= 1.0 for value in values if value == value):
             raise Unlike(f"attribute `{name}` of `requirement` is no share")
-    shares, confidences = (np.atleast_1d(told.get(name, [])) for name in ("share", "confidence"))
+    shares, confidences = (np.atleast_1d(attributes.get(name, [])) for name in ("share", "confidence"))
     for share, confidence in zip(shares, confidences, strict=False):
         if confidence == 1.0 or (confidence > 0.0 and not can_be_shown(share)):
             raise Unlike("a requirement asks for what no number of cases shows")
@@ -229,10 +229,10 @@ def _rises(values: np.ndarray) -> bool:
 
 def are_cases(group: StoredGroup, wanted: np.ndarray) -> np.ndarray:
     """True for each of these positions in the case table whose case is in the group."""
-    found = np.zeros(np.shape(wanted), bool)
+    are_there = np.zeros(np.shape(wanted), bool)
     for piece in blocks(group.shape("case")[0]):
-        found |= np.isin(wanted, group.stretch("case", piece.start, piece.stop))
-    return found
+        are_there |= np.isin(wanted, group.stretch("case", piece.start, piece.stop))
+    return are_there
 
 
 def _within(group: StoredGroup, name: str, low: int, high: int) -> None:

@@ -33,9 +33,14 @@ def read(group: StoredGroup) -> tuple[StepErrorLimit, ...]:
         raise Unlike(f"attribute `{ATTRIBUTE}` is no list of requirements")
     metrics = {variable.name for variable in group.role("metric")}
     out = []
-    for each in plain:
-        good = isinstance(each, dict) and all(type(each.get(name)) is kind for name, kind in FIELDS.items())
-        if not good or each["metric"] not in metrics or each["comparison"] not in ("<", "<=") or not each["limit"] > 0:
+    for entry in plain:
+        good = isinstance(entry, dict) and all(type(entry.get(name)) is kind for name, kind in FIELDS.items())
+        if (
+            not good
+            or entry["metric"] not in metrics
+            or entry["comparison"] not in ("<", "<=")
+            or not entry["limit"] > 0
+        ):
             raise Unlike(f"attribute `{ATTRIBUTE}` is no list of requirements")
-        out.append(StepErrorLimit(**{name: each[name] for name in FIELDS}))
+        out.append(StepErrorLimit(**{name: entry[name] for name in FIELDS}))
     return tuple(out)

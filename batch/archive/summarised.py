@@ -93,19 +93,19 @@ class CaseSummary:
         """The rows of a requirement, for all cases or for its design points, as plain numbers by names without
         `judged_`."""
         values = self.values
-        here = (values["judged_requirement"] == requirement) & ((values["judged_point"] < 0) == whole)
+        rows_wanted = (values["judged_requirement"] == requirement) & ((values["judged_point"] < 0) == whole)
         return [
             {name.removeprefix("judged_"): values[name][row].item() for name in VARIABLES if name.startswith("judged_")}
-            for row in np.flatnonzero(here)
+            for row in np.flatnonzero(rows_wanted)
         ]
 
 
-def write(parent: Any, found: CaseSummary) -> None:
+def write(parent: Any, summary: CaseSummary) -> None:
     """Write the group into an experiment's group of an open file."""
     node = parent.create_group(NAME, track_order=True)
-    node.attrs["cases"], node.attrs["limited"] = found.cases, found.limited
-    node.attrs["rows"], node.attrs["drawn"] = found.rows, found.drawn
-    tables.write(node, VARIABLES, found.values)
+    node.attrs["cases"], node.attrs["limited"] = summary.cases, summary.limited
+    node.attrs["rows"], node.attrs["drawn"] = summary.rows, summary.drawn
+    tables.write(node, VARIABLES, summary.values)
 
 
 def read(node: Any, group: StoredGroup) -> CaseSummary | None:
@@ -123,16 +123,16 @@ def read(node: Any, group: StoredGroup) -> CaseSummary | None:
         raise Unlike(f"attribute `limited` or `rows` of `{NAME}` is missing or of another type")
     if not isinstance(drawn, np.bool_):
         raise Unlike(f"attribute `drawn` of `{NAME}` is missing or of another type")
-    found = CaseSummary(int(cases), int(limited), rows, bool(drawn), values)
-    _check(found, group)
-    return found
+    summary = CaseSummary(int(cases), int(limited), rows, bool(drawn), values)
+    _check(summary, group)
+    return summary
 
 
-def _check(found: CaseSummary, group: StoredGroup) -> None:
+def _check(summary: CaseSummary, group: StoredGroup) -> None:
     """Check that counts are those of its cases, and that names and places exist in the group. Raises Unlike."""
-    values = found.values
+    values = summary.values
     for name in COUNTS:
-        _within(name, values[name], 0, found.cases)
+        _within(name, values[name], 0, summary.cases)
     none = values["finite"] == 0
     for name in ("cause_first", "judged_worst_case", "least_case", "most_case"):
         some = values[name][~none] if name in ("least_case", "most_case") else values[name]
@@ -146,17 +146,17 @@ def _check(found: CaseSummary, group: StoredGroup) -> None:
             raise Unlike(f"variable `{NAME}/{name}` names what it does not have")
     doubtful = values["cause_status"] == DOUBTFUL
     for some in (doubtful, ~doubtful):
-        _need("cause_cases", values["cause_cases"][some].sum() <= found.cases)
-    overflows = _check_metrics(found)
-    _check_judged(found, group, overflows=overflows)
+        _need("cause_cases", values["cause_cases"][some].sum() <= summary.cases)
+    overflows = _check_metrics(summary)
+    _check_judged(summary, group, overflows=overflows)
 
 
-def _check_metrics(found: CaseSummary) -> bool:
+def _check_metrics(summary: CaseSummary) -> bool:
     """Check that the counts of each metric include every case, and that its moments match its extremes; True where
     values are so far apart that their moments overflow. Raises Unlike."""
-    values = found.values
+    values = summary.values
     finite, least, most = values["finite"], values["least"], values["most"]
-    _need("finite", finite + values["infinite"] + values["unknown"] == found.cases)
+    _need("finite", finite + values["infinite"] + values["unknown"] == summary.cases)
     some = finite > 0
     for name in ("least", "most", "mean", "variance"):
         _need(name, np.isnan(values[name][finite < (2 if name == "variance" else 1)]))
@@ -165,35 +165,38 @@ def _check_metrics(found: CaseSummary) -> bool:
     _need("least", least[some] <= most[some])
     with np.errstate(over="ignore"):
         span, near = most - least, ROUNDING * np.maximum(np.abs(least), np.abs(most))
-        sums, squares = (np.isfinite(power * found.cases) for power in (span, span * (span * found.cases)))
+        sums, squares = (np.isfinite(power * summary.cases) for power in (span, span * (span * summary.cases)))
         _need("mean", ((least - near <= values["mean"]) & (values["mean"] <= most + near))[some & sums])
         _need("variance", ((values["variance"] >= 0.0) & (values["variance"] <= span * span))[(finite > 1) & squares])
     _need("variance", ~(values["variance"] < 0.0))
     return not squares[some].all()
 
 
-def _check_judged(found: CaseSummary, group: StoredGroup, *, overflows: bool) -> None:
+def _check_judged(summary: CaseSummary, group: StoredGroup, *, overflows: bool) -> None:
     """Check that each requirement has a row for all cases, and one over a share of cases also for each design point.
     Raises Unlike."""
-    values = found.values
+    values = summary.values
     required = group.shape("requirement")[0] if "requirement" in group.variables else 0
-    of, at, cases = (values[f"judged_{name}"] for name in ("requirement", "point", "cases"))
-    _within("judged_requirement", of, 0, required - 1)
-    _within("judged_point", at, -1, len(values["point"]) - 1)
-    _within("judged_cases", cases, 1, found.cases)
+    requirement_numbers, point_numbers, cases = (values[f"judged_{name}"] for name in ("requirement", "point", "cases"))
+    _within("judged_requirement", requirement_numbers, 0, required - 1)
+    _within("judged_point", point_numbers, -1, len(values["point"]) - 1)
+    _within("judged_cases", cases, 1, summary.cases)
     _need("judged_missed", values["judged_missed"] + values["judged_unknown"] <= cases)
     _need("judged_no_value", values["judged_no_value"] <= values["judged_unknown"])
     _need("judged_deviation", ~(values["judged_deviation"] < 0.0))
     if not overflows:
         for name in ("judged_mean", "judged_deviation"):
             _need(name, ~np.isinf(values[name]))
-    _need("judged_point", len(set(zip(of.tolist(), at.tolist(), strict=True))) == len(of))
-    _need("judged_requirement", np.bincount(of[at < 0], minlength=required) == 1)
-    _need("judged_cases", cases[at < 0] == found.cases)
+    _need(
+        "judged_point",
+        len(set(zip(requirement_numbers.tolist(), point_numbers.tolist(), strict=True))) == len(requirement_numbers),
+    )
+    _need("judged_requirement", np.bincount(requirement_numbers[point_numbers < 0], minlength=required) == 1)
+    _need("judged_cases", cases[point_numbers < 0] == summary.cases)
     if required:
         shares = np.atleast_1d(group.variables["requirement"].attributes.get("share", np.full(required, np.nan)))
-        parts = [int(cases[(of == number) & (at >= 0)].sum()) for number in range(required)]
-        _need("judged_cases", np.array(parts) == np.where(np.isnan(shares), 0, found.cases))
+        parts = [int(cases[(requirement_numbers == number) & (point_numbers >= 0)].sum()) for number in range(required)]
+        _need("judged_cases", np.array(parts) == np.where(np.isnan(shares), 0, summary.cases))
 
 
 def _need(name: str, sound: np.ndarray | bool) -> None:

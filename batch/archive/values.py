@@ -43,7 +43,7 @@ def values_of_cases(experiment: Experiment, layout: Layout, run: Run, id_head: b
         **{AT_LIMIT + path: share for path, share in run.at_limit.items()},
         **{EXCESS + path: most for path, most in run.excess.items()},
         **{EXTREME_AT + metric: number for metric, number in run.extreme_at.items()},
-        **{GRAPPLE + of: figure for of, figure in run.grapples.items()},
+        **{GRAPPLE + payload: figure for payload, figure in run.grapples.items()},
     }
     for role in ("limit", "excess", "extreme", "grapple"):  # by the free name
         values |= {variable.name: values[variable.key] for variable in layout.role(role)}

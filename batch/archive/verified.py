@@ -64,18 +64,18 @@ class Verified:
     step: float
 
 
-def write(parent: Any, found: Verified) -> None:
+def write(parent: Any, verified_metrics: Verified) -> None:
     """Write the group into an experiment's group of an open file."""
     node = parent.create_group(NAME, track_order=True)
-    node.attrs["order"] = found.order
-    node.attrs["step_s"] = found.step
+    node.attrs["order"] = verified_metrics.order
+    node.attrs["step_s"] = verified_metrics.step
     values = {
-        "verified_case": found.cases,
-        "verified_metric": np.array(found.metrics, dtype=object),
-        "half": found.half,
-        "quarter": found.quarter,
-        "instant": found.instant,
-        "missed": found.missed,
+        "verified_case": verified_metrics.cases,
+        "verified_metric": np.array(verified_metrics.metrics, dtype=object),
+        "half": verified_metrics.half,
+        "quarter": verified_metrics.quarter,
+        "instant": verified_metrics.instant,
+        "missed": verified_metrics.missed,
     }
     tables.write(node, VARIABLES, values)
 
@@ -90,8 +90,8 @@ def read(node: Any, group: StoredGroup) -> Verified | None:
     cases, metrics = values["verified_case"], tuple(map(str, values["verified_metric"].tolist()))
     if not len(cases) or not (np.diff(cases) > 0).all() or not are_cases(group, cases).all():
         raise Unlike("its verified cases are none of its cases")
-    there = {variable.name for variable in group.role("metric")}
-    if not metrics or len(set(metrics)) != len(metrics) or not there.issuperset(metrics):
+    metric_names = {variable.name for variable in group.role("metric")}
+    if not metrics or len(set(metrics)) != len(metrics) or not metric_names.issuperset(metrics):
         raise Unlike("its verified metrics are none of its metrics")
     instant = values["instant"]
     if not ((instant >= 0.0) & (instant < MOST)).all():

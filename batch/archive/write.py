@@ -84,14 +84,14 @@ class ArchiveWriter:
             self.abandon()
             raise
 
-    def put_signals(self, number: int, first: int, run: Run, kept: np.ndarray | None = None) -> None:
-        """Write the histories of some cases of an experiment: its recorded cases from the `first` one on. kept: a mask
-        of the cases of `run` that are recorded; None: all"""
+    def put_signals(self, number: int, first: int, run: Run, mask: np.ndarray | None = None) -> None:
+        """Write the histories of some cases of an experiment: its recorded cases from the `first` one on. mask:
+        the cases of `run` that are recorded; None: all"""
         group = self.groups[number]
-        last = first + (len(run.case) if kept is None else int(kept.sum()))
+        last = first + (len(run.case) if mask is None else int(mask.sum()))
         for variable in group.layout.role("signal"):
             values = run.signals[variable.key]
-            group.node[variable.name][first:last] = values if kept is None else values[kept]
+            group.node[variable.name][first:last] = values if mask is None else values[mask]
         self._sink.check()
 
     def case_values(self, number: int, run: Run) -> dict[str, Any]:
@@ -109,10 +109,10 @@ class ArchiveWriter:
         for variable in group.layout.variables:
             if variable.dims[0] == "case":
                 _put(group.node[variable.name], first, last, values[variable.name])
-        here = (group.part.kept >= first) & (group.part.kept < last)
+        recorded = (group.part.kept >= first) & (group.part.kept < last)
         for name, gathered in group.gathered.items():
-            own = values[name][group.part.kept[here] - first]
-            gathered[here] = own.astype(str) if own.dtype.kind == "S" else own
+            own = values[name][group.part.kept[recorded] - first]
+            gathered[recorded] = own.astype(str) if own.dtype.kind == "S" else own
         self._sink.check()
 
     def look_back(self, number: int) -> None:
@@ -122,19 +122,19 @@ class ArchiveWriter:
         archives unchanged.
         """
         group = self.groups[number]
-        for each in [*(each.name for each in group.layout.role("metric")), "status"]:
-            stored = group.node[each]
+        for variable_name in [*(variable.name for variable in group.layout.role("metric")), "status"]:
+            stored = group.node[variable_name]
             for rows in blocks(len(stored)):
                 stored[rows]
 
-    def put_verified(self, number: int, found: verified.Verified) -> None:
+    def put_verified(self, number: int, verified_metrics: verified.Verified) -> None:
         """Write the metrics from shorter steps for some cases of an experiment, in a group of its own."""
-        verified.write(self.groups[number].node, found)
+        verified.write(self.groups[number].node, verified_metrics)
         self._sink.check()
 
-    def put_summary(self, number: int, found: summarised.CaseSummary) -> None:
+    def put_summary(self, number: int, summary: summarised.CaseSummary) -> None:
         """Write the summary of all cases of an experiment, in a group of its own."""
-        summarised.write(self.groups[number].node, found)
+        summarised.write(self.groups[number].node, summary)
         self._sink.check()
 
     def finish(self) -> None:
@@ -174,15 +174,15 @@ class ArchiveWriter:
         layout = archive_layout.layout(part.experiment, len(part.rows), len(part.kept), part.single)
         early = {"until_shown": part.until_shown} if part.until_shown else {}
         put_attributes(node, {**layout.attributes, **early, "code_key": part.code})
-        made = {variable.name: _make(node, layout, variable) for variable in layout.variables}
+        datasets = {variable.name: _make(node, layout, variable) for variable in layout.variables}
         for variable in layout.variables:
-            put_attributes(made[variable.name], variable.code_key(part.results))
+            put_attributes(datasets[variable.name], variable.code_key(part.results))
         for variable in layout.role("dimension"):
-            made[variable.name].make_scale(variable.name)
+            datasets[variable.name].make_scale(variable.name)
         for variable in layout.variables:
             if variable.role != "dimension":
                 for axis, dim in enumerate(variable.dims):
-                    made[variable.name].dims[axis].attach_scale(made[dim])
+                    datasets[variable.name].dims[axis].attach_scale(datasets[dim])
         gathered = {
             variable.source: np.empty(len(part.kept), KINDS[variable.kind]) for variable in layout.role("recorded")
         }
@@ -199,7 +199,7 @@ class ArchiveWriter:
             group, {**about, "git_commit": commit, "git_dirty": changed, "defines": " ".join(self.plan.defines)}
         )
 
-        summed = any(each.part.summed for each in self.groups)
+        summed = any(group.part.summed for group in self.groups)
         tables: dict[str, tuple[Experiment, str]] = {}
         arrays: dict[str, np.ndarray] = {}
         keepers: dict[str, recipes.ArrayKeeper] = {}
@@ -253,9 +253,9 @@ def _put(dataset: Any, first: int, last: int, values: Any) -> None:
     if getattr(values, "dtype", np.dtype(object)).kind != "S":
         dataset[first:last] = values
         return
-    module, there = h5py(), dataset.id.get_space()
-    there.select_hyperslab((first,), (last - first,))
-    dataset.id.write(module.h5s.create_simple((last - first,)), there, values, module.h5t.py_create(values.dtype))
+    module, space = h5py(), dataset.id.get_space()
+    space.select_hyperslab((first,), (last - first,))
+    dataset.id.write(module.h5s.create_simple((last - first,)), space, values, module.h5t.py_create(values.dtype))
 
 
 def _write_rest(group: OpenGroup) -> None:
