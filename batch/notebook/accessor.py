@@ -77,7 +77,7 @@ class Accessor(Generic[Data]):
         share a dimension. Repeats are a dimension, and so is what decides the structure. Where there is no case it is
         not-a-number.
         """
-        wanted = [each for name in names for each in ([name] if isinstance(name, str) else name)]
+        wanted = [wanted for name in names for wanted in ([name] if isinstance(name, str) else name)]
         block = grid.to_grid(list(self._parts().values()), wanted)
         return block[names[0]] if len(names) == 1 and isinstance(names[0], str) else block
 
@@ -103,7 +103,10 @@ class Accessor(Generic[Data]):
         them. `units` of each says so. `sel`, `grid` and `frames` go on working."""
         units = {**(wanted or {}), **more}
         parts = self._parts()
-        known = {name: [each for each in units if quantities.named(data, each)] for name, data in parts.items()}
+        known = {
+            name: [known_name for known_name in units if quantities.named(data, known_name)]
+            for name, data in parts.items()
+        }
         for unit in units:
             if not any(unit in names for names in known.values()):
                 raise unknown_name(
@@ -111,7 +114,9 @@ class Accessor(Generic[Data]):
                 )
         return self._whole(
             {
-                name: quantities.in_units(data, {each: units[each] for each in known[name]} if units else None)
+                name: quantities.in_units(
+                    data, {known_name: units[known_name] for known_name in known[name]} if units else None
+                )
                 for name, data in parts.items()
             }
         )
@@ -185,14 +190,14 @@ class TreeAccessor(Accessor[xarray.DataTree]):
     """`data.met` of a DataTree: each question is put to each run, sweep or structure in it."""
 
     def _parts(self) -> dict[str, xarray.Dataset]:
-        found = {
+        datasets = {
             node.path.removeprefix(self._data.path.rstrip("/")) or "/": node.to_dataset()
             for node in self._data.subtree
             if name_of(node)
         }
-        if not found:
+        if not datasets:
             raise Problem(error("E389", "this DataTree is of no archive: nothing in it has an attribute `experiment`"))
-        return found
+        return datasets
 
     def _whole(self, parts: Mapping[str, xarray.Dataset]) -> xarray.DataTree:
         tree = xarray.DataTree.from_dict(dict(parts), name=self._data.name)

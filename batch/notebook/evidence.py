@@ -26,8 +26,8 @@ def table(path: Path, parts: Mapping[str, xarray.Dataset]) -> Any:
             if names[group.name] != group.count:
                 message = f"evidence is of all cases, and here are {names[group.name]:,} of {group.count:,}"
                 raise Problem(error("E388", message, help="ask the data as they were opened: `batch.open(FILE).met`"))
-        found = requirement_evidence(groups, path.name, several=len(by_run(file.groups)) > 1)
-        rows = [as_data(row) for row in found]
+        evidence = requirement_evidence(groups, path.name, several=len(by_run(file.groups)) > 1)
+        rows = [as_data(row) for row in evidence]
     held = {name: ("row", _column([row[name] for row in rows])) for name in FIELDS}
     return xarray.Dataset(held, coords={"row": range(len(rows))}).to_dataframe()
 

@@ -37,7 +37,7 @@ def frames(
     known: dict[str, None] = {}
     for name, data in parts.items():
         with experiment(path, data) as (file, group):
-            own = next(each for each in file.plan().experiments if each.name == group.name)
+            own = next(planned for planned in file.plan().experiments if planned.name == group.name)
             names = [link.name for link in own.structure.links]
             known |= dict.fromkeys(names)
             chosen = [link for link in links if link in names] if links else names
@@ -57,23 +57,23 @@ def _frames(
     q = _positions(data, own)
     instants = q[0] if q else _instants(data)
     dims, shape = instants.dims, instants.shape
-    found = places(group, path, data, _cases(data, instants))
+    case_places = places(group, path, data, _cases(data, instants))
     by_case = (-1, *(1,) * (len(shape) - 1)) if RECORDED in dims else ()
-    varied = {v.path: group.at(v.name, found).reshape(by_case) for v in group.role("coordinate")}
-    rows = [each.values for each in q]
+    varied = {v.path: group.at(v.name, case_places).reshape(by_case) for v in group.role("coordinate")}
+    rows = [joint_positions.values for joint_positions in q]
     values = parameters(own, varied)
     base = _base(data, own, instants, values)
     world = world_poses(own, values, rows, base)
     unknown = np.isnan(sum((*rows, *base.p), np.zeros(shape)))
     along = dims.index("time") if "time" in dims else None
     poses = [pose_variables(world[link], shape, along) for link in links]
-    kept: dict[str, Any] = {}
+    coordinates: dict[str, Any] = {}
     for name, array in instants.coords.items():
         if name in OWN:
-            told = {**array.attrs, "path": path_of(str(name), array.attrs)}
-            kept[f"coordinates.{name}"] = (array.dims, array.values, told)
+            attributes = {**array.attrs, "path": path_of(str(name), array.attrs)}
+            coordinates[f"coordinates.{name}"] = (array.dims, array.values, attributes)
         elif not _of_joints(array):
-            kept[str(name)] = array.variable
+            coordinates[str(name)] = array.variable
     out = xarray.Dataset(
         {
             "position": ((*dims, LINK, "axis"), _stacked([pose.position for pose in poses], unknown), TOLD["position"]),
@@ -83,7 +83,7 @@ def _frames(
                 TOLD["orientation"],
             ),
         },
-        coords={**kept, LINK: list(links), "axis": list("xyz"), "quaternion": list("wxyz")},
+        coords={**coordinates, LINK: list(links), "axis": list("xyz"), "quaternion": list("wxyz")},
         attrs=data.attrs,
     )
     out.encoding = {"source": str(path)}
@@ -107,19 +107,19 @@ def _all_recorded(data: xarray.Dataset, group: ArchiveGroup) -> None:
 def _positions(data: xarray.Dataset, own: Experiment) -> tuple[xarray.DataArray, ...]:
     """q of each moving joint, over the same dimensions, cases first; rad or m. Raises Problem E370."""
     units = {joint.name: "m" if joint.kind == "prismatic" else "rad" for joint in own.structure.moving}
-    found = {joint: _position(data, joint, unit) for joint, unit in units.items()}
-    lacking = [joint for joint, q in found.items() if q is None]
+    q_of_joint = {joint: _position(data, joint, unit) for joint, unit in units.items()}
+    lacking = [joint for joint, q in q_of_joint.items() if q is None]
     of_base = [name for name in OF_FREE_BASE if own.structure.free and name not in data]
     if lacking or of_base:
-        every = lacking and len(lacking) == len(found)
+        every = lacking and len(lacking) == len(q_of_joint)
         which = ", ".join([*([POSITION] if every else [f"{joint}.{POSITION}" for joint in lacking]), *of_base])
         message = f"the links of `{run_name(data)}` cannot be placed: {which} is not in this Dataset"
-        recorded = {channel for each in own.structure.record for channel in each.channels}
+        recorded = {channel for recording in own.structure.record for channel in recording.channels}
         helps = lacking_help(free=bool(of_base))
         if recorded.issuperset(f"{joint}.{POSITION}" for joint in lacking) and RECORDED not in data.coords:
             helps = NO_HISTORIES
         raise Problem(error("E370", message, help=helps))
-    alike: tuple[xarray.DataArray, ...] = xarray.broadcast(*(q for q in found.values() if q is not None))
+    alike: tuple[xarray.DataArray, ...] = xarray.broadcast(*(q for q in q_of_joint.values() if q is not None))
     return tuple(q.transpose(RECORDED, ..., missing_dims="ignore") for q in alike)
 
 

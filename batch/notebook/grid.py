@@ -37,7 +37,7 @@ def to_grid(parts: Sequence[xarray.Dataset], names: Sequence[str]) -> xarray.Dat
     if len(sweeps) > 1:
         helps = f"of one of them: `data.met.sel(run={sweeps[0]!r}).met.grid(...)`"
         raise Problem(error("E388", f"these are the cases of several: {', '.join(sweeps)}", help=helps))
-    known = [str(each) for data in parts for each in data if {CASE, RECORDED} & set(data[each].dims)]
+    known = [str(variable) for data in parts for variable in data if {CASE, RECORDED} & set(data[variable].dims)]
     if not names:
         names = list(dict.fromkeys(str(n) for data in parts for n in data if data[n].attrs.get("role") == "metric"))
     dims: dict[str, str] = {}
@@ -73,25 +73,29 @@ def _block(parts: Sequence[xarray.Dataset], name: str, dim: str, inner: Collecti
     axes, alike = _axes(columns)
     shape = tuple(len(axis.values) for axis in axes)
     if np.prod(shape, dtype=float) > max(SMALL, EMPTIEST * count):
-        told = " x ".join(f"{size} of {axis.path}" for size, axis in zip(shape, axes, strict=True))
+        sizes_text = " x ".join(f"{size} of {axis.path}" for size, axis in zip(shape, axes, strict=True))
         helps = "samples are points: plot them over `data[PATH]`, or choose fewer by `data.met.sel(...)`"
-        raise Problem(error("E388", f"{count:,} cases are no block of {told}", help=helps))
+        raise Problem(error("E388", f"{count:,} cases are no block of {sizes_text}", help=helps))
     places = np.ravel_multi_index([axis.codes for axis in axes], shape) if axes else np.zeros(count, np.int64)
     _each_once(parts, dim, places, columns)
     having = [data[name].transpose(dim, ...) for data in parts if name in data and data.sizes[dim]]
     inside = having[0].isel({dim: 0}, drop=True)
-    kept = np.concatenate([np.full(data.sizes[dim], name in data) for data in parts])
+    has_name = np.concatenate([np.full(data.sizes[dim], name in data) for data in parts])
     values = np.concatenate([array.values for array in having])
     cells = int(np.prod(shape, dtype=np.int64))
     if len(values) < cells:
         values = values.astype(object if values.dtype.kind not in "iubf" else np.result_type(values.dtype, np.float32))
     block = np.full((cells, *values.shape[1:]), np.nan if len(values) < cells else values[:1], dtype=values.dtype)
-    block[places[kept]] = values
+    block[places[has_name]] = values
     attributes = {path: column.attrs for path, column in columns.items()}
     labels: dict[str, Any] = {axis.path: (axis.path, axis.values, attributes[axis.path]) for axis in axes}
     beside = {path: (axis.path, values, attributes[path]) for axis in axes for path, values in axis.beside.items()}
     single = {path: ((), value, attributes[path]) for path, value in alike.items()}
-    own = {str(each): array for each, array in inside.coords.items() if set(array.dims) and each not in columns}
+    own = {
+        str(coordinate): array
+        for coordinate, array in inside.coords.items()
+        if set(array.dims) and coordinate not in columns
+    }
     return xarray.DataArray(
         block.reshape((*shape, *values.shape[1:])),
         dims=(*(axis.path for axis in axes), *inside.dims),
@@ -110,7 +114,9 @@ def _columns(parts: Sequence[xarray.Dataset], dim: str) -> dict[str, xarray.Data
         lacking = np.nan if first.dtype.kind in "iuf" else ""
         pieces = [
             np.full(data.sizes[dim], lacking) if held is None else held.values
-            for data, held in zip(parts, (_held(*each, path) for each in zip(parts, tables, strict=True)), strict=True)
+            for data, held in zip(
+                parts, (_held(*held_and_table, path) for held_and_table in zip(parts, tables, strict=True)), strict=True
+            )
         ]
         values = np.concatenate([piece if first.dtype.kind in "iuf" else piece.astype(str) for piece in pieces])
         out[path] = xarray.DataArray(values, dims=(dim,), attrs=first.attrs)
@@ -166,14 +172,14 @@ def _each_once(
     twice = np.flatnonzero(np.diff(places[order]) == 0)
     if not len(twice):
         return
-    one, other = order[twice[0]], order[twice[0] + 1]
+    place_a, other = order[twice[0]], order[twice[0] + 1]
     rows = np.concatenate([data[dim].values for data in parts])
-    told = [
-        f"{path} = {in_deck_unit([column.values[one]], column.attrs)[0]}"
+    at_parameters = [
+        f"{path} = {in_deck_unit([column.values[place_a]], column.attrs)[0]}"
         if column.dtype.kind in "iuf"
-        else f"{path} = {column.values[one]}"
+        else f"{path} = {column.values[place_a]}"
         for path, column in columns.items()
     ]
-    where = f"are both at {', '.join(told)}" if told else "differ in nothing that is varied here"
+    where = f"are both at {', '.join(at_parameters)}" if at_parameters else "differ in nothing that is varied here"
     helps = "choose some by `data.met.sel(...)`, one of them by `data.met.sel(case=[...])`"
-    raise Problem(error("E388", f"cases #{rows[one]} and #{rows[other]} {where}", help=helps))
+    raise Problem(error("E388", f"cases #{rows[place_a]} and #{rows[other]} {where}", help=helps))

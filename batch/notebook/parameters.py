@@ -17,14 +17,14 @@ def table(path: Path, data: xarray.Dataset, case: int) -> Any:
     Problem E389."""
     with experiment(path, data) as (file, group):
         [position] = places(group, path, data, np.array([case]))
-        found = cases.parameters(file, group, int(position))
-        own = next(each for each in file.plan().experiments if each.name == group.name)
+        rows = cases.parameters(file, group, int(position))
+        own = next(planned for planned in file.plan().experiments if planned.name == group.name)
     origins = {name: quantity.origin for name, quantity in own.parameters.items()}
-    columns: dict[str, list[Any]] = {key: [each[key] for each in found.values()] for key in ("value", "unit", "varies")}
-    columns["origin"] = [origins[name].kind for name in found]
-    columns["place"] = [str(origins[name].place or "") for name in found]
+    columns: dict[str, list[Any]] = {key: [row[key] for row in rows.values()] for key in ("value", "unit", "varies")}
+    columns["origin"] = [origins[name].kind for name in rows]
+    columns["place"] = [str(origins[name].place or "") for name in rows]
     held = {name: ("path", _column(values)) for name, values in columns.items()}
-    return xarray.Dataset(held, coords={"path": list(found)}).to_dataframe()
+    return xarray.Dataset(held, coords={"path": list(rows)}).to_dataframe()
 
 
 def _column(values: list[Any]) -> np.ndarray:

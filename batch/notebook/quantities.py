@@ -18,28 +18,28 @@ QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s
 """A number and its unit."""
 
 
-def number(given: Any, name: str, unit: str) -> float:
+def number(amount: Any, name: str, unit: str) -> float:
     """A value given for a variable, in the variable's unit: a number is taken directly, a text has its own unit. Raises
     Problem E386."""
-    if isinstance(given, xarray.DataArray) and given.ndim == 0 and given.dtype.kind in "iuf":
-        own, told = _measure(unit, name), str(given.attrs.get("units", unit))
-        measure = _measure(told, name)
+    if isinstance(amount, xarray.DataArray) and amount.ndim == 0 and amount.dtype.kind in "iuf":
+        own, own_unit = _measure(unit, name), str(amount.attrs.get("units", unit))
+        measure = _measure(own_unit, name)
         if not units.same(measure.dimension, own.dimension):
-            raise _wrong(f"`{name}` = {given.item()!r} is in {told or '1'}; it is in {unit or '1'}")
-        return float(given) if measure.scale == own.scale else float(given) * measure.scale / own.scale
-    if isinstance(given, int | float | np.integer | np.floating) and not isinstance(given, bool):
-        return float(given)
+            raise _wrong(f"`{name}` = {amount.item()!r} is in {own_unit or '1'}; it is in {unit or '1'}")
+        return float(amount) if measure.scale == own.scale else float(amount) * measure.scale / own.scale
+    if isinstance(amount, int | float | np.integer | np.floating) and not isinstance(amount, bool):
+        return float(amount)
     example = f'such as "0.5{"" if unit in ("", "1") else f" {unit}"}"'
-    if not isinstance(given, str):
-        raise _wrong(f"`{name}` = {given!r}: it must be a number", f"write a number, or a text {example}")
-    found = QUANTITY.fullmatch(given)
-    if found is None:
-        raise _wrong(f"`{name}` = {given!r} cannot be read", f"write a number and its unit, {example}")
-    measure, own = _measure(found[2], name), _measure(unit, name)
+    if not isinstance(amount, str):
+        raise _wrong(f"`{name}` = {amount!r}: it must be a number", f"write a number, or a text {example}")
+    match_ = QUANTITY.fullmatch(amount)
+    if match_ is None:
+        raise _wrong(f"`{name}` = {amount!r} cannot be read", f"write a number and its unit, {example}")
+    measure, own = _measure(match_[2], name), _measure(unit, name)
     if not units.same(measure.dimension, own.dimension):
-        which = f"is in {found[2]}" if found[2] else "has no unit"
-        raise _wrong(f"`{name}` = {given!r} {which}; it is in {unit or '1'}", f"write one {example}")
-    value = measure.to_si(float(found[1]))
+        which = f"is in {match_[2]}" if match_[2] else "has no unit"
+        raise _wrong(f"`{name}` = {amount!r} {which}; it is in {unit or '1'}", f"write one {example}")
+    value = measure.to_si(float(match_[1]))
     return value if own.scale == 1.0 else value / own.scale
 
 
@@ -48,8 +48,8 @@ def same_units(arrays: Mapping[str, xarray.DataArray], name: str) -> None:
     own = {path: str(array.attrs.get("units", "")) for path, array in arrays.items()}
     if len(set(own.values())) > 1:
         some = {unit: path.lstrip("/") for path, unit in reversed(own.items())}
-        told = " and in ".join(f"{unit or '1'} in `{path}`" for unit, path in reversed(some.items()))
-        raise _wrong(f"`{name}` is in {told}", f"ask one of them: `data[{next(reversed(some.values()))!r}].met`")
+        units_text = " and in ".join(f"{unit or '1'} in `{path}`" for unit, path in reversed(some.items()))
+        raise _wrong(f"`{name}` is in {units_text}", f"ask one of them: `data[{next(reversed(some.values()))!r}].met`")
 
 
 def in_units(data: xarray.Dataset, wanted: Mapping[str, str] | None) -> xarray.Dataset:
@@ -57,7 +57,7 @@ def in_units(data: xarray.Dataset, wanted: Mapping[str, str] | None) -> xarray.D
     recorded_case follow. Raises Problem E386."""
     changed: dict[Any, xarray.Variable] = {}
     for name, unit in (deck_units(data) if wanted is None else wanted).items():
-        changed |= {each: _converted(data[each].variable, name, unit) for each in named(data, name)}
+        changed |= {variable: _converted(data[variable].variable, name, unit) for variable in named(data, name)}
     coordinates = {name: variable for name, variable in changed.items() if name in data.coords}
     others = {name: variable for name, variable in changed.items() if name not in data.coords}
     return data.assign_coords(coordinates).assign(others)
@@ -65,7 +65,11 @@ def in_units(data: xarray.Dataset, wanted: Mapping[str, str] | None) -> xarray.D
 
 def named(data: xarray.Dataset, name: str) -> list[Any]:
     """The variables with a name, or with a path in the deck."""
-    return [each for each, array in data.variables.items() if name in (each, path_of(str(each), array.attrs))]
+    return [
+        variable
+        for variable, array in data.variables.items()
+        if name in (variable, path_of(str(variable), array.attrs))
+    ]
 
 
 def deck_units(data: xarray.Dataset) -> dict[str, str]:
@@ -79,11 +83,11 @@ def deck_units(data: xarray.Dataset) -> dict[str, str]:
 
 def in_deck_unit(values: Iterable[float], attributes: Mapping[str, Any]) -> list[str]:
     """Values of a variable in the deck's notation, to ten digits, which `number` reads back."""
-    unit, shown = str(attributes.get("units", "")), str(attributes.get("deck_unit", attributes.get("units", "")))
-    if not _known(unit) or not _known(shown):
-        unit = shown = ""
-    scale = parse_unit(shown or "1").scale / parse_unit(unit or "1").scale
-    return [f"{value / scale:.10g}{'' if shown in ('', '1') else f' {shown}'}" for value in values]
+    unit, deck_word = str(attributes.get("units", "")), str(attributes.get("deck_unit", attributes.get("units", "")))
+    if not _known(unit) or not _known(deck_word):
+        unit = deck_word = ""
+    scale = parse_unit(deck_word or "1").scale / parse_unit(unit or "1").scale
+    return [f"{value / scale:.10g}{'' if deck_word in ('', '1') else f' {deck_word}'}" for value in values]
 
 
 def _converted(variable: xarray.Variable, name: str, unit: str) -> xarray.Variable:

@@ -60,7 +60,7 @@ def selected(parts: Parts, wanted: Mapping[str, Any]) -> dict[str, xarray.Datase
     left = {path: _cut(data, dims[path], masks[path]) for path, data in parts.items()}
     if len(left) > 1:
         left = {path: data for path, data in left.items() if masks[path].any()} or left
-    return {path: _alone(data, wanted[CASE]) for path, data in left.items()} if _one(wanted) else left
+    return {path: _alone(data, wanted[CASE]) for path, data in left.items()} if _is_one_case(wanted) else left
 
 
 def _masks(
@@ -69,22 +69,22 @@ def _masks(
     """For each Dataset, a mask of the cases that match one condition."""
     if name == CASE and not isinstance(value, slice):
         return _named(parts, dims, value)
-    found = {path: variables[name] for path, variables in known.items() if name in variables}
-    if name == MET or (name in (FAILED, MISSED) and not found):
+    variables_named = {path: variables[name] for path, variables in known.items() if name in variables}
+    if name == MET or (name in (FAILED, MISSED) and not variables_named):
         return {path: _ended(data, dims[path], name, value) for path, data in parts.items()}
     out = {path: np.zeros(data.sizes[dims[path]], bool) for path, data in parts.items()}
-    if not found:
-        names = [each for path, data in parts.items() for each in _names(data, dims[path])]
+    if not variables_named:
+        names = [known_name for path, data in parts.items() for known_name in _names(data, dims[path])]
         raise unknown_name(list(parts.values()), name, "no parameter or metric", names)
-    same_units(found, name)
-    arrays = list(found.values())
+    same_units(variables_named, name)
+    arrays = list(variables_named.values())
     values = np.concatenate([array.values for array in arrays])
     if arrays[0].dtype.kind in "iuf":
         chosen = _numbers(values.astype(np.float64), value, name, arrays[0].attrs)
     else:
         chosen = _words(values.astype(str), value, name)
     ends = np.cumsum([len(array) for array in arrays])[:-1]
-    return out | dict(zip(found, np.split(chosen, ends), strict=True))
+    return out | dict(zip(variables_named, np.split(chosen, ends), strict=True))
 
 
 def _names(data: xarray.Dataset, dim: str) -> list[str]:
@@ -99,20 +99,20 @@ def _numbers(values: np.ndarray, wanted: Any, name: str, attributes: Mapping[str
         if wanted.step is not None:
             raise Problem(error("E386", f"`{name}`: a range of values has no step", help="`slice(first, last)`"))
         out = np.ones(len(values), bool)
-        for given, sign in ((wanted.start, 1.0), (wanted.stop, -1.0)):
-            if given is not None:
-                bound = number(given, name, unit)
+        for bound_wanted, sign in ((wanted.start, 1.0), (wanted.stop, -1.0)):
+            if bound_wanted is not None:
+                bound = number(bound_wanted, name, unit)
                 slack = CLOSE * abs(bound) if bound else ZERO * _largest(values)
                 slack = slack if np.isfinite(bound) else 0.0
                 out &= sign * values >= sign * bound - slack
         return out
     out = np.zeros(len(values), bool)
-    for given in _listed(wanted):
-        value = number(given, name, unit)
-        here = np.isclose(values, value, rtol=CLOSE, atol=0.0 if value else ZERO * _largest(values))
-        if not here.any():
-            raise _no_such(values, value, given, name, attributes)
-        out |= here
+    for wanted_value in _listed(wanted):
+        value = number(wanted_value, name, unit)
+        matching = np.isclose(values, value, rtol=CLOSE, atol=0.0 if value else ZERO * _largest(values))
+        if not matching.any():
+            raise _no_such(values, value, wanted_value, name, attributes)
+        out |= matching
     return out
 
 
@@ -120,13 +120,13 @@ def _words(values: np.ndarray, wanted: Any, name: str) -> np.ndarray:
     if isinstance(wanted, slice):
         raise Problem(error("E386", f"`{name}` is a word: it has no range", help="write a list of words"))
     out = np.zeros(len(values), bool)
-    for word in (str(_item(each)) for each in _listed(wanted)):
-        here = values == word
-        if not here.any():
+    for word in (str(_item(word_wanted)) for word_wanted in _listed(wanted)):
+        matching = values == word
+        if not matching.any():
             words = list(dict.fromkeys(values.tolist()))
             helps = [*did_you_mean(word, words), f"there are: {', '.join(words)}"]
             raise Problem(error("E387", f"no case has `{name}` = {word}", help=helps))
-        out |= here
+        out |= matching
     return out
 
 
@@ -134,17 +134,17 @@ def _largest(values: np.ndarray) -> float:
     return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
-def _no_such(values: np.ndarray, value: float, given: Any, name: str, attributes: Mapping[str, Any]) -> Problem:
+def _no_such(values: np.ndarray, value: float, wanted_value: Any, name: str, attributes: Mapping[str, Any]) -> Problem:
     """The error E387, with the nearest values to the one that no case has."""
     finite = distinct(values[np.isfinite(values)])
     nearest = np.sort(finite[np.argsort(np.abs(finite - value), kind="stable")[:NEAREST]])
-    unit, shown = (str(attributes.get(key, "")) for key in ("units", "deck_unit"))
+    unit, deck_word = (str(attributes.get(key, "")) for key in ("units", "deck_unit"))
     texts = in_deck_unit(nearest, attributes)
     helps = [f"nearest are: {', '.join(repr(text).replace(chr(39), chr(34)) for text in texts)}"] if texts else []
-    if not isinstance(given, str) and shown not in ("", unit):
+    if not isinstance(wanted_value, str) and deck_word not in ("", unit):
         helps.append(f"a number alone is in {unit or '1'}, as the values here are")
-    told = given if isinstance(given, str) else f"{value:g} {unit}".removesuffix(" 1").rstrip()
-    return Problem(error("E387", f"no case has `{name}` = {told}", help=helps))
+    value_text = wanted_value if isinstance(wanted_value, str) else f"{value:g} {unit}".removesuffix(" 1").rstrip()
+    return Problem(error("E387", f"no case has `{name}` = {value_text}", help=helps))
 
 
 def _named(parts: Parts, dims: Mapping[str, str], wanted: Any) -> dict[str, np.ndarray]:
@@ -154,12 +154,18 @@ def _named(parts: Parts, dims: Mapping[str, str], wanted: Any) -> dict[str, np.n
     every, every_id = np.concatenate(list(rows.values())), np.concatenate(ids)
     out = np.zeros(len(every), bool)
     where = ", ".join(dict.fromkeys(map(run_name, parts.values())))
-    for each in map(_item, _listed(wanted)):
-        each = int(each) if isinstance(each, float) and each.is_integer() else each  # as idxmin gives positions
-        text = f"#{int(each)}" if isinstance(each, int | np.integer) and not isinstance(each, bool) else each
+    for case_wanted in map(_item, _listed(wanted)):
+        case_wanted = (
+            int(case_wanted) if isinstance(case_wanted, float) and case_wanted.is_integer() else case_wanted
+        )  # as idxmin gives positions
+        text = (
+            f"#{int(case_wanted)}"
+            if isinstance(case_wanted, int | np.integer) and not isinstance(case_wanted, bool)
+            else case_wanted
+        )
         if not isinstance(text, str):
             helps = 'a position, 7; "#7"; or the beginning of a case_id'
-            raise Problem(error("E386", f"`{CASE}` = {each!r} names no case", help=helps))
+            raise Problem(error("E386", f"`{CASE}` = {case_wanted!r} names no case", help=helps))
         out[found_cases(text, every, every_id, where)] = True
     return dict(zip(rows, np.split(out, np.cumsum([len(row) for row in rows.values()])[:-1]), strict=True))
 
@@ -182,8 +188,8 @@ def _ended(data: xarray.Dataset, dim: str, name: str, wanted: Any) -> np.ndarray
     if name == FAILED:
         return np.asarray((data["status"].values != 0) == wanted)
     outcomes = data["met"].transpose(dim, ...).values.reshape(data.sizes[dim], -1)
-    found = (outcomes == 1).all(axis=1) if name == MET else (outcomes == 0).any(axis=1)
-    return np.asarray(found == wanted)
+    ended_so = (outcomes == 1).all(axis=1) if name == MET else (outcomes == 0).any(axis=1)
+    return np.asarray(ended_so == wanted)
 
 
 def _of_runs(parts: Parts, wanted: Any) -> dict[str, xarray.Dataset]:
@@ -204,7 +210,7 @@ def _cut(data: xarray.Dataset, dim: str, mask: np.ndarray) -> xarray.Dataset:
     return data.isel(keep)
 
 
-def _one(wanted: Mapping[str, Any]) -> bool:
+def _is_one_case(wanted: Mapping[str, Any]) -> bool:
     """True if one case is asked for by its name."""
     return CASE in wanted and not isinstance(wanted[CASE], slice) and _single(wanted[CASE])
 
@@ -216,17 +222,17 @@ def _alone(data: xarray.Dataset, name: Any) -> xarray.Dataset:
         raise Problem(error("E387", f"case {name!r} is none of those that are chosen by the other values"))
     if data.sizes.get(RECORDED) == 0:
         data = data.drop_dims(RECORDED)
-    return data.isel({each: 0 for each in (CASE, RECORDED) if each in data.dims})
+    return data.isel({dim: 0 for dim in (CASE, RECORDED) if dim in data.dims})
 
 
 def _listed(wanted: Any) -> Sequence[Any]:
     every = [wanted] if _single(wanted) else list(wanted)
-    return [each.item() if isinstance(each, np.ndarray) and each.ndim == 0 else each for each in every]
+    return [element.item() if isinstance(element, np.ndarray) and element.ndim == 0 else element for element in every]
 
 
-def _item(given: Any) -> Any:
+def _item(element: Any) -> Any:
     """The value in an array of no dimensions, and anything else unchanged."""
-    return given.item() if isinstance(given, xarray.DataArray) and given.ndim == 0 else given
+    return element.item() if isinstance(element, xarray.DataArray) and element.ndim == 0 else element
 
 
 def _single(wanted: Any) -> bool:

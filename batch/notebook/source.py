@@ -22,9 +22,9 @@ def file_of(data: xarray.Dataset | xarray.DataTree) -> Path:
     """The file that was opened. Raises Problem E389 where it is not known any more, as after `where` and `merge`."""
     root = data.root if isinstance(data, xarray.DataTree) else data
     known = [root.encoding.get(SOURCE), *(array.encoding.get(SOURCE) for array in data.variables.values())]
-    for found in known:
-        if isinstance(found, str | os.PathLike):
-            return Path(found)
+    for source_path in known:
+        if isinstance(source_path, str | os.PathLike):
+            return Path(source_path)
     helps = '`data.encoding["source"] = "FILE.h5"` says it'
     raise Problem(error("E389", "it is not known from which archive these numbers are", help=helps))
 
@@ -60,17 +60,17 @@ def archive(path: Path, parts: Mapping[str, xarray.Dataset]) -> Iterator[Archive
 
 def places(group: ArchiveGroup, path: Path, data: xarray.Dataset, cases: np.ndarray) -> np.ndarray:
     """Positions in the archive of cases of a Dataset. Raises Problem E389 where they are other cases there."""
-    found = positions(group.values(CASE), cases)
-    if found is None:
+    case_places = positions(group.values(CASE), cases)
+    if case_places is None:
         raise _changed(path)
     for dim, name in ((CASE, "case_id"), (RECORDED, f"{PREFIX}case_id")):
         if name in data.variables and data[name].dims == data[dim].dims:
             own, ids = np.atleast_1d(data[dim].values), np.atleast_1d(data[name].values)
-            theirs = dict(zip(cases.tolist(), group.at("case_id", found).tolist(), strict=True))
+            theirs = dict(zip(cases.tolist(), group.at("case_id", case_places).tolist(), strict=True))
             mine = zip(own.tolist(), ids.astype(str).tolist(), strict=True)
             if any(theirs.get(case, case_id) != case_id for case, case_id in mine):
                 raise _changed(path)
-    return found
+    return case_places
 
 
 def _changed(path: Path) -> Problem:

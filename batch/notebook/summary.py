@@ -51,21 +51,21 @@ def _answered(data: xarray.Dataset) -> list[str]:
     try:
         with experiment(file_of(data), data) as (_, group):
             answer = SearchAnswer.of(group)
-            found = None if answer is None else answer_outcome(answer)
+            outcome = None if answer is None else answer_outcome(answer)
     except (Problem, OSError):
         return []
-    if found is None:
+    if outcome is None:
         return []
     return [
-        f"  {found.headline}",
-        *(f"  require {requirement.text}: {requirement.said}" for requirement in found.requirements),
+        f"  {outcome.headline}",
+        *(f"  require {requirement.text}: {requirement.said}" for requirement in outcome.requirements),
     ]
 
 
 def _cases(data: xarray.Dataset) -> str:
     if CASE in data.dims:
-        count, kept = data.sizes[CASE], data.sizes.get(RECORDED, 0)
-        return f"{count:,} case{'s' if count != 1 else ''}, {kept:,} with a history"
+        count, recorded = data.sizes[CASE], data.sizes.get(RECORDED, 0)
+        return f"{count:,} case{'s' if count != 1 else ''}, {recorded:,} with a history"
     if RECORDED in data.dims:
         return f"histories of {data.sizes[RECORDED]:,} cases"
     alone = next((name for name in (CASE, RECORDED) if name in data.coords), "")

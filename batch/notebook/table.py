@@ -64,15 +64,15 @@ def varied(data: xarray.Dataset, dim: str) -> dict[str, xarray.DataArray]:
             cases = varied(data, CASE)
             return {path: array.isel({CASE: places}).rename({CASE: RECORDED}) for path, array in cases.items()}
     roles = ("choice", "coordinate", "recorded")
-    found = {
+    by_path = {
         path_of(name, data[name].attrs): data[name]
         for name in map(str, data.variables)
         if data[name].dims == (dim,) and data[name].attrs.get("role") in roles and name != f"{PREFIX}case_id"
     }
     repeated = data.variables.get(REPEAT)
     if repeated is not None and repeated.dims == (dim,) and repeated.values.any():
-        found[REPEAT] = data[REPEAT]
-    return found
+        by_path[REPEAT] = data[REPEAT]
+    return by_path
 
 
 def positions(values: np.ndarray, wanted: np.ndarray) -> np.ndarray | None:
