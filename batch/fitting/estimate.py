@@ -134,14 +134,14 @@ class Fit:
 def noise_of(logs: LoggedRuns) -> np.ndarray:
     """The rms of the noise of each signal, by its second differences (von Neumann), [signal]; `LEAST_NOISE` of its
     spread at least, for of a smooth or filtered signal these tell nothing."""
-    found = []
+    noises = []
     for run in logs.runs:
         for number in range(len(run.channels)):
             measured = run.measured[run.channel_of == number]
             curved = np.diff(measured, 2)
             rms = float(np.sqrt(np.mean(curved**2) / 6.0)) if len(curved) else 0.0
-            found.append(max(rms, LEAST_NOISE * float(np.std(measured)), 1e-300))
-    return np.array(found)
+            noises.append(max(rms, LEAST_NOISE * float(np.std(measured)), 1e-300))
+    return np.array(noises)
 
 
 class Fitter:
@@ -180,7 +180,7 @@ class Fitter:
         ends = []
         for begin in (self.start, *self._elsewhere()):
             ends.append(self._minimised(begin))
-        values, cost, converged = min(ends, key=lambda each: each[1])
+        values, cost, converged = min(ends, key=lambda end: end[1])
         for _ in range(MOST_ROUNDS):
             before = self.weights
             self.weights = self._weighed(self._residuals(values[None, :])[0], settled=True)
@@ -195,8 +195,8 @@ class Fitter:
     def held(self) -> np.ndarray:
         """Whether the deck allows no value beside that of a parameter, the others staying, [path]."""
         moves = np.diag(1e-6 * self.size)
-        found = self.logs.refused(np.vstack([self.start + moves, self.start - moves]))
-        return np.array(np.all(found.reshape(2, -1), axis=0))
+        refused = self.logs.refused(np.vstack([self.start + moves, self.start - moves]))
+        return np.array(np.all(refused.reshape(2, -1), axis=0))
 
     def slopes_at_start(self, noise: np.ndarray) -> np.ndarray:
         """The slopes at the deck's values, of residuals weighted by the inverse of a noise, with the priors' rows last,
@@ -216,10 +216,10 @@ class Fitter:
     # Numbers of runs
 
     def _residuals(self, values: np.ndarray) -> np.ndarray:
-        found = self.logs.residuals(values)
+        residuals = self.logs.residuals(values)
         self.runs += len(values) * len(self.logs.runs)
         self._progress(self.runs)
-        return found
+        return residuals
 
     def _costs(self, residuals: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Half of the weighted squares, priors included, [case]; infinite where a case fails."""
@@ -265,7 +265,7 @@ class Fitter:
 
     def _size_of(self, place: int) -> float:
         values = np.tile(self.start, (2 * len(PROBED), 1))
-        values[:, place] += [*PROBED, *(-each for each in PROBED)]
+        values[:, place] += [*PROBED, *(-probe for probe in PROBED)]
         change = np.sum((self.weights * (self._residuals(values) - self._first)) ** 2, axis=1)
         change = np.where(np.isfinite(change), change, 0.0).reshape(2, -1).max(axis=0)
         large = np.flatnonzero(change >= 0.01 * np.count_nonzero(self.weights))
@@ -313,8 +313,8 @@ class Fitter:
         """The residuals, [number], and by how much each move changes them, [number, move]: the mean of differences near
         and far on both sides, without those that are refused or have an event on their way; not-a-number where all are.
         moves: of values, [move, path]"""
-        found = self._residuals(np.vstack([values, *(values + side * moves for side in SIDES)]))
-        middle, moved = found[0], found[1:].reshape(len(SIDES), len(moves), found.shape[1])
+        residuals = self._residuals(np.vstack([values, *(values + side * moves for side in SIDES)]))
+        middle, moved = residuals[0], residuals[1:].reshape(len(SIDES), len(moves), residuals.shape[1])
         changes = np.full((len(middle), len(moves)), np.nan)
         for place in range(len(moves)):
             sides = (moved[:, place] - middle) / np.array(SIDES)[:, None]
@@ -338,7 +338,7 @@ class Fitter:
         good = [place for place in np.argsort(costs, kind="stable")[: TRIED // 4] if np.isfinite(costs[place])]
         chosen = [np.zeros(len(self.start))]
         while good and len(chosen) <= STARTS:
-            apart = [min(float(np.linalg.norm(draws[place] - each)) for each in chosen) for place in good]
+            apart = [min(float(np.linalg.norm(draws[place] - draw)) for draw in chosen) for place in good]
             chosen.append(draws[good.pop(int(np.argmax(apart)))])
         return self._values_of(np.array(chosen[1:]).reshape(-1, len(self.start)))
 
@@ -364,7 +364,7 @@ class Fitter:
             if before - cost < CONVERGED:
                 known = singular > 1e-9 * singular[0]
                 along_each = [right[known] / singular[known, None] / scale, np.diag(1.0 / scale)]
-                sides = np.vstack([each * move for move in POLISHED for each in along_each])
+                sides = np.vstack([direction * move for move in POLISHED for direction in along_each])
                 before, (values, cost) = cost, self._best(values, cost, values + sides)
                 if before - cost < ENDED:
                     return values, cost, True

@@ -46,7 +46,7 @@ class Known:
     @property
     def worst(self) -> float:
         """The largest standard error of a parameter that is not held, in its size."""
-        free = np.array([each != "held" for each in self.verdict])
+        free = np.array([verdict != "held" for verdict in self.verdict])
         return float(np.max(self.deviation / self.size, where=free, initial=0.0))
 
 
@@ -91,11 +91,11 @@ def correlated(
 ) -> list[tuple[str, str, float]]:
     """Pairs of known parameters whose estimates are correlated by `least` or more, with the correlation."""
     deviation = np.sqrt(np.diag(covariance))
-    found = []
-    for one in range(len(paths)):
-        for other in range(one):
+    pairs = []
+    for first_place in range(len(paths)):
+        for other in range(first_place):
             with np.errstate(invalid="ignore", divide="ignore"):
-                share = float(covariance[one, other] / (deviation[one] * deviation[other]))
-            if abs(share) >= least and known.verdict[one] == known.verdict[other] == "known":
-                found.append((paths[other], paths[one], share))
-    return found
+                share = float(covariance[first_place, other] / (deviation[first_place] * deviation[other]))
+            if abs(share) >= least and known.verdict[first_place] == known.verdict[other] == "known":
+                pairs.append((paths[other], paths[first_place], share))
+    return pairs

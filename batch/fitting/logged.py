@@ -56,7 +56,7 @@ class LoggedRun:
     @classmethod
     def read(
         cls,
-        given: GivenRun,
+        run: GivenRun,
         file: str,
         starts: Mapping[str, tuple[float, str]],
         mapped: Sequence[MappedColumn] = (),
@@ -69,9 +69,9 @@ class LoggedRun:
 
         Raises Problem for a log that does not fit beside the run (E478), and for a parameter that cannot vary.
         """
-        log = read_log(file, described_columns(given.experiment), mapped, zero)
-        varied, _ = given.vary_most(_of_deck(starts))
-        logged = cls(given, file, log, tuple(starts), varied, zero=zero)
+        log = read_log(file, described_columns(run.experiment), mapped, zero)
+        varied, _ = run.vary_most(_of_deck(starts))
+        logged = cls(run, file, log, tuple(starts), varied, zero=zero)
         if not len(logged.measured):
             message = f"no number of `{file}` has one of the run beside it"
             begins = min((float(times[0]) for times, _ in log.signals.values() if len(times)), default=0.0) + zero
@@ -82,7 +82,7 @@ class LoggedRun:
     @classmethod
     def imagined(
         cls,
-        given: GivenRun,
+        run: GivenRun,
         starts: Mapping[str, tuple[float, str]],
         start: np.ndarray,
         measured: Collection[str],
@@ -97,25 +97,25 @@ class LoggedRun:
         """
         coordinates = sweep.cases.coordinates
         further = {
-            coordinate.path: (float(coordinate.values[0]), given.unit(coordinate.path) or "1")
+            coordinate.path: (float(coordinate.values[0]), run.unit(coordinate.path) or "1")
             for coordinate in coordinates
         }
-        varied, _ = given.vary_most({**_of_deck(starts), **further})
-        first, found = cls(given, sweep.name, MeasuredSignals({}, [], []), tuple(starts), varied), []
+        varied, _ = run.vary_most({**_of_deck(starts), **further})
+        first, motions = cls(run, sweep.name, MeasuredSignals({}, [], []), tuple(starts), varied), []
         for number in range(sweep.cases.count):
             fixed = {coordinate.path: float(coordinate.values[number]) for coordinate in coordinates}
             motion = first._with_fixed(f"{sweep.name} #{number}" if coordinates else sweep.name, fixed)
             if coordinates and not motion.is_allowed(start):
                 continue
-            signals = {name: each for name, each in motion.courses(start).items() if name in measured}
-            motion.log.signals.update({name: (each.times, each.values) for name, each in signals.items()})
-            found += [motion] if signals else []
-        if not found:
+            signals = {name: course for name, course in motion.courses(start).items() if name in measured}
+            motion.log.signals.update({name: (course.times, course.values) for name, course in signals.items()})
+            motions += [motion] if signals else []
+        if not motions:
             message = f"`{sweep.name}` records nothing that a log has, or fails at its start"
             if coordinates:
                 message = f"no case of `{sweep.name}` ends within limits and requirements, and records what a log has"
             raise Problem(error("E480", message, sweep.place, help="let it record what was logged"))
-        return tuple(found)
+        return tuple(motions)
 
     def _with_fixed(self, name: str, fixed: Mapping[str, float]) -> LoggedRun:
         """The same run with other values of `fixed` and an empty log of this name. The program is shared."""
@@ -126,9 +126,9 @@ class LoggedRun:
     def is_allowed(self, values: np.ndarray) -> bool:
         """Whether a case reaches its end, within the limits of all joints and with all requirements met. values: of
         `paths`, SI, [path]"""
-        found = engine.run(self._with(self.inputs(values[None, :])), record=False)
-        outside = any(each[0] > 0.0 for each in found.excess.values())
-        return bool(found.status[0] == engine.DONE and not outside and all(each[0] for each in found.met.values()))
+        result = engine.run(self._with(self.inputs(values[None, :])), record=False)
+        outside = any(excess[0] > 0.0 for excess in result.excess.values())
+        return bool(result.status[0] == engine.DONE and not outside and all(met[0] for met in result.met.values()))
 
     @property
     def name(self) -> str:
@@ -179,14 +179,18 @@ class LoggedRun:
     @cached_property
     def instants(self) -> np.ndarray:
         """The instants that are fitted, s, one channel after the other, [number]."""
-        found = [self.log.signals[each][0][rows] for each, rows in zip(self.channels, self._rows, strict=True)]
-        return np.concatenate(found) if found else np.empty(0)
+        stretches = [
+            self.log.signals[channel][0][rows] for channel, rows in zip(self.channels, self._rows, strict=True)
+        ]
+        return np.concatenate(stretches) if stretches else np.empty(0)
 
     @cached_property
     def measured(self) -> np.ndarray:
         """The measured numbers at `instants`, SI, [number]."""
-        found = [self.log.signals[each][1][rows] for each, rows in zip(self.channels, self._rows, strict=True)]
-        return np.concatenate(found) if found else np.empty(0)
+        stretches = [
+            self.log.signals[channel][1][rows] for channel, rows in zip(self.channels, self._rows, strict=True)
+        ]
+        return np.concatenate(stretches) if stretches else np.empty(0)
 
     @cached_property
     def channel_of(self) -> np.ndarray:
@@ -229,16 +233,16 @@ class LoggedRun:
         """The signals that one case computes, by channel. values: of `paths`, SI, [path]"""
         history = self._histories(self.inputs(values[None, :]))[0]
         courses, times = {}, self._times + self._delays(values[None, :])[0]
-        for column, each in enumerate(self.columns):
+        for column, column_about in enumerate(self.columns):
             finite = np.isfinite(history[:, column])
             if finite.any():
-                courses[each["channel"]] = ComputedChannel(times[finite], history[finite, column])
+                courses[column_about["channel"]] = ComputedChannel(times[finite], history[finite, column])
         return courses
 
     def cause(self, values: np.ndarray) -> str:
         """Why a case fails, in words. values: of `paths`, SI, [path]"""
-        found = engine.run(self._with(self.inputs(values[None, :])), record=False)
-        return found.cause[0]
+        result = engine.run(self._with(self.inputs(values[None, :])), record=False)
+        return result.cause[0]
 
     @property
     def _times(self) -> np.ndarray:
@@ -247,15 +251,17 @@ class LoggedRun:
 
     def _with(self, own: np.ndarray) -> engine.Prepared:
         cases = self.varied.experiment.cases
-        coordinates = tuple(replace(each, values=column) for each, column in zip(cases.coordinates, own.T, strict=True))
+        coordinates = tuple(
+            replace(coordinate, values=column) for coordinate, column in zip(cases.coordinates, own.T, strict=True)
+        )
         return self._prepared.with_cases(replace(cases, count=len(own), coordinates=coordinates))
 
     def _histories(self, own: np.ndarray) -> np.ndarray:
         """[case, row, column]; own: values of `used`, [case, path]"""
-        found = engine.run(self._with(own), record=True)
+        result = engine.run(self._with(own), record=True)
         signals = [recorded.name for recorded in self.given.experiment.structure.record]
         return np.concatenate(
-            [found.signals[signal].reshape(len(own), len(found.time), -1) for signal in signals], axis=2
+            [result.signals[signal].reshape(len(own), len(result.time), -1) for signal in signals], axis=2
         )
 
     def _at_instants(self, history: np.ndarray, delay: float) -> np.ndarray:
@@ -283,7 +289,7 @@ class LoggedRun:
 
 def _of_deck(starts: Mapping[str, tuple[float, str]]) -> dict[str, tuple[float, str]]:
     """The parameters that are none of a log."""
-    return {path: each for path, each in starts.items() if not path.startswith(DELAY)}
+    return {path: start for path, start in starts.items() if not path.startswith(DELAY)}
 
 
 @frozen
@@ -301,21 +307,23 @@ class LoggedRuns:
     @cached_property
     def signal_of(self) -> np.ndarray:
         """The number of each number's signal: a channel of one log, counted over all logs, [number]."""
-        first, found = 0, []
+        first, signal_numbers = 0, []
         for run in self.runs:
-            found.append(first + run.channel_of)
+            signal_numbers.append(first + run.channel_of)
             first += len(run.channels)
-        return np.concatenate(found)
+        return np.concatenate(signal_numbers)
 
     @cached_property
     def stretch_of(self) -> np.ndarray:
         """The number of each number's stretch of time, of which each log has as many, [number]."""
-        found = []
-        for number, each in enumerate(self.runs):
-            first, last = float(each.instants.min()), float(each.instants.max())
-            share = (each.instants - first) / max(last - first, 1e-300)
-            found.append(number * self.stretches + np.minimum(share * self.stretches, self.stretches - 1).astype(int))
-        return np.concatenate(found)
+        stretch_numbers = []
+        for number, run in enumerate(self.runs):
+            first, last = float(run.instants.min()), float(run.instants.max())
+            share = (run.instants - first) / max(last - first, 1e-300)
+            stretch_numbers.append(
+                number * self.stretches + np.minimum(share * self.stretches, self.stretches - 1).astype(int)
+            )
+        return np.concatenate(stretch_numbers)
 
     @property
     def stretches(self) -> int:
@@ -331,7 +339,7 @@ class LoggedRuns:
 
     def refused(self, values: np.ndarray) -> np.ndarray:
         """Whether a value is one that its parameter cannot have, [case]. values: SI, [case, path]"""
-        found = np.zeros(len(values), dtype=bool)
+        refused = np.zeros(len(values), dtype=bool)
         for run in self.runs:
-            found |= run.refused(values)
-        return found
+            refused |= run.refused(values)
+        return refused

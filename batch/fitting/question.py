@@ -94,11 +94,11 @@ class FitQuestion:
 
     def comparisons(self, values: np.ndarray, runs: Sequence[LoggedRun]) -> tuple[Comparison, ...]:
         """The residuals of each log with these values, SI, [path]."""
-        found = []
+        comparisons = []
         for run in runs:
             joints = [joint.name for joint in run.given.experiment.structure.joints]
-            found.append(compare(run.courses(values), run.columns, joints, run.log))
-        return tuple(found)
+            comparisons.append(compare(run.courses(values), run.columns, joints, run.log))
+        return tuple(comparisons)
 
     def identifiable(self) -> Known:
         """The knowledge that the logs can give of the parameters at the deck's values, from their noise alone."""
@@ -119,7 +119,7 @@ class FitQuestion:
                 own = np.array([noise[channel] for channel in motion.channels])
                 more = fitter.promised_slopes(LoggedRuns((motion,), self.paths), own)
                 judged.append((known(np.vstack([slopes, more]), fitter.size, fitter.held), motion))
-            best, motion = min(judged, key=lambda each: each[0].worst)
+            best, motion = min(judged, key=lambda promise: promise[0].worst)
             promises.append(Promise(motion, best, sweep, len(motions)))
         return tuple(promises)
 
@@ -165,7 +165,7 @@ def fit_question(
     Raises Problem for mistakes in these.
     """
     runs: dict[str | None, GivenRun] = {}
-    pairs = [_run_and_log(each) for each in (*logs, *predict)]
+    pairs = [_run_and_log(run_and_log) for run_and_log in (*logs, *predict)]
     for run, _ in pairs:
         if run not in runs:
             runs[run] = given_run(deck, run, include_dirs=include_dirs, defines=defines, settings=settings)
@@ -178,22 +178,24 @@ def fit_question(
     paths = _paths(estimates, every, delays)
     begins = dict(zeros)
     named = [path.removeprefix(DELAY) for path in (*begins, *paths) if path in begins or path.startswith(DELAY)]
-    unknown = next((each for each in named if each and each not in [log for _, log in pairs]), None)
+    unknown = next((file for file in named if file and file not in [log for _, log in pairs]), None)
     if unknown is not None:
         raise _wrong(f"`{unknown}` is no log of this command", "name it as it stands there")
     starts = {path: (0.0, "s") if path in delays else _start(path, every) for path in paths}
     mapped = [mapped_column(column) for column in columns]
     read = [LoggedRun.read(runs[run], log, starts, mapped, begins.get(log, begins.get("", 0.0))) for run, log in pairs]
     for path in paths:
-        if path not in delays and not any(path in each.used for each in read[: len(logs)]):
+        if path not in delays and not any(path in run.used for run in read[: len(logs)]):
             _check_varies(path, starts[path], first)
             raise _wrong(f"`{path}` has no effect in a run that has a log", "leave it out")
-    given = [_prior(prior, starts) for prior in priors]
-    twice = next((path for path, _ in given if [each for each, _ in given].count(path) > 1), None)
+    prior_pairs = [_prior(prior, starts) for prior in priors]
+    twice = next(
+        (path for path, _ in prior_pairs if [prior_path for prior_path, _ in prior_pairs].count(path) > 1), None
+    )
     if twice is not None:
         raise _wrong(f"`{twice}` has two priors", "give one")
     start = np.array([value for value, _ in starts.values()])
-    measured = {channel for each in read[: len(logs)] for channel in each.channels}
+    measured = {channel for run in read[: len(logs)] for channel in run.channels}
     return FitQuestion(
         tuple(read[: len(logs)]),
         tuple(read[len(logs) :]),
@@ -202,7 +204,7 @@ def fit_question(
         start,
         tuple("s" if path in delays else _owner(path, every).written_in(path)[0] for path in paths),
         tuple(unit for _, unit in starts.values()),
-        dict(given),
+        dict(prior_pairs),
     )
 
 
@@ -232,7 +234,7 @@ def _run_and_log(text: str) -> tuple[str | None, str]:
 def _paths(estimates: Sequence[str], runs: Sequence[GivenRun], delays: Sequence[str]) -> list[str]:
     """Paths without wildcards, each once: parameters of a form, or else names of definitions and values of that form.
     delays: those of logs. Raises Problem E480 where a form has none, or some that a fit cannot move"""
-    found = []
+    matching_paths = []
     for estimate in estimates:
         matching = [estimate]
         if any(letter in estimate for letter in "*?["):
@@ -249,8 +251,8 @@ def _paths(estimates: Sequence[str], runs: Sequence[GivenRun], delays: Sequence[
                 still = next(path for path in matching if path not in movable)
                 message = f"a fit cannot move all that is like `{estimate}`: not `{still}`"
                 raise _wrong(message, known_words("estimate of these", movable, len(movable)))
-        found += matching
-    return list(dict.fromkeys(found))
+        matching_paths += matching
+    return list(dict.fromkeys(matching_paths))
 
 
 def _names(run: GivenRun) -> list[str]:
@@ -260,19 +262,23 @@ def _names(run: GivenRun) -> list[str]:
 
 def _movable(paths: Sequence[str], runs: Sequence[GivenRun]) -> set[str]:
     """Those of these paths whose numbers can vary together in a run."""
-    found = set[str]()
+    movable = set[str]()
     for run in runs:
         known = ((path, next(explanations_of(run.compiled, path), None)) for path in paths)
-        values = {path: (each.value, each.unit) for path, each in known if each and isinstance(each.value, float)}
+        values = {
+            path: (explanation.value, explanation.unit)
+            for path, explanation in known
+            if explanation and isinstance(explanation.value, float)
+        }
         _, left_out = run.vary_most(values)
-        found |= values.keys() - set(left_out)
-    return found
+        movable |= values.keys() - set(left_out)
+    return movable
 
 
 def _listing(path: str, run: GivenRun) -> str:
     """The command that lists numbers of a run: those that begin as a path does, or else as the first one does."""
     heads = [name.partition(".")[0] for name in _names(run)]
-    head = next((each for each in heads if each == path.partition(".")[0]), heads[0])
+    head = next((head_ for head_ in heads if head_ == path.partition(".")[0]), heads[0])
     return f"`met explain {quoted(run.deck.file)} {head} --run {run.name}` lists those of `{head}`"
 
 
@@ -284,8 +290,8 @@ def _owner(path: str, runs: Sequence[GivenRun]) -> GivenRun:
 def _start(path: str, runs: Sequence[GivenRun]) -> tuple[float, str]:
     """The deck's value, SI, and its unit. Raises Problem for a path that has no number, or one each in several runs."""
     owner = _owner(path, runs)
-    found = {run.name: next(explanations_of(run.compiled, path), None) for run in runs}
-    values = {name: each.value for name, each in found.items() if each is not None}
+    explanations = {run.name: next(explanations_of(run.compiled, path), None) for run in runs}
+    values = {name: explanation.value for name, explanation in explanations.items() if explanation is not None}
     if not values:
         _check_varies(path, (0.0, "1"), owner)
     if not values or not all(isinstance(value, float) for value in values.values()):
@@ -322,7 +328,7 @@ def _prior(text: str, starts: Mapping[str, tuple[float, str]]) -> tuple[str, Pri
         raise _wrong(f"`{path}` is not estimated", f"`--estimate {path}`")
     try:
         measure = parse_unit(match["unit"].strip() or "1")
-        mean, deviation = (measure.to_si(float(match[each])) for each in ("mean", "deviation"))
+        mean, deviation = (measure.to_si(float(match[part])) for part in ("mean", "deviation"))
     except ValueError:
         raise _wrong(f"`{text}` cannot be read", f"{_EXAMPLE}: two numbers, and a unit") from None
     if not same(measure.dimension, parse_unit(starts[path][1]).dimension):

@@ -50,17 +50,17 @@ def column_doubts(pairs: Mapping[str, Pair], kinds: Mapping[str, tuple[str, str]
     they are but for noise"""
     pairs = {name: pair for name, pair in pairs.items() if len(pair.instants) >= FEWEST}
     residuals = {name: _mean_square(pair.residual) for name, pair in pairs.items()}
-    found = []
+    doubts = []
     for name, pair in pairs.items():
         unlike = residuals[name] > UNLIKE * _mean_square(pair.measured)
         if unlike and (doubt := _column_doubt(name, pair, kinds[name][1], residuals[name], name in white)):
-            found.append(doubt)
+            doubts.append(doubt)
     names = [name for name in pairs if name not in white]
     for i, a in enumerate(names):
         for b in names[i + 1 :]:
             if kinds[a] == kinds[b]:
-                found += _exchanged(a, b, pairs, residuals)
-    return found
+                doubts += _exchanged(a, b, pairs, residuals)
+    return doubts
 
 
 def _column_doubt(name: str, pair: Pair, unit: str, now: float, white: bool) -> str:
@@ -70,7 +70,7 @@ def _column_doubt(name: str, pair: Pair, unit: str, now: float, white: bool) -> 
     square = _mean_square(course)
     scales = {} if white else SCALES | (ANGLES if "rad" in unit else {})
     left = {factor: _mean_square(pair.measured / factor - course) for factor in scales}
-    factor = min(left, key=lambda each: left[each], default=1.0)
+    factor = min(left, key=lambda way: left[way], default=1.0)
     if left and left[factor] <= HALVED * min(now, square):
         return f"`{name}` of the log fits {scales[factor]}: {_left(left[factor], now)}"
     times = math.sqrt(_mean_square(pair.measured) / square) if square else 1.0
@@ -85,9 +85,9 @@ def _column_doubt(name: str, pair: Pair, unit: str, now: float, white: bool) -> 
 
 def _exchanged(a: str, b: str, pairs: Mapping[str, Pair], residuals: Mapping[str, float]) -> list[str]:
     crossed = [Pair.of(pairs[x].instants, pairs[x].measured, pairs[y].course) for x, y in ((a, b), (b, a))]
-    if any(len(each.instants) < FEWEST for each in crossed):
+    if any(len(pair.instants) < FEWEST for pair in crossed):
         return []
-    left = [_mean_square(each.residual) for each in crossed]
+    left = [_mean_square(pair.residual) for pair in crossed]
     now, after = residuals[a] + residuals[b], sum(left)
     if after > HALVED * now or left[0] > residuals[b] or left[1] > residuals[a]:
         return []
@@ -110,17 +110,17 @@ def clock_doubts(pairs: Mapping[str, Pair]) -> list[str]:
     def share(delay: float = 0.0, rate: float = 0.0, jump: tuple[float, float] = (math.inf, 0.0)) -> float:
         """Geometric mean over the columns: one of which the model knows little does not hide the others. jump: an
         instant, s, and by how much later ones come earlier"""
-        found = []
+        residual_shares = []
         for pair in moving:
             instants = pair.instants - np.where(pair.instants > jump[0], jump[1], 0.0)
             residual = pair.measured - pair.course.at(instants / (1.0 + rate) - delay)
             residual = residual[np.isfinite(residual)]
             if 2 * len(residual) < len(pair.instants):
                 return math.inf
-            found.append(_mean_square(residual) / float(np.var(pair.measured)) + NOTHING)
-        return float(np.exp(np.mean(np.log(found))))
+            residual_shares.append(_mean_square(residual) / float(np.var(pair.measured)) + NOTHING)
+        return float(np.exp(np.mean(np.log(residual_shares))))
 
-    now, (delay, late), (rate, fast) = share(), _best(share, LATEST), _best(lambda each: share(rate=each), FASTEST)
+    now, (delay, late), (rate, fast) = share(), _best(share, LATEST), _best(lambda trial: share(rate=trial), FASTEST)
     longest = max((pair.instants for pair in moving), key=len)
     usual, gaps = gaps_of(max((pair.instants for pair in pairs.values()), key=len))
     jumps = [(instant, length - usual) for instant, length in gaps]
@@ -151,11 +151,11 @@ def gaps_of(instants: np.ndarray) -> tuple[float, tuple[tuple[float, float], ...
 def _best(score: Callable[[float], float], largest: float) -> tuple[float, float]:
     """The number up to `largest`, of either sign, with the lowest score, and its score."""
     grid = np.linspace(-largest, largest, 101)
-    at = float(grid[int(np.argmin([score(each) for each in grid]))])
+    lowest = float(grid[int(np.argmin([score(trial) for trial in grid]))])
     step = 2.0 * largest / 100.0
-    bounds = (max(at - step, -largest), min(at + step, largest))
-    found = optimize.minimize_scalar(score, bounds=bounds, method="bounded", options={"xatol": 1e-7})
-    return float(found.x), float(found.fun)
+    bounds = (max(lowest - step, -largest), min(lowest + step, largest))
+    optimum = optimize.minimize_scalar(score, bounds=bounds, method="bounded", options={"xatol": 1e-7})
+    return float(optimum.x), float(optimum.fun)
 
 
 def _mean_square(numbers: np.ndarray) -> float:

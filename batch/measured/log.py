@@ -99,14 +99,14 @@ def read_log(
                 help=[f"it records {_listed(channels)}: name {what}s so", *more],
             )
         )
-    return replace(log, signals={name: (times - zero, each) for name, (times, each) in log.signals.items()})
+    return replace(log, signals={name: (times - zero, values) for name, (times, values) in log.signals.items()})
 
 
 def _csv_signals(
     path: str | Path, columns: Sequence[Mapping[str, str]], mapped: Sequence[MappedColumn]
 ) -> MeasuredSignals:
     table = _with_names(read_csv(str(path)), mapped, [TIME, *(column["channel"] for column in columns)])
-    changes = {each.channel: each for each in mapped}
+    changes = {mapping.channel: mapping for mapping in mapped}
     head = table.columns[0].place
     time_column = table.column(TIME)
     if time_column is None:
@@ -130,36 +130,36 @@ def _csv_signals(
     time = table.numbers(time_column, "s", parse_unit("s").dimension, Label(time_column.place, "times of the log"))
     table.rising(time_column, time)
     instants = _changed(time_column, time, changes)
-    found = {column["channel"]: _column(table, column, changes) for column in columns}
-    signals = {name: (instants, numbers) for name, numbers in found.items() if numbers is not None}
-    known, sources = {TIME, *found}, {each.column for each in mapped}
+    columns_read = {column["channel"]: _column(table, column, changes) for column in columns}
+    signals = {name: (instants, numbers) for name, numbers in columns_read.items() if numbers is not None}
+    known, sources = {TIME, *columns_read}, {mapping.column for mapping in mapped}
     used = [f"{column.name} [{column.unit or '1'}]" for column in table.columns if column.name in known]
     unused = [visible(column.name) for column in table.columns if column.name not in {*known, *sources}]
-    return MeasuredSignals(signals, [visible(each) for each in used], unused, time_column.place if signals else head)
+    return MeasuredSignals(signals, [visible(name) for name in used], unused, time_column.place if signals else head)
 
 
 def _with_names(table: CsvTable, mapped: Sequence[MappedColumn], channels: Sequence[str]) -> CsvTable:
     """The table with columns under the names of channels, too. channels: what the run records, and `time`."""
     head = table.columns[0].place
     added: list[CsvColumn] = []
-    for each in mapped:
-        if any(each.channel == one.name for one in added):
-            message = f"`{visible(each.channel)}` has two columns"
+    for mapping in mapped:
+        if any(mapping.channel == column_.name for column_ in added):
+            message = f"`{visible(mapping.channel)}` has two columns"
             raise Problem(error("E478", message, help="leave one of them out"))
-        if each.channel == TIME and each.factor < 0.0:
-            message = f"times of `{visible(each.column)}` would fall"
+        if mapping.channel == TIME and mapping.factor < 0.0:
+            message = f"times of `{visible(mapping.column)}` would fall"
             raise Problem(error("E478", message, head, help="the factor of `time` is above 0"))
-        if each.channel not in channels:
-            helps = did_you_mean(each.channel, channels) or f"it records {_listed(channels[1:])}"
-            raise Problem(error("E478", f"the run does not record `{visible(each.channel)}`", help=helps))
-        column = table.column(each.column)
+        if mapping.channel not in channels:
+            helps = did_you_mean(mapping.channel, channels) or f"it records {_listed(channels[1:])}"
+            raise Problem(error("E478", f"the run does not record `{visible(mapping.channel)}`", help=helps))
+        column = table.column(mapping.column)
         if column is None:
-            names = [visible(one.name) for one in table.columns]
-            message = f"`{table.file}` has no column `{visible(each.column)}`"
+            names = [visible(column_.name) for column_ in table.columns]
+            message = f"`{table.file}` has no column `{visible(mapping.column)}`"
             raise Problem(
-                error("E478", message, head, help=did_you_mean(each.column, names) or f"it has {_listed(names)}")
+                error("E478", message, head, help=did_you_mean(mapping.column, names) or f"it has {_listed(names)}")
             )
-        added.append(replace(column, name=each.channel, unit=column.unit if each.unit is None else each.unit))
+        added.append(replace(column, name=mapping.channel, unit=column.unit if mapping.unit is None else mapping.unit))
     return replace(table, columns=(*added, *table.columns))
 
 

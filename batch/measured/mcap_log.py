@@ -85,8 +85,8 @@ def mcap_signals(path: str | Path, columns: Sequence[Mapping[str, str]]) -> Meas
         helps = "`mcap recover` keeps what is in a file whose writer was killed"
         raise Problem(error("E478", f"`{path}` breaks off before its end, or is damaged", help=helps)) from None
     except (McapError, DecodeError, ValueError, TypeError, KeyError, RuntimeError, OverflowError) as reason:
-        said = visible(str(reason).split("\n")[0])[:120]
-        raise Problem(error("E478", f"`{path}` cannot be read as an MCAP file: {said}")) from None
+        reason_text = visible(str(reason).split("\n")[0])[:120]
+        raise Problem(error("E478", f"`{path}` cannot be read as an MCAP file: {reason_text}")) from None
     return log.found()
 
 
@@ -95,7 +95,7 @@ class _Log:
 
     def __init__(self, path: str, columns: Sequence[Mapping[str, str]]) -> None:
         self.path = path
-        self.units = {each["channel"]: each["unit"] for each in columns}
+        self.units = {column["channel"]: column["unit"] for column in columns}
         self.signals: dict[str, set[str]] = {}
         for column in columns:
             self.signals.setdefault("/" + column["signal"].replace(".", "/"), set()).add(column["channel"])
@@ -123,16 +123,16 @@ class _Log:
                     raise self.problem(f"has more than {MOST_BYTES >> 20:,} MiB of messages", "cut out what is shown")
                 plain = Chunk("", data, record.message_end_time, record.message_start_time, 0, len(data))
                 within = breakup_chunk(plain)
-            for each in within:
-                if isinstance(each, Schema):
-                    self.schemas[each.id] = each
-                elif isinstance(each, Channel):
-                    self.channels[each.id], self.topics[each.id] = each, each.topic
-                    self.readings.pop(each.id, None)
-                elif isinstance(each, Message):
-                    self.message(each)
-                elif isinstance(each, Metadata) and each.name == "met.case":
-                    self.prefixes.add(str(each.metadata.get("prefix", "")))
+            for mcap_record in within:
+                if isinstance(mcap_record, Schema):
+                    self.schemas[mcap_record.id] = mcap_record
+                elif isinstance(mcap_record, Channel):
+                    self.channels[mcap_record.id], self.topics[mcap_record.id] = mcap_record, mcap_record.topic
+                    self.readings.pop(mcap_record.id, None)
+                elif isinstance(mcap_record, Message):
+                    self.message(mcap_record)
+                elif isinstance(mcap_record, Metadata) and mcap_record.name == "met.case":
+                    self.prefixes.add(str(mcap_record.metadata.get("prefix", "")))
                     if len(self.prefixes) > 1:
                         helps = "export one: `met export ARCHIVE --case '#0' -o log.mcap`"
                         raise self.problem("has several cases, and a log is of one", helps)
@@ -175,50 +175,50 @@ class _Log:
         def scale(path: tuple[str, ...]) -> tuple[str, float] | None:
             if path not in scales:
                 names = (_own(signal, path), _of_joint(signal, path))
-                name = next((each for each in names if each in channels), None)
+                name = next((candidate for candidate in names if candidate in channels), None)
                 scales[path] = None if name is None else (name, self.scale(channel, path, name))
             return scales[path]
 
         def read(data: bytes) -> Iterator[tuple[str, float]]:
             for path, value in _numbers(decoder(data)):
-                found = scale(path)
-                if found is not None:
-                    yield found[0], value * found[1]
+                reading = scale(path)
+                if reading is not None:
+                    yield reading[0], value * reading[1]
 
         return read
 
     def scale(self, channel: Any, path: tuple[str, ...], name: str) -> float:
         """SI units of one of a field's. Raises Problem E478."""
         wanted = self.units[name]
-        told = channel.metadata.get(f"unit.{'.'.join(path)}", channel.metadata.get("unit"))
+        unit_text = channel.metadata.get(f"unit.{'.'.join(path)}", channel.metadata.get("unit"))
         topic = f"topic `{_short(channel.topic)}` of `{self.path}`"
-        if told is None:
+        if unit_text is None:
             if wanted == "1":
                 return 1.0
             helps = f"let the metadata of its channel have `unit`, as `{wanted}`"
             raise Problem(error("E478", f"{topic} tells no unit", help=helps))
         try:
-            measure = parse_unit(told)
+            measure = parse_unit(unit_text)
             scale = measure.scale
         except (ValueError, OverflowError, ZeroDivisionError, RecursionError):
-            raise Problem(error("E478", f"{topic}: `{_short(told)}` is not a unit")) from None
+            raise Problem(error("E478", f"{topic}: `{_short(unit_text)}` is not a unit")) from None
         if not same(measure.dimension, parse_unit(wanted).dimension):
-            found = text(measure.dimension)
-            message = f"{topic}: `{name}` is in {found}, and the run records it in {wanted}"
+            dimension = text(measure.dimension)
+            message = f"{topic}: `{name}` is in {dimension}, and the run records it in {wanted}"
             raise Problem(error("E478", message, help=f"write it in {wanted}"))
         return scale
 
     def joint_states(self, data: bytes) -> Iterator[tuple[str, float]]:
         """The numbers of a joint state; none for another message."""
         try:
-            told = json.loads(data)
+            state = json.loads(data)
         except RecursionError:
             raise self.problem("has a message that is too deep") from None
-        names = told.get("name") if isinstance(told, dict) else None
+        names = state.get("name") if isinstance(state, dict) else None
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
             return
         for part, signal in STATES.items():
-            values = told.get(part) or []
+            values = state.get(part) or []
             if not isinstance(values, list) or len(values) not in (0, len(names)):
                 message = f"has a joint state with {len(names)} names whose `{part}` is not as long"
                 raise self.problem(message, "a joint state has a number for each name, or an empty list")
@@ -239,9 +239,9 @@ class _Log:
             instants, numbers = instants[order], np.array(values)[order]
             last = np.append(instants[1:] > instants[:-1], True)  # among several at one instant, the last
             signals[channel] = (instants[last], numbers[last])
-        told = [f"{name} [{self.units[name]}]" for name in self.units if name in signals]
+        shown_channels = [f"{name} [{self.units[name]}]" for name in self.units if name in signals]
         since = [f"time since its first message, {begin / SECOND:.3f} s after 1970"] if begin else ["time [s]"]
-        return MeasuredSignals(signals, [*since, *map(visible, told)] if signals else [], unused)
+        return MeasuredSignals(signals, [*since, *map(visible, shown_channels)] if signals else [], unused)
 
     def problem(self, message: str, helps: str = "") -> Problem:
         return Problem(error("E478", f"`{self.path}` {message}", help=[helps] if helps else []))
@@ -270,11 +270,11 @@ def _of_joint(signal: str, path: tuple[str, ...]) -> str:
 def _numbers(message: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], float]]:
     """The floating-point numbers of a message by their fields; of messages within it, too."""
     for field in message.DESCRIPTOR.fields:
-        value, here = getattr(message, field.name), (*path, field.name)
+        value, inner_path = getattr(message, field.name), (*path, field.name)
         if isinstance(value, float):
-            yield here, value
-        elif hasattr(value, "DESCRIPTOR") and len(here) < DEEPEST:
-            yield from _numbers(value, here)
+            yield inner_path, value
+        elif hasattr(value, "DESCRIPTOR") and len(inner_path) < DEEPEST:
+            yield from _numbers(value, inner_path)
 
 
 def _uncompressed(chunk: Any) -> bytes:

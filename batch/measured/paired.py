@@ -54,12 +54,12 @@ def computed(group: ArchiveGroup, position: int, columns: Sequence[Mapping[str, 
     """The channels of a recorded case as far as they are finite. columns: those of `described_columns`, in order"""
     times = group.values("time")
     signals = list(dict.fromkeys(column["signal"] for column in columns))
-    found = np.hstack([group.signal(name, position).reshape(len(times), -1) for name in signals])
+    history = np.hstack([group.signal(name, position).reshape(len(times), -1) for name in signals])
     out = {}
-    for each, values in zip(columns, found.T.astype(np.float64), strict=True):
+    for column, values in zip(columns, history.T.astype(np.float64), strict=True):
         finite = np.isfinite(values)
         if finite.any():
-            out[each["channel"]] = ComputedChannel(times[finite], values[finite])
+            out[column["channel"]] = ComputedChannel(times[finite], values[finite])
     return out
 
 

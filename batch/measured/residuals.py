@@ -139,7 +139,7 @@ def compare(
     kinds = {column["channel"]: (column["signal"], column["unit"]) for column in columns}
     residuals = []
     for name, pair in pairs.items():
-        joint = next((each for each in joints if name.startswith(f"{each}.")), "")
+        joint = next((joint_name for joint_name in joints if name.startswith(f"{joint_name}.")), "")
         residuals.append(_residual(name, pair, courses, units, joint))
     usual = {name: pair.usual() for name, pair in pairs.items()}
     white = {residual.channel for residual in residuals if residual.white}
@@ -165,8 +165,12 @@ def compare(
 
 
 def _span(times: Sequence[np.ndarray]) -> tuple[float, float]:
-    found = [time for time in times if len(time)]
-    return (min(float(each[0]) for each in found), max(float(each[-1]) for each in found)) if found else (0.0, 0.0)
+    non_empty = [time for time in times if len(time)]
+    return (
+        (min(float(time[0]) for time in non_empty), max(float(time[-1]) for time in non_empty))
+        if non_empty
+        else (0.0, 0.0)
+    )
 
 
 def _residual(
@@ -202,9 +206,9 @@ def _whiteness(residual: np.ndarray) -> tuple[float, bool | None]:
     lags = min(LAGS, count // 4)
     if lags < 2 or power <= 1e-24 * float(residual @ residual):
         return 0.0, None
-    each = np.array([centred[lag:] @ centred[:-lag] / power for lag in range(1, lags + 1)])
-    statistic = count * (count + 2.0) * float(np.sum(each**2 / (count - np.arange(1, lags + 1))))
-    return float(each[0]), bool(stats.chi2.sf(statistic, lags) >= WHITE)
+    correlations = np.array([centred[lag:] @ centred[:-lag] / power for lag in range(1, lags + 1)])
+    statistic = count * (count + 2.0) * float(np.sum(correlations**2 / (count - np.arange(1, lags + 1))))
+    return float(correlations[0]), bool(stats.chi2.sf(statistic, lags) >= WHITE)
 
 
 # What a residual follows
@@ -227,7 +231,7 @@ def _features(
     slope, middle = own.rate, float(own.times.mean())
     q, qd, tau = (f"{joint}.{signal}" for signal in ("q", "qd", "tau"))
     why = "a unit, a gain, masses or a payload" if name == tau else "a unit, a gain, a constant of the motor"
-    found = [
+    features = [
         _Feature(f"{name} itself", why, "1", lambda t: own.at(t)[:, None]),
         _Feature(f"the rate of {name}", "a delay", "s", lambda t: -slope.at(t)[:, None]),
         _Feature("time", "a drift", f"{unit} per s", lambda t: t[:, None] - middle),
@@ -235,14 +239,14 @@ def _features(
     if tau in courses and name in (q, qd):
         load = courses[tau]
         words = "what yields under load"
-        found.append(_Feature(tau, words, f"{unit} per {units[tau]}", lambda t: load.at(t)[:, None]))
+        features.append(_Feature(tau, words, f"{unit} per {units[tau]}", lambda t: load.at(t)[:, None]))
     if name in (q, qd):
-        return found
+        return features
     if qd in courses:
         rate = courses[qd]
         faster = rate.rate
         still = STILL * float(np.abs(rate.values).max())
-        found += [
+        features += [
             _Feature(f"the sign of {qd}", "dry friction", unit, lambda t: _sign(rate.at(t), still)[:, None]),
             _Feature(qd, "viscous friction", f"{unit} per {units[qd]}", lambda t: rate.at(t)[:, None]),
             _Feature(
@@ -251,8 +255,8 @@ def _features(
         ]
     if q in courses and units[q] == "rad":
         angle = courses[q]
-        found.append(_Feature(f"sine and cosine of {q}", "gravity, payload", unit, lambda t: _turned(angle.at(t))))
-    return found
+        features.append(_Feature(f"sine and cosine of {q}", "gravity, payload", unit, lambda t: _turned(angle.at(t))))
+    return features
 
 
 def _sign(rates: np.ndarray, still: float) -> np.ndarray:
@@ -273,34 +277,41 @@ def _explained(pair: Pair, features: Sequence[_Feature]) -> tuple[FollowedCause,
         return None
     halves = np.arange(len(residual)) * count // len(residual) % 2
     numbers = {feature: feature.at(instants) for feature in features}
-    left = [feature for feature in features if _told(feature, numbers[feature], residual)]
+    left = [feature for feature in features if _varies_enough(feature, numbers[feature], residual)]
     chosen: list[_Feature] = []
     gains: list[tuple[float, tuple[str, ...]]] = []
     explained = 0.0
     while left:
-        shares = [_share(residual, np.hstack([numbers[one] for one in (*chosen, each)]), halves) for each in left]
+        shares = [
+            _share(residual, np.hstack([numbers[feature_] for feature_ in (*chosen, feature)]), halves)
+            for feature in left
+        ]
         best = int(np.argmax(shares))
         gain = shares[best] - explained
         if gain < LEAST_SHARE:
             break
         others = zip(left, shares, strict=True)
-        alike = tuple(each.what for each, share in others if each != left[best] and share - explained >= ALIKE * gain)
+        alike = tuple(
+            other.what for other, share in others if other != left[best] and share - explained >= ALIKE * gain
+        )
         gains.append((gain, alike))
         explained = shares[best]
         chosen.append(left.pop(best))
     if not chosen:
         return ()
     sizes = np.split(
-        _fitted(residual, np.hstack([numbers[each] for each in chosen]))[1:],
-        np.cumsum([numbers[each].shape[1] for each in chosen])[:-1],
+        _fitted(residual, np.hstack([numbers[feature] for feature in chosen]))[1:],
+        np.cumsum([numbers[feature].shape[1] for feature in chosen])[:-1],
     )
     return tuple(
-        FollowedCause(each.what, each.means, float(size[0]) if len(size) == 1 else None, each.unit, gain, alike)
-        for each, size, (gain, alike) in zip(chosen, sizes, gains, strict=True)
+        FollowedCause(
+            feature.what, feature.means, float(size[0]) if len(size) == 1 else None, feature.unit, gain, alike
+        )
+        for feature, size, (gain, alike) in zip(chosen, sizes, gains, strict=True)
     )
 
 
-def _told(feature: _Feature, numbers: np.ndarray, residual: np.ndarray) -> bool:
+def _varies_enough(feature: _Feature, numbers: np.ndarray, residual: np.ndarray) -> bool:
     """Whether a feature changes, and is no delay of more than what a log's clock is tried with."""
     if not np.isfinite(numbers).all() or np.ptp(numbers, axis=0).max() == 0.0:
         return False
@@ -319,8 +330,8 @@ def _fitted(residual: np.ndarray, numbers: np.ndarray) -> np.ndarray:
     scale = np.abs(numbers).max(axis=0)
     scale[scale == 0.0] = 1.0
     design = np.hstack([np.ones((len(residual), 1)), numbers / scale])
-    found = np.linalg.lstsq(design, residual, rcond=1e-10)[0]
-    return np.asarray(found / np.concatenate([[1.0], scale]))
+    coefficients = np.linalg.lstsq(design, residual, rcond=1e-10)[0]
+    return np.asarray(coefficients / np.concatenate([[1.0], scale]))
 
 
 def _share(residual: np.ndarray, numbers: np.ndarray, halves: np.ndarray) -> float:
@@ -329,6 +340,6 @@ def _share(residual: np.ndarray, numbers: np.ndarray, halves: np.ndarray) -> flo
     left = 0.0
     for half in (0, 1):
         fitted = _fitted(residual[halves != half], numbers[halves != half])
-        here = halves == half
-        left += float(np.sum((residual[here] - fitted[0] - numbers[here] @ fitted[1:]) ** 2))
+        in_half = halves == half
+        left += float(np.sum((residual[in_half] - fitted[0] - numbers[in_half] @ fitted[1:]) ** 2))
     return 1.0 - left / float(np.sum((residual - residual.mean()) ** 2))
