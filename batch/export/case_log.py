@@ -37,7 +37,7 @@ class LogLine:
 def log_lines(case: ExportedCase) -> list[LogLine]:
     """The log of a case in the order of time: its name, its end, and the requirements that it met."""
     group, position = case.group, case.position
-    status, cause = int(_at(group, "status", position)), str(_at(group, "cause", position))
+    status, cause = int(_value_in_case(group, "status", position)), str(_value_in_case(group, "cause", position))
     end = ends(case)
     out = [LogLine(0.0, "INFO", case_text(group, position))]
     if status == DONE:
@@ -45,10 +45,10 @@ def log_lines(case: ExportedCase) -> list[LogLine]:
     else:
         word = STATUS.get(status, "failed")
         out.append(LogLine(end, "ERROR", f"{word}: {cause.removeprefix(f'{word}: ')}"))
-    if "bed_limited" in group.variables and (ticks := int(_at(group, "bed_limited", position))):
+    if "bed_limited" in group.variables and (ticks := int(_value_in_case(group, "bed_limited", position))):
         text = f"the load motor of a bed was at its limit for {ticks:,} ticks: the run is not what the joint would do"
         out.append(LogLine(end, "WARNING", text))
-    if "warning" in group.variables and (warning := str(_at(group, "warning", position))):
+    if "warning" in group.variables and (warning := str(_value_in_case(group, "warning", position))):
         out.append(LogLine(end, "WARNING", warning))
     metrics = {variable.name: variable for variable in group.role("metric")}
     for text, outcome, name in _requirements(group, position):
@@ -61,10 +61,10 @@ def ends(case: ExportedCase) -> float:
     """The end of a case, s: after its last row; for a failed one, the instant of the failure, if its cause names it."""
     last = float(case.time[-1]) if len(case.time) else 0.0
     group, position = case.group, case.position
-    if int(_at(group, "status", position)) == FAILED:
-        told = FAILED_AT.match(str(_at(group, "cause", position)))
+    if int(_value_in_case(group, "status", position)) == FAILED:
+        match_ = FAILED_AT.match(str(_value_in_case(group, "cause", position)))
         try:
-            return max(last, float(told[1])) if told else last
+            return max(last, float(match_[1])) if match_ else last
         except ValueError:
             return last
     return last
@@ -88,12 +88,12 @@ def result(case: ExportedCase) -> tuple[tuple[MessageField, ...], dict[str, Any]
     ]
     data: dict[str, Any] = {
         "case": case.number,
-        "case_id": str(_at(group, "case_id", position)),
-        "status": STATUS.get(int(_at(group, "status", position)), "failed"),
-        "cause": str(_at(group, "cause", position)),
+        "case_id": str(_value_in_case(group, "case_id", position)),
+        "status": STATUS.get(int(_value_in_case(group, "status", position)), "failed"),
+        "cause": str(_value_in_case(group, "cause", position)),
         "valid_rows": len(case.time),
         "varied": [
-            {"name": v.path, "value": float(_at(group, v.name, position)), "unit": v.unit}
+            {"name": v.path, "value": float(_value_in_case(group, v.name, position)), "unit": v.unit}
             for v in group.role("coordinate")
         ],
         "requirements": [{"text": text, "outcome": outcome} for text, outcome, _ in _requirements(group, position)],
@@ -101,7 +101,7 @@ def result(case: ExportedCase) -> tuple[tuple[MessageField, ...], dict[str, Any]
     if metrics:
         names = {variable.name: variable.name.rpartition(".")[2] for variable in metrics}  # `metrics.q` is `q` here
         fields.append(MessageField("metrics", within=tuple(MessageField(name) for name in names.values())))
-        data["metrics"] = {field: float(_at(group, name, position)) for name, field in names.items()}
+        data["metrics"] = {field: float(_value_in_case(group, name, position)) for name, field in names.items()}
     return tuple(fields), data
 
 
@@ -109,7 +109,7 @@ def varied(case: ExportedCase) -> dict[str, str]:
     """Varied parameters of a case, in the deck's units, by path; choices of structure in words."""
     group, position = case.group, case.position
     numbers = {v.path: _value(group, v, position) for v in group.role("coordinate")}
-    return {**{v.path: str(_at(group, v.name, position)) for v in group.role("choice")}, **numbers}
+    return {**{v.path: str(_value_in_case(group, v.name, position)) for v in group.role("choice")}, **numbers}
 
 
 def _requirements(group: ArchiveGroup, position: int) -> list[tuple[str, str, str]]:
@@ -117,8 +117,8 @@ def _requirements(group: ArchiveGroup, position: int) -> list[tuple[str, str, st
     if "met" not in group.variables:
         return []
     texts = [str(text) for text in group.values("requirement")]
-    told = group.variables["requirement"].attributes.get("metric", [])
-    metrics: Sequence[str] = told if isinstance(told, list) else [str(told)]
+    judged = group.variables["requirement"].attributes.get("metric", [])
+    metrics: Sequence[str] = judged if isinstance(judged, list) else [str(judged)]
     metrics = metrics if len(metrics) == len(texts) else [""] * len(texts)
     outcomes = np.atleast_1d(group.at("met", [position])[0]).tolist()
     return [
@@ -128,8 +128,8 @@ def _requirements(group: ArchiveGroup, position: int) -> list[tuple[str, str, st
 
 
 def _value(group: ArchiveGroup, variable: Stored, position: int) -> str:
-    return value_text(float(_at(group, variable.name, position)), variable)
+    return value_text(float(_value_in_case(group, variable.name, position)), variable)
 
 
-def _at(group: ArchiveGroup, name: str, position: int) -> Any:
+def _value_in_case(group: ArchiveGroup, name: str, position: int) -> Any:
     return group.at(name, [position])[0]

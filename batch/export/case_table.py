@@ -42,9 +42,9 @@ class NumberOfUnit(float):
     text: str
 
     def __new__(cls, text: str) -> NumberOfUnit:
-        made = super().__new__(cls, text)
-        made.text = text if not text.lstrip("-").isdecimal() else f"{text}.0"
-        return made
+        number = super().__new__(cls, text)
+        number.text = text if not text.lstrip("-").isdecimal() else f"{text}.0"
+        return number
 
     def __repr__(self) -> str:
         return self.text
@@ -72,9 +72,9 @@ class CaseTable:
     def _column(self, field: TableColumn, group_of: np.ndarray, positions: np.ndarray) -> list[object]:
         out: list[object] = [None] * len(positions)
         for number in np.unique(group_of).tolist():
-            here = np.flatnonzero(group_of == number)
-            values = _values(self.groups[number], field, positions[here])
-            for place, value in zip(here.tolist(), values, strict=True):
+            in_group = np.flatnonzero(group_of == number)
+            values = _values(self.groups[number], field, positions[in_group])
+            for place, value in zip(in_group.tolist(), values, strict=True):
                 out[place] = value
         return out
 
@@ -172,5 +172,5 @@ def _outcomes(group: ArchiveGroup, text: str, positions: np.ndarray) -> list[obj
     texts = requirements.requirement_texts(group)
     if text not in texts:
         return [None] * len(positions)
-    found = requirements.outcomes(group, positions)[:, texts.index(text)]
-    return [OUTCOME.get(int(value)) for value in found]
+    outcomes = requirements.outcomes(group, positions)[:, texts.index(text)]
+    return [OUTCOME.get(int(value)) for value in outcomes]

@@ -109,8 +109,8 @@ class ExportFormat:
             message = f"{target} would be in SI: {self.title} has no other units"
             raise Problem(error("E376", message, help="`-o FILE.csv` can be in the deck's"))
         if request.table == "evidence" and (request.signals or request.named):
-            of = f"signal `{request.signals[0]}`" if request.signals else "case"
-            message = f"evidence is of requirements over all cases: its table has no {of}"
+            kind = f"signal `{request.signals[0]}`" if request.signals else "case"
+            message = f"evidence is of requirements over all cases: its table has no {kind}"
             raise Problem(error("E376", message, help="leave out `--evidence`, or `--signals` and `--case`"))
         if request.table == "metrics" and request.signals:
             message = f"signals are histories: a table of metrics has no `{request.signals[0]}`"
@@ -119,5 +119,5 @@ class ExportFormat:
 
 def find(name: str) -> ExportFormat:
     """The format of that name; its module is imported when it is first asked for. Raises KeyError."""
-    found: ExportFormat = import_module(FORMATS[name]).FORMAT
-    return found
+    export_format: ExportFormat = import_module(FORMATS[name]).FORMAT
+    return export_format

@@ -26,10 +26,10 @@ def check(campaign: Campaign, target: Path, *, histories: bool) -> None:
     """Refuse, before anything runs, a campaign that could not be exported. histories: True where they were asked for.
     Raises Problem E305, E323, E370-E376."""
     writer = find(str(format_of(target)))
-    kept = sum(len(part.kept) for part in campaign.parts)
+    recorded = sum(len(part.kept) for part in campaign.parts)
     writer.check_request(ExportRequest("histories" if histories else None), target)
     takes_histories = "metrics" not in writer.tables or ("histories" in writer.tables and campaign.cases == 1)
-    if not kept and not campaign.keep.later and (takes_histories or histories):
+    if not recorded and not campaign.keep.later and (takes_histories or histories):
         message = f"{target} would be empty: no histories are kept"
         helps = ["`--histories all` keeps them, and `--histories '#0'` those of a case"]
         if not any(part.experiment.structure.record for part in campaign.parts):

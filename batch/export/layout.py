@@ -112,7 +112,7 @@ def _plot(arms: Sequence[PosedArm], signal: str) -> dict[str, Any]:
                 {"value": value, "label": label, "color": colour, "enabled": True, "timestampMethod": "receiveTime"}
             )
             units.append("" if column.unit == "1" else pretty_unit(column.unit))
-    told = f"{signal} ({', '.join(dict.fromkeys(units))})" if any(units) else signal
+    title = f"{signal} ({', '.join(dict.fromkeys(units))})" if any(units) else signal
     return {
         "paths": paths,
         "xAxisVal": "timestamp",
@@ -122,7 +122,7 @@ def _plot(arms: Sequence[PosedArm], signal: str) -> dict[str, Any]:
         "showLegend": True,
         "legendDisplay": "floating",
         "showPlotValuesInLegend": False,
-        **_titled(told),
+        **_titled(title),
     }
 
 

@@ -80,9 +80,9 @@ def arms(file: ArchiveFile, cases: Sequence[ExportedCase], *, named: bool) -> li
     return [arm_of(plan, case, prefix if len(cases) > 1 else "") for case, prefix in zip(cases, prefixes, strict=True)]
 
 
-def too_many(cases: int, asked: str, helps: Sequence[str]) -> Diagnostic:
+def too_many(cases: int, names: str, helps: Sequence[str]) -> Diagnostic:
     """The error that more than `OVERLAID` cases were asked for."""
-    return error("E372", f"{cases:,} cases of `{asked}` are too many to show over one another", help=helps)
+    return error("E372", f"{cases:,} cases of `{names}` are too many to show over one another", help=helps)
 
 
 def write(file: ArchiveFile, arms: Sequence[PosedArm], output: Path) -> int:
@@ -104,7 +104,7 @@ def write(file: ArchiveFile, arms: Sequence[PosedArm], output: Path) -> int:
 
 def _about(writer: Writer, file: ArchiveFile, arms: Sequence[PosedArm]) -> None:
     """Write the origin of the file, before all else: a later export recognises by it that it may overwrite the file."""
-    told = {
+    about = {
         "archive": file.path.name,
         "deck": file.deck,
         "arm": arms[0].experiment.structure.arm,
@@ -112,7 +112,7 @@ def _about(writer: Writer, file: ArchiveFile, arms: Sequence[PosedArm]) -> None:
         "met": VERSION,
         **{name: str(value) for name, value in file.provenance.items()},
     }
-    writer.add_metadata(ABOUT, {plain(name): plain(value) for name, value in told.items()})
+    writer.add_metadata(ABOUT, {plain(name): plain(value) for name, value in about.items()})
     for arm in arms:
         case, group = arm.case, arm.case.group
         keys = {
@@ -146,22 +146,22 @@ class Channels:
         data = build_file_descriptor_set(kind).SerializeToString(deterministic=True)
         return self._channel(topic, kind.DESCRIPTOR.full_name, data, {})
 
-    def own(self, topic: str, name: str, fields: tuple[wire.MessageField, ...], told: dict[str, str]) -> int:
-        """The channel of a message type of MET's. told: metadata of the channel, such as units"""
+    def own(self, topic: str, name: str, fields: tuple[wire.MessageField, ...], metadata: dict[str, str]) -> int:
+        """The channel of a message type of MET's. metadata: of the channel, such as units"""
         if (name, fields) not in self._described:
             used = {known.removeprefix(f"{wire.PACKAGE}.") for known, _ in self._described.values()}
             numbered = (f"{name}_{number}" for number in itertools.count(2))  # of another structure of the sweep
-            unlike = next(each for each in itertools.chain([name], numbered) if each not in used)
+            unlike = next(candidate for candidate in itertools.chain([name], numbered) if candidate not in used)
             self._described[name, fields] = f"{wire.PACKAGE}.{unlike}", wire.schema(unlike, fields)
-        return self._channel(topic, *self._described[name, fields], told)
+        return self._channel(topic, *self._described[name, fields], metadata)
 
-    def _channel(self, topic: str, name: str, data: bytes, told: dict[str, str]) -> int:
+    def _channel(self, topic: str, name: str, data: bytes, metadata: dict[str, str]) -> int:
         if topic in self._topics:
             return self._topics[topic]
         if (name, data) not in self._schemas:
             self._schemas[name, data] = self._writer.register_schema(name, "protobuf", data)
         schema = self._schemas[name, data]
-        self._topics[topic] = self._writer.register_channel(topic, "protobuf", schema, told)
+        self._topics[topic] = self._writer.register_channel(topic, "protobuf", schema, metadata)
         return self._topics[topic]
 
 
@@ -186,37 +186,39 @@ def _messages(channels: Channels, arms: Sequence[PosedArm], number: int) -> Iter
     drawn = channels.foxglove(topics.topic(arm, "scene"), SceneUpdate)
     log = channels.foxglove("/log", Log)
     streams = [_stream(channels, arm, name, columns) for name, columns in topics.signals(case).items()]
-    said = log_lines(case)
+    lines = log_lines(case)
     update = scene.scene(arm, base, number > 0, scene.size(arms))
     yield 0, number, drawn, update.SerializeToString(deterministic=True)
-    yield from ((0, number, log, _log(case, arm, line)) for line in said if line.time == 0.0)
+    yield from ((0, number, log, _log(case, arm, line)) for line in lines if line.time == 0.0)
     times = nanoseconds(case.time)
     for first in range(0, len(times), BLOCK_ROWS):
-        here = slice(first, first + BLOCK_ROWS)
-        made = [(frames, _transforms(arm, base, times, here))]
-        made += [(stream.channel, wire.rows(stream.fields, stream.values[here])) for stream in streams]
-        for row, time in enumerate(times[here]):
-            for channel, messages in made:
+        block = slice(first, first + BLOCK_ROWS)
+        blocks = [(frames, _transforms(arm, base, times, block))]
+        blocks += [(stream.channel, wire.rows(stream.fields, stream.values[block])) for stream in streams]
+        for row, time in enumerate(times[block]):
+            for channel, messages in blocks:
                 yield time, number, channel, messages[row]
-    yield from ((_ns(line.time), number, log, _log(case, arm, line)) for line in said if line.time > 0.0)
+    yield from ((_ns(line.time), number, log, _log(case, arm, line)) for line in lines if line.time > 0.0)
     parts, data = result(case)
     units = {v.name.rpartition(".")[2]: v.unit for v in case.group.role("metric")}
-    told = {f"unit.{name}": unit for name, unit in units.items()}
-    channel = channels.own(topics.topic(arm, "result"), "result", parts, told)
-    yield _ns(said[-1].time), number, channel, wire.message(parts, data)
+    metadata = {f"unit.{name}": unit for name, unit in units.items()}
+    channel = channels.own(topics.topic(arm, "result"), "result", parts, metadata)
+    yield _ns(lines[-1].time), number, channel, wire.message(parts, data)
 
 
 def _stream(channels: Channels, arm: PosedArm, name: str, columns: Sequence[SignalColumn]) -> SignalStream:
     values = arm.case.signal(name)[:, [column.place for column in columns]]
     parts = topics.fields(columns)
     units = {".".join(column.parts or ("value",)): column.unit for column in columns}
-    one = len(set(units.values())) == 1
-    told = {"unit": columns[0].unit} if one else {f"unit.{path}": unit for path, unit in units.items()}
-    channel = channels.own(topics.topic(arm, name), name.replace(".", "_"), parts, {**told, "about": columns[0].about})
+    same_unit = len(set(units.values())) == 1
+    metadata = {"unit": columns[0].unit} if same_unit else {f"unit.{path}": unit for path, unit in units.items()}
+    channel = channels.own(
+        topics.topic(arm, name), name.replace(".", "_"), parts, {**metadata, "about": columns[0].about}
+    )
     return SignalStream(channel, parts, values)
 
 
-def _transforms(arm: PosedArm, base: str, times: Sequence[int], here: slice) -> list[bytes]:
+def _transforms(arm: PosedArm, base: str, times: Sequence[int], block: slice) -> list[bytes]:
     """The frames of all links at some rows."""
     from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
     from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -227,9 +229,9 @@ def _transforms(arm: PosedArm, base: str, times: Sequence[int], here: slice) -> 
     for link, pose in arm.poses.items():
         parent = arm.parents[link]
         names = (arm.prefix + parent if parent in arm.poses else base, arm.prefix + link)
-        moved.append((*names, pose.position[here].tolist(), pose.orientation[here].tolist()))
+        moved.append((*names, pose.position[block].tolist(), pose.orientation[block].tolist()))
     out = []
-    for row, time in enumerate(times[here]):
+    for row, time in enumerate(times[block]):
         stamp = _stamp(time)
         message = FrameTransforms()
         for parent, child, position, orientation in moved:
@@ -275,7 +277,7 @@ def _check_positions(campaign: Campaign, target: Path) -> None:
     E370."""
     for part in campaign.parts:
         structure = part.experiment.structure
-        recorded = {channel for each in structure.record for channel in each.channels}
+        recorded = {channel for recording in structure.record for channel in recording.channels}
         lacking = [f"{joint.name}.q" for joint in structure.moving if f"{joint.name}.q" not in recorded]
         if part.recorded and lacking:
             which = "q" if len(lacking) == len(structure.moving) else ", ".join(lacking)
@@ -307,24 +309,24 @@ class Mcap(ExportFormat):
         """Refuse a campaign that cannot be shown: positions are not recorded, or it has too many cases. Raises Problem
         E370, E372."""
         _check_positions(campaign, target)
-        kept = sum(len(part.kept) for part in campaign.parts)
-        if kept > OVERLAID:
+        recorded = sum(len(part.kept) for part in campaign.parts)
+        if recorded > OVERLAID:
             archive = quoted(target.with_suffix(".h5"))
             helps = (
                 "`--case '#0'` runs one alone, and `--histories '#0'` keeps the signals of one",
                 f"or run all, and choose then: `-o {archive}`, `met export {archive} --case '#0'`",
             )
-            raise Problem(too_many(kept, ", ".join(campaign.asked), helps))
+            raise Problem(too_many(recorded, ", ".join(campaign.asked), helps))
 
     def write_histories(
         self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: ExportRequest
     ) -> WrittenExport:
-        shown = arms(file, cases, named=request.named)
+        posed_arms = arms(file, cases, named=request.named)
         if not request.layout:
-            return WrittenExport(write(file, shown, target))
-        text, beside = layout.text(shown), layout.beside(target)
+            return WrittenExport(write(file, posed_arms, target))
+        text, beside = layout.text(posed_arms), layout.beside(target)
         check(beside, file.path, lambda path: path.read_text("utf-8", "replace") == text, force=request.force)
-        rows = write(file, shown, target)
+        rows = write(file, posed_arms, target)
         layout.write(beside, text)
         return WrittenExport(rows, beside)
 

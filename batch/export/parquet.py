@@ -64,7 +64,8 @@ def write_rows(file: ArchiveFile, table: CaseTable | EvidenceColumns, output: Pa
     arrow, parquet = pyarrow_here()
     kinds = {"float": arrow.float64(), "int": arrow.int64(), "str": arrow.string()}
     fields = [
-        arrow.field(field.name, kinds[field.kind], metadata=_told(field.unit, field.about)) for field in table.fields
+        arrow.field(field.name, kinds[field.kind], metadata=_metadata(field.unit, field.about))
+        for field in table.fields
     ]
     schema = arrow.schema(fields).with_metadata(_about(file, table.runs))
     with whole(output) as sink:
@@ -77,14 +78,14 @@ def write_rows(file: ArchiveFile, table: CaseTable | EvidenceColumns, output: Pa
 
 
 def _about(file: ArchiveFile, runs: Iterable[str]) -> dict[str, str]:
-    told = {
+    about = {
         "archive": file.path.name,
         "deck": file.deck,
         "runs": list(runs),
         "met": VERSION,
         "provenance": file.provenance,
     }
-    return {ABOUT: json.dumps(told)}
+    return {ABOUT: json.dumps(about)}
 
 
 def pyarrow_here() -> tuple[Any, Any]:
@@ -110,17 +111,17 @@ def _schema(
         if case.signal(column.variable).dtype != np.float32
     }
     fields = [arrow.field("run", arrow.string()), arrow.field("case", arrow.int64())]
-    for each in alike:
-        kind = arrow.string() if each.kind == "str" else arrow.float64()
-        fields.append(arrow.field(each.name, kind, metadata=_told(each.unit, each.about)))
-    fields.append(arrow.field("time", arrow.float64(), metadata=_told("s", "time")))
+    for field in alike:
+        kind = arrow.string() if field.kind == "str" else arrow.float64()
+        fields.append(arrow.field(field.name, kind, metadata=_metadata(field.unit, field.about)))
+    fields.append(arrow.field("time", arrow.float64(), metadata=_metadata("s", "time")))
     for column in columns:
         kind = arrow.float64() if column.path in double else arrow.float32()
-        fields.append(arrow.field(column.path, kind, metadata=_told(column.unit, column.about)))
+        fields.append(arrow.field(column.path, kind, metadata=_metadata(column.unit, column.about)))
     return arrow.schema(fields)
 
 
-def _told(unit: str, about: str) -> dict[str, str]:
+def _metadata(unit: str, about: str) -> dict[str, str]:
     return {"unit": unit, "about": about}
 
 
@@ -137,13 +138,13 @@ def _table(arrow: Any, schema: Any, case: ExportedCase, fields: Sequence[TableCo
     arrays: dict[str, Any] = {"time": case.time}
     signals = {name: case.signal(name) for name in dict.fromkeys(column.variable for column in case.columns)}
     arrays |= {column.path: signals[column.variable][:, column.place] for column in case.columns}
-    made = []
+    arrays_ = []
     for field in schema:
         if field.name in arrays:
-            made.append(arrow.array(arrays[field.name], field.type))
+            arrays_.append(arrow.array(arrays[field.name], field.type))
         else:
-            made.append(arrow.repeat(arrow.scalar(alike.get(field.name), field.type), rows))
-    return arrow.Table.from_arrays(made, schema=schema)
+            arrays_.append(arrow.repeat(arrow.scalar(alike.get(field.name), field.type), rows))
+    return arrow.Table.from_arrays(arrays_, schema=schema)
 
 
 class Parquet(ExportFormat):

@@ -71,24 +71,24 @@ def pick(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: 
     for group, _ in wanted:
         if group.name not in columns:
             panels(group, signals)  # raises for signals that this structure of the sweep does not have
-    found = []
+    exported = []
     for group in groups:
         if group.name in columns:
             numbers, valid, time = (group.values(name) for name in ("case", "n_valid", "time"))
             places = [place for other, place in wanted if other is group] if cases else group.recorded_positions
             for place in map(int, places):
                 rows = time[: valid[place]]
-                found.append(ExportedCase(group, place, int(numbers[place]), rows, columns[group.name]))
+                exported.append(ExportedCase(group, place, int(numbers[place]), rows, columns[group.name]))
     if cases:
-        order = {key: at for at, key in enumerate(wanted)}
-        return sorted(found, key=lambda case: order[case.group, case.position])
+        order = {key: place for place, key in enumerate(wanted)}
+        return sorted(exported, key=lambda case: order[case.group, case.position])
     ranks = {group.name: rank(names, group) for group in groups}
-    return sorted(found, key=lambda case: (ranks[case.group.name], case.number))
+    return sorted(exported, key=lambda case: (ranks[case.group.name], case.number))
 
 
 def rank(names: Sequence[str], group: ArchiveGroup) -> int:
     """The first of the names by which a group is asked for."""
-    return min(at for at, name in enumerate(names) if name in (group.name, group.sweep))
+    return min(place for place, name in enumerate(names) if name in (group.name, group.sweep))
 
 
 def _columns(groups: Sequence[ArchiveGroup], signals: Sequence[str]) -> dict[str, tuple[SignalColumn, ...]]:
@@ -100,11 +100,11 @@ def _columns(groups: Sequence[ArchiveGroup], signals: Sequence[str]) -> dict[str
         problems = []
         for group in groups:
             try:
-                found = panels(group, [name] if name else [])
+                signal_panels = panels(group, [name] if name else [])
             except Problem as problem:
                 problems.append(problem)
                 continue
-            for panel in found:
+            for panel in signal_panels:
                 key = (group.name, panel.variable)
                 known[key] = known.get(key) or _columns_of(group, group.variables[panel.variable])
                 out.setdefault(group.name, []).extend(known[key][place] for place in panel.columns)
@@ -118,7 +118,7 @@ def _columns_of(group: ArchiveGroup, variable: Stored) -> list[SignalColumn]:
     joints, components = group.joints(variable), group.components(variable)
     owners: list[tuple[str, ...]] = [(joint,) for joint in joints] or [()]
     inner: list[tuple[str, ...]] = [(component,) for component in components] or [()]
-    parts = [(*owner, *each) for owner in owners for each in inner]
+    parts = [(*owner, *component) for owner in owners for component in inner]
     units = [
         variable.units_by_joint[place // len(inner)] if variable.units_by_joint else variable.unit
         for place in range(len(parts))

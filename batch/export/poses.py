@@ -61,7 +61,7 @@ def arm_of(plan: Plan, case: ExportedCase, prefix: str) -> PosedArm:
     not tell the arm."""
     group = case.group
     with reading(group.path):
-        experiment = next((each for each in plan.experiments if each.name == group.name), None)
+        experiment = next((experiment_ for experiment_ in plan.experiments if experiment_.name == group.name), None)
         if experiment is None:
             raise LookupError(group.name)
         varied = {v.path: group.at(v.name, [case.position])[0] for v in group.role("coordinate")}
@@ -80,11 +80,11 @@ def arm_of(plan: Plan, case: ExportedCase, prefix: str) -> PosedArm:
         world = world_poses(experiment, values, q, base)
         parents = {joint.child: joint.parent for joint in experiment.structure.joints}
         parents |= {BASE: ""} if BASE in world else {}
-        told = {variable.name for variable in group.role("signal")}
+        signal_names = {variable.name for variable in group.role("signal")}
         for payload in experiment.structure.payloads:
             parents[payload.name] = "" if payload.flies else payload.link
             names = [f"payloads.{payload.name}.{part}" for part in ("position", "orientation")]
-            if payload.flies and told.issuperset(names):
+            if payload.flies and signal_names.issuperset(names):
                 world[payload.name] = free_pose(*(case.signal(name).astype(np.float64) for name in names))
         within = {name: compose(inverse(world.get(parents[name], HERE)), pose) for name, pose in world.items()}
         poses = {name: pose_variables(pose, len(case.time)) for name, pose in within.items()}
@@ -105,8 +105,8 @@ def positions(case: ExportedCase, joints: Sequence[str], *, free: bool = False) 
     """q of each of these joints by row, as one signal of all or a signal of each. Raises Problem E370: free, where what
     tells of a free base is missing too."""
     signals = {variable.name: variable for variable in case.group.role("signal")}
-    found = {joint: _position(case, joint, signals) for joint in joints}
-    missing = [joint for joint, q in found.items() if q is None]
+    q_of_joint = {joint: _position(case, joint, signals) for joint in joints}
+    missing = [joint for joint, q in q_of_joint.items() if q is None]
     of_base = [name for name in OF_FREE_BASE if free and name not in signals]
     if missing or of_base:
         every = missing and len(missing) == len(joints)
@@ -117,7 +117,7 @@ def positions(case: ExportedCase, joints: Sequence[str], *, free: bool = False) 
             f"`met export {quoted(case.group.path)} -o FILE.csv` needs no positions",
         )
         raise Problem(error("E370", message, help=helps))
-    return [q for q in found.values() if q is not None]
+    return [q for q in q_of_joint.values() if q is not None]
 
 
 def _position(case: ExportedCase, joint: str, signals: Mapping[str, Stored]) -> np.ndarray | None:

@@ -52,17 +52,17 @@ def scene(arm: PosedArm, root: str, ghost: bool, size: float) -> Any:
     grey = _colour(JOINTS, opacity)
     payloads = [payload for payload in structure.payloads if payload.name in arm.poses]
     bodies: list[Link | Payload] = [*structure.links, *payloads]
-    found = shapes(_numbers(arm, size), bodies)
+    shapes_of = shapes(_numbers(arm, size), bodies)
     if all(link.name != BASE for link in structure.links):
-        _draw(_entity(out, root, f"{arm.prefix}{BASE}"), found[BASE], grey, grey)
+        _draw(_entity(out, root, f"{arm.prefix}{BASE}"), shapes_of[BASE], grey, grey)
     for number, link in enumerate(bodies):
         entity = _entity(out, arm.prefix + link.name, arm.prefix + link.name)
         what = "payload" if isinstance(link, Payload) else "link"
-        told = {what: link.name, "mass": f"{arm.values.get(f'{head(link)}.mass', math.nan):g} kg"}
+        metadata = {what: link.name, "mass": f"{arm.values.get(f'{head(link)}.mass', math.nan):g} kg"}
         if drawn(link) and link.shape is not None:
-            told["shape"] = link.shape[0]
-        _draw(entity, found[link.name], _colour(LINKS[number % len(LINKS)], opacity), grey)
-        for key, value in told.items():
+            metadata["shape"] = link.shape[0]
+        _draw(entity, shapes_of[link.name], _colour(LINKS[number % len(LINKS)], opacity), grey)
+        for key, value in metadata.items():
             entity.metadata.add(key=key, value=plain(value))
     return out
 
@@ -84,9 +84,9 @@ def _entity(scene: Any, frame: str, name: str) -> Any:
     return entity
 
 
-def _draw(entity: Any, found: Sequence[ArmShape], own: Any, grey: Any) -> None:
+def _draw(entity: Any, arm_shapes: Sequence[ArmShape], own: Any, grey: Any) -> None:
     """The shapes of a body, the joints' and rails' in grey; lines of one role are one primitive."""
-    for shape in found:
+    for shape in arm_shapes:
         colour = own if shape.role in ("link", "payload") else grey
         middle, (x, y, z) = _point(shape.middle), _point(shape.size)
         if shape.kind == "sphere":
@@ -97,8 +97,8 @@ def _draw(entity: Any, found: Sequence[ArmShape], own: Any, grey: Any) -> None:
             radius = x if shape.kind == "cylinder" else ROD * z
             pose, extent = _pose(middle, turned_to(_point(shape.axis))), _vector((2 * radius, 2 * radius, z))
             entity.cylinders.add(pose=pose, size=extent, bottom_scale=1.0, top_scale=1.0, color=colour)
-    for role in dict.fromkeys(shape.role for shape in found if shape.kind == "line"):
-        lines = [shape for shape in found if shape.kind == "line" and shape.role == role]
+    for role in dict.fromkeys(shape.role for shape in arm_shapes if shape.kind == "line"):
+        lines = [shape for shape in arm_shapes if shape.kind == "line" and shape.role == role]
         _lines(entity, lines, own if role in ("link", "payload") else grey)
 
 
@@ -158,5 +158,5 @@ def _vector(numbers: Sequence[float]) -> Any:
 def _colour(hexadecimal: str, opacity: float) -> Any:
     from foxglove_schemas_protobuf.Color_pb2 import Color
 
-    r, g, b = (int(hexadecimal[at : at + 2], 16) / 255.0 for at in (1, 3, 5))
+    r, g, b = (int(hexadecimal[digit : digit + 2], 16) / 255.0 for digit in (1, 3, 5))
     return Color(r=r, g=g, b=b, a=opacity)

@@ -59,17 +59,17 @@ def _describe(message: Any, fields: Sequence[MessageField], path: str) -> None:
     for number, field in enumerate(fields, 1):
         label = Of.LABEL_REPEATED if field.many else Of.LABEL_OPTIONAL
         # a name in JSON equal to the name itself: derived ones may coincide, as of `a_b` and `aB`
-        told = message.field.add(name=field.name, number=number, label=label, json_name=field.name)
+        description = message.field.add(name=field.name, number=number, label=label, json_name=field.name)
         if not field.within:
-            told.type = kinds[field.kind]
+            description.type = kinds[field.kind]
             continue
         if field.within not in types:
             own = f"Part{len(types) + 1}"
-            while any(own == each.name for each in fields):  # types and fields share their names
+            while any(own == field_.name for field_ in fields):  # types and fields share their names
                 own += "_"
             types[field.within] = own
             _describe(message.nested_type.add(name=own), field.within, f"{path}.{own}")
-        told.type, told.type_name = Of.TYPE_MESSAGE, f"{path}.{types[field.within]}"
+        description.type, description.type_name = Of.TYPE_MESSAGE, f"{path}.{types[field.within]}"
 
 
 def rows(fields: Sequence[MessageField], values: np.ndarray) -> list[bytes]:
@@ -86,7 +86,7 @@ def rows(fields: Sequence[MessageField], values: np.ndarray) -> list[bytes]:
     for column, place in enumerate(places):
         out[:, place : place + 8] = doubles[:, column]
     data = out.tobytes()
-    return [data[at : at + size] for at in range(0, count * size, size)] if size else [b""] * count
+    return [data[start : start + size] for start in range(0, count * size, size)] if size else [b""] * count
 
 
 def _parts(fields: Sequence[MessageField]) -> Iterator[bytes | None]:

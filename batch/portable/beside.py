@@ -24,10 +24,10 @@ NANOSECOND = 1e-9
 def other_group(archive: ArchiveFile, group: ArchiveGroup, other: ArchiveFile) -> tuple[ArchiveGroup, Experiment]:
     """The other archive's run or sweep that is matched with `group`: it varies the same parameters. Raises Problem E393
     where they have no case in common."""
-    (found,) = beside(archive, [group], other)
-    assert found is not None
-    theirs = next(experiment for experiment in other.plan().experiments if experiment.name == found.group.name)
-    return found.group, theirs
+    (matched,) = beside(archive, [group], other)
+    assert matched is not None
+    theirs = next(experiment for experiment in other.plan().experiments if experiment.name == matched.group.name)
+    return matched.group, theirs
 
 
 def is_archive(path: str | Path) -> bool:
@@ -52,13 +52,15 @@ def log_data(path: str | Path, columns: Sequence[Mapping[str, str]], rows: np.nd
     """
     log = read_log(path, columns)
     channels = [column["channel"] for column in columns]
-    begin, end = (pick(time[at] for time, _ in log.signals.values()) for pick, at in ((min, 0), (max, -1)))
+    begin, end = (
+        pick(time[end_place] for time, _ in log.signals.values()) for pick, end_place in ((min, 0), (max, -1))
+    )
     if not (begin < rows[-1] and end > rows[0]):
         message = _spans(begin, end, rows)
         raise Problem(error("E478", message, log.head, help="let its times begin where the run begins, at 0 s"))
     both, run = min(end, rows[-1]) - max(begin, rows[0]), rows[-1] - rows[0]
     whole = both >= COVERED * (end - begin) and both >= COVERED * run
-    values = [_at(rows, *log.signals[name]) if name in log.signals else None for name in channels]
+    values = [_interpolated(rows, *log.signals[name]) if name in log.signals else None for name in channels]
     part = "" if whole else f"{_spans(begin, end, rows)}: what both have is shown"
     return {"values": values, "told": log.told, "unused": log.unused, "part": part}
 
@@ -69,7 +71,7 @@ def _spans(begin: float, end: float, rows: np.ndarray) -> str:
     return f"the log is from {log[0]} s to {log[1]} s, and the run from {run[0]} s to {run[1]} s"
 
 
-def _at(rows: np.ndarray, time: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+def _interpolated(rows: np.ndarray, time: np.ndarray, numbers: np.ndarray) -> np.ndarray:
     """Numbers at other times, by straight lines; not-a-number before the first and after the last, with an allowance
     for the rounding of a clock in nanoseconds."""
     inside = (rows >= time[0] - NANOSECOND) & (rows <= time[-1] + NANOSECOND)

@@ -81,8 +81,8 @@ def write(experiment: Experiment, output: Path) -> ModuleFiles:
     """Compile an experiment to `output`, and describe it in the .json file beside it. Raises Problem E470."""
     prepared = prepare(experiment)
     module = compiled(prepared.recording)
-    told = described(prepared, module)
-    text = json.dumps(told, indent=1, allow_nan=False) + "\n"
+    description = described(prepared, module)
+    text = json.dumps(description, indent=1, allow_nan=False) + "\n"
     beside = output.with_suffix(".json")
     for path, data in ((output, module.code), (beside, text.encode())):
         try:
@@ -90,7 +90,7 @@ def write(experiment: Experiment, output: Path) -> ModuleFiles:
                 file.write(data)
         except OSError as reason:
             raise _cannot_write(path, reason) from reason
-    return ModuleFiles(output, beside, told)
+    return ModuleFiles(output, beside, description)
 
 
 def check_page(output: Path) -> None:

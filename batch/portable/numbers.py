@@ -87,40 +87,42 @@ def deck_of(
 
 def _run_of(deck: str | Path, sweep: str, defines: Sequence[str], include_dirs: Sequence[str | Path]) -> str:
     tree = read(Path(deck), tuple(map(Path, include_dirs)), tuple(defines))
-    found = Definitions(tree, Complaints()).of_kind("sweep").get(sweep)
-    of = found.group.of if found is not None else None
-    if of is None:
+    sweep_definition = Definitions(tree, Complaints()).of_kind("sweep").get(sweep)
+    run_word = sweep_definition.group.of if sweep_definition is not None else None
+    if run_word is None:
         message = f"{deck} has no sweep `{sweep}` of one run"
         raise Problem(error("E479", message, help="name the deck that the archive was made with"))
-    return of.text
+    return run_word.text
 
 
 def varied(run: GivenRun, fixed: tuple[str, ...] = ()) -> OtherNumbers:
     """The run with the numbers in its deck as inputs, in the deck's units, without those that cannot vary. Raises
     Problem E479 where there is none."""
-    there = run.experiment.parameters
+    parameters = run.experiment.parameters
     numbers = {
-        path: (each.value, each.unit)
-        for path, each in there.items()
-        if isinstance(each.value, float) and each.origin.kind == "deck"
+        path: (parameter.value, parameter.unit)
+        for path, parameter in parameters.items()
+        if isinstance(parameter.value, float) and parameter.origin.kind == "deck"
     }
-    made, left_out = run.vary_most(numbers)
-    paths = [coordinate.path for coordinate in made.experiment.cases.coordinates]
+    with_inputs, left_out = run.vary_most(numbers)
+    paths = [coordinate.path for coordinate in with_inputs.experiment.cases.coordinates]
     if len(paths) > MOST:
         left_out = tuple(path for path in numbers if path not in paths[:MOST])
-        made = run.vary({path: numbers[path] for path in paths[:MOST]})
-    coordinates = made.experiment.cases.coordinates
+        with_inputs = run.vary({path: numbers[path] for path in paths[:MOST]})
+    coordinates = with_inputs.experiment.cases.coordinates
     if not coordinates:
         raise Problem(error("E479", f"no number of `{run.name}` can vary", help="leave `--numbers` out"))
     units = [run.written_in(coordinate.path) for coordinate in coordinates]
-    shown = tuple(
-        replace(each, unit=unit, scale=measure.scale)
-        for each, (unit, measure) in zip(coordinates, units, strict=True)
+    with_units = tuple(
+        replace(coordinate, unit=unit, scale=measure.scale)
+        for coordinate, (unit, measure) in zip(coordinates, units, strict=True)
     )  # fmt: skip
-    cases = replace(made.experiment.cases, coordinates=shown)
-    made = replace(made, experiment=replace(made.experiment, cases=cases))
+    cases = replace(with_inputs.experiment.cases, coordinates=with_units)
+    with_inputs = replace(with_inputs, experiment=replace(with_inputs.experiment, cases=cases))
     assert run.compiled.plan is not None
-    return OtherNumbers(run.name, run.compiled.plan, fixed, made, tuple(measure for _, measure in units), left_out)
+    return OtherNumbers(
+        run.name, run.compiled.plan, fixed, with_inputs, tuple(measure for _, measure in units), left_out
+    )
 
 
 def limits(run: VariedRun) -> list[dict[str, Any]]:
@@ -150,11 +152,14 @@ def limits(run: VariedRun) -> list[dict[str, Any]]:
         good, bad = np.where(wrong, good, middle), np.where(wrong, middle, bad)
     ends = np.where(refused, good, far)
 
-    def said(n: int) -> str:
+    def refusal(n: int) -> str:
         if not refused[n]:
             return f"it is more than {FAR:g} times as far as the deck's"
         path = paths[n % count]
-        columns = {each: np.array([bad[n] if each == path else value]) for each, value in zip(paths, own, strict=True)}
+        columns = {
+            other_path: np.array([bad[n] if other_path == path else value])
+            for other_path, value in zip(paths, own, strict=True)
+        }
         try:
             run.check(columns, 1)
         except Problem as problem:
@@ -162,6 +167,6 @@ def limits(run: VariedRun) -> list[dict[str, Any]]:
         return ""
 
     return [
-        {"low": float(ends[n]), "high": float(ends[count + n]), "below": said(n), "above": said(count + n)}
+        {"low": float(ends[n]), "high": float(ends[count + n]), "below": refusal(n), "above": refusal(count + n)}
         for n in range(count)
     ]

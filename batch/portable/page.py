@@ -78,7 +78,7 @@ def view(
                 error("E473", f"a page is of one run or sweep, and {file.path} has {len(groups)}", help=helps)
             )
         (group,) = groups
-        experiment = next(each for each in file.plan().experiments if each.name == group.name)
+        experiment = next(experiment_ for experiment_ in file.plan().experiments if experiment_.name == group.name)
         data = data_of(experiment, file, group)
         data["report"] = visible(f"met report {quoted(Path(archive).name)}")
         answer = design_answer(file, pools(groups)[0])
@@ -92,16 +92,16 @@ def view(
         return page_of(experiment, data)
 
 
-def _numbers(numbers: OtherNumbers, of: Experiment) -> dict[str, Any]:
-    """Data of the second module, whose inputs are the deck's numbers, as for a page of one case. of: the archive's
-    data"""
+def _numbers(numbers: OtherNumbers, archived: Experiment) -> dict[str, Any]:
+    """Data of the second module, whose inputs are the deck's numbers, as for a page of one case. archived: the
+    archive's data"""
     experiment, status = numbers.run.experiment, np.full(1, -1, np.int8)
     empty = {use.name: np.full(1, np.nan) for use in experiment.metrics}
     group = GroupInMemory.of_metrics(experiment, np.arange(1), status, empty)
     data = data_of(experiment, numbers.plan, group, source="deck")
     exact = {
-        each.unit: [str(measure.exact.numerator), str(measure.exact.denominator)]
-        for each, measure in zip(experiment.cases.coordinates, numbers.measures, strict=True)
+        coordinate.unit: [str(measure.exact.numerator), str(measure.exact.denominator)]
+        for coordinate, measure in zip(experiment.cases.coordinates, numbers.measures, strict=True)
     }
     data["exact"] = [exact[coordinate.unit] for coordinate in experiment.cases.coordinates]
     data["limits"] = limits(numbers.run)
@@ -109,8 +109,8 @@ def _numbers(numbers: OtherNumbers, of: Experiment) -> dict[str, Any]:
     words = [
         f"Any number that the deck writes can be moved here, one at a time; the others are those of `{numbers.of}`"
     ]
-    if of.varies:
-        words.append(f", which `{of.name_in_deck}` varies")
+    if archived.varies:
+        words.append(f", which `{archived.name_in_deck}` varies")
     if numbers.fixed:
         words.append(f", with {', '.join(numbers.fixed)}")
     words.append(". The run is computed here by another program than the archive's, for numbers are its inputs ")
@@ -129,18 +129,18 @@ def _beside(
     if beside.is_archive(against):
         with ArchiveFile(against) as other:
             other.need_every_row("a page that simulates")
-            theirs, of = beside.other_group(file, group, other)
+            theirs, other_experiment = beside.other_group(file, group, other)
             units = [described_column["unit"] for described_column in described_columns(experiment)]
-            found = data_of(of, other, theirs)
-            found["arm"].pop("acting", None)  # of a second arm only the shape is drawn
-            return {"name": name, "page": found | {"own": units}}
+            data = data_of(other_experiment, other, theirs)
+            data["arm"].pop("acting", None)  # of a second arm only the shape is drawn
+            return {"name": name, "page": data | {"own": units}}
     schedule = experiment.structure.schedule
     rows = np.arange(schedule.rows) * schedule.record / schedule.base_hz
-    found = beside.log_data(against, described_columns(experiment), rows)
-    if found["part"]:
-        tell(found["part"])
-    values = [None if each is None else doubles(each) for each in found["values"]]
-    return {"name": name, "values": values, "told": found["told"], "unused": found["unused"]}
+    data = beside.log_data(against, described_columns(experiment), rows)
+    if data["part"]:
+        tell(data["part"])
+    values = [None if column is None else doubles(column) for column in data["values"]]
+    return {"name": name, "values": values, "told": data["told"], "unused": data["unused"]}
 
 
 def data_of(
@@ -165,15 +165,15 @@ def data_of(
         drawn_arm(experiment, [described_column["channel"] for described_column in described_columns(experiment)])
     )
     code_key, module = prepared.code_key, making()
-    told = described(prepared, module)
+    description = described(prepared, module)
     positions = group.values("case")[:MOST_CASES]
     rows = np.searchsorted(experiment.cases.table, positions)
-    told["cases"]["inputs"] = inputs(experiment, np.asarray(rows, np.int64)).tolist()
+    description["cases"]["inputs"] = inputs(experiment, np.asarray(rows, np.int64)).tolist()
     stored = {variable.name: variable for variable in group.role("metric")}
     known = {name.removeprefix("metrics."): name for name in stored}
-    shown: dict[str, Any] = visible_texts(told)
-    metrics = [*told["metrics"], *told["not_computed"]]
-    columns = _in_deck_units(DeckUnits(archive, group), told["columns"])
+    visible_description: dict[str, Any] = visible_texts(description)
+    metrics = [*description["metrics"], *description["not_computed"]]
+    columns = _in_deck_units(DeckUnits(archive, group), description["columns"])
     lacking = [metric["name"] for metric in metrics if metric["name"] not in known]
     with reading(group.path):
         if lacking:
@@ -181,7 +181,7 @@ def data_of(
         metric_units = [deck_unit(stored[known[metric["name"]]]) for metric in metrics]
     return {
         "module": base64.b64encode(module.code).decode("ascii"),
-        "description": shown,
+        "description": visible_description,
         "source": source,
         "same_code": code_key == group.attributes.get("code_key"),
         "positions": positions.tolist(),
@@ -190,8 +190,8 @@ def data_of(
         "metrics": [
             doubles(group.stretch(known[metric["name"]], 0, len(positions))) for metric in metrics
         ],
-        "labels": [visible(each["name"]) for each in told["inputs"]],
-        "units": [_unit(each["unit"]) for each in told["inputs"]],
+        "labels": [visible(parameter["name"]) for parameter in description["inputs"]],
+        "units": [_unit(parameter["unit"]) for parameter in description["inputs"]],
         "metricUnits": [visible(unit) for _, unit in metric_units],
         "metricScales": [scale for scale, _ in metric_units],
         "metricAbout": [visible(stored[known[metric["name"]]].long_name) for metric in metrics],
@@ -199,7 +199,7 @@ def data_of(
         "atLimits": {
             visible(name): [visible(use.path) for use in uses] for name, uses in extremes(experiment).items()
         },
-        "signalAbout": {visible(each.name): visible(each.doc) for each in experiment.structure.record},
+        "signalAbout": {visible(recording.name): visible(recording.doc) for recording in experiment.structure.record},
         "springs": [f"{joint}.q" for joint in sorted(experiment.structure.springs)],
         "columnUnits": [_unit(unit) for _, unit in columns],
         "columnScales": [scale for scale, _ in columns],
@@ -212,8 +212,8 @@ def _in_deck_units(units: DeckUnits, columns: Sequence[Mapping[str, str]]) -> li
     out = []
     for column in columns:
         panel = Panel(column["signal"], "", column["unit"], column["signal"], (), ())
-        shown = units.panel(panel)
-        out.append((shown.scale, shown.unit))
+        in_unit = units.panel(panel)
+        out.append((in_unit.scale, in_unit.unit))
     return out
 
 
