@@ -101,11 +101,13 @@ class RecordedWorld(ArmWorld):
 
         base = BaseMotion()
         if system.structure.free:
-            found = moving(*OF_FREE_BASE, f"links.{BASE}.velocity", f"links.{BASE}.rate")
-            base = BaseMotion(found.pose, found.w, found.v)
+            base_motion = moving(*OF_FREE_BASE, f"links.{BASE}.velocity", f"links.{BASE}.rate")
+            base = BaseMotion(base_motion.pose, base_motion.w, base_motion.v)
         elif system.structure.base is not None:
             base = prescribed(system, read, time)
-        q, qd = (tuple(graph.input(f"{joint.name}.{of}") for joint in system.joints) for of in (POSITION, RATE))
+        q, qd = (
+            tuple(graph.input(f"{joint.name}.{quantity}") for joint in system.joints) for quantity in (POSITION, RATE)
+        )
         super().__init__(system, read, system.tree(read), Motion(q, qd), base, time, time)
         heads = {payload.name: f"payloads.{payload.name}" for payload in system.flying}
         self._in_flight = {
@@ -141,10 +143,10 @@ def acting_on(experiment: Experiment, scene: ArmScene, recorded: Collection[str]
         loads = answer(owner, model.loads, p, world)
         own = [(ActingArrow(_kind(model), name, unit), x) for unit, x in _arrows(loads, world, joints, values)]
         gas = [] if model.jet is None else [(name, _jet(answer(owner, model.jet, p, world), world))]
-        found = Formulas.of(graph, [x for _, numbers in (*own, *gas) for x in numbers])
-        if missing := set(found.inputs) - known:
+        gas_formulas = Formulas.of(graph, [x for _, numbers in (*own, *gas) for x in numbers])
+        if missing := set(gas_formulas.inputs) - known:
             not_drawn.append(NotDrawn("load", name, _signals(missing, system.joints)))
-        elif nodes + (more := _size(found)) > MOST_NODES:
+        elif nodes + (more := _size(gas_formulas)) > MOST_NODES:
             not_drawn.append(NotDrawn("load", name))
         else:
             nodes += more
@@ -182,7 +184,7 @@ def acting_json(acting: ActingOnArm) -> dict[str, Any]:
         "arrows": [[arrow.kind, arrow.name, arrow.unit] for arrow in acting.arrows],
         "jets": list(acting.jets),
         "payloads": [[payload.name, payload.link, payload.body] for payload in acting.payloads],
-        "notDrawn": [[each.what, each.name, list(each.signals)] for each in acting.not_drawn],
+        "notDrawn": [[lacking.what, lacking.name, list(lacking.signals)] for lacking in acting.not_drawn],
     }
 
 
@@ -201,11 +203,11 @@ def _arrows(
     for force in loads.forces:
         if world.is_ground(force.link):
             continue
-        at = world.position(force.link, force.point)
+        point = world.position(force.link, force.point)
         if not _nothing(force.force):
-            yield "N", [*at, *force.force]
+            yield "N", [*point, *force.force]
         if not _nothing(force.moment):
-            yield "N*m", [*at, *force.moment]
+            yield "N*m", [*point, *force.moment]
     for name, torque in loads.torques.items():
         joint = joints[name]
         axis, pivot = (_three(values, f"{name}.{part}") for part in ("axis", "pivot"))
@@ -215,10 +217,10 @@ def _arrows(
 
 
 def _jet(jet: Jet, world: ArmWorld) -> list[Real]:
-    at, axis = world.position(jet.link, jet.point), world.to_world(jet.link, jet.axis)
+    point, axis = world.position(jet.link, jet.point), world.to_world(jet.link, jet.axis)
     sides = [world.to_world(jet.plate.link, side) for side in (jet.plate.width, jet.plate.height)]
     middle = world.position(jet.plate.link, jet.plate.middle)
-    return [*at, *axis, jet.fires, jet.exponent, *middle, *(x for side in sides for x in side)]
+    return [*point, *axis, jet.fires, jet.exponent, *middle, *(x for side in sides for x in side)]
 
 
 def _stage(payload: Payload, time: Real, values: Mapping[str, Any], early: float) -> Real:
@@ -249,5 +251,5 @@ def _settled(value: Any) -> Any:
 
 def _signals(missing: Collection[str], joints: Sequence[Joint]) -> tuple[str, ...]:
     """Signals that contain these channels, by their names in a deck's record."""
-    of_joints = {f"{joint.name}.{of}": of for joint in joints for of in (POSITION, RATE)}
+    of_joints = {f"{joint.name}.{quantity}": quantity for joint in joints for quantity in (POSITION, RATE)}
     return tuple(sorted({of_joints.get(name, name.rpartition(".")[0]) for name in missing}))

@@ -33,8 +33,8 @@ def drawn_arm(experiment: Experiment, recorded: Sequence[str]) -> DrawnArm:
     if missing := lacking(scene, recorded):
         return DrawnArm(tuple(recorded), None, None, missing)
     acting = acting_on(experiment, scene, recorded)
-    shown = acting.arrows or acting.payloads or acting.not_drawn
-    return DrawnArm(tuple(recorded), scene, acting if shown else None, ())
+    is_shown = acting.arrows or acting.payloads or acting.not_drawn
+    return DrawnArm(tuple(recorded), scene, acting if is_shown else None, ())
 
 
 def drawn_json(arm: DrawnArm) -> dict[str, Any]:
@@ -56,15 +56,15 @@ def drawn_json(arm: DrawnArm) -> dict[str, Any]:
         channels = [f"{joint}.reaction.force.{axis}" for axis in "xyz"]
         if number in bodies and all(channel in places for channel in channels):
             forces.append([bodies[number], *columns(channels)])
-    found: dict[str, Any] = {
+    data: dict[str, Any] = {
         "scene": scene_json(arm.scene),
         "columns": columns(arm.scene.channels),
         "reactions": forces,
     }
     if arm.acting is not None:
-        found["acting"] = acting_json(arm.acting) | {"columns": columns(arm.acting.channels)}
-    shown: dict[str, Any] = visible_texts(found)
-    return shown
+        data["acting"] = acting_json(arm.acting) | {"columns": columns(arm.acting.channels)}
+    visible_data: dict[str, Any] = visible_texts(data)
+    return visible_data
 
 
 def visible_texts(value: Any) -> Any:
@@ -72,5 +72,5 @@ def visible_texts(value: Any) -> Any:
     if isinstance(value, str):
         return visible(value)
     if isinstance(value, dict):
-        return {visible(key): visible_texts(each) for key, each in value.items()}
-    return [visible_texts(each) for each in value] if isinstance(value, list) else value
+        return {visible(key): visible_texts(element) for key, element in value.items()}
+    return [visible_texts(element) for element in value] if isinstance(value, list) else value

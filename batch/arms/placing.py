@@ -59,5 +59,5 @@ def world_poses(
     system = System(experiment)
     memory = {PARAMETER + path: value for path, value in values.items()}
     system.keep_tree(memory.__getitem__, memory.__setitem__)
-    found = motions(system.tree(memory.__getitem__), q, [0.0] * len(q), BaseMotion(base))
-    return {name: motion.pose for name, motion in found.items()}
+    motion_of = motions(system.tree(memory.__getitem__), q, [0.0] * len(q), BaseMotion(base))
+    return {name: motion.pose for name, motion in motion_of.items()}

@@ -101,10 +101,10 @@ def arm_scene(experiment: Experiment, recorded: Sequence[str]) -> ArmScene:
     payloads = []
     for payload in structure.payloads:
         signals = (f"payloads.{payload.name}.position", f"payloads.{payload.name}.orientation")
-        told = [*_channels(signals[0], "xyz"), *_channels(signals[1], "wxyz")]
-        if payload.flies and set(told) <= set(recorded):
+        channels_of_pose = [*_channels(signals[0], "xyz"), *_channels(signals[1], "wxyz")]
+        if payload.flies and set(channels_of_pose) <= set(recorded):
             world[payload.name] = _recorded_pose(graph, *signals)
-            channels += told
+            channels += channels_of_pose
         elif payload.flies:
             continue
         else:
@@ -120,12 +120,12 @@ def arm_scene(experiment: Experiment, recorded: Sequence[str]) -> ArmScene:
     reach = max([*lengths.values(), 0.0])
     reach = reach if 0.0 < reach < math.inf else NO_REACH
     arm = ArmNumbers(experiment, values, varied, first, travel, reach)
-    found = shapes(arm, bodies)
+    shapes_of = shapes(arm, bodies)
     names = list(dict.fromkeys([BASE, *(body.name for body in bodies)]))
     number = {name: place for place, name in enumerate(names)}
     moving = {joint.name: place for place, joint in enumerate(joints)}
     own = moving | _rigid_with(structure.joints, moving)
-    listed = [(number[name], shape) for name, several in found.items() for shape in several]
+    listed = [(number[name], shape) for name, several in shapes_of.items() for shape in several]
     outputs: list[Any] = [x for name in names for x in (*(e for row in world[name].R for e in row), *world[name].p)]
     outputs += [x for _, shape in listed for vector in (shape.middle, shape.axis, shape.size) for x in vector]
     tip = max((body.name for body in structure.links), key=lambda name: lengths.get(name, 0.0), default=BASE)
@@ -149,7 +149,7 @@ def lacking(scene: ArmScene, recorded: Sequence[str]) -> tuple[str, ...]:
     missing = set(scene.channels) - set(recorded)
     joints = [name for name in scene.joints if f"{name}.{POSITION}" in missing]
     every = [POSITION] if joints and len(joints) == len(scene.joints) else [f"{name}.{POSITION}" for name in joints]
-    return (*every, *(name for name in OF_FREE_BASE if any(each.startswith(f"{name}.") for each in missing)))
+    return (*every, *(name for name in OF_FREE_BASE if any(channel.startswith(f"{name}.") for channel in missing)))
 
 
 def scene_json(scene: ArmScene) -> dict[str, Any]:
@@ -218,7 +218,7 @@ def _size(experiment: Experiment, first: Mapping[str, float], name: str) -> floa
 def _end(arm: ArmNumbers, name: str) -> Vector:
     """A link's far end in its frame, m: of its shape; else of the last joint that it carries, or its centre of mass."""
     structure = arm.experiment.structure
-    link = next((each for each in structure.links if each.name == name), None)
+    link = next((link_ for link_ in structure.links if link_.name == name), None)
     carried = [joint for joint in structure.joints if joint.parent == name]
     if link is not None and drawn(link) and link.shape is not None:
         kind, sizes = shape_of(arm, link)
@@ -245,7 +245,7 @@ def _gravity(
         if use.model == "gravity":
             path = f"environment.{use.name}.g"
             x, y, z = (float(first.get(f"{path}.{part}", 0.0)) for part in "xyz")
-            return None if any(each.startswith(path) for each in varied) or x == y == z == 0.0 else (x, y, z)
+            return None if any(path_.startswith(path) for path_ in varied) or x == y == z == 0.0 else (x, y, z)
     return None
 
 

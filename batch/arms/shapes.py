@@ -80,13 +80,13 @@ def shapes(arm: ArmNumbers, bodies: Sequence[Link | Payload]) -> dict[str, list[
         out[BASE] = [*ends, *_rails(arm, joints)]
     for body in bodies:
         role: Literal["link", "payload"] = "payload" if isinstance(body, Payload) else "link"
-        found = [_solid(arm, body, role)] if drawn(body) else _bare(arm, body, carried.get(body.name, ()), role)
+        solids = [_solid(arm, body, role)] if drawn(body) else _bare(arm, body, carried.get(body.name, ()), role)
         if isinstance(body, Link) and body.root:
-            found = []  # it is drawn by its pieces
+            solids = []  # it is drawn by its pieces
         if body.name in carrier and carrier[body.name].name not in structure.springs:
-            found += _joint(arm, carrier[body.name])
-        out[body.name] = [*found, *_rails(arm, carried.get(body.name, ()))]
-    return {name: [each for each in found if _there(each)] for name, found in out.items()}
+            solids += _joint(arm, carrier[body.name])
+        out[body.name] = [*solids, *_rails(arm, carried.get(body.name, ()))]
+    return {name: [shape for shape in solids if _is_visible(shape)] for name, solids in out.items()}
 
 
 def head(body: Link | Payload) -> str:
@@ -107,9 +107,9 @@ def shape_of(arm: ArmNumbers, body: Link | Payload) -> tuple[str, dict[str, Real
     case.
     """
     assert body.shape is not None
-    kind, given = body.shape
-    sizes: dict[str, Real] = dict(given)
-    along = "xyz"[int(dict(given).get("along", 0.0))]
+    kind, written_sizes = body.shape
+    sizes: dict[str, Real] = dict(written_sizes)
+    along = "xyz"[int(dict(written_sizes).get("along", 0.0))]
     length = f"size_{along}" if kind == "box" else "length"
     centre = f"{head(body)}.com.{along}"
     before, now = arm.first.get(centre, math.nan), arm.values.get(centre)
@@ -117,7 +117,7 @@ def shape_of(arm: ArmNumbers, body: Link | Payload) -> tuple[str, dict[str, Real
         now is not None
         and length in sizes
         and before > 0.0
-        and math.isclose(2.0 * before, dict(given)[length], rel_tol=1e-9)
+        and math.isclose(2.0 * before, dict(written_sizes)[length], rel_tol=1e-9)
     ):
         sizes[length] = 2.0 * now
     for name in sizes:
@@ -187,6 +187,6 @@ def numbers(arm: ArmNumbers, path: str) -> Vector:
     return (x, y, z)
 
 
-def _there(shape: ArmShape) -> bool:
+def _is_visible(shape: ArmShape) -> bool:
     """False for a line that has no length in any case."""
     return shape.kind != "line" or not all(constant(x) and x == 0.0 for x in shape.axis)

@@ -10,48 +10,53 @@ from met.analysis.linear.answers import Linearized
 from met.diagnostic import Problem, error
 
 
-def arrays(found: Linearized) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+def arrays(linearized: Linearized) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     """The matrices by name, each with the names of its axes."""
-    plant = found.plant
+    plant = linearized.plant
     return {
-        "A": (("state", "from_state"), found.A),
-        "B": (("state", "input"), found.B),
-        "C": (("output", "from_state"), found.C),
-        "D": (("output", "input"), found.D),
+        "A": (("state", "from_state"), linearized.A),
+        "B": (("state", "input"), linearized.B),
+        "C": (("output", "from_state"), linearized.C),
+        "D": (("output", "input"), linearized.D),
         "plant_A": (("plant_state", "from_plant_state"), plant.A),
         "plant_B": (("plant_state", "held"), plant.B),
     }
 
 
-def axes(found: Linearized) -> dict[str, tuple[str, ...]]:
+def axes(linearized: Linearized) -> dict[str, tuple[str, ...]]:
     """The names along each axis."""
-    plant = found.plant
+    plant = linearized.plant
     return {
-        "state": found.states,
-        "from_state": found.states,
-        "input": found.inputs,
-        "output": found.outputs,
+        "state": linearized.states,
+        "from_state": linearized.states,
+        "input": linearized.inputs,
+        "output": linearized.outputs,
         "plant_state": plant.states,
         "from_plant_state": plant.states,
         "held": plant.inputs,
     }
 
 
-def to_xarray(found: Linearized) -> Any:
+def to_xarray(linearized: Linearized) -> Any:
     """An xarray.Dataset of A, B, C, D of a period, of the plant's A and B in continuous time, and of the poles."""
     import xarray
 
-    poles = found.poles
-    data: dict[str, Any] = dict(arrays(found))
+    poles = linearized.poles
+    data: dict[str, Any] = dict(arrays(linearized))
     data["pole"] = (("mode",), np.array([pole.z for pole in poles], dtype=complex))
-    shares = [[dict(pole.shares)[state] for state in found.states] for pole in poles]
-    data["share"] = (("mode", "state"), np.array(shares).reshape(len(poles), len(found.states)))
-    coordinates = {name: list(values) for name, values in axes(found).items()}
-    about = {"experiment": found.experiment, "case": found.case, "time": found.time, "period": found.seconds}
+    shares = [[dict(pole.shares)[state] for state in linearized.states] for pole in poles]
+    data["share"] = (("mode", "state"), np.array(shares).reshape(len(poles), len(linearized.states)))
+    coordinates = {name: list(values) for name, values in axes(linearized).items()}
+    about = {
+        "experiment": linearized.experiment,
+        "case": linearized.case,
+        "time": linearized.time,
+        "period": linearized.seconds,
+    }
     return xarray.Dataset(data, coordinates, about)
 
 
-def state_space(found: Linearized) -> Any:
+def state_space(linearized: Linearized) -> Any:
     """A `control.StateSpace` in discrete time, with names. Raises Problem E451 where python-control is missing."""
     try:
         import control
@@ -59,11 +64,11 @@ def state_space(found: Linearized) -> Any:
         helps = "`pip install control`, or what MET's extra `control` names"
         raise Problem(error("E451", "a `control.StateSpace` needs the package python-control", help=helps)) from reason
     return control.ss(
-        found.A, found.B, found.C, found.D, found.seconds,
-        states=[_word(name) for name in found.states],
-        inputs=[_word(name) for name in found.inputs] or None,
-        outputs=[_word(name) for name in found.outputs] or None,
-        name=found.experiment,
+        linearized.A, linearized.B, linearized.C, linearized.D, linearized.seconds,
+        states=[_word(name) for name in linearized.states],
+        inputs=[_word(name) for name in linearized.inputs] or None,
+        outputs=[_word(name) for name in linearized.outputs] or None,
+        name=linearized.experiment,
     )  # fmt: skip
 
 

@@ -31,10 +31,10 @@ def check(output: Path) -> None:
         raise Problem(error("E305", f"{output} exists: it is not written over", help=helps))
 
 
-def write(found: Linearized, output: Path) -> None:
+def write(linearized: Linearized, output: Path) -> None:
     """Writes the answers. Raises Problem E305."""
     kind = output.suffix.lower()
-    content = {".npz": _npz, ".h5": _hdf5, ".csv": _csv}[kind](found)
+    content = {".npz": _npz, ".h5": _hdf5, ".csv": _csv}[kind](linearized)
     try:
         with whole_file(output) as file:
             file.write(content)
@@ -42,43 +42,48 @@ def write(found: Linearized, output: Path) -> None:
         raise cannot_write(output, reason, code="E305") from reason
 
 
-def _about(found: Linearized) -> dict[str, Any]:
-    return {"experiment": found.experiment, "case": found.case, "time": found.time, "period": found.seconds}
-
-
-def _npz(found: Linearized) -> bytes:
-    made = io.BytesIO()
-    several: dict[str, Any] = {name: matrix for name, (_, matrix) in arrays(found).items()}
-    several |= {
-        axis: np.array(values, dtype=str) for axis, values in axes(found).items() if not axis.startswith("from_")
+def _about(linearized: Linearized) -> dict[str, Any]:
+    return {
+        "experiment": linearized.experiment,
+        "case": linearized.case,
+        "time": linearized.time,
+        "period": linearized.seconds,
     }
-    several |= {name: np.array(value) for name, value in _about(found).items()}
-    np.savez(made, **several)
-    return made.getvalue()
 
 
-def _hdf5(found: Linearized) -> bytes:
+def _npz(linearized: Linearized) -> bytes:
+    buffer = io.BytesIO()
+    several: dict[str, Any] = {name: matrix for name, (_, matrix) in arrays(linearized).items()}
+    several |= {
+        axis: np.array(values, dtype=str) for axis, values in axes(linearized).items() if not axis.startswith("from_")
+    }
+    several |= {name: np.array(value) for name, value in _about(linearized).items()}
+    np.savez(buffer, **several)
+    return buffer.getvalue()
+
+
+def _hdf5(linearized: Linearized) -> bytes:
     import h5py
 
-    made = io.BytesIO()
-    with h5py.File(made, "w", libver=("earliest", "v110"), track_order=True) as file:
-        for axis, values in axes(found).items():
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w", libver=("earliest", "v110"), track_order=True) as file:
+        for axis, values in axes(linearized).items():
             file.create_dataset(axis, data=np.array(values, dtype=object), dtype=h5py.string_dtype())
             file[axis].make_scale(axis)
-        for name, (along, matrix) in arrays(found).items():
+        for name, (along, matrix) in arrays(linearized).items():
             dataset = file.create_dataset(name, data=matrix)
             for number, axis in enumerate(along):
                 dataset.dims[number].attach_scale(file[axis])
-        file.attrs.update(_about(found))
-    return made.getvalue()
+        file.attrs.update(_about(linearized))
+    return buffer.getvalue()
 
 
-def _csv(found: Linearized) -> bytes:
-    text, names = io.StringIO(), axes(found)
+def _csv(linearized: Linearized) -> bytes:
+    text, names = io.StringIO(), axes(linearized)
     out = csv.writer(text, lineterminator="\n")
-    for key, value in _about(found).items():
+    for key, value in _about(linearized).items():
         out.writerow([f"# {key}", json.dumps(value)])
-    for name, ((rows, across), matrix) in arrays(found).items():
+    for name, ((rows, across), matrix) in arrays(linearized).items():
         out.writerow([name, *names[across]])
         for row, values in zip(names[rows], matrix.tolist(), strict=True):
             out.writerow([row, *(repr(value) for value in values)])

@@ -15,26 +15,26 @@ if TYPE_CHECKING:
     import xarray
 
 
-def to_dataset(experiment: Experiment, found: MetricGradients) -> xarray.Dataset:
+def to_dataset(experiment: Experiment, gradients: MetricGradients) -> xarray.Dataset:
     """`value` (case, metric) and `slope` (case, metric, number) in SI, with their units, and `why_not`, which is empty
     where there is a slope."""
     import xarray
 
-    why_not = np.full(found.slope.shape, "", dtype=object)
-    for place, reason in found.why_not.items():
+    why_not = np.full(gradients.slope.shape, "", dtype=object)
+    for place, reason in gradients.why_not.items():
         why_not[place] = reason
     units = metric_units(experiment.structure)
     return xarray.Dataset(
         {
-            "value": (("case", "metric"), found.value),
-            "slope": (("case", "metric", "number"), found.slope),
+            "value": (("case", "metric"), gradients.value),
+            "slope": (("case", "metric", "number"), gradients.slope),
             "why_not": (("case", "metric", "number"), why_not.astype(str)),
         },
         {
-            "case": list(found.cases),
-            "metric": list(found.metrics),
-            "number": list(found.paths),
-            "unit": ("metric", [units[name] for name in found.metrics]),
+            "case": list(gradients.cases),
+            "metric": list(gradients.metrics),
+            "number": list(gradients.paths),
+            "unit": ("metric", [units[name] for name in gradients.metrics]),
             "number_unit": (
                 "number",
                 [coordinate_unit(experiment, coordinate) for coordinate in experiment.cases.coordinates],

@@ -49,24 +49,30 @@ def figure(question: LinearQuestion, answers: Sequence[Linearized | str]) -> Any
     from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
 
-    found = {case: each for case, each in enumerate(answers) if isinstance(each, Linearized)}
-    if not found:
+    answered = {case: answer for case, answer in enumerate(answers) if isinstance(answer, Linearized)}
+    if not answered:
         raise Problem(
             error("E450", "there is nothing to draw: no case has an answer", help="`--at` asks at another instant")
         )
     values, label = _coordinate(question)
     norm = Normalize(float(np.min(values)), float(np.max(values)))
-    made = Figure(figsize=(9.4, 4.9), dpi=144, layout="constrained")
-    z_plane, s_plane = made.subplots(1, 2)
-    for case in found:
-        poles = np.array([(pole.z, pole.s / (2.0 * math.pi)) for pole in found[case].poles])
+    picture = Figure(figsize=(9.4, 4.9), dpi=144, layout="constrained")
+    z_plane, s_plane = picture.subplots(1, 2)
+    for case in answered:
+        poles = np.array([(pole.z, pole.s / (2.0 * math.pi)) for pole in answered[case].poles])
         colour = ScalarMappable(norm, MAP).to_rgba(values[case])
-        for axes, at in ((z_plane, poles[:, 0]), (s_plane, poles[np.isfinite(poles[:, 1].real), 1])):
-            axes.plot(at.real, at.imag, ".", color=colour, markersize=4)
-            for end, sign in ((min(found), "x"), (max(found), "o")):
-                if case == end and len(found) > 1:
+        for axes, points in ((z_plane, poles[:, 0]), (s_plane, poles[np.isfinite(poles[:, 1].real), 1])):
+            axes.plot(points.real, points.imag, ".", color=colour, markersize=4)
+            for end, sign in ((min(answered), "x"), (max(answered), "o")):
+                if case == end and len(answered) > 1:
                     axes.plot(
-                        at.real, at.imag, sign, color=INK, markersize=7, markerfacecolor="none", markeredgewidth=0.9
+                        points.real,
+                        points.imag,
+                        sign,
+                        color=INK,
+                        markersize=7,
+                        markerfacecolor="none",
+                        markeredgewidth=0.9,
                     )
     _circle(z_plane)
     _damping(s_plane)
@@ -74,17 +80,17 @@ def figure(question: LinearQuestion, answers: Sequence[Linearized | str]) -> Any
     s_plane.set_ylabel("Im s / 2π, Hz")
     z_plane.set_xlabel("Re z")
     z_plane.set_ylabel("Im z")
-    made.colorbar(ScalarMappable(norm, MAP), ax=[z_plane, s_plane], label=label, aspect=30, pad=0.02)
-    first = next(iter(found.values()))
-    left = len(answers) - len(found)
-    made.suptitle(
+    picture.colorbar(ScalarMappable(norm, MAP), ax=[z_plane, s_plane], label=label, aspect=30, pad=0.02)
+    first = next(iter(answered.values()))
+    left = len(answers) - len(answered)
+    picture.suptitle(
         f"{first.experiment} {first.where}, {count(len(answers), 'case')}"
         + (f", {left:,} of them without an answer" if left else "")
         + "; × the first, ○ the last",
         x=0.01,
         ha="left",
     )
-    return made
+    return picture
 
 
 def _coordinate(question: LinearQuestion) -> tuple[np.ndarray, str]:

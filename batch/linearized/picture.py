@@ -26,22 +26,22 @@ STEPS = 2000
 """Largest number of periods in a picture of a step."""
 
 
-def draw(found: Linearized, output: Path) -> None:
+def draw(linearized: Linearized, output: Path) -> None:
     """Draw the available pictures: the Bode and Nichols curves of each opened loop, with margins marked; the responses
     of outputs to steps of inputs. Raises Problem E450 where there is neither, E305, E326."""
     import matplotlib
 
     style: Any = STYLE
     with matplotlib.rc_context(style):
-        places.save(figure(found), output)
+        places.save(figure(linearized), output)
 
 
-def figure(found: Linearized) -> Any:
+def figure(linearized: Linearized) -> Any:
     """The picture that `draw` writes, a matplotlib Figure. Raises Problem E450."""
     from matplotlib.figure import Figure
 
-    loops = [loop for loop in found.loops if loop.loop is not None and loop.returns]
-    steps = bool(found.inputs and found.outputs)
+    loops = [loop for loop in linearized.loops if loop.loop is not None and loop.returns]
+    steps = bool(linearized.inputs and linearized.outputs)
     if not loops and not steps:
         helps = ("`--open SIGNAL` opens a loop", "`--input SIGNAL --output SIGNAL` asks for a step")
         raise Problem(
@@ -51,28 +51,32 @@ def figure(found: Linearized) -> Any:
                 help=helps,
             )
         )
-    rows = [2.0] * bool(loops) + [1.0] * (len(found.outputs) if steps else 0)
-    made = Figure(figsize=(9.4, 2.1 * sum(rows) + 0.9), dpi=144, layout="constrained")
-    grid = made.add_gridspec(len(rows), 1, height_ratios=rows)
+    rows = [2.0] * bool(loops) + [1.0] * (len(linearized.outputs) if steps else 0)
+    picture = Figure(figsize=(9.4, 2.1 * sum(rows) + 0.9), dpi=144, layout="constrained")
+    grid = picture.add_gridspec(len(rows), 1, height_ratios=rows)
     if loops:
         inner = grid[0].subgridspec(2, 2)
-        _bode(made.add_subplot(inner[0, 0]), made.add_subplot(inner[1, 0]), loops, found)
-        _nichols(made.add_subplot(inner[:, 1]), loops, found)
+        _bode(picture.add_subplot(inner[0, 0]), picture.add_subplot(inner[1, 0]), loops, linearized)
+        _nichols(picture.add_subplot(inner[:, 1]), loops, linearized)
     if steps:
-        first = len(rows) - len(found.outputs)
-        for row, name in enumerate(found.outputs):
-            _step(made.add_subplot(grid[first + row]), found, row, name, last=row == len(found.outputs) - 1)
-    made.suptitle(f"{found.experiment} {found.where}, a period of {1e3 * found.seconds:g} ms", x=0.01, ha="left")
-    return made
+        first = len(rows) - len(linearized.outputs)
+        for row, name in enumerate(linearized.outputs):
+            _step(
+                picture.add_subplot(grid[first + row]), linearized, row, name, last=row == len(linearized.outputs) - 1
+            )
+    picture.suptitle(
+        f"{linearized.experiment} {linearized.where}, a period of {1e3 * linearized.seconds:g} ms", x=0.01, ha="left"
+    )
+    return picture
 
 
-def _frequencies(found: Linearized) -> np.ndarray:
-    highest = math.pi / found.seconds
+def _frequencies(linearized: Linearized) -> np.ndarray:
+    highest = math.pi / linearized.seconds
     return np.geomspace(highest / 10.0**DECADES, highest, POINTS)
 
 
-def _bode(size: Any, phase: Any, loops: list[OpenLoop], found: Linearized) -> None:
-    w = _frequencies(found)
+def _bode(size: Any, phase: Any, loops: list[OpenLoop], linearized: Linearized) -> None:
+    w = _frequencies(linearized)
     for number, loop in enumerate(loops):
         assert loop.loop is not None
         L, colour = loop.loop.response(w), COLOURS[number % len(COLOURS)]
@@ -81,12 +85,12 @@ def _bode(size: Any, phase: Any, loops: list[OpenLoop], found: Linearized) -> No
         phase.semilogx(w / (2.0 * math.pi), turned, color=colour)
         if loop.margins is None:
             continue
-        for at, axis, curve in (
+        for frequency, axis, curve in (
             (loop.margins.at_phase, phase, turned),
             (loop.margins.at_gain_up, size, np.abs(L)),
         ):
-            if at is not None:
-                axis.plot(at / (2.0 * math.pi), np.interp(at, w, curve), "o", color=colour, markersize=4)
+            if frequency is not None:
+                axis.plot(frequency / (2.0 * math.pi), np.interp(frequency, w, curve), "o", color=colour, markersize=4)
     size.axhline(1.0, color=FAINT, linewidth=0.8)
     phase.axhline(-180.0, color=FAINT, linewidth=0.8)
     size.set_ylabel("size of L")
@@ -127,8 +131,8 @@ def _degrees(axis: Any) -> tuple[float, float]:
     return low, high
 
 
-def _nichols(ax: Any, loops: list[OpenLoop], found: Linearized) -> None:
-    w = _frequencies(found)
+def _nichols(ax: Any, loops: list[OpenLoop], linearized: Linearized) -> None:
+    w = _frequencies(linearized)
     for number, loop in enumerate(loops):
         assert loop.loop is not None
         L, colour = loop.loop.response(w), COLOURS[number % len(COLOURS)]
@@ -146,16 +150,17 @@ def _nichols(ax: Any, loops: list[OpenLoop], found: Linearized) -> None:
     ax.set_title("Nichols; grey: |S| is 2, and 4", fontsize="small", color=FAINT)
 
 
-def _step(ax: Any, found: Linearized, row: int, name: str, *, last: bool) -> None:
-    slowest = max((pole.seconds for pole in found.poles if pole.s.real < 0.0 and pole.seconds < 1e7 * found.seconds),
-                  default=found.seconds)  # fmt: skip
-    count = int(min(STEPS, max(20.0, 6.0 * slowest / found.seconds)))
-    for number, signal in enumerate(found.inputs):
-        x, values = np.zeros(len(found.states)), []
+def _step(ax: Any, linearized: Linearized, row: int, name: str, *, last: bool) -> None:
+    period = linearized.seconds
+    slowest = max((pole.seconds for pole in linearized.poles if pole.s.real < 0.0 and pole.seconds < 1e7 * period),
+                  default=period)  # fmt: skip
+    count = int(min(STEPS, max(20.0, 6.0 * slowest / period)))
+    for number, signal in enumerate(linearized.inputs):
+        x, values = np.zeros(len(linearized.states)), []
         for _ in range(count + 1):
-            values.append(float(found.C[row] @ x + found.D[row, number]))
-            x = found.A @ x + found.B[:, number]
-        time = found.seconds * np.arange(count + 1)
+            values.append(float(linearized.C[row] @ x + linearized.D[row, number]))
+            x = linearized.A @ x + linearized.B[:, number]
+        time = period * np.arange(count + 1)
         ax.step(time, values, where="post", color=COLOURS[number % len(COLOURS)], label=f"step of {signal}")
     ax.set_ylabel(name)
     ax.legend(fontsize="small")

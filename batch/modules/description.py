@@ -91,12 +91,12 @@ def _inputs(experiment: Experiment) -> list[dict[str, Any]]:
 
 def described_columns(experiment: Experiment) -> list[dict[str, Any]]:
     """The channel of each number of a row, the signal that it is of, and its SI unit."""
-    found = []
+    columns = []
     for recorded in experiment.structure.record:
         count = len(recorded.channels)
         own = recorded.unit if len(recorded.unit) == count else [recorded.unit[0]] * count
         if len(recorded.unit) == len(recorded.joints) != count:  # one a joint, of vectors
             own = [unit for unit in recorded.unit for _ in range(count // len(recorded.joints))]
         for channel, unit in zip(recorded.channels, own, strict=True):
-            found.append({"channel": channel, "signal": recorded.name, "unit": unit})
-    return found
+            columns.append({"channel": channel, "signal": recorded.name, "unit": unit})
+    return columns

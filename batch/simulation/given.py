@@ -10,21 +10,21 @@ from typing import Any
 import numpy as np
 
 from batch.notebook.quantities import number
-from batch.simulation.arguments import shown
+from batch.simulation.arguments import short_repr
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem, error
 from met.host.files import memory
 
 
-def values_in_si(given: Any, path: str, unit: str) -> np.ndarray:
+def values_in_si(argument: Any, path: str, unit: str) -> np.ndarray:
     """The values given for a path in its SI unit: an array without dimensions for one, with one dimension for many.
 
-    given  a real finite number, which is in SI; a text with a unit, "25 kg"; what has `magnitude` and `units`, as
-           pint's quantities do, or an xarray.DataArray with the attribute `units`; or a list or array of these
+    argument  a real finite number, which is in SI; a text with a unit, "25 kg"; what has `magnitude` and `units`, as
+              pint's quantities do, or an xarray.DataArray with the attribute `units`; or a list or array of these
 
     Raises Problem E386 for a unit or a text that is wrong, E430 for a list inside a list, E431 for all else.
     """
-    magnitude, units = measured(given)
+    magnitude, units = measured(argument)
     items = magnitude if isinstance(magnitude, list | tuple | range) else None
     if items is None and hasattr(magnitude, "__array__"):
         array = np.asanyarray(magnitude)
@@ -38,27 +38,30 @@ def values_in_si(given: Any, path: str, unit: str) -> np.ndarray:
         items = list(array) if array.ndim else None
     if items is None:
         return np.array(_in_si(magnitude, units, path, unit, f"`{path}`"))
-    values = [_in_si(each, units, path, unit, f"value {at} of `{path}`") for at, each in enumerate(items)]
+    values = [
+        _in_si(entry, units, path, unit, f"value {number_in_list} of `{path}`")
+        for number_in_list, entry in enumerate(items)
+    ]
     return np.array(values, dtype=np.float64)
 
 
-def real(given: Any) -> float | None:
+def real(argument: Any) -> float | None:
     """A finite real number, in Python or in an array without dimensions; None for anything else: truth values, masked
     or complex values, those with a unit, and numbers too large for 64 bits."""
-    if not isinstance(given, float):
-        given, units = measured(given)
-        if hasattr(given, "__array__"):
-            given = np.asanyarray(given).tolist()
-        if units is not None or isinstance(given, bool) or not isinstance(given, Real):
+    if not isinstance(argument, float):
+        argument, units = measured(argument)
+        if hasattr(argument, "__array__"):
+            argument = np.asanyarray(argument).tolist()
+        if units is not None or isinstance(argument, bool) or not isinstance(argument, Real):
             return None
     try:
-        found = float(given)
+        converted = float(argument)
     except OverflowError:
         return None
-    return found if math.isfinite(found) else None
+    return converted if math.isfinite(converted) else None
 
 
-def columns(given: Mapping[str, np.ndarray], *, product: bool) -> tuple[dict[str, np.ndarray], int]:
+def columns(values_of: Mapping[str, np.ndarray], *, product: bool) -> tuple[dict[str, np.ndarray], int]:
     """A column for each path, one value a case, and the number of cases.
 
     product  False: several lists go in step, so all have one length; True: each value of one with each of the others,
@@ -66,12 +69,12 @@ def columns(given: Mapping[str, np.ndarray], *, product: bool) -> tuple[dict[str
 
     Raises Problem E430 where lengths differ, a list is empty, or a product has no room in memory.
     """
-    lists = {path: values for path, values in given.items() if values.ndim}
+    lists = {path: values for path, values in values_of.items() if values.ndim}
     for path, values in lists.items():
         if not len(values):
             raise Problem(error("E430", f"`{path}` has no value", help="one at least, or leave it out"))
     if product:
-        check_room(math.prod(map(len, lists.values())), len(given))
+        check_room(math.prod(map(len, lists.values())), len(values_of))
         grid = np.meshgrid(*lists.values(), indexing="ij")
         lists = {path: values.reshape(-1) for path, values in zip(lists, grid, strict=True)}
     sizes = {path: len(values) for path, values in lists.items()}
@@ -87,7 +90,7 @@ def columns(given: Mapping[str, np.ndarray], *, product: bool) -> tuple[dict[str
             )
         )
     return {
-        path: lists[path] if path in lists else np.full(count, float(values)) for path, values in given.items()
+        path: lists[path] if path in lists else np.full(count, float(values)) for path, values in values_of.items()
     }, count
 
 
@@ -99,35 +102,35 @@ def check_room(count: int, numbers: int) -> None:
         raise Problem(error("E430", message, help="run fewer at once, or `batch.run` a sweep into an archive"))
 
 
-def _in_si(given: Any, units: str | None, path: str, unit: str, where: str) -> float:
+def _in_si(argument: Any, units: str | None, path: str, unit: str, where: str) -> float:
     """One value in the SI unit of its path. units: those of the list that it is in; where: its name in a message."""
-    if isinstance(given, str) and units is None:
-        found: float | None = number(str(given), path, unit)
+    if isinstance(argument, str) and units is None:
+        in_si: float | None = number(str(argument), path, unit)
     else:
-        magnitude, own = (given, None) if units is not None else measured(given)
+        magnitude, own = (argument, None) if units is not None else measured(argument)
         if isinstance(magnitude, list | tuple | range) or (isinstance(magnitude, np.ndarray) and magnitude.ndim):
             raise Problem(
                 error("E430", f"`{path}` has a list inside a list", help="one value a case: a list of numbers")
             )
-        found, units = real(magnitude), own if units is None else units
-        if found is not None and units is not None:
-            found = number(f"{found!r} {units}", path, unit)
-    if found is None or not math.isfinite(found):
+        in_si, units = real(magnitude), own if units is None else units
+        if in_si is not None and units is not None:
+            in_si = number(f"{in_si!r} {units}", path, unit)
+    if in_si is None or not math.isfinite(in_si):
         helps = 'a value is a number in SI, a text such as "25 kg", a quantity with its unit, or a list of these'
-        raise Problem(error("E431", f"{where} is not a finite number: {shown(given)}", help=helps))
-    return found
+        raise Problem(error("E431", f"{where} is not a finite number: {short_repr(argument)}", help=helps))
+    return in_si
 
 
-def measured(given: Any) -> tuple[Any, str | None]:
+def measured(argument: Any) -> tuple[Any, str | None]:
     """The magnitude of a quantity, and its unit in MET's notation; the unit is None where it has none."""
-    units = getattr(given, "units", None)
-    if units is not None and hasattr(given, "magnitude"):
+    units = getattr(argument, "units", None)
+    if units is not None and hasattr(argument, "magnitude"):
         try:
             text = format(units, "~C")  # pint's short names
         except (TypeError, ValueError):
             text = str(units)
-        return given.magnitude, text.replace("**", "^").replace(" ", "") or "1"
-    attributes = getattr(given, "attrs", None)
-    if isinstance(attributes, Mapping) and hasattr(given, "values"):
-        return given.values, str(attributes["units"]) if "units" in attributes else None
-    return given, None
+        return argument.magnitude, text.replace("**", "^").replace(" ", "") or "1"
+    attributes = getattr(argument, "attrs", None)
+    if isinstance(attributes, Mapping) and hasattr(argument, "values"):
+        return argument.values, str(attributes["units"]) if "units" in attributes else None
+    return argument, None

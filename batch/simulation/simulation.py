@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from batch.archive.in_memory import DatasetMaker
-from batch.simulation.arguments import PATHS, settings, shown, text_or_none, texts, whole
+from batch.simulation.arguments import PATHS, settings, short_repr, text_or_none, texts, whole
 from batch.simulation.given import check_room, columns, values_in_si
 from ic.driver.given_values import VariedRun, given_run
 from ic.printing.columns import size as size_text
@@ -140,13 +140,13 @@ class Simulation:
         check_room(count, len(table))
         program = self._program({path: float(column[0]) for path, column in table.items()}, False)
         program.varied.check(table, count)
-        of, key = program.varied.experiment, tuple(table)
+        varied, key = program.varied.experiment, tuple(table)
         if key not in self._gradients:
-            self._gradients[key] = GradientProgram(of)
-        experiment = replace(of, cases=_cases(of.cases, table, count, 1))
+            self._gradients[key] = GradientProgram(varied)
+        experiment = replace(varied, cases=_cases(varied.cases, table, count, 1))
         names = texts(metrics, "metrics", "D379", '["settle"]')
-        found = self._gradients[key].of(range(count), names, experiment=experiment, threads=threads)
-        return to_dataset(experiment, found)
+        gradients = self._gradients[key].of(range(count), names, experiment=experiment, threads=threads)
+        return to_dataset(experiment, gradients)
 
     def start(
         self,
@@ -177,16 +177,16 @@ class Simulation:
         if key not in self._stepped:
             first = {path: (float(column[0]), self._units[path] or "1") for path, column in table.items()}
             self._stepped[key] = program(self._given, first, kinds=kinds, record=seen, repeated=repeat > 0)
-        found = self._stepped[key]
-        zeros = {path: np.zeros(1) for path in found.paths}
-        found.varied.check({**table, **zeros}, 1)
-        return SteppedRun(found, {**table, **zeros}, repeat)
+        stepped_program = self._stepped[key]
+        zeros = {path: np.zeros(1) for path in stepped_program.paths}
+        stepped_program.varied.check({**table, **zeros}, 1)
+        return SteppedRun(stepped_program, {**table, **zeros}, repeat)
 
     def _in_si(self, values: Mapping[str, Any] | None) -> dict[str, np.ndarray]:
-        found: dict[str, np.ndarray] = {}
+        in_si: dict[str, np.ndarray] = {}
         values = {} if values is None else values
         if not isinstance(values, Mapping) or not all(isinstance(path, str) for path in values):
-            message = f"values are given by the paths of parameters, and not as {shown(values)}"
+            message = f"values are given by the paths of parameters, and not as {short_repr(values)}"
             raise Problem(error("E431", message, help='by path: `{"gearbox.kp": 0.02}`'))
         for path, value in values.items():
             if path not in self._units:
@@ -196,8 +196,8 @@ class Simulation:
                 self._given.vary({path: (value if isinstance(value, str) and value.isidentifier() else 0.0, "1")})
             elif unit == "":
                 raise _no_number(path, value)
-            found[path] = values_in_si(value, path, unit or "1")
-        return found
+            in_si[path] = values_in_si(value, path, unit or "1")
+        return in_si
 
     def _program(self, first: Mapping[str, float], repeated: bool) -> SimulationProgram:
         """The program whose inputs are these paths, compiled with these values on the first call."""
@@ -231,17 +231,17 @@ class Simulation:
         return names
 
 
-def _commanded(commands: Any, given: Iterable[str]) -> dict[str, str]:
-    """The kinds of commands by joint, "" for that of the deck. given: paths of values. Raises Problem E435."""
+def _commanded(commands: Any, paths: Iterable[str]) -> dict[str, str]:
+    """The kinds of commands by joint, "" for that of the deck. paths: of values. Raises Problem E435."""
     example = '["shoulder"]'
     joints = texts(list(commands) if isinstance(commands, Mapping) else commands, "commands", "E435", example)
     kinds = [""] * len(joints)
     if isinstance(commands, Mapping):
         kinds = list(texts(list(commands.values()), "commands", "E435", '{"shoulder": "torque"}'))
-    for at, joint in enumerate(joints):
-        if joint in joints[:at]:
+    for place, joint in enumerate(joints):
+        if joint in joints[:place]:
             raise Problem(error("E435", f"`commands` has joint `{joint}` twice", help="name each joint once"))
-        path = next((path for path in given if f"{path}.".startswith(f"{joint}.servo.command.")), None)
+        path = next((path for path in paths if f"{path}.".startswith(f"{joint}.servo.command.")), None)
         if path is not None:
             message = f"`{path}` is given, and joint `{joint}` is commanded from outside"
             helps = [f"leave `{path}` out, and tell `step` its command", f"or leave `{joint}` out of `commands`"]
@@ -251,9 +251,9 @@ def _commanded(commands: Any, given: Iterable[str]) -> dict[str, str]:
 
 def _cases(template: Cases, table: Mapping[str, np.ndarray], count: int, repeat: int) -> Cases:
     """The cases of a table, as a plan has them."""
-    made = [replace(coordinate, values=table[coordinate.path]) for coordinate in template.coordinates]
+    coordinates = [replace(coordinate, values=table[coordinate.path]) for coordinate in template.coordinates]
     repeats = np.tile(np.arange(repeat), count) if repeat > 1 else None
-    return replace(template, count=count * repeat, coordinates=tuple(made), repeats=repeats)
+    return replace(template, count=count * repeat, coordinates=tuple(coordinates), repeats=repeats)
 
 
 def _no_number(path: str, value: Any) -> Problem:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.simulation.arguments import shown
+from batch.simulation.arguments import short_repr
 from batch.simulation.given import measured, real
 from ic.driver.given_values import GivenRun, VariedRun
 from ic.text.complaints import known_words
@@ -74,8 +74,8 @@ class Observation:
                 error("E432", f"no `{name}` is seen", help=[*helps, '`start(..., record=["..."])` says what is'])
             )
         where, shape = self._columns[name]
-        found = self.row[where]
-        return found.reshape(shape) if shape else float(found[0])
+        values = self.row[where]
+        return values.reshape(shape) if shape else float(values[0])
 
     @property
     def q(self) -> np.ndarray:
@@ -112,9 +112,11 @@ class SteppedRun:
         self._program, self._prepared = program, program.prepared
         experiment = self._prepared.experiment
         self.joints, self.period = program.joints, program.divisor / experiment.structure.schedule.base_hz
-        given = [float(table[coordinate.path][0]) for coordinate in experiment.cases.coordinates]
-        given += [float(repeat) if name == REPEAT else float(experiment.cases.seed) for name in experiment.cases.noise]
-        self._block = block = self._prepared.kernel.block(np.array([given]).reshape(1, -1))
+        input_values = [float(table[coordinate.path][0]) for coordinate in experiment.cases.coordinates]
+        input_values += [
+            float(repeat) if name == REPEAT else float(experiment.cases.seed) for name in experiment.cases.noise
+        ]
+        self._block = block = self._prepared.kernel.block(np.array([input_values]).reshape(1, -1))
         names, cells = self._prepared.program.inputs, self._prepared.recording.cells
         self._given = [block.inputs[names.index(path)] for path in program.paths]
         self._held = [block.state[cells.index(PARAMETER + path)] for path in program.paths if PARAMETER + path in cells]
@@ -138,8 +140,8 @@ class SteppedRun:
         if self.done:
             raise self._over()
         values = self._checked(commands)
-        for value, given in zip(values, self._given, strict=True):
-            given[:] = value
+        for value, held_inputs in zip(values, self._given, strict=True):
+            held_inputs[:] = value
         for value, held in zip(values, self._held, strict=True):
             held[:] = value
         first, self._tick = self._tick, self._tick + self._program.divisor
@@ -161,8 +163,8 @@ class SteppedRun:
         outputs = self._block.outputs[: len(names), :1].T.copy()
         judge(names, outputs)
         by_name = {name: outputs[:, column] for column, name in enumerate(names)}
-        given = self._block.inputs[:, :1].T
-        return causes_of(self._prepared.experiment, given, by_name)[0]
+        input_values = self._block.inputs[:, :1].T
+        return causes_of(self._prepared.experiment, input_values, by_name)[0]
 
     @property
     def metrics(self) -> dict[str, float]:
@@ -190,10 +192,12 @@ class SteppedRun:
             listed = np.atleast_1d(np.asanyarray(listed)).tolist()
         elif not isinstance(listed, list | tuple):
             listed = [listed]
-        found = [real(each) for each in listed]
-        values = [value for value in found if value is not None]
-        if units is not None or not len(found) == len(values) == len(self._given):
-            message = f"commands are a finite number for each of {', '.join(self.joints)}, and not {shown(commands)}"
+        numbers = [real(command) for command in listed]
+        values = [value for value in numbers if value is not None]
+        if units is not None or not len(numbers) == len(values) == len(self._given):
+            message = (
+                f"commands are a finite number for each of {', '.join(self.joints)}, and not {short_repr(commands)}"
+            )
             order = ", in this order" if len(self.joints) > 1 else ""
             example = ", ".join(f"0.{place}" for place in range(1, 1 + min(len(self.joints), MOST_SHOWN)))
             more = ", ..." if len(self.joints) > MOST_SHOWN else ""
@@ -206,7 +210,7 @@ class SteppedRun:
 
 
 def program(
-    given: GivenRun,
+    run: GivenRun,
     first: Mapping[str, tuple[float, str]],
     *,
     kinds: Mapping[str, str],
@@ -220,7 +224,7 @@ def program(
 
     Raises Problem, E435 for a joint that cannot be commanded from outside.
     """
-    uses = {use.joint: use for use in given.experiment.structure.servos}
+    uses = {use.joint: use for use in run.experiment.structure.servos}
     for joint in kinds:
         if joint not in uses:
             helps = [*did_you_mean(joint, uses), known_words("joints with a servo", uses)]
@@ -231,23 +235,23 @@ def program(
                 "E435", "no joint is commanded from outside", help=f'name some: `commands=["{next(iter(uses), "")}"]`'
             )
         )
-    structure = given.experiment.structure
+    structure = run.experiment.structure
     taken = {
-        joint: _command(uses[joint], kind, structure, is_set=given.sets(f"{joint}.servo.command"))
+        joint: _command(uses[joint], kind, structure, is_set=run.sets(f"{joint}.servo.command"))
         for joint, kind in kinds.items()
     }
     values = {f"{joint}.servo.command.value": (0.0, command.unit) for joint, command in taken.items()}
     words = {f"{joint}.servo.command": command.word for joint, command in taken.items() if command.word}
-    varied = given.vary({**first, **values}, repeat=2 if repeated else 1, words=words)
+    varied = run.vary({**first, **values}, repeat=2 if repeated else 1, words=words)
     structure = varied.experiment.structure
     divisor = math.lcm(math.gcd(*(uses[joint].divisor for joint in taken)), structure.schedule.dynamics)
     seen = _seen(structure, record)
     structure = replace(varied.experiment.structure, record=seen, schedule=replace(structure.schedule, record=divisor))
     experiment = replace(varied.experiment, structure=structure)
     columns, place = {}, 0
-    for each in seen:
-        columns[each.name] = slice(place, place + len(each.channels)), each.shape
-        place += len(each.channels)
+    for recording in seen:
+        columns[recording.name] = slice(place, place + len(recording.channels)), recording.shape
+        place += len(recording.channels)
     return SteppedProgram(
         varied, engine.prepare(experiment, lanes=LANES), tuple(taken), tuple(values), divisor, columns
     )
@@ -276,23 +280,25 @@ def _command(use: ServoUse, kind: str, structure: Structure, *, is_set: bool) ->
     if use.continuous:
         message = f"the law of joint `{use.joint}` is continuous: it has no tick at which it takes a command"
         raise Problem(error("E435", message, help=f'give it a rate: `set={{"{use.joint}.servo.rate": "1 kHz"}}`'))
-    (joint,) = (each for each in structure.moving if each.name == use.joint)
+    (joint,) = (joint_ for joint_ in structure.moving if joint_.name == use.joint)
     unit = joint_unit(COMMAND_UNIT[kind], joint)
-    told = not is_set and command is not None and (command.kind, command.model, command.guide) == (kind, "constant", "")
-    return OutsideCommand(unit, "" if told else f"{kind}(0 {unit})")
+    is_decks = (
+        not is_set and command is not None and (command.kind, command.model, command.guide) == (kind, "constant", "")
+    )
+    return OutsideCommand(unit, "" if is_decks else f"{kind}(0 {unit})")
 
 
 def _seen(structure: Structure, record: Sequence[str] | None) -> tuple[Recorded, ...]:
     """The signals observed at each step: q, qd, and these channels; None: those that the deck records. Raises Problem
     E432."""
     known = recordable(structure, record or ())
-    found = {name: each for name in ALWAYS_SEEN for each in known[name]}
-    found = {each.name: each for each in found.values()}
+    signals = {name: recording for name in ALWAYS_SEEN for recording in known[name]}
+    signals = {recording.name: recording for recording in signals.values()}
     if record is None:
-        return tuple({**found, **{each.name: each for each in structure.record}}.values())
+        return tuple({**signals, **{recording.name: recording for recording in structure.record}}.values())
     for name in record:
         if name not in known:
             helps = [*did_you_mean(name, known), "`met plan DECK` lists the channels of a run"]
             raise Problem(error("E432", f"no channel `{name}` in this run", help=helps))
-        found |= {each.name: each for each in known[name]}
-    return tuple(found.values())
+        signals |= {recording.name: recording for recording in known[name]}
+    return tuple(signals.values())
