@@ -117,8 +117,8 @@ class Child:
                 return None
             self._read += more
         line, _, self._read = self._read.partition(b"\n")
-        found: dict[str, Any] = json.loads(line)
-        return found
+        message: dict[str, Any] = json.loads(line)
+        return message
 
     def _death(self, task: Task) -> Outcome:
         """The outcome of a task whose process is dead: lost if it was killed; broken if it ended by itself, since

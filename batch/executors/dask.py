@@ -149,10 +149,10 @@ class Dask:
         """Wait for a worker, but not for ever. Raises Problem."""
         where = self._client.scheduler.address
         self._seen = time.monotonic()
-        told = False
+        has_warned = False
         while not self._workers:
-            if self._counted and not told:
-                told = True
+            if self._counted and not has_warned:
+                has_warned = True
                 until = f"waiting for one, {WORKER_SECONDS:g} s at most"
                 self._say(f"Dask's scheduler at {where} has no worker yet: {until}")
             if why := self._stuck():
@@ -211,8 +211,8 @@ class Dask:
         }
         dask_future = None
         try:
-            told = {"errand": ERRAND, "told": {"order": order}}
-            dask_future = self._client.submit(eval, CALL, told, key=key, pure=False)
+            errand = {"errand": ERRAND, "told": {"order": order}}
+            dask_future = self._client.submit(eval, CALL, errand, key=key, pure=False)
             return self._outcome(task, await _held(dask_future))
         except KilledWorker:
             return Outcome(task, "lost", why="died with its Dask worker")
@@ -228,11 +228,11 @@ class Dask:
             if dask_future is not None:
                 dask_future.release()
 
-    def _outcome(self, task: Task, told: Mapping[str, Any]) -> Outcome:
+    def _outcome(self, task: Task, answer: Mapping[str, Any]) -> Outcome:
         """The outcome of a task from a worker's answer."""
-        if told["kind"] != "done":
-            return Outcome(task, told["kind"], why=told["why"])
-        if "proof" in told and told["proof"] != self._sections[task.section].key(task.first, task.last):
-            why = f"{told['host']} has other code of MET {VERSION}, or other models: install the same everywhere"
+        if answer["kind"] != "done":
+            return Outcome(task, answer["kind"], why=answer["why"])
+        if "proof" in answer and answer["proof"] != self._sections[task.section].key(task.first, task.last):
+            why = f"{answer['host']} has other code of MET {VERSION}, or other models: install the same everywhere"
             return Outcome(task, "broken", why=why)
-        return Outcome(task, "done", Done(*told["done"]))
+        return Outcome(task, "done", Done(*answer["done"]))

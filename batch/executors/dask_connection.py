@@ -148,6 +148,6 @@ def _started(threads: int) -> Iterator[Any]:
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):
-        for each in (cluster.scheduler, *cluster.workers.values()):
-            each.http_server.stop()  # each has a web server, which cannot be switched off
+        for server in (cluster.scheduler, *cluster.workers.values()):
+            server.http_server.stop()  # each has a web server, which cannot be switched off
         yield client

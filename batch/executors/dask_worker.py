@@ -52,17 +52,17 @@ def carry_out(order: Mapping[str, Any]) -> dict[str, Any]:
             f"{host} does not see {folder}: put the archive where all hosts see it under the same name (`-o`)"
         )
     worker = get_worker()
-    kept: WorkerChildren = sync(worker.loop, WorkerChildren.on, worker, order)
-    outcome = kept.carry_out(task, order["key"])
+    children: WorkerChildren = sync(worker.loop, WorkerChildren.on, worker, order)
+    outcome = children.carry_out(task, order["key"])
     if outcome.kind == "broken":
         return _broken(f"on {host}, {outcome.why}")
     if outcome.done is None:
         return {"kind": outcome.kind, "why": outcome.why}
-    told = {"kind": "done", "done": [outcome.done.seconds, outcome.done.failed], "host": host}
-    if not kept.proved:
-        kept.proved = True
-        told["proof"] = shard.read(folder / "shards" / task.path).key
-    return told
+    answer = {"kind": "done", "done": [outcome.done.seconds, outcome.done.failed], "host": host}
+    if not children.proved:
+        children.proved = True
+        answer["proof"] = shard.read(folder / "shards" / task.path).key
+    return answer
 
 
 async def dismiss(campaign: str, dask_worker: Worker) -> None:
@@ -91,13 +91,13 @@ class WorkerChildren(WorkerPlugin):
         if worker.status not in WORKER_ANY_RUNNING:
             raise Reschedule
         name = order["campaign"]
-        kept = worker.plugins.get(name)
-        if not isinstance(kept, WorkerChildren):
+        children = worker.plugins.get(name)
+        if not isinstance(children, WorkerChildren):
             crew = Crew(Path(order["folder"]), threads=order["threads"], timeout=order["timeout"])
-            kept = WorkerChildren(name, crew)
-            await worker.plugin_add(plugin=kept, name=name)
-        kept._at_work.add(order["key"])
-        return kept
+            children = WorkerChildren(name, crew)
+            await worker.plugin_add(plugin=children, name=name)
+        children._at_work.add(order["key"])
+        return children
 
     def carry_out(self, task: Task, key: str) -> Outcome:
         """Run a task, for which the children were requested with `on`. Raises Reschedule where they were released

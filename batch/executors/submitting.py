@@ -83,10 +83,10 @@ def submit(
         folder.remove_partial_shards()
         missing = []
         for section in values:
-            kept, told = folder.sound_tasks(section)
-            for note in told:
+            sound, messages = folder.sound_tasks(section)
+            for note in messages:
                 say(note)
-            missing += [Task(section.number, *gap) for gap in uncovered(kept, len(section.rows))]
+            missing += [Task(section.number, *gap) for gap in uncovered(sound, len(section.rows))]
         cases = sum(task.cases for task in missing)
         if cases < campaign.cases:
             say(f"goes on: {campaign.cases - cases:,} of {campaign.cases:,} cases are done")
@@ -131,11 +131,11 @@ def shares(missing: Sequence[Task], count: int) -> list[list[Task]]:
     """Cut the missing tasks into stretches and distribute them, so that each job has about as many cases, from
     everywhere."""
     whole = sum(task.cases for task in missing)
-    each = max(GRANULE, -(-whole // (count * STRIPES * GRANULE)) * GRANULE)
+    cases_each = max(GRANULE, -(-whole // (count * STRIPES * GRANULE)) * GRANULE)
     pieces = [
-        Task(task.section, first, min(first + each, task.last))
+        Task(task.section, first, min(first + cases_each, task.last))
         for task in missing
-        for first in range(task.first, task.last, each)
+        for first in range(task.first, task.last, cases_each)
     ]
     return [pieces[number::count] for number in range(count)]
 
@@ -152,9 +152,9 @@ def _sbatch(command: Sequence[str], script: str, more: bool) -> str:
     done = subprocess.run(command, input=script, capture_output=True, text=True)
     number = re.match(r"\d+", done.stdout.strip())
     if done.returncode != 0 or number is None:
-        said = (done.stderr or done.stdout).strip().splitlines()
-        words = said[-1] if said else "it said nothing"
-        given = ["what is given by `--sbatch` goes to sbatch as it is"] if more else []
-        helps = [*given, "`met run` runs it on this machine"]
+        lines = (done.stderr or done.stdout).strip().splitlines()
+        words = lines[-1] if lines else "it said nothing"
+        hint = ["what is given by `--sbatch` goes to sbatch as it is"] if more else []
+        helps = [*hint, "`met run` runs it on this machine"]
         raise Problem(error("E358", f"sbatch refuses the job: {words}", help=helps))
     return number.group()

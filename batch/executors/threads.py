@@ -48,7 +48,7 @@ class Threads:
             self._computed = 0
         # one shard may be on its way to the disk, with its histories in memory
         ended = [self._written.popleft() for _ in range(len(self._written) - bool(self._waiting))]
-        return [self._outcome(*each) for each in ended]
+        return [self._outcome(*task_and_end) for task_and_end in ended]
 
     def close(self) -> None:
         self._waiting.clear()

@@ -107,15 +107,15 @@ def check(deck: WatchedDeck, name: str | None = None) -> None:
             raise Problem(_no_deck(deck, problem.diagnostics)) from problem
     if name is not None and not tree.unreadable and not has_none:
         asked_definitions(known, complaints, (name,))
-        if unknown := [each for each in complaints.errors if each.code == "D164"]:
+        if unknown := [diagnostic for diagnostic in complaints.errors if diagnostic.code == "D164"]:
             raise Problem(unknown)
 
 
-def _no_deck(deck: WatchedDeck, found: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
+def _no_deck(deck: WatchedDeck, mistakes: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
     """Mistakes of a file that is not named like a deck, with a remark on why it is read as one."""
     kinds = ", ".join(ARCHIVES)
     helps = f"{deck.name} is read as a deck: its name does not end like an archive's ({kinds})"
-    return (*found[:-1], replace(found[-1], help=(*found[-1].help, helps)))
+    return (*mistakes[:-1], replace(mistakes[-1], help=(*mistakes[-1].help, helps)))
 
 
 def compiled(
@@ -132,19 +132,24 @@ def compiled(
     except Problem as problem:
         return DeckAnswer(_words(problem.diagnostics, problem.sources), (), tuple(problem.sources))
     known = Definitions(tree, Complaints())
-    found = [each for kind in EXPERIMENTS for each in known.of_kind(kind).values()]
-    names = tuple(each.name for each in [each for each in found if known.writes(each)] or found)
-    made = compile_deck(
+    definitions = [definition for kind in EXPERIMENTS for definition in known.of_kind(kind).values()]
+    names = tuple(
+        definition.name
+        for definition in [definition for definition in definitions if known.writes(definition)] or definitions
+    )
+    compiled_deck = compile_deck(
         tree, select=None if name is None else (name,), defines=deck.defines, settings=deck.settings, memo=memo
     )  # fmt: skip
-    words, files = _words(made.diagnostics, made.sources), tuple(made.sources)
-    if made.plan is None:
+    words, files = _words(compiled_deck.diagnostics, compiled_deck.sources), tuple(compiled_deck.sources)
+    if compiled_deck.plan is None:
         return DeckAnswer(words, names, files)
-    experiments = {each.name: each for each in made.plan.experiments}
-    experiment = experiments.get(group or "", made.plan.experiments[0])
+    experiments = {experiment_.name: experiment_ for experiment_ in compiled_deck.plan.experiments}
+    experiment = experiments.get(group or "", compiled_deck.plan.experiments[0])
     if experiment.search is not None:
         return DeckAnswer(_words([_search(deck, experiment)], {}), names, files)
-    return DeckAnswer(words, names, files, made.plan, experiment, tuple(experiments) if len(experiments) > 1 else ())
+    return DeckAnswer(
+        words, names, files, compiled_deck.plan, experiment, tuple(experiments) if len(experiments) > 1 else ()
+    )
 
 
 def _search(deck: WatchedDeck, experiment: Experiment) -> Diagnostic:
@@ -199,21 +204,21 @@ def run_cases(
     linear_metrics.check(prepared)
     rows = shown_rows(prepared.experiment)
     prepared.kernel  # noqa: B018 - compiling is not running
-    done, told, count, found = 0, time.monotonic(), FIRST, []
+    done, last_shown, count, outputs = 0, time.monotonic(), FIRST, []
     while done < len(rows) and not stop():
         began = time.monotonic()
-        here = rows[done : done + count]
+        block = rows[done : done + count]
         try:
-            found.append(linear_metrics.compute(prepared, here, record=False, progress=working)[1])
+            outputs.append(linear_metrics.compute(prepared, block, record=False, progress=working)[1])
         except _GivenUp:
             return
-        done += len(here)
+        done += len(block)
         took = time.monotonic() - began
         count = max(1, min(4 * count, round(count * SHARE / max(took, 1e-6))))
         progress(done)
-        if done == len(rows) or time.monotonic() - told > TELLING:
-            told = time.monotonic()
-            yield results(prepared, rows[:done], None, np.concatenate(found))
+        if done == len(rows) or time.monotonic() - last_shown > TELLING:
+            last_shown = time.monotonic()
+            yield results(prepared, rows[:done], None, np.concatenate(outputs))
 
 
 def numbers(experiment: Experiment, run: Run) -> str:
@@ -234,7 +239,7 @@ def numbers(experiment: Experiment, run: Run) -> str:
         "done": done,
         "failed": int((run.status != DONE).sum()),
         "failures": [[failure.count, visible(failure.cause), failure.row] for failure in pool.failures[:5]],
-        "doubtful": sorted({visible(each) for each in run.warning if each})[:5],
+        "doubtful": sorted({visible(warning) for warning in run.warning if warning})[:5],
         "verdicts": [
             [visible(text), *(int((pool.outcomes[:, n] == value).sum()) for value in (1, 0, -1))]
             for n, text in enumerate(pool.requirements)

@@ -34,24 +34,26 @@ class Board:
         self._chosen: tuple[str, str | None] | None = None
         self._ended = False
 
-    def tell(self, of: int | None = None, **changes: Any) -> None:
-        """Change entries of the state. of: the page that they concern, where they count only while it is shown"""
+    def tell(self, shown_page: int | None = None, **changes: Any) -> None:
+        """Change entries of the state. shown_page: that which they concern, where they count only while it is shown"""
         with self._changed:
-            if of in (None, self._state["page"]) and any(self._state[name] != value for name, value in changes.items()):
+            if shown_page in (None, self._state["page"]) and any(
+                self._state[name] != value for name, value in changes.items()
+            ):
                 self._state.update(changes)
                 self._number += 1
                 self._changed.notify_all()
 
-    def show(self, kind: str, text: str, of: int | None = None, **changes: Any) -> int:
-        """Store a text, a `page` or `numbers`, and change other entries of the state with it; returns its number. of:
-        as for `tell`"""
+    def show(self, kind: str, text: str, shown_page: int | None = None, **changes: Any) -> int:
+        """Store a text, a `page` or `numbers`, and change other entries of the state with it; returns its number.
+        shown_page: as for `tell`"""
         with self._changed:
             texts = self._texts[kind]
             number = max(texts, default=0) + 1
             texts[number] = text.encode()
-            for old in [each for each in texts if each <= number - KEPT]:
+            for old in [text_number for text_number in texts if text_number <= number - KEPT]:
                 del texts[old]
-            self.tell(of, **{kind: number}, **changes)
+            self.tell(shown_page, **{kind: number}, **changes)
             return number
 
     def text(self, kind: str, number: int) -> bytes | None:

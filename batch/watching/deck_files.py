@@ -38,8 +38,8 @@ class DeckFiles:
     """The watched files and folders, as of the last check."""
 
     def __init__(self, deck: Path, include_dirs: Sequence[str] = ()) -> None:
-        more = [each for each in os.environ.get("MET_DECK_PATH", "").split(os.pathsep) if each]
-        self._deck, self._folders = deck, [Path(each) for each in (*include_dirs, *more)]
+        more = [folder for folder in os.environ.get("MET_DECK_PATH", "").split(os.pathsep) if folder]
+        self._deck, self._folders = deck, [Path(folder) for folder in (*include_dirs, *more)]
         self._stamps: dict[Path, Stamp] = {}
         self._digests: dict[Path, bytes] = {}
         self._named: dict[Path, list[str]] = {}
@@ -107,7 +107,7 @@ class DeckFiles:
         except OSError as reason:
             digest = repr(stamp).encode() if reason.errno == errno.EFBIG else b""  # no file of a deck is as large
         named = () if text is None or LIBRARY in path.parents else dict.fromkeys(NAMED.findall(text))
-        self._named[path] = [os.fsdecode(each) for each in [*named][:MOST_NAMED]]
+        self._named[path] = [os.fsdecode(name) for name in [*named][:MOST_NAMED]]
         before = self._digests.get(path)
         self._digests[path] = digest
         return before is not None and before != digest

@@ -47,8 +47,8 @@ class Door:
             elif key.fileobj in self._outside:  # else it was turned away for one who came in this round
                 self._listen_to(key.fileobj)
         late = time.monotonic() - OUTSIDE_SECONDS
-        for each in [each for each, (_, since, _) in self._outside.items() if since < late]:
-            self._turn_away(each)
+        for address in [address for address, (_, since, _) in self._outside.items() if since < late]:
+            self._turn_away(address)
 
     def open(self) -> None:
         self._listening.setblocking(False)
@@ -56,8 +56,8 @@ class Door:
 
     def close(self) -> None:
         """Turn all away."""
-        for each in [*self._outside]:
-            self._turn_away(each)
+        for address in [*self._outside]:
+            self._turn_away(address)
         self._waiting.close()
 
     def _let_come(self) -> None:
@@ -75,21 +75,21 @@ class Door:
         self._listen_to(connection)
 
     def _listen_to(self, connection: socket) -> None:
-        address, _, said = self._outside[connection]
+        address, _, request = self._outside[connection]
         try:
-            more = connection.recv(LONGEST_METHOD + 1 + len(self._shown) - len(said))
+            more = connection.recv(LONGEST_METHOD + 1 + len(self._shown) - len(request))
         except BlockingIOError:
             return
         except OSError:
             more = b""
-        said += more
-        method, blank, path = said.partition(b" ")
-        if not more or len(method) > LONGEST_METHOD or b"\n" in said:
+        request += more
+        method, blank, path = request.partition(b" ")
+        if not more or len(method) > LONGEST_METHOD or b"\n" in request:
             self._turn_away(connection, STRANGE if more else b"")
         elif blank and len(path) >= len(self._shown):
             if hmac.compare_digest(path[: len(self._shown)], self._shown):
                 self._forget(connection)
-                self._admit(connection, address, bytes(said))
+                self._admit(connection, address, bytes(request))
             else:
                 self._turn_away(connection, STRANGE)
 

@@ -115,11 +115,11 @@ class _Loop:
     def _of(self, mishap: Exception) -> dict[str, Any]:
         """The message about an error that is not a mistake of the deck: the machine's, or MET's own, which is also
         printed in the terminal. To be called while it is handled."""
-        told: dict[str, Any] = {"broken": True, "tried": time.time()}
+        state: dict[str, Any] = {"broken": True, "tried": time.time()}
         if isinstance(mishap, MemoryError | OSError):
-            return told | {"messages": _words(Problem(of_machine(mishap)))}
+            return state | {"messages": _words(Problem(of_machine(mishap)))}
         with self._telling:
-            return told | {"messages": visible(self._confess(mishap)), "fault": True}
+            return state | {"messages": visible(self._confess(mishap)), "fault": True}
 
     def _once(self) -> bool:
         """Compile the files on the disk, and show the result. True where they have changed meanwhile."""
@@ -133,31 +133,35 @@ class _Loop:
             self._tell(answer.messages)
         self._tell = None
         self._is_broken = answer.experiment is None
-        told: dict[str, Any] = {"names": list(answer.names), "groups": list(answer.groups), "messages": answer.messages}
-        told["fault"] = False
+        state: dict[str, Any] = {
+            "names": list(answer.names),
+            "groups": list(answer.groups),
+            "messages": answer.messages,
+        }
+        state["fault"] = False
         if answer.experiment is None:
-            self._board.tell(**told, broken=True, tried=begun, doing="")
+            self._board.tell(**state, broken=True, tried=begun, doing="")
             return False
         try:
-            self._show(answer, prepare(answer.experiment), told, begun)
+            self._show(answer, prepare(answer.experiment), state, begun)
         except Problem as problem:
             self._is_broken = True
-            self._board.tell(**told | {"messages": _words(problem)}, broken=True, tried=begun, doing="")
+            self._board.tell(**state | {"messages": _words(problem)}, broken=True, tried=begun, doing="")
         return False
 
-    def _show(self, answer: DeckAnswer, prepared: Prepared, told: dict[str, Any], begun: float) -> None:
+    def _show(self, answer: DeckAnswer, prepared: Prepared, state: dict[str, Any], begun: float) -> None:
         """Show the page, and begin to run its cases; an unchanged page or program stays."""
         experiment = prepared.experiment
-        told |= {
+        state |= {
             "run": experiment.name_in_deck, "group": experiment.name, "broken": False, "saved": begun, "tried": begun,
         }  # fmt: skip
         text = answers.page(answer, prepared)
         if text == self._page and self._shown is not None and prepared.work_key == self._shown.work_key:
-            self._board.tell(**told, doing="")
+            self._board.tell(**state, doing="")
             return
         self.give_up(0.0)
         self._page, self._shown, self._stop = text, prepared, threading.Event()
-        page = self._board.show("page", text, **told, numbers=0, doing="compiling for this machine")
+        page = self._board.show("page", text, **state, numbers=0, doing="compiling for this machine")
         self._cases = threading.Thread(target=self._run_cases, args=(prepared, page, self._stop), daemon=True)
         self._cases.start()
 

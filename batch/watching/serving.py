@@ -185,8 +185,8 @@ class _Request(BaseHTTPRequestHandler):
             self._send(text.encode(), "text/html; charset=utf-8", policy)
         elif what == "events":
             self._events()
-        elif what in ("page", "numbers") and (found := self.server.board.text(what, number)) is not None:
-            self._send(found, "application/json", FRAME_POLICY)
+        elif what in ("page", "numbers") and (stored := self.server.board.text(what, number)) is not None:
+            self._send(stored, "application/json", FRAME_POLICY)
         elif what == "run":
             self._send(page_of_runs().encode(), "text/html; charset=utf-8", INNER_POLICY)
         elif what is not None:
@@ -200,8 +200,8 @@ class _Request(BaseHTTPRequestHandler):
         if what != "choose" or not _is_number(size) or int(size) > MOST_CHOICE:
             self._refuse(HTTPStatus.NOT_FOUND if what != "choose" else HTTPStatus.BAD_REQUEST)
             return
-        told = parse_qs(self.rfile.read(int(size)).decode("utf-8", "replace"))
-        run, group = (told.get(name, [None])[0] for name in ("run", "group"))
+        form = parse_qs(self.rfile.read(int(size)).decode("utf-8", "replace"))
+        run, group = (form.get(name, [None])[0] for name in ("run", "group"))
         if run is not None and self.server.board.choose(run, group):
             self._send(b"", "text/plain", FRAME_POLICY)
         else:
@@ -233,9 +233,9 @@ class _Request(BaseHTTPRequestHandler):
         number = 0
         while not self.server.board.ended:
             number, state = self.server.board.after(number, ALIVE_SECONDS)
-            said = ":\n\n" if state is None else f"data: {json.dumps(state)}\n\n"
+            event = ":\n\n" if state is None else f"data: {json.dumps(state)}\n\n"
             try:
-                self.wfile.write(said.encode())
+                self.wfile.write(event.encode())
                 self.wfile.flush()
             except OSError:
                 return
