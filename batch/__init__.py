@@ -112,10 +112,10 @@ def run(
     from batch.export import from_run
 
     archive, target = from_run.archive_and_export(output)
-    made = _plan(plan, experiments, set, vary)
+    made_plan = _plan(plan, experiments, set, vary)
     chosen = executor or choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
     campaign = prepare(
-        made,
+        made_plan,
         output=archive,
         experiments=experiments,
         cases=cases,
@@ -182,9 +182,9 @@ def linear(
     from batch.linearized import LinearAnswer
     from met.analysis.linear.answers import question_of
 
-    asked = experiments_named(_plan(plan, None), None if experiment is None else (experiment,))[:1]
-    ((found, rows),) = select_rows(asked, [case])
-    question = question_of(found, of, at=at, inputs=inputs, outputs=outputs, opened=opened)
+    chosen = experiments_named(_plan(plan, None), None if experiment is None else (experiment,))[:1]
+    ((chosen_experiment, rows),) = select_rows(chosen, [case])
+    question = question_of(chosen_experiment, of, at=at, inputs=inputs, outputs=outputs, opened=opened)
     return LinearAnswer(question.of(int(rows[0])))
 
 
@@ -211,13 +211,13 @@ def gradient(
     from met.analysis.linear.gradient import GradientProgram
 
     names = None if experiment is None else (experiment,)
-    found = experiments_named(_plan(plan, names), names)[0]
-    ((found, rows),) = select_rows([found], cases)
-    return to_dataset(found, GradientProgram(found).of(rows[:], metrics))
+    chosen_experiment = experiments_named(_plan(plan, names), names)[0]
+    ((chosen_experiment, rows),) = select_rows([chosen_experiment], cases)
+    return to_dataset(chosen_experiment, GradientProgram(chosen_experiment).of(rows[:], metrics))
 
 
 def _plan(
-    given: object,
+    source: object,
     experiments: Sequence[str] | None,
     set: Mapping[str, object] | Sequence[str] = (),
     vary: Mapping[str, object] | Sequence[str] = (),
@@ -226,19 +226,19 @@ def _plan(
     Raises TypeError for other arguments, and for values that are set or varied in a plan."""
     from met.plan import Plan
 
-    if not isinstance(given, Plan | str | os.PathLike):
-        raise TypeError(f"batch.run takes a deck's path or a plan, and not {type(given).__name__}")
-    if not isinstance(given, Plan) and Path(given).suffix != ".json":
+    if not isinstance(source, Plan | str | os.PathLike):
+        raise TypeError(f"batch.run takes a deck's path or a plan, and not {type(source).__name__}")
+    if not isinstance(source, Plan) and Path(source).suffix != ".json":
         import ic
 
-        return ic.compile(given, set=set, vary=vary, select=experiments)
+        return ic.compile(source, set=set, vary=vary, select=experiments)
     if set or vary:
         raise TypeError("`set` and `vary` are of decks: the values of a plan are settled")
-    if isinstance(given, Plan):
-        return given
+    if isinstance(source, Plan):
+        return source
     from met.plan import file as plan_file
 
-    return plan_file.read(given)
+    return plan_file.read(source)
 
 
 def look(path: str | os.PathLike[str], notes: Sequence[str] = ()) -> Archive:
@@ -264,16 +264,18 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     with ArchiveFile(Path(path)) as file:
         several = len(file.groups) > 1
         summed = {group.name: group.summary.cases for group in file.groups if group.summary is not None}
-        kept = {group.name: group.count for group in file.groups}
+        row_counts = {group.name: group.count for group in file.groups}
     import xarray
 
     import batch.notebook  # noqa: F401 - registers `data.met`
 
     opened = xarray.open_datatree if several else xarray.open_dataset
     with reading(Path(path)):
-        found = opened(path, engine="h5netcdf", **({} if chunks is None else {"chunks": chunks}))
+        data = opened(path, engine="h5netcdf", **({} if chunks is None else {"chunks": chunks}))
     for name, cases in summed.items():
-        (found[name] if several else found).attrs["summary_of_cases"] = cases
-        message = f"{path} keeps a summary of {cases:,} cases of `{name}`, and the rows of {kept[name]:,} that it names"
+        (data[name] if several else data).attrs["summary_of_cases"] = cases
+        message = (
+            f"{path} keeps a summary of {cases:,} cases of `{name}`, and the rows of {row_counts[name]:,} that it names"
+        )
         warnings.warn(f"{message}: these are no sample of them; `data.met.evidence()` judges all", stacklevel=2)
-    return found
+    return data

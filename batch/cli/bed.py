@@ -39,12 +39,12 @@ class Amount(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Read an amount with its unit as SI."""
         try:
-            found = measured(value, self._unit)
+            amount = measured(value, self._unit)
         except (ValueError, Problem):
-            found = 0.0
-        if not 0.0 < found < math.inf:
+            amount = 0.0
+        if not 0.0 < amount < math.inf:
             self.fail(f"`{value}` is none: write `12 {self._unit}`", param, ctx)
-        return found
+        return amount
 
 
 PORT = click.option("--port", "word", metavar="[JOINT=]PORT", required=True, help="The port of the bed.")

@@ -101,15 +101,15 @@ def best(
 
     with ArchiveFile(archive) as file:
         file.need_every_row("choosing among designs")
-        found = pools(groups_named(file, [experiment] if experiment else []))
-        found = [each for each in found if each.count > 1 or search_of(each.groups[0]) is not None]
-        if not found:
+        pools_ = pools(groups_named(file, [experiment] if experiment else []))
+        pools_ = [pool_ for pool_ in pools_ if pool_.count > 1 or search_of(pool_.groups[0]) is not None]
+        if not pools_:
             helps = "a sweep has several: `vary`, `sample`"
             raise Problem(error("E395", f"{archive} has no designs to choose among: each run is one case", help=helps))
-        if len(found) > 1:
-            helps = f"name one: {', '.join(f'`--run {each.name}`' for each in found)}"
+        if len(pools_) > 1:
+            helps = f"name one: {', '.join(f'`--run {pool_.name}`' for pool_ in pools_)}"
             raise Problem(error("E395", f"{archive} holds several sweeps", help=helps))
-        pool = found[0]
+        pool = pools_[0]
         searched = search_result(file, pool.groups[0])
         if output is not None and not (diff or write):
             raise click.UsageError("-o is the file for --write")
@@ -128,7 +128,7 @@ def best(
             deck = None
             if (diff or write) and searched.ok:
                 deck = chosen_deck(file, searched.values, output, experiment=searched.name, among=searched.of)
-            tell(form, finite(searched.data), searched.lines, deck, asked=diff or write, write=write)
+            tell(form, finite(searched.data), searched.lines, deck, requested=diff or write, write=write)
             return YES if searched.ok else NO
         designs = Designs(pool, over, choose)
         if not pool.requirements and not by:
@@ -143,11 +143,11 @@ def best(
         answer = BestAnswer(designs, goals, traded, **context(file, pool), judged=judged, least_margin=least)
         deck = None
         if (diff or write) and answer.best is not None and answer.advised:
-            of = f"{designs.count:,} designs"
-            deck = chosen_deck(file, answer.values(answer.best), output, experiment=answer.name, among=of)
+            among = f"{designs.count:,} designs"
+            deck = chosen_deck(file, answer.values(answer.best), output, experiment=answer.name, among=among)
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
         data = answer.as_data() if form == "json" else {}
-        tell(form, data, answer.lines(width), deck, asked=diff or write, write=write)
+        tell(form, data, answer.lines(width), deck, requested=diff or write, write=write)
         return YES if answer.advised else NO
 
 
@@ -157,14 +157,14 @@ def tell(
     lines: Iterable[str],
     deck: ChosenDeck | None,
     *,
-    asked: bool,
+    requested: bool,
     write: bool,
     why_not: str = "no design is advised",
 ) -> None:
     """Say the answer, and what changes in the deck; write it.
 
     data, lines  the answer for programs, and for people;  deck: None where nothing is good enough to be written
-    asked        whether the deck is asked for;  why_not: why there is none, in words
+    requested    whether the deck is asked for;  why_not: why there is none, in words
     """
     import json
 
@@ -176,7 +176,7 @@ def tell(
         say("\n".join(map(line, lines)))
         if deck is not None:
             say("\n".join(["", *map(line, deck.diff())]))
-        elif asked:
+        elif requested:
             say(f"\n{why_not}, so nothing is written into the deck")
     if deck is not None and write:
         deck.write()

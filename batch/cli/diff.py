@@ -48,14 +48,18 @@ def diff(a: str, b: str, tolerances: tuple[str, ...], require: str, distribution
     from batch.differences.tolerance import tolerances as read
     from met.outputs import quoted
 
-    found = diff(a, b, read(tolerances), distributions=distributions)
+    difference = diff(a, b, read(tolerances), distributions=distributions)
     options = [
         *(f"--tol {quoted(tolerance)}" for tolerance in tolerances),
         *(["--distributions"] if distributions else []),
     ]
     cut = Shortening(every, f"`{' '.join(['met diff', quoted(a), quoted(b), *options, '--all'])}`")
-    say(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(map(line, diff_lines(found, cut))))
-    enough = VERDICTS.index(found.verdict) <= VERDICTS.index(require)
-    if form != "json" and found.verdict == EQUIVALENT and not enough:
+    say(
+        json.dumps(as_data(difference), indent=1)
+        if form == "json"
+        else "\n".join(map(line, diff_lines(difference, cut)))
+    )
+    enough = VERDICTS.index(difference.verdict) <= VERDICTS.index(require)
+    if form != "json" and difference.verdict == EQUIVALENT and not enough:
         click.echo("exit 1: `--require identical` asks for the same bits")
     return YES if enough else NO

@@ -101,13 +101,13 @@ def export(
     written = [path for path in (done.path, done.layout) if path is not None]
     with kept(f"{done.path} is whole"):
         if form == "json":
-            told = {
+            facts = {
                 "written": [str(path) for path in written],
                 "cases": done.cases,
                 "rows": done.rows,
                 "table": done.table,
             }
-            click.echo(json.dumps(told, indent=1))
+            click.echo(json.dumps(facts, indent=1))
         elif not quiet:
             for path in written:
                 say(f"{path}  ({size(path.stat().st_size)}){summary(done) if path == done.path else ''}")

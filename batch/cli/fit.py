@@ -108,7 +108,7 @@ def fit(
 
     if names_plan(deck) or names_archive(deck):
         raise click.UsageError(f"`{deck}` is no deck, of which numbers could be estimated")
-    if any(varies(each) for each in options["settings"]):
+    if any(varies(setting) for setting in options["settings"]):
         raise click.UsageError("--vary is for sweeps: `--estimate PATH` is what a fit moves")
     if output is not None and not (diff or write):
         raise click.UsageError("-o is the file for --write")
@@ -120,23 +120,23 @@ def fit(
     if options["motions"] and not identifiable:
         raise click.UsageError("--motion is for --identifiable: a run without a log cannot be fitted")
     question = fit_question(deck, logs, estimates, **options)
-    given = {key: options[key] for key in ("defines", "settings")}
+    how_read = {key: options[key] for key in ("defines", "settings")}
     bar, changed = Bar(), None
     if identifiable:
         bar.begin("slopes", 0)
         known, promised = question.identifiable(), question.promised(bar.advance)
         bar.end()
-        chosen = [each for each in promised if each.values]
+        chosen = [promise for promise in promised if promise.values]
         if diff or write:
             if len(chosen) != 1:
                 raise click.UsageError("--identifiable writes the best motion of one sweep: `--motion SWEEP`")
             name = chosen[0].motion.given.name
-            changed = fitted_deck(deck, shown.written_motion(chosen[0]), output, experiment=name, **given)
-            if logged := {each.given.name for each in question.runs} & {name, *changed.others}:
+            changed = fitted_deck(deck, shown.written_motion(chosen[0]), output, experiment=name, **how_read)
+            if logged := {run.given.name for run in question.runs} & {name, *changed.others}:
                 message = f"with this motion, `{min(logged)}` is no longer the run of its log"
                 raise Problem(error("E480", message, help=f"give `{name}` servos of its own"))
         data = shown.identifiable_data(question, known, promised)
-        tell(form, data, shown.identifiable_lines(question, known, promised), changed, asked=False, write=write)
+        tell(form, data, shown.identifiable_lines(question, known, promised), changed, requested=False, write=write)
         return YES if set(known.verdict) == {"known"} else NO
     bar.begin(f"fit of {question.runs[0].given.name}", 0)
     answer = question.answer(bar.advance)
@@ -150,9 +150,9 @@ def fit(
         if diff or write:
             values = shown.written_values(question, answer)
             try:
-                changed = fitted_deck(deck, values, output, experiment=question.runs[0].given.name, **given)
+                changed = fitted_deck(deck, values, output, experiment=question.runs[0].given.name, **how_read)
             except Problem:
-                tell(form, data, lines, None, asked=False, write=False)  # the numbers are not lost with the deck
+                tell(form, data, lines, None, requested=False, write=False)  # the numbers are not lost with the deck
                 raise
     if drawn is not None:
         run = (*question.predicted, *question.runs)[0]
@@ -164,7 +164,7 @@ def fit(
         data,
         lines,
         changed,
-        asked=diff or write,
+        requested=diff or write,
         write=write,
         why_not="not all numbers are known, or a log is doubtful",
     )

@@ -80,20 +80,20 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
             if options[key] is not None:
                 raise click.UsageError(f"{option} is of one case, and --all-cases of all")
     names = (name,) if name is not None else ()
-    given = {key: options[key] for key in ("defines", "include_dirs", "settings")}
-    check_options(source, names, **given)
+    how_read = {key: options[key] for key in ("defines", "include_dirs", "settings")}
+    check_options(source, names, **how_read)
     output, drawn = (None if options[key] is None else path_of(options[key]) for key in ("output", "picture"))
     if output is not None:
         files.check(output)
     if drawn is not None:
         places.check(drawn)
-    plan = read_plan(source, names, **given, quiet=form == "json")
-    asked = experiments_named(plan, names or None)
+    plan = read_plan(source, names, **how_read, quiet=form == "json")
+    experiments = experiments_named(plan, names or None)
     if options["case"] is not None:
-        ((experiment, rows), *_) = select_rows(asked, [options["case"]])
+        ((experiment, rows), *_) = select_rows(experiments, [options["case"]])
         case = int(rows[0])
     else:
-        experiment, case = asked[0], 0
+        experiment, case = experiments[0], 0
     question = question_of(
         experiment, **{key: options[key] for key in ("of", "at", "inputs", "outputs", "opened")}
     )  # fmt: skip
@@ -102,17 +102,17 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
         if drawn is not None:
             locus.draw(question, every, drawn)
         data = [
-            as_data(each) if isinstance(each, Linearized) else {"case": n, "why_not": each}
-            for n, each in enumerate(every)
+            as_data(answer) if isinstance(answer, Linearized) else {"case": n, "why_not": answer}
+            for n, answer in enumerate(every)
         ]
         say(json.dumps(data, indent=1) if form == "json" else "\n".join(case_lines(question, every)))
-        loops = [loop for each in every if isinstance(each, Linearized) for loop in each.loops]
+        loops = [loop for answer in every if isinstance(answer, Linearized) for loop in answer.loops]
         return NO if any(loop.unstable for loop in loops) else YES
-    found = question.of(case)
+    linearized = question.of(case)
     if output is not None:
-        files.write(found, output)
+        files.write(linearized, output)
     if drawn is not None:
-        picture.draw(found, drawn)
-    lines = linear_lines(found, experiment.cases.count)
-    say(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(lines))
-    return NO if any(loop.unstable for loop in found.loops) else YES
+        picture.draw(linearized, drawn)
+    lines = linear_lines(linearized, experiment.cases.count)
+    say(json.dumps(as_data(linearized), indent=1) if form == "json" else "\n".join(lines))
+    return NO if any(loop.unstable for loop in linearized.loops) else YES

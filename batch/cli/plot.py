@@ -74,8 +74,8 @@ def plot(
     from batch.plotting import plot
 
     if arm:
-        for option, given in (("names", names), ("--over", over), ("--against", against)):
-            if given:
+        for option, value in (("names", names), ("--over", over), ("--against", against)):
+            if value:
                 raise click.UsageError(f"--arm draws an arm alone: leave out {option}")
         if len(cases) > 1:
             raise click.UsageError("--arm is of one case: leave all but one --case out")

@@ -50,7 +50,7 @@ def report(
 
     if tolerances and against is None:
         raise click.UsageError("--tol is for a comparison: `--against BEFORE.h5` names the other archive")
-    told = (lambda done: click.echo(f"stability of {done} cases is known", err=True)) if verbose else None
+    progress = (lambda done: click.echo(f"stability of {done} cases is known", err=True)) if verbose else None
     target = make(
         archive,
         output,
@@ -59,7 +59,7 @@ def report(
         against=against,
         tolerances=tolerances,
         simulate=not no_simulation,
-        progress=told,
+        progress=progress,
     )
     if not quiet:
         with kept(f"{target} is whole"):

@@ -81,25 +81,29 @@ def residuals(
     with ArchiveFile(archive) as file:
         group = groups_named(file, [run] if run is not None else [])[0]
         position = group.recorded_position(case if case is not None else "#0")
-        experiment = next(each for each in file.plan().experiments if each.name == group.name)
+        experiment = next(experiment_ for experiment_ in file.plan().experiments if experiment_.name == group.name)
         recorded = described_columns(experiment)
         measured = read_log(log, recorded, [mapped_column(column) for column in columns], zero)
         joints = [joint.name for joint in experiment.structure.joints]
         courses = computed(group, position, recorded)
-        found = compare(courses, recorded, joints, measured)
-        if not found.residuals:
+        comparison = compare(courses, recorded, joints, measured)
+        if not comparison.residuals:
             message = f"no number of `{log}` has one of the run beside it"
             raise Problem(
                 error("E478", message, measured.head, help="let its times begin where the run begins, at 0 s")
             )
         if output is not None:
-            units = {each["channel"]: each["unit"] for each in recorded}
+            units = {column["channel"]: column["unit"] for column in recorded}
             title = f"{group.name}, {case_text(group, position)}, and {log}"
             pictures.draw(title, pictures.panels(measured, units, {"computed": courses}), output)
         if form == "json":
-            say(json.dumps({"experiment": group.name, "case": case_text(group, position), **as_data(found)}, indent=1))
+            say(
+                json.dumps(
+                    {"experiment": group.name, "case": case_text(group, position), **as_data(comparison)}, indent=1
+                )
+            )
         else:
             failed = ", which did not end well: as far as it came" if group.values("status")[position] else ""
             head = f"{group.name}, {case_text(group, position)}{failed}"
-            say("\n".join(map(line, [head, "", *residual_lines(found)])))
+            say("\n".join(map(line, [head, "", *residual_lines(comparison)])))
     return YES

@@ -60,10 +60,10 @@ def measured(value: Any, si: str) -> float:
 
     split = re.fullmatch(r"([-+.\deE]*\d\.?)\s*(\D*)", str(value).strip())
     number, unit = split.groups() if split else ("", "")
-    found = float(number) * (parse_unit(unit).scale if unit else 1.0)
+    number_in_si = float(number) * (parse_unit(unit).scale if unit else 1.0)
     if unit and not units.same(parse_unit(unit).dimension, parse_unit(si).dimension):
         raise ValueError
-    return found
+    return number_in_si
 
 
 @click.command(short_help="Run the cases of a deck or a plan into an archive.")
@@ -218,8 +218,8 @@ def status(where: str, form: str) -> int:
             helps.append("`met run DECK -o ARCHIVE` begins one; its folder is beside the archive until that is whole")
             raise Problem(error("E359", f"no campaign fills {where}", help=helps))
         since = f", begun at {data['began']}" if data["began"] != "unknown" else ""
-        said = f"{data['archive']} is whole: {data['cases']:,} case{'s' if data['cases'] != 1 else ''}{since}"
-        say(json.dumps(data, indent=1) if form == "json" else line(said))
+        text = f"{data['archive']} is whole: {data['cases']:,} case{'s' if data['cases'] != 1 else ''}{since}"
+        say(json.dumps(data, indent=1) if form == "json" else line(text))
         return YES
     data = report(folder, time.time())
     say(json.dumps(data, indent=1) if form == "json" else "\n".join(map(line, lines(data))))

@@ -45,16 +45,16 @@ def sensitivity(
             other.need_every_row("what a change depends on")
             both, _, _ = match_experiments(other, file)
             pairs = {
-                here.name: (there, *(matched := match_cases(there, here), matched.a, matched.b)[1:])
-                for there, here in both
+                group_b.name: (group_a, *(matched := match_cases(group_a, group_b), matched.a, matched.b)[1:])
+                for group_a, group_b in both
             }
         for group in groups:
             if against is not None and group.name not in pairs:
                 helps = "name one that both have: `--run NAME`"
                 raise Problem(error("E361", f"no cases of `{group.name}` are in {against}", help=helps))
-            found = sensitivities(group, metrics, pairs.get(group.name))
-            data.append({"experiment": group.name, "outputs": [as_data(each) for each in found]})
-            texts.append("\n\n".join("\n".join(map(line, sensitivity_lines(each))) for each in found))
+            results = sensitivities(group, metrics, pairs.get(group.name))
+            data.append({"experiment": group.name, "outputs": [as_data(result) for result in results]})
+            texts.append("\n\n".join("\n".join(map(line, sensitivity_lines(result))) for result in results))
             if len(groups) > 1:
                 texts[-1] = f"{line(group.name)}\n\n{texts[-1]}"
     say(json.dumps(data, indent=1) if form == "json" else "\n\n".join(texts))

@@ -117,8 +117,15 @@ def profile(
     from met.analysis.profile import as_data
     from met.analysis.profile import profile as measured
 
-    found = [(measured(each), each) for each in _asked_for(source, names, defines, include_dirs, settings, form)]
-    _say(form, [as_data(each) for each, _ in found], [profile_lines(*each) for each in found])
+    profiles = [
+        (measured(experiment), experiment)
+        for experiment in _asked_for(source, names, defines, include_dirs, settings, form)
+    ]
+    _say(
+        form,
+        [as_data(run_profile) for run_profile, _ in profiles],
+        [profile_lines(*run_profile) for run_profile in profiles],
+    )
     return YES
 
 
@@ -145,13 +152,17 @@ def margin(
     from met.diagnostic import Problem, error
 
     named = _asked_for(source, names, defines, include_dirs, settings, form)
-    asked = [each for each in named if each.structure.substitutions]
-    if not asked:
+    on_beds = [experiment for experiment in named if experiment.structure.substitutions]
+    if not on_beds:
         helps = ("a run says so: `substitute JOINT { }`", "name the run or sweep that does, if it is another one")
         raise Problem(error("E333", "no joint is on a bed here", help=helps))
-    found = [(each, margins(each)) for each in asked]
-    _say(form, [as_data(*each) for each in found], [margin_lines(*each) for each in found])
-    return YES if all(one.stable for _, cases in found for case in cases for one in case) else NO
+    margins_of = [(experiment, margins(experiment)) for experiment in on_beds]
+    _say(
+        form,
+        [as_data(*experiment_and_margins) for experiment_and_margins in margins_of],
+        [margin_lines(*experiment_and_margins) for experiment_and_margins in margins_of],
+    )
+    return YES if all(joint_margin.stable for _, cases in margins_of for case in cases for joint_margin in case) else NO
 
 
 def _asked_for(

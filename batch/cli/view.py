@@ -92,12 +92,12 @@ def _write(
 
     target = Path(archive).with_suffix(".view.html") if output is None else path_of(output)
     files.check_page(target)
-    said: list[str] = []
-    text = page(archive, () if name is None else (name,), against, numbers, include_dirs, said.append)
+    notes: list[str] = []
+    text = page(archive, () if name is None else (name,), against, numbers, include_dirs, notes.append)
     files.write_page(text, target)
     if not quiet:
-        for each in said:
-            say(f"note: {each}", err=True)
+        for note in notes:
+            say(f"note: {note}", err=True)
         with kept(f"{target} is whole"):
             say(f"{target}  ({size(target.stat().st_size)})")
             say(
@@ -134,12 +134,12 @@ def _watch(
             say(messages, err=True)
 
     words = ["view", deck, *([] if name is None else [name])]
-    told = partial(confess, arguments=words, verbose=verbose)
+    confess_here = partial(confess, arguments=words, verbose=verbose)
     path = find(deck, include_dirs)
     try:
         with terminable():
             watched = WatchedDeck(deck, path, include_dirs, defines, settings)
-            follow(watched, name, port=port, ready=ready, tell=tell, confess=told)
+            follow(watched, name, port=port, ready=ready, tell=tell, confess=confess_here)
     except Terminated:
         return TERMINATED
     except KeyboardInterrupt:
