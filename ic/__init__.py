@@ -76,11 +76,11 @@ def compile(
     return compiled.plan
 
 
-def _settings(given: Mapping[str, object] | Iterable[str]) -> Iterable[str]:
+def _settings(settings: Mapping[str, object] | Iterable[str]) -> Iterable[str]:
     """The settings as texts `PATH=VALUE`; several values as the deck's list of them."""
-    if not isinstance(given, Mapping):
-        return (given,) if isinstance(given, str) else given
-    return [f"{path}={_as_written(value)}" for path, value in given.items()]
+    if not isinstance(settings, Mapping):
+        return (settings,) if isinstance(settings, str) else settings
+    return [f"{path}={_as_written(value)}" for path, value in settings.items()]
 
 
 def _as_written(value: object) -> str:

@@ -62,22 +62,22 @@ def check(
     """
     for deck in decks:
         check_options(deck, defines=defines, include_dirs=include_dirs, settings=settings)
-    found: list[_Checked] = []
+    checked_decks: list[_Checked] = []
     for deck in decks:
         try:
-            each = _checked(deck, include_dirs, defines, settings)
+            checked_deck = _checked(deck, include_dirs, defines, settings)
         except Problem as problem:
-            each = _Checked(deck, None, problem.diagnostics, problem.sources)
-        found.append(each)
+            checked_deck = _Checked(deck, None, problem.diagnostics, problem.sources)
+        checked_decks.append(checked_deck)
         if form != "text":
             continue
-        if each.diagnostics and (each.plan is None or not quiet):
-            complain(each.diagnostics, each.sources)
-        if each.plan is not None and not quiet:
-            _print_verdict(each, verbose)
+        if checked_deck.diagnostics and (checked_deck.plan is None or not quiet):
+            complain(checked_deck.diagnostics, checked_deck.sources)
+        if checked_deck.plan is not None and not quiet:
+            _print_verdict(checked_deck, verbose)
     if form != "text":
-        _complain_together(found, form)
-    return BAD_INPUT if any(each.plan is None for each in found) else YES
+        _complain_together(checked_decks, form)
+    return BAD_INPUT if any(checked_deck.plan is None for checked_deck in checked_decks) else YES
 
 
 @frozen
@@ -122,24 +122,24 @@ def _print_verdict(checked: _Checked, verbose: bool) -> None:
     say(verdict(checked.plan, checked.diagnostics, len(checked.allowed)))
 
 
-def _complain_together(found: Iterable[_Checked], form: str) -> None:
+def _complain_together(checked_decks: Iterable[_Checked], form: str) -> None:
     """Print the messages of several files as one, for programs: those that decks share are printed once."""
     from ic.printing.codes import titles
 
     diagnostics: dict[object, Diagnostic] = {}
     allowed: dict[object, tuple[Diagnostic, str]] = {}
     sources: dict[str, str] = {}
-    for each in found:
-        for one in each.diagnostics:
-            diagnostics.setdefault(_whoever_includes(one), one)
-        for warning, allowance in each.allowed:
+    for checked_deck in checked_decks:
+        for diagnostic in checked_deck.diagnostics:
+            diagnostics.setdefault(_whoever_includes(diagnostic), diagnostic)
+        for warning, allowance in checked_deck.allowed:
             allowed.setdefault(_whoever_includes(warning), (warning, allowance.because))
-        sources |= each.sources
+        sources |= checked_deck.sources
     complain(
         tuple(diagnostics.values()),
         sources,
         form=form,
-        allowed=[each for key, each in allowed.items() if key not in diagnostics],
+        allowed=[diagnostic for key, diagnostic in allowed.items() if key not in diagnostics],
         titles=titles() if form == "sarif" else None,
     )
 
@@ -186,20 +186,20 @@ def plan(
     if output is not None and not output.endswith(".json"):
         helps = "`met run` knows a plan by its ending, and takes any other file for a deck"
         raise Problem(error("E300", f"cannot write {output}: a plan's name ends in .json", help=helps))
-    made = _plan(deck, include_dirs, defines, settings, names, everything, quiet)
-    if not made.experiments:
+    whole_plan = _plan(deck, include_dirs, defines, settings, names, everything, quiet)
+    if not whole_plan.experiments:
         raise Problem(error("D161", "this deck has no run", help="write `run NAME { ... }`"))
     if output is not None:
-        plan_file.write(made, output)
+        plan_file.write(whole_plan, output)
         if not quiet and form == "text":
             with kept(f"{output} is whole"):
                 say(f"wrote {output}")
     elif form == "json":
-        say(plan_file.dumps(made), end="", exact=True)
+        say(plan_file.dumps(whole_plan), end="", exact=True)
     elif not quiet:
         from ic.printing.plan import print_plan
 
-        _print(print_plan(made, verbose=verbose))
+        _print(print_plan(whole_plan, verbose=verbose))
 
 
 @click.command()
@@ -228,13 +228,13 @@ def cases(
     from ic.printing.cases import cases_json, print_cases
 
     check_options(deck, defines=defines, include_dirs=include_dirs, settings=settings)
-    made = _plan(deck, include_dirs, defines, settings, names, not names, True)
-    sweeps = [e for e in made.experiments if names or e.varies] or list(made.experiments)
-    shown = [list(groups) for _, groups in groupby(sweeps, lambda experiment: experiment.name_in_deck)]
+    whole_plan = _plan(deck, include_dirs, defines, settings, names, not names, True)
+    sweeps = [e for e in whole_plan.experiments if names or e.varies] or list(whole_plan.experiments)
+    by_sweep = [list(groups) for _, groups in groupby(sweeps, lambda experiment: experiment.name_in_deck)]
     if form == "json":
-        _print_json([cases_json(groups) for groups in shown])
+        _print_json([cases_json(groups) for groups in by_sweep])
         return
-    for position, groups in enumerate(shown):
+    for position, groups in enumerate(by_sweep):
         if position:
             click.echo()
         _print(print_cases(groups, everything=everything))
@@ -342,11 +342,11 @@ def dump(
     from ic.printing.dump import WRITTEN, DumpRequest, find_stage
 
     check_options(deck, settings=settings)
-    shown = find_stage(stage)
+    print_stage = find_stage(stage)
     if settings and stage in WRITTEN:
         message = f"`met dump {stage}` shows what the deck says; `met dump plan`, what --set and --vary make of it"
         raise click.UsageError(message)
-    _print(shown(DumpRequest(deck, include_dirs, defines, names or None, settings)))
+    _print(print_stage(DumpRequest(deck, include_dirs, defines, names or None, settings)))
 
 
 def _plan(
@@ -401,13 +401,13 @@ def _plan_in_file(path: str, names: tuple[str, ...]) -> Plan:
     from met.diagnostic import error
     from met.plan import file as plan_file
 
-    made = plan_file.read(path)
-    known = {experiment.name: experiment for experiment in made.experiments}
+    whole_plan = plan_file.read(path)
+    known = {experiment.name: experiment for experiment in whole_plan.experiments}
     for name in names:
         if name not in known:
             helps = [*did_you_mean(name, known), known_words("it has", known)]
             raise Problem(error("D174", f"no run or sweep `{name}` in this plan", help=helps))
-    return replace(made, experiments=tuple(known[name] for name in names)) if names else made
+    return replace(whole_plan, experiments=tuple(known[name] for name in names)) if names else whole_plan
 
 
 def _print(lines: Iterable[str]) -> None:

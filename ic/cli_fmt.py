@@ -29,21 +29,21 @@ def fmt(paths: tuple[str, ...], check: bool, diff: bool, upgrade: bool, quiet: b
     from ic.driver.upgrade import Upgrades, upgrades
     from ic.formatting.files import STDIN, decks, lay_out, write
 
-    found = decks(paths)
-    if STDIN in found and len(found) > 1:
+    files = decks(paths)
+    if STDIN in files and len(files) > 1:
         raise click.UsageError("`-` stands alone: what is formatted goes to standard output")
-    made = Upgrades({}, {})
+    upgraded = Upgrades({}, {})
     if upgrade:
-        if STDIN in found:
+        if STDIN in files:
             raise click.UsageError("--upgrade takes files: what a deck means depends on what lies beside it")
-        made = upgrades([path for path in found if not path.endswith(".json")])
+        upgraded = upgrades([path for path in files if not path.endswith(".json")])
     changed = 0
     broken = False
-    for path in found:
+    for path in files:
         try:
-            if path in made.refused:
-                raise made.refused[path]
-            deck = lay_out(path, made.texts.get(path))
+            if path in upgraded.refused:
+                raise upgraded.refused[path]
+            deck = lay_out(path, upgraded.texts.get(path))
             if deck.changes and path != STDIN and not (check or diff):
                 write(path, deck.after)
         except Problem as problem:
@@ -56,7 +56,7 @@ def fmt(paths: tuple[str, ...], check: bool, diff: bool, upgrade: bool, quiet: b
         if path == STDIN and not (check or diff):
             say(deck.after, end="", exact=True)
         if path != STDIN and not quiet and (verbose or deck.changes) and (check or not diff):
-            done = "upgraded" if path in made.texts else "formatted"
+            done = "upgraded" if path in upgraded.texts else "formatted"
             state = "as it should be" if not deck.changes else f"would be {done}" if check else done
             ends = "; its lines end with a newline alone" if deck.changes and deck.ends else ""
             say(f"{deck.name}: {state}{ends}", err=diff)

@@ -54,5 +54,5 @@ def import_(file: str, output: str | None, force: bool, mimic: str, quiet: bool,
 
 
 def _remark(remarks: list[str], quiet: bool) -> None:
-    for each in [] if quiet else remarks:
-        say(f"note: {each}", err=True)
+    for remark in [] if quiet else remarks:
+        say(f"note: {remark}", err=True)

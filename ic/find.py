@@ -15,13 +15,13 @@ def find(name: str, include_dirs: Sequence[str | Path] = ()) -> Path:
 
     Raises Problem D173 with what was probably meant and the standard decks.
     """
-    found = Files(include_dirs).deck(name)
-    if Path(found.path).exists():
-        return Path(found.path)
-    here = sorted(path.name for path in Path(name).parent.glob("*.ic") if path.exists() and path.name.isprintable())
+    deck_file = Files(include_dirs).deck(name)
+    if Path(deck_file.path).exists():
+        return Path(deck_file.path)
+    beside = sorted(path.name for path in Path(name).parent.glob("*.ic") if path.exists() and path.name.isprintable())
     standard = standard_decks()
     folder = "" if str(Path(name).parent) == "." else f"{Path(name).parent}/"
-    known = [f"{folder}{each}" for each in here] + standard
+    known = [f"{folder}{file_name}" for file_name in beside] + standard
     close = nearest(name, known) or nearest(f"{name}.ic", known)
     helps = [f"did you mean `{close}`?"] if close is not None else []
     raise Problem(error("D173", f"no deck `{name}`", help=[*helps, f"standard decks: {', '.join(standard)}"]))

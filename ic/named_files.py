@@ -30,7 +30,7 @@ class NamedFiles(Generic[T]):
         self._most, self._missing = most, missing
         self._files = Files(deck.include_dirs, unsaved=deck.unsaved)
         self._read: dict[str, T | Problem] = {}
-        self.asked = False
+        self.was_asked = False
 
     @property
     def sources(self) -> tuple[SourceFile, ...]:
@@ -40,35 +40,35 @@ class NamedFiles(Generic[T]):
     @property
     def loaded(self) -> Iterable[T]:
         """The contents of the files without mistakes."""
-        return (each for each in self._read.values() if not isinstance(each, Problem))
+        return (content for content in self._read.values() if not isinstance(content, Problem))
 
     def get(self, named: String) -> T:
         """The content of the file of this name. Raises Problem, the same each time for a fault of the file."""
-        self.asked = True
-        found = self._find(named)
-        if found.name not in self._read:
+        self.was_asked = True
+        file = self._find(named)
+        if file.name not in self._read:
             try:
-                text = self._files.text(found, kind=self._kind, most=self._most)
-                self._read[found.name] = self._load(found.name, text)
+                text = self._files.text(file, kind=self._kind, most=self._most)
+                self._read[file.name] = self._load(file.name, text)
             except Problem as problem:
                 placed = (
                     d if d.at else Diagnostic(d.code, d.message, Label(named.place), d.also, d.help)
                     for d in problem.diagnostics
                 )
-                self._read[found.name] = Problem(placed)
-        made = self._read[found.name]
-        if isinstance(made, Problem):
-            raise made
-        return made
+                self._read[file.name] = Problem(placed)
+        content = self._read[file.name]
+        if isinstance(content, Problem):
+            raise content
+        return content
 
     def _find(self, named: String) -> FoundFile:
         file = self._deck if named.place.file == COMMAND_LINE else named.place.file
         path = os.path.join(LIBRARY, file[1:-1]) if file.startswith("<") else file
         folders = self._files.where(FoundFile(path, file), False)
-        found = self._files.find(named.value, folders) if named.value.strip() else None
-        if found is None:
+        found_file = self._files.find(named.value, folders) if named.value.strip() else None
+        if found_file is None:
             slashed = folders_by_slash(named.value, f'"{named.value}"')
             near = slashed or did_you_mean(named.value, self._files.listed(folders, self._ending))
             looked = f"looked in {', '.join(dict.fromkeys(folder.in_words for folder in folders))}"
             raise Problem(error(self._missing, f'cannot find "{named.value}"', named.place, help=(*near, looked)))
-        return found
+        return found_file

@@ -55,16 +55,16 @@ def read(
         with suppress(GiveUp):
             parsed, roofs = used.parse(seen, file or FoundFile(DECK_IN_MEMORY, DECK_IN_MEMORY))
     sources = (*files.read_so_far.values(), *(source for source in seen.sources if source.name == COMMAND_LINE))
-    found = in_order(findings.all, sources)
+    diagnostics = in_order(findings.all, sources)
     complete = seen.complete and used.complete
     sound = used.sound and despite_errors and not any(error.code in UNKNOWN_TEXT for error in findings.errors)
     if not complete or (findings.errors and not sound):
-        raise Problem(found, {source.name: source.text for source in sources})
+        raise Problem(diagnostics, {source.name: source.text for source in sources})
     return Deck(
         sources[0].name,
         parsed.entries,
         sources,
-        found,
+        diagnostics,
         tuple(os.fspath(include_dir) for include_dir in include_dirs),
         os.fspath(path),
         tuple(defines),
@@ -79,8 +79,10 @@ def read(
 def read_again(deck: Deck, defines: Sequence[str], *, library: Path = LIBRARY) -> Deck:
     """A deck read again with further macros, `NAME=VALUE`, which replace those of their names on the command line."""
     names = {define.partition("=")[0] for define in defines}
-    kept = [define for define in deck.defines if define.partition("=")[0] not in names]
-    return read(deck.path, deck.include_dirs, (*kept, *defines), library=library, text=deck.text, unsaved=deck.unsaved)
+    other_defines = [define for define in deck.defines if define.partition("=")[0] not in names]
+    return read(
+        deck.path, deck.include_dirs, (*other_defines, *defines), library=library, text=deck.text, unsaved=deck.unsaved
+    )
 
 
 def in_order(diagnostics: Iterable[Diagnostic], sources: Sequence[SourceFile]) -> tuple[Diagnostic, ...]:

@@ -58,14 +58,14 @@ class UsedDecks:
         for use in parsed.uses:
             if not self._may_be_called(use.roof, roofs, own):
                 continue
-            found = self._used_deck(use, (*within, file))
-            if found is None:
+            used_deck = self._used_deck(use, (*within, file))
+            if used_deck is None:
                 continue
-            inner, inner_roofs = found
+            inner, inner_roofs = used_deck
             entries, left = under_roof(inner, use.roof.text, EXPERIMENTS)
             brought += entries
             roofs[use.roof.text] = Roof(use, left)
-            roofs |= {f"{use.roof.text}.{name}": each for name, each in inner_roofs.items()}
+            roofs |= {f"{use.roof.text}.{name}": roof for name, roof in inner_roofs.items()}
         return replace(parsed, entries=(*brought, *with_full_names(parsed.entries, roofs))), roofs
 
     def _may_be_called(self, roof: Word, roofs: Roofs, own: dict[str, Word]) -> bool:
@@ -90,25 +90,27 @@ class UsedDecks:
         """The entries and roofs of a used deck; None where it cannot be read, which is reported."""
         self._used += 1
         if self._used > MOST_USED:
-            self._findings.error("D018", f"more than {MOST_USED} decks are used", use.at)
+            self._findings.error("D018", f"more than {MOST_USED} decks are used", use.file_place)
             raise GiveUp
         includer = self._files.read_files.get(use.source, within[-1])
-        file = find_file(self._files, self._findings, includer, use.file, use.angled, use.at)
+        file = find_file(self._files, self._findings, includer, use.file, use.angled, use.file_place)
         if file is None:
             return None
-        chain = [each.identity for each in within]
+        chain = [deck_file.identity for deck_file in within]
         if file.identity in chain:
             loop = [*within[chain.index(file.identity) :], file]
-            message = "a deck that uses itself: " + " uses ".join(f"`{each.name}`" for each in loop)
+            message = "a deck that uses itself: " + " uses ".join(f"`{deck_file.name}`" for deck_file in loop)
             help = "move what both need into a deck of its own, and use that"
-            self._findings.error("D397", message, use.at, help=help)
+            self._findings.error("D397", message, use.file_place, help=help)
             return None
-        at = shown_place(use.at)
-        included, used = ((at.file, at.line), *at.included), (0, *(n + 1 for n in at.used))
+        place = shown_place(use.file_place)
+        included, used = ((place.file, place.line), *place.included), (0, *(n + 1 for n in place.used))
         try:
             self._files.text(file)
         except Problem as problem:
-            self._findings.add(*(reached_by(diagnostic, use.at, included, used) for diagnostic in problem.diagnostics))
+            self._findings.add(
+                *(reached_by(diagnostic, use.file_place, included, used) for diagnostic in problem.diagnostics)
+            )
             return None
         seen = preprocess_on(self._files, self._findings, lambda: file, included=included, used=used, count=self._count)
         if not seen.complete:

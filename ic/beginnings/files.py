@@ -70,9 +70,11 @@ def write(texts: Mapping[str, str], *, force: bool) -> None:
     """Write the files, by path. Raises Problem E344, and writes none, where one exists and `force` is not given."""
     for path in texts:
         _check_place(path)
-    there = [path for path in texts if os.path.lexists(path)]
-    if there and not force:
-        raise Problem(error("E344", _there(there), help="--force writes over it; -o writes to another place"))
+    existing = [path for path in texts if os.path.lexists(path)]
+    if existing and not force:
+        raise Problem(
+            error("E344", _already_there(existing), help="--force writes over it; -o writes to another place")
+        )
     for path, text in texts.items():
         if folder := os.path.dirname(path):
             os.makedirs(folder, exist_ok=True)
@@ -82,13 +84,13 @@ def write(texts: Mapping[str, str], *, force: bool) -> None:
 def put(path: str, text: str) -> None:
     """Write a new file in place of one of the same name; a link there is not followed. Raises Problem E338 where the
     system refuses; then no new file is left."""
-    there = os.path.lexists(path)
+    existed = os.path.lexists(path)
     _check_place(path)
     try:
         with new_file(path) as stream:
             stream.write(text.encode())
     except OSError as reason:
-        if not there and os.path.lexists(path):
+        if not existed and os.path.lexists(path):
             os.unlink(path)
         helps = "nothing was kept; -o names another place"
         raise Problem(error("E338", f"cannot write `{path}`: {refusal_text(reason)}", help=helps)) from None
@@ -108,6 +110,6 @@ def _check_place(path: str) -> None:
         raise Problem(error("E338", f"cannot write `{path}`: `{folder}` is a file, not a folder", help=helps))
 
 
-def _there(paths: Sequence[str]) -> str:
+def _already_there(paths: Sequence[str]) -> str:
     named = ", ".join(f"`{path}`" for path in paths)
     return f"{named} is there already" if len(paths) == 1 else f"{named} are there already"

@@ -12,13 +12,13 @@ class Beginning:
     group        of entry points in which it is offered
     declaration  what the entry point gives of the file
     module       the file
-    said         what there is to be seen in the deck
+    to_see       what there is to be seen in the deck
     servo, guide, environment, integrator, metric, require      what stands in the deck
     """
 
     group: str
     declaration: str
-    said: str
+    to_see: str
     module: str
     servo: str = "{ model = ideal;  bandwidth = 40 1/s;  command = rate(step(to = 0.5 rad/s, at = 0.1 s)); }"
     guide: str = ""
@@ -31,7 +31,7 @@ class Beginning:
 SERVO = Beginning(
     group="met.servos",
     declaration="SERVO",
-    said="the bar is brought to 0.5 rad/s by a torque that has a limit",
+    to_see="the bar is brought to 0.5 rad/s by a torque that has a limit",
     servo="""{
     model   = $name;
     gain    = 20 N*m*s/rad;
@@ -98,7 +98,7 @@ SERVO = Servo(
 SENSOR = Beginning(
     group="met.sensors",
     declaration="SENSOR",
-    said="the bar goes slower than the 0.5 rad/s asked, by the bias of what its servo sees",
+    to_see="the bar goes slower than the 0.5 rad/s asked, by the bias of what its servo sees",
     servo="""{
     model      = rigid_gearbox;
     ratio      = 100;
@@ -172,7 +172,7 @@ SENSOR = Sensor(
 ENVIRONMENT = Beginning(
     group="met.environments",
     declaration="ENVIRONMENT",
-    said="the drag on the bar's end is what the servo must overcome",
+    to_see="the drag on the bar's end is what the servo must overcome",
     environment=" drag = $name { link = bar;  damping = 3 N*s/m;  point = [1, 0, 0] m; } ",
     metric="max { of = hinge.tau; }",
     require="seen > 1 N*m",
@@ -220,7 +220,7 @@ ENVIRONMENT = Environment(
 COMMAND = Beginning(
     group="met.profiles",
     declaration="PROFILE",
-    said="the bar goes to 0.5 rad/s smoothly, within 0.5 s",
+    to_see="the bar goes to 0.5 rad/s smoothly, within 0.5 s",
     servo="{ model = ideal;  bandwidth = 40 1/s;  command = rate($name(to = 0.5 rad/s, over = 0.5 s)); }",
     module='''\
 """$name: from zero to a value along half a cosine, then that value.
@@ -267,7 +267,7 @@ PROFILE = Profile(
 METRIC = Beginning(
     group="met.metrics",
     declaration="METRIC",
-    said="`seen` is the mean speed of the bar, there and back alike",
+    to_see="`seen` is the mean speed of the bar, there and back alike",
     metric="$name { of = hinge.qd; }",
     require="seen > 0.4 rad/s",
     module='''\
@@ -320,7 +320,7 @@ METRIC = Metric(
 INTEGRATOR = Beginning(
     group="met.integrators",
     declaration="INTEGRATOR",
-    said="the bar is brought to 0.5 rad/s; `integrator` says by whom",
+    to_see="the bar is brought to 0.5 rad/s; `integrator` says by whom",
     integrator="$name",
     module='''\
 """$name: Ralston's method, order 2, which has the least bound of its error among those of two slopes.
@@ -354,7 +354,7 @@ INTEGRATOR = Integrator(name="$name", doc=__doc__, order=2, real_limit=2.0, adva
 GUIDE = Beginning(
     group="met.guides",
     declaration="GUIDE",
-    said="the bar is brought to 0.5 rad along half a wave, as all joints would be that follow the guide",
+    to_see="the bar is brought to 0.5 rad along half a wave, as all joints would be that follow the guide",
     servo="{ model = ideal;  bandwidth = 40 1/s;  command = position(lead); }",
     guide="\n    guide lead  = $name { over = 1 s;  hinge.to = 0.5 rad; }",
     metric="final { of = hinge.q; }",
@@ -410,7 +410,7 @@ MODELS = {
 TRIAL = """\
 // $name.ic: a deck to try the $kind model `$name` in
 //
-// What is to be seen: $said.
+// What is to be seen: $to_see.
 //
 //   met run $name.ic
 

@@ -285,14 +285,14 @@ Entry = Let | Setting | Statement | Group
 class UseEntry:
     """`use <panda.ic> as panda;`: the file as it is asked for, whether in < >, and the name of the roof.
 
-    at      the place of the file's name
+    file_place  the place of the file's name
     source  the file that the entry stands in, by the name that messages print
     """
 
     file: str
     angled: bool
     roof: Word
-    at: Place
+    file_place: Place
     source: str
 
 

@@ -60,8 +60,8 @@ HEADS = tuple(
 def choices(head: str) -> tuple[str, ...]:
     """The entries that a sweep may choose under this first word of a path, such as `JOINT`, `SERVO` or `rates`; under
     "", whole paths of one word."""
-    found = (entry for block in BLOCKS.values() for entry in block.entries if entry.varies == "choice")
-    split = (entry.path.rpartition(".") for entry in found)
+    entries = (entry for block in BLOCKS.values() for entry in block.entries if entry.varies == "choice")
+    split = (entry.path.rpartition(".") for entry in entries)
     return tuple(last for first, _, last in split if first == head)
 
 

@@ -130,9 +130,9 @@ SCALE = BlockDeclaration(
     doc="The ratios of the joint's motor to the motor on the bed. They are pure numbers; time is not scaled.",
     entries=(
         *(
-            Entry(name=each.name, written=f"{each.name} = {example};", default="1", varies="number",
-                  path=f"JOINT.bed.scale.{each.name}", parameter=each, doc=each.doc)
-            for each, example in zip(bed_scale.PARAMETERS, (25, 2, 10), strict=True)
+            Entry(name=parameter.name, written=f"{parameter.name} = {example};", default="1", varies="number",
+                  path=f"JOINT.bed.scale.{parameter.name}", parameter=parameter, doc=parameter.doc)
+            for parameter, example in zip(bed_scale.PARAMETERS, (25, 2, 10), strict=True)
         ),
         Entry(name="inertia", written="inertia = 12.5;", default="torque/rate", parameter=SCALE_OF_INERTIA,
               doc=SCALE_OF_INERTIA.doc),

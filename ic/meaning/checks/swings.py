@@ -174,7 +174,7 @@ def check_sensor(
             integrator,
             dynamics,
             path,
-            of="the rate constant of the sensor's filter, 2 pi cutoff",
+            meaning="the rate constant of the sensor's filter, 2 pi cutoff",
         )
     swing = evaluate_declared(scope, sensor.swing, values, path)
     if swing is not None:

@@ -109,13 +109,13 @@ def resolve_guides(
     scope: Scope, block: MergedBlock, arm: ResolvedArm, uses: list[Use], duration: float | None
 ) -> list[Guiding]:
     """Every guide of the run, in the deck's order; mistakes are reported. duration: of the run, s; None: unknown."""
-    found = []
+    guidings = []
     for item in block.of_kind(KIND):
         with scope.complaints.gather():
             guiding = _guide(scope, item, arm, uses, duration)
             if guiding is not None:
-                found.append(guiding)
-    return found
+                guidings.append(guiding)
+    return guidings
 
 
 def check_guides(scope: Scope, guides: Iterable[Guiding], structure: Structure) -> None:
@@ -167,11 +167,11 @@ def check_period(scope: Scope, guide: Guiding, rate: Rate) -> None:
 
 def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration: float | None) -> Guiding | None:
     if item.detail or item.value is None:
-        at = item.detail[0].place if item.detail else item.place
+        place = item.detail[0].place if item.detail else item.place
         message = f"guide `{item.name}` has no model"
         message = f"`{item.detail[0].text}` after the name of a guide" if item.detail else message
         scope.complaints.error(
-            "D270", message, at, help=[USAGE, known_words("guide models", sorted(models.available(KIND)))]
+            "D270", message, place, help=[USAGE, known_words("guide models", sorted(models.available(KIND)))]
         )
         return None
     guide = find_model(scope, KIND, word_of(item.value), place_of(item.value))
@@ -238,19 +238,19 @@ def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any]
     numbers = [x for value in values.values() for x in (value if isinstance(value, tuple) else (value,))]
     if guide.idle is None or any(isinstance(x, Scalar) for x in numbers):
         return
-    found = guide.idle(SimpleNamespace(**values), duration)
-    if found is not None:
-        written = [part for name in found[0] if (part := (item.body or MergedBlock()).get(name)) is not None]
+    idleness = guide.idle(SimpleNamespace(**values), duration)
+    if idleness is not None:
+        written = [part for name in idleness[0] if (part := (item.body or MergedBlock()).get(name)) is not None]
         needed = [
-            parameter for parameter in guide.parameters if parameter.name in found[0] and parameter.default is None
+            parameter for parameter in guide.parameters if parameter.name in idleness[0] and parameter.default is None
         ]
         scope.complaints.remark(
             "D301",
-            f"guide `{item.name}` {found[1]}",
+            f"guide `{item.name}` {idleness[1]}",
             value_place(written[0] if written else item),
             help="change that, or leave it out"
             if not needed
-            else f"change {' or '.join(f'`{name}`' for name in found[0])}",
+            else f"change {' or '.join(f'`{name}`' for name in idleness[0])}",
         )
 
 
@@ -267,13 +267,13 @@ def _of_joints(
         if general is not None and joints and len(parts) > 1:
             fits = len(parts) == len(joints)
             values = [spell(part) for part in parts] if fits else ["..."] * len(joints)
-            each = "  ".join(f"{joint}.{wanted.name} = {value};" for joint, value in zip(joints, values, strict=True))
+            lines = "  ".join(f"{joint}.{wanted.name} = {value};" for joint, value in zip(joints, values, strict=True))
             follow = f"{', '.join(f'`{joint}`' for joint in joints)} alone follow{'s' * (len(joints) == 1)} it"
             scope.complaints.error(
                 "D071",
                 f"`{wanted.name}` of {owner.label} is one number for each joint, and this is a list",
                 value_place(general),
-                help=f"write `{each}`" if fits else [f"write `{each}`", follow],
+                help=f"write `{lines}`" if fits else [f"write `{lines}`", follow],
             )
             scope.checks.fail(owner.join(wanted.name))
             continue
@@ -298,7 +298,7 @@ def _courses(
     scope: Scope, owner: Owner, body: MergedBlock, known: Iterable[str], guided: Iterable[str], joints: Iterable[str]
 ) -> tuple[Course, ...]:
     """The courses of the path's components that are written, in order."""
-    found = []
+    courses = []
     for name in known:
         part = body.get(name)
         if part is None:
@@ -328,8 +328,8 @@ def _courses(
         with scope.complaints.gather():
             model = _course(scope, owner, part)
             if model is not None:
-                found.append(Course(name, model))
-    return tuple(found)
+                courses.append(Course(name, model))
+    return tuple(courses)
 
 
 def _course(scope: Scope, owner: Owner, item: Item) -> str | None:

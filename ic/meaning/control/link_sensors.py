@@ -58,24 +58,24 @@ def resolve_link_sensors(
 ) -> list[Sensing]:
     """Every sensor of the run, in the deck's order; mistakes are reported."""
     scope.sensors = frozenset(item.name for item in block.of_kind(KIND))
-    found = []
+    sensors = []
     for item in block.of_kind(KIND):
         with scope.complaints.gather():
             sensing = _sensor(scope, item, arm, payloads)
             if sensing is not None:
-                found.append(sensing)
-    return found
+                sensors.append(sensing)
+    return sensors
 
 
 def _sensor(scope: Scope, item: Item, arm: ResolvedArm, payloads: tuple[Payload, ...]) -> Sensing | None:
     if item.detail or item.value is None:
-        at = item.detail[0].place if item.detail else item.place
+        place = item.detail[0].place if item.detail else item.place
         message = (
             f"`{item.detail[0].text}` after the name of a sensor"
             if item.detail
             else (f"sensor `{item.name}` has no model")
         )
-        scope.complaints.error("D280", message, at, help=[USAGE, known_words("sensors of links", _of_links())])
+        scope.complaints.error("D280", message, place, help=[USAGE, known_words("sensors of links", _of_links())])
         return None
     sensor = find_model(scope, KIND, word_of(item.value), place_of(item.value))
     if sensor is None or refuse_values(scope, item.value, [p.name for p in sensor.parameters]):
@@ -99,8 +99,8 @@ def _sensor(scope: Scope, item: Item, arm: ResolvedArm, payloads: tuple[Payload,
     check_names(scope, owner, sensor.parameters, body, arm=arm.name, known=known, failed=arm.failed)
     values = use_model(scope, owner, sensor.parameters, body, ["rate"])
     scope.not_sweepable[owner.path] = not_sweepable.model("a sensor", owner.path)
-    given = body.get("rate")
-    rate = fixed_rate(scope, owner, given, owner.label, doc="how often it reads") if given is not None else None
+    rate_item = body.get("rate")
+    rate = fixed_rate(scope, owner, rate_item, owner.label, doc="how often it reads") if rate_item is not None else None
     words = [parameter for parameter in sensor.parameters if parameter.shape == "word" and not parameter.names]
     return Sensing(item.name, sensor.name, words_chosen(words, body), rate, values or {}, item.place)
 

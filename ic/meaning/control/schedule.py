@@ -81,7 +81,7 @@ def divisor(complaints: Complaints, rate: Rate, base: Rate, others: list[Rate], 
         message = f"{rate.label} at {hz(rate.hz)} Hz does not divide the base rate, {hz(base.hz)} Hz"
         fits = dict.fromkeys((max(1, math.floor(ratio)), math.ceil(ratio)))
         helps.append("nearest that fit: " + ", ".join(_fitting(base.hz, n) for n in fits))
-    common = _common([exact(each.hz) for each in (rate, base, *others)])
+    common = _common([exact(other.hz) for other in (rate, base, *others)])
     if common is not None:
         helps.append(f"{'or ' if helps else ''}a base rate that all divide: `base = {common};` in `rates`")
     complaints.error("D100", message, label, also=also, help=helps)
@@ -178,8 +178,8 @@ def fastest_rate(
     # as in the engine, a division by a product that underflows is infinite, without an exception
     numbers = {name: np.float64(x) if isinstance(x, float) else x for name, x in parameters.items()}
     with scope.complaints.gather(), np.errstate(all="ignore"):
-        found: Real = bound(SimpleNamespace(**numbers))
-        return found
+        fastest: Real = bound(SimpleNamespace(**numbers))
+        return fastest
     return None
 
 
@@ -191,7 +191,7 @@ def check_stability(
     integrator: Any,
     dynamics: Rate,
     path: str,
-    of: str = "the servo's fastest rate constant, on any arm",
+    meaning: str = "the servo's fastest rate constant, on any arm",
 ) -> None:
     """Warn of h lambda of a joint under its servo, or of a sensor; an error where it is unstable.
 
@@ -234,7 +234,7 @@ def check_stability(
             code="D104",
             place=dynamics.place,
             message=f"{label} is unstable with {integrator.name} at this rate of the dynamics",
-            help=f"h * lambda must stay below {limit:g}; lambda is {of}",
+            help=f"h * lambda must stay below {limit:g}; lambda is {meaning}",
             needs=(path,),
         )
         scope.checks.observe((fastest,), warn, dynamics.place, needs=(path,))

@@ -221,7 +221,7 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
     scope.not_sweepable[f"{item.name}.servo.model"] = not_sweepable.chosen(f"{item.name}.servo", "definitions")
     words = words_chosen([parameter for parameter in servo.parameters if parameter.name in servo.deciding], block)
     bare = ServoUse(item.name, name, servo.name, command, 1, words=words)
-    sensors = tuple(use for each in sensed if (use := use_sensor(scope, owner, bare, each)) is not None)
+    sensors = tuple(use for sensor_item in sensed if (use := use_sensor(scope, owner, bare, sensor_item)) is not None)
     return Use(item.name, name, servo, command, rate, parameters, item.place, words, sensors)
 
 
@@ -275,8 +275,8 @@ def _check_needed(scope: Scope, owner: Owner, servo: Any, command: Command, bloc
     place = place_of(item.value) if item is not None and item.value is not None else used
     for parameter in servo.parameters:
         settled = scope.parameters.get(owner.join(parameter.name))
-        given = block.get(parameter.name) is not None or (settled is not None and settled.origin.kind != "default")
-        if command.kind in parameter.needed_for and not given:
+        has_value = block.get(parameter.name) is not None or (settled is not None and settled.origin.kind != "default")
+        if command.kind in parameter.needed_for and not has_value:
             message = f"{owner.label} needs `{parameter.name}` under a {command.kind} command"
             scope.complaints.missing(
                 owner.place,
@@ -338,12 +338,12 @@ def check_rest(scope: Scope, use: Use) -> None:
 
 def commands_of(scope: Scope) -> dict[str, dict[str, Settled]]:
     """The parameters of the commands of a run's joints: by joint, then by name."""
-    found: dict[str, dict[str, Settled]] = {}
+    by_joint: dict[str, dict[str, Settled]] = {}
     for path, quantity in scope.parameters.items():
         joint, of_command, name = path.partition(".servo.command.")
         if of_command:
-            found.setdefault(joint, {})[name] = quantity
-    return found
+            by_joint.setdefault(joint, {})[name] = quantity
+    return by_joint
 
 
 STEPS = ("constant", "step", "pulse")
@@ -353,9 +353,9 @@ FAR = 0.02
 """Distance between a joint and the beginning of its command that a servo with a motor makes up unnoticed, rad (m)."""
 
 
-def check_start(scope: Scope, use: Use, asked: Mapping[str, Settled]) -> None:
+def check_start(scope: Scope, use: Use, parameters: Mapping[str, Settled]) -> None:
     """Warn where a joint does not begin at its command: one whose servo follows regardless of the arm, and any other
-    whose command is a motion and not a step. asked: the command's parameters by name"""
+    whose command is a motion and not a step. parameters: the command's parameters by name"""
     command = use.command
     if command is None or command.kind != "position" or scope.complaints.errors:
         return
@@ -363,19 +363,19 @@ def check_start(scope: Scope, use: Use, asked: Mapping[str, Settled]) -> None:
         return
     begins = scope.parameters.get(f"initial.{use.joint}.q")
     profile = models.find_own("command").get(command.model)  # another package's is called only to be recorded
-    values = [each.value for each in asked.values()]
-    if begins is None or profile is None or {p.name for p in profile.parameters} - set(asked):
+    values = [parameter.value for parameter in parameters.values()]
+    if begins is None or profile is None or {p.name for p in profile.parameters} - set(parameters):
         return
     if not isinstance(begins.value, (int, float)) or any(isinstance(value, Scalar) for value in values):
         return  # a sweep varies one of them
-    unit, scale = unit_written([*asked.values(), begins], begins.unit)
-    value, _ = profile.course(SimpleNamespace(**{name: each.value for name, each in asked.items()}), 0.0)
+    unit, scale = unit_written([*parameters.values(), begins], begins.unit)
+    value, _ = profile.course(SimpleNamespace(**{name: parameter.value for name, parameter in parameters.items()}), 0.0)
     far = use.servo.follows or abs(value - begins.value) > FAR
     if far and differ_beyond_rounding(value, begins.value):
         by_use = sorted(
-            asked.values(), key=lambda each: each.unit == "s"
+            parameters.values(), key=lambda parameter: parameter.unit == "s"
         )  # of a table its values before their instants
-        places = [each.origin.place for each in by_use if each.origin.place is not None]
+        places = [parameter.origin.place for parameter in by_use if parameter.origin.place is not None]
         also = [] if begins.origin.place is None else [Label(begins.origin.place, "the joint begins here")]
         scope.complaints.remark(
             "D169",
@@ -392,11 +392,11 @@ def differ_beyond_rounding(a: Any, b: Any) -> Any:
     return np.abs(a - b) > APART + DIGITS * np.maximum(np.abs(a), np.abs(b))
 
 
-def unit_written(found: Iterable[Settled], wanted: str) -> tuple[str, float]:
+def unit_written(several: Iterable[Settled], wanted: str) -> tuple[str, float]:
     """The unit that the deck wrote first of the dimension of `wanted`, and its size; `wanted`, in SI, where none is."""
     dimension = parse_unit(wanted).dimension
-    for each in found:
-        written = each.expression.unit if isinstance(each.expression, (Number, WithUnit)) else None
+    for quantity in several:
+        written = quantity.expression.unit if isinstance(quantity.expression, (Number, WithUnit)) else None
         if written is not None and measure_of(written).dimension == dimension:
             return written.text, measure_of(written).scale
     return wanted, 1.0
@@ -486,7 +486,7 @@ def use_command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used:
         if guide in scope.guides:
             return Command(kind, "", guide)
         _check_known(scope, call.positional[0])
-    inner = _asked(scope, call)
+    inner = _argument(scope, call)
     label = f"the command of {owner.label}"
     spot = replace(
         owner,
@@ -504,7 +504,7 @@ def use_command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used:
     return None if model is None else Command(kind, model)
 
 
-def _asked(scope: Scope, command: Call) -> Expression:
+def _argument(scope: Scope, command: Call) -> Expression:
     """The argument of a command; the name of a course alone is that course without parameters. Raises Problem."""
     inner = command.positional[0]
     if isinstance(inner, String):
@@ -571,7 +571,7 @@ def check_servo_definition(scope: Scope, name: str) -> None:
                 and len(command.value.positional) == 1
                 and command.value.name.text in COMMAND_UNIT
             ):
-                inner = _asked(scope, command.value)
+                inner = _argument(scope, command.value)
                 if not isinstance(inner, Call) and not is_guide(scope, inner):
                     scope.names.evaluate(inner)
             words = {p.name: p for p in servo.parameters if p.shape == "word"}

@@ -72,8 +72,8 @@ def _renamed(scope: Scope, shared: SharedServo, kind: str, joint: str) -> Shared
             known={on_joint(path): list(map(on_joint, parameters)) for path, parameters in entries.known.items()},
             not_sweepable={on_joint(path): _on_joint(why, on_joint) for path, why in entries.not_sweepable.items()},
         )
-    found: SharedEntries = memo[key]
-    return found
+    renamed: SharedEntries = memo[key]
+    return renamed
 
 
 def _on_joint(why: NotSweepable, on_joint: Callable[[str], str]) -> NotSweepable:
@@ -93,8 +93,8 @@ def _shared(scope: Scope, item: Item, kind: str, resolve: Resolve) -> SharedServ
     memo, key = scope.definitions.memo, ("servo", definition.name, kind)
     if key not in memo:
         memo[key] = _alone(scope, item, kind, definition, resolve)
-    found: SharedServo | None = memo[key]
-    return found
+    servo: SharedServo | None = memo[key]
+    return servo
 
 
 def _alone(scope: Scope, item: Item, kind: str, definition: Definition, resolve: Resolve) -> SharedServo | None:
@@ -108,7 +108,7 @@ def _alone(scope: Scope, item: Item, kind: str, definition: Definition, resolve:
     if use is None or use.parameters is None or entries is None or not complaints.is_clear:
         return None
     settled = (*alone.parameters.values(), *alone.auxiliary.values())
-    if any(ANY in text for each in settled for text in (each.unit, each.doc, each.origin.note)):
+    if any(ANY in text for parameter in settled for text in (parameter.unit, parameter.doc, parameter.origin.note)):
         return None
     heads = (definition.name, *scope.definitions.homes(definition))
     return SharedServo(use, entries, heads)

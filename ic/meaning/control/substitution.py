@@ -49,17 +49,17 @@ def resolve_substitutions(
 ) -> tuple[Substitution, ...]:
     """Every joint whose motor is on a bed, in the arm's order; those that failed join `scope.failed_servos`."""
     servos = {use.joint: use for use in uses}
-    found: dict[str, tuple[Substitution, Place]] = {}
+    by_joint: dict[str, tuple[Substitution, Place]] = {}
     for item in block.of_kind("substitute"):
         with scope.complaints.gather():
-            made = _substitution(scope, item, arm, servos)
-            if made is not None:
-                found[item.name] = made
+            substitution = _substitution(scope, item, arm, servos)
+            if substitution is not None:
+                by_joint[item.name] = substitution
                 continue
         scope.checks.fail(f"{item.name}.bed")
         scope.checks.fail(f"{item.name}.law")
         scope.failed_servos |= {item.name}
-    in_order = [found[joint.name] for joint in arm.joints if joint.name in found]
+    in_order = [by_joint[joint.name] for joint in arm.joints if joint.name in by_joint]
     for use, place in in_order[1:]:
         first, also = in_order[0]
         if use.law != first.law:
@@ -76,9 +76,11 @@ def resolve_substitutions(
     return tuple(use for use, _ in in_order)
 
 
-def check_ticks(scope: Scope, found: tuple[Substitution, ...], ticks: Mapping[str, Ticks], schedule: Schedule) -> None:
+def check_ticks(
+    scope: Scope, substitutions: tuple[Substitution, ...], ticks: Mapping[str, Ticks], schedule: Schedule
+) -> None:
     """Check that the servos of substituted joints tick, and together."""
-    for use in found:
+    for use in substitutions:
         if ticks[use.joint].continuous and use.place is not None:
             scope.complaints.error(
                 "D106",
@@ -95,15 +97,15 @@ def check_ticks(scope: Scope, found: tuple[Substitution, ...], ticks: Mapping[st
                 help=f"give it {SLOWEST_BED_HZ:g} Hz or more: between two ticks the shaft goes on with what it was "
                 "told last",
             )
-    for use in found[1:]:
-        rates = [schedule.base_hz / ticks[each.joint].divisor for each in (use, found[0])]
-        if rates[0] != rates[1] and use.place is not None and found[0].place is not None:
+    for use in substitutions[1:]:
+        rates = [schedule.base_hz / ticks[other.joint].divisor for other in (use, substitutions[0])]
+        if rates[0] != rates[1] and use.place is not None and substitutions[0].place is not None:
             scope.complaints.error(
                 "D178",
                 f"the servo of joint `{use.joint}` ticks at {rates[0]:g} Hz, and that of joint "
-                f"`{found[0].joint}`, whose motor is on a bed too, at {rates[1]:g} Hz",
+                f"`{substitutions[0].joint}`, whose motor is on a bed too, at {rates[1]:g} Hz",
                 use.place,
-                also=[Label(found[0].place, f"{rates[1]:g} Hz")],
+                also=[Label(substitutions[0].place, f"{rates[1]:g} Hz")],
                 help=[
                     "all substituted joints of a run are solved together: give their servos the same `rate`",
                     "or substitute them in two runs",
@@ -111,37 +113,39 @@ def check_ticks(scope: Scope, found: tuple[Substitution, ...], ticks: Mapping[st
             )
 
 
-def check_brakes(scope: Scope, found: tuple[Substitution, ...], environment: Iterable[EnvironmentUse]) -> None:
+def check_brakes(scope: Scope, substitutions: tuple[Substitution, ...], environment: Iterable[EnvironmentUse]) -> None:
     """Check that no model puts dry friction on a joint whose motor is on a bed: there friction is the bed's."""
     for use in environment:
         friction_joint = models.find("environment", use.model).friction_joint
         joint = scope.parameters.get(f"environment.{use.name}.{friction_joint}") if friction_joint else None
-        for each in found:
-            if joint is not None and joint.value == each.joint and use.place is not None and each.place is not None:
-                message = f"`{use.name}` puts friction on joint `{each.joint}`, whose motor is on a bed"
+        for other in substitutions:
+            if joint is not None and joint.value == other.joint and use.place is not None and other.place is not None:
+                message = f"`{use.name}` puts friction on joint `{other.joint}`, whose motor is on a bed"
                 scope.complaints.error(
                     "D244",
                     message,
                     use.place,
-                    also=[Label(each.place, "on a bed")],
+                    also=[Label(other.place, "on a bed")],
                     help=leave_out("leave it out: on a bed, friction is the bed's"),
                 )
 
 
-def check_runaways(scope: Scope, found: tuple[Substitution, ...], environment: Iterable[EnvironmentUse]) -> None:
+def check_runaways(
+    scope: Scope, substitutions: tuple[Substitution, ...], environment: Iterable[EnvironmentUse]
+) -> None:
     """Check that no model replaces the outputs of a servo whose rate loop is the drive's: they do not reach the
     drive."""
-    on_rate = {use.joint: use for use in found if models.find("bed", use.bed).drive == "rate"}
+    on_rate = {use.joint: use for use in substitutions if models.find("bed", use.bed).drive == "rate"}
     for use in environment:
         model = models.find("environment", use.model)
         if model.replaced_outputs is None or not model.servo_of:
             continue
         joint = scope.parameters.get(f"environment.{use.name}.{model.servo_of}")
-        each = None if joint is None else on_rate.get(str(joint.value))
-        if each is not None and use.place is not None and each.place is not None:
-            message = f"`{use.name}` replaces the voltage of joint `{each.joint}`, and `{each.bed}` sends a rate"
+        on_bed = None if joint is None else on_rate.get(str(joint.value))
+        if on_bed is not None and use.place is not None and on_bed.place is not None:
+            message = f"`{use.name}` replaces the voltage of joint `{on_bed.joint}`, and `{on_bed.bed}` sends a rate"
             helps = leave_out("leave it out: what the drive does with its rate is the drive's")
-            scope.complaints.error("D368", message, use.place, also=[Label(each.place, "on a bed")], help=helps)
+            scope.complaints.error("D368", message, use.place, also=[Label(on_bed.place, "on a bed")], help=helps)
 
 
 def _substitution(
@@ -190,7 +194,7 @@ def _substitution(
         scope.complaints.error(
             "D176",
             f"the servo of joint `{item.name}` has `{only[0]} = {word}`, and a motor on a bed has "
-            f"{' or '.join(f'`{each}`' for each in only[1])} alone",
+            f"{' or '.join(f'`{other_word}`' for other_word in only[1])} alone",
             item.place,
             also=[Label(use.place, "its servo")],
             help=f"write `{only[0]} = {only[1][0]};`, or leave the joint to its servo",
@@ -212,22 +216,22 @@ def _substitution(
         scale = _scale(scope, item.name, scaled)
         if scale is None:
             return None
-    bed, law = (_model(scope, each, block.get(each), item) for each in DEFAULTS)
-    for each, model in (("bed", bed), ("law", law)):
+    bed, law = (_model(scope, part_kind, block.get(part_kind), item) for part_kind in DEFAULTS)
+    for part_kind, model in (("bed", bed), ("law", law)):
         if model is None:
             continue
-        part = block.get(each)
+        part = block.get(part_kind)
         owner = Owner(
-            f"{each} `{model.name}` of joint `{item.name}`",
+            f"{part_kind} `{model.name}` of joint `{item.name}`",
             (part or item).place,
-            f"{item.name}.{each}",
+            f"{item.name}.{part_kind}",
             homes=(part or item).homes,
             joint=kind,  # type: ignore[arg-type]
             call=True,
         )
         scope.not_sweepable[f"{owner.path}.model"] = not_sweepable.chosen(owner.path, "models")
         body = (part.body if part is not None else None) or MergedBlock()
-        if each == "bed":
+        if part_kind == "bed":
             _use_bed(scope, owner, model, body, use, scale)
             if scale is not None and scaled is not None:
                 _check_strength(scope, owner, use, scale, scaled)
@@ -247,17 +251,21 @@ def _has_rate(scope: Scope, item: Item, block: MergedBlock, bed: Any, use: Use) 
     otherwise that was reported."""
     named = block.get("bed")
     place = item.place if named is None or named.value is None else _name_place(named.value)
-    told = f"`{bed.name}` tells the drive of joint `{item.name}` a rate"
+    sentence = f"`{bed.name}` tells the drive of joint `{item.name}` a rate"
     beds = models.find_own("bed").items()
-    sends = [f"`{name}` sends {_of_kind(each.drive)}" for name, each in beds if each.drive != "rate"]
+    sends = [f"`{name}` sends {_of_kind(model.drive)}" for name, model in beds if model.drive != "rate"]
     other = f"or another bed: {', '.join(sends)}"
     if use.servo.rate_loop is None or use.servo.rate_wanted is None:
-        known = [name for name, each in models.available("servo").items() if each.rate_loop and models.has_motor(each)]
-        message = f"{told}, and servo `{use.definition}` ({use.servo.name}) has no rate loop that could be the drive's"
+        known = [
+            name for name, servo in models.available("servo").items() if servo.rate_loop and models.has_motor(servo)
+        ]
+        message = (
+            f"{sentence}, and servo `{use.definition}` ({use.servo.name}) has no rate loop that could be the drive's"
+        )
         helps = [known_words("servo models that have one", sorted(known)), other]
     elif use.command is not None and use.command.kind not in RATES:
-        message = f"{told}, and the joint's command is {_of_kind(use.command.kind)}"
-        helps = [f"command it by {' or '.join(_of_kind(each) for each in RATES)}", other]
+        message = f"{sentence}, and the joint's command is {_of_kind(use.command.kind)}"
+        helps = [f"command it by {' or '.join(_of_kind(kind) for kind in RATES)}", other]
     else:
         return True
     scope.complaints.error("D368", message, place, also=[Label(use.place, "its servo")], help=helps)
@@ -303,7 +311,7 @@ def _scale(scope: Scope, joint: str, item: Item) -> BedScale | None:
                 message=f"`inertia` of {owner.label} is not that of its torque and rate",
                 place=value_place(written),
                 path=own,
-                needs=tuple(owner.join(each.name) for each in bed_scale.PARAMETERS),
+                needs=tuple(owner.join(parameter.name) for parameter in bed_scale.PARAMETERS),
                 help="leave it out: with one time for both, inertia is torque over rate",
             )
     return None if scope.complaints.error_count > before else BedScale(**values)
@@ -317,8 +325,8 @@ def _not_its_quotient(table: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 def _check_strength(scope: Scope, owner: Owner, use: Use, scale: BedScale, scaled: Item) -> None:
     """Warn where the bed's motor reaches its largest torque before the joint's would."""
-    path, of = owner.join("tau_max"), f"{use.joint}.servo.tau_max"
-    own, joints = scope.parameters.get(path), scope.parameters.get(of)
+    path, servo_path = owner.join("tau_max"), f"{use.joint}.servo.tau_max"
+    own, joints = scope.parameters.get(path), scope.parameters.get(servo_path)
     if own is None or joints is None:
         return
     place = own.origin.place if own.origin.kind == "deck" and own.origin.place is not None else scaled.place
@@ -342,7 +350,7 @@ def _check_strength(scope: Scope, owner: Owner, use: Use, scale: BedScale, scale
             ],
         )
 
-    scope.checks.observe(values, warn, place, needs=(path, of, f"{owner.path}.{SCALE.name}.torque"))
+    scope.checks.observe(values, warn, place, needs=(path, servo_path, f"{owner.path}.{SCALE.name}.torque"))
 
 
 def _use_bed(scope: Scope, owner: Owner, bed: Any, body: MergedBlock, use: Use, scale: BedScale | None = None) -> None:

@@ -37,33 +37,33 @@ class Ticking(Protocol):
     def place(self) -> Place: ...
 
 
-def rate_of(scope: Scope, each: Ticking, shared: Rate | None) -> Rate | None:
+def rate_of(scope: Scope, ticker: Ticking, shared: Rate | None) -> Rate | None:
     """The own rate, else that of the servos; None where there is neither (already reported)."""
-    found = each.rate or shared
-    if found is None or found.hz == CONTINUOUS:
-        message = "the servos are continuous" if found is not None else "the run has no rate of the servos"
+    own_rate = ticker.rate or shared
+    if own_rate is None or own_rate.hz == CONTINUOUS:
+        message = "the servos are continuous" if own_rate is not None else "the run has no rate of the servos"
         scope.complaints.error(
-            each.code,
-            f"{each.label} has no rate, and {message}",
-            each.place,
-            help=f"write `rate = 100 Hz;` in the {each.kind}",
+            ticker.code,
+            f"{ticker.label} has no rate, and {message}",
+            ticker.place,
+            help=f"write `rate = 100 Hz;` in the {ticker.kind}",
         )
         return None
-    return found
+    return own_rate
 
 
-def check_instants(scope: Scope, each: Ticking, divisor: int, dynamics: int, rate: Rate, step: Rate) -> None:
+def check_instants(scope: Scope, ticker: Ticking, divisor: int, dynamics: int, rate: Rate, step: Rate) -> None:
     """Check that it ticks at instants of the dynamics, since it sees the arm there."""
     if divisor % dynamics:
-        report_between_steps(scope, each, rate, step)
+        report_between_steps(scope, ticker, rate, step)
 
 
-def report_between_steps(scope: Scope, each: Ticking, rate: Rate, step: Rate) -> None:
+def report_between_steps(scope: Scope, ticker: Ticking, rate: Rate, step: Rate) -> None:
     """Report one whose rate does not divide that of the dynamics."""
     scope.complaints.error(
-        each.code,
-        f"{each.label} {each.verb} at {rate.hz:g} Hz, between the steps of the dynamics",
+        ticker.code,
+        f"{ticker.label} {ticker.verb} at {rate.hz:g} Hz, between the steps of the dynamics",
         rate.place,
         also=[Label(step.place, f"{step.hz:g} Hz")],
-        help=f"give the {each.kind} a `rate` that divides {step.hz:g} Hz, or quicken the dynamics",
+        help=f"give the {ticker.kind} a `rate` that divides {step.hz:g} Hz, or quicken the dynamics",
     )

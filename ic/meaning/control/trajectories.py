@@ -41,16 +41,16 @@ def use_file(
 
     name  of the column, unless another is named: that of the joint, or of what `kind` says
     """
-    others = [each for each in profile.parameters if each.name not in LISTS]
-    check_keys(scope, body, [each.name for each in profile.written], owner)
+    others = [declared for declared in profile.parameters if declared.name not in LISTS]
+    check_keys(scope, body, [declared.name for declared in profile.written], owner)
     values = use_model(
         scope,
         owner,
         others,
         MergedBlock({key: item for key, item in body.items.items() if key in [other.name for other in others]}),
     )
-    for each in (FILE.name, COLUMN.name, *LISTS):
-        scope.not_sweepable[owner.join(each)] = not_sweepable.FILE
+    for entry in (FILE.name, COLUMN.name, *LISTS):
+        scope.not_sweepable[owner.join(entry)] = not_sweepable.FILE
     columns: dict[str, tuple[float, ...]] | None = None
     file = body.get(FILE.name)
     if file is None:
@@ -61,8 +61,8 @@ def use_file(
         with scope.complaints.gather():
             columns = _columns(scope, owner, profile, body, file, name, kind)
     if columns is None:
-        for each in LISTS:
-            scope.checks.fail(owner.join(each))
+        for entry in LISTS:
+            scope.checks.fail(owner.join(entry))
     return None if values is None or columns is None else {**values, **columns}
 
 
@@ -75,19 +75,21 @@ def _columns(
     if body.get(COLUMN.name) is not None:
         place = place_of(body.items[COLUMN.name].value or named)
     table = scope.definitions.csv_files.get(named)
-    here = Label(named.place, "read here")  # the same for all joints, so that the file's own faults are reported once
+    label_of_file = Label(
+        named.place, "read here"
+    )  # the same for all joints, so that the file's own faults are reported once
     columns = {}
     angle = None
-    for name, column_name, at in zip(LISTS, (TIME, wanted), (named.place, place), strict=True):
+    for name, column_name, where in zip(LISTS, (TIME, wanted), (named.place, place), strict=True):
         declared = parameter(profile, name)
         column = table.column(column_name)
         assert declared is not None  # by the declaration of `from_file`
         if column is None:
             why = "the times of the rows stand in a column `time [s]`" if column_name == TIME else ""
-            if at is named.place and not why:
+            if where is named.place and not why:
                 why = f'that of the {kind}\'s name is taken, unless `column = "NAME"` names another'
-            raise missing_column(table, column_name, at, why)
-        label = here if column_name == TIME else Label(named.place, f"read here for {kind} `{own}`")
+            raise missing_column(table, column_name, where, why)
+        label = label_of_file if column_name == TIME else Label(named.place, f"read here for {kind} `{own}`")
         columns[name] = keep_column(scope, owner, declared, table, column, label)
         if owner.unit(declared)[0] == "rad":
             angle = column
@@ -97,7 +99,7 @@ def _columns(
                 "D196",
                 f"`{table.file}` has {len(table.rows) or 'no'} row{'s' if not table.rows else ''}",
                 table.columns[0].place,
-                also=[here],
+                also=[label_of_file],
                 help=f"a trajectory has {FEWEST} at least; `table` takes a single point",
             )
         )

@@ -24,13 +24,13 @@ KINDS: tuple[JointKind, ...] = ("revolute", "prismatic")
 def servos_in_use(definitions: Definitions) -> frozenset[str]:
     """The servo definitions that a run has, or a sweep chooses, and those that these are like."""
     servos = definitions.of_kind("servo")
-    values = [each.value for block in _runs(definitions) if (own := block.get("servos")) for each in _within(own)]
+    values = [item.value for block in _runs(definitions) if (own := block.get("servos")) for item in _within(own)]
     for kind in OF_A_RUN:
         for definition in definitions.of_kind(kind).values():
             values += _values(definition.group.body)
     names = (definitions.definition_named(value) or word_of(value) for value in values)
     used = [servos[name] for name in names if name is not None and name in servos]
-    return frozenset(home for each in used for home in definitions.homes(each))
+    return frozenset(home for used_servo in used for home in definitions.homes(used_servo))
 
 
 def _runs(definitions: Definitions) -> Iterator[MergedBlock]:
@@ -61,28 +61,28 @@ def check_on_a_joint(scope: Scope, name: str) -> None:
     servo, block = models.find("servo", model, definition.place), without_sensors(block)
     command = block.get("command")
     inner = command.value.positional[:1] if command is not None and isinstance(command.value, Call) else ()
-    told: list[tuple[Diagnostic, ...]] = []
+    reports: list[tuple[Diagnostic, ...]] = []
     for joint in KINDS:
         complaints = Complaints()
         lacking = (*NOT_PARAMETERS, *(parameter.name for parameter in servo.parameters))
-        complaints.known_missing |= {(definition.place, each) for each in lacking}
-        here = Scope(scope.definitions.reporting_to(complaints), complaints)
+        complaints.known_missing |= {(definition.place, entry) for entry in lacking}
+        trial = Scope(scope.definitions.reporting_to(complaints), complaints)
         homes = scope.definitions.homes(definition)
         owner = Owner(f"servo `{definition.name}`", definition.place, "a.servo", homes, "", joint)
         with complaints.gather():
-            use_model(here, owner, servo.parameters, block, NOT_PARAMETERS)
+            use_model(trial, owner, servo.parameters, block, NOT_PARAMETERS)
         with complaints.gather():
-            if not any(is_guide(scope, each) or _is_of_a_file(each) for each in inner):
-                use_command(here, owner, servo, command, definition.place)
+            if not any(is_guide(scope, part) or _is_of_a_file(part) for part in inner):
+                use_command(trial, owner, servo, command, definition.place)
         if not complaints.errors:
             return
-        told.append(complaints.errors)
-    scope.complaints.add(*min(told, key=len))
+        reports.append(complaints.errors)
+    scope.complaints.add(*min(reports, key=len))
 
 
 def _is_of_a_file(inner: Expression) -> bool:
     """Return True for a course from a file, which is read by the joint's name."""
     body = inner.body or () if isinstance(inner, Call) else ()
-    given = [word for word, _ in inner.named] if isinstance(inner, Call) else []
-    given += [each.path[-1] for each in body if isinstance(each, Setting)]
-    return any(word.text == "file" for word in given)
+    words = [word for word, _ in inner.named] if isinstance(inner, Call) else []
+    words += [setting.path[-1] for setting in body if isinstance(setting, Setting)]
+    return any(word.text == "file" for word in words)

@@ -132,13 +132,13 @@ class CsvTable:
         return [(cell, self._cell(line, row, column.number)) for cell, line, row in cells]
 
     def _numbers(self, column: CsvColumn, measure: Measure) -> tuple[float, ...]:
-        made = []
+        numbers = []
         for number in range(len(self.rows)):
-            found = _si(self._text(column, number), measure)
-            if found is None:
+            si = _si(self._text(column, number), measure)
+            if si is None:
                 raise _no_number(self.cell(column, number), measure)
-            made.append(found)
-        return tuple(made)
+            numbers.append(si)
+        return tuple(numbers)
 
     def _text(self, column: CsvColumn, number: int) -> str:
         return _stripped(_cells(self.rows[number][1])[column.number])[0]
@@ -175,14 +175,14 @@ def _si(text: str, measure: Measure) -> float | None:
 def _no_number(cell: CsvCell, measure: Measure) -> Problem:
     """The error for a cell without a number for `_si`."""
     text = cell.text
-    found = f"`{text[:40]}` is not a number" if text else "there is no number here"
+    mistake = f"`{text[:40]}` is not a number" if text else "there is no number here"
     if _NUMBER.fullmatch(text):
         lost = measure.to_si(float(text), text) == 0.0
-        found = "this number is too " + ("small: it would become 0" if lost else "large: the largest is 1.8e308")
+        mistake = "this number is too " + ("small: it would become 0" if lost else "large: the largest is 1.8e308")
     return Problem(
         error(
             "D194",
-            found,
+            mistake,
             cell.place,
             also=[Label(cell.column.place, f"column `{cell.column.name}`")],
             help="a number is written as 12.5 or -1e-3, with a point and without a unit",
@@ -252,15 +252,17 @@ def _with_units(file: str, text: str, head: int, columns: tuple[CsvColumn, ...])
     if head < 2 or any(column.unit is not None for column in columns):
         return columns
     above = text.split("\n", min(head - 1, MOST_REMARKS))[: head - 1]
-    line, told = next(((n, each) for n, each in enumerate(above, 1) if each.startswith(UNITS)), (0, ""))
+    line, units_line = next(
+        ((n, text_line) for n, text_line in enumerate(above, 1) if text_line.startswith(UNITS)), (0, "")
+    )
     if not line:
         return columns
-    cells = [_stripped(cell)[0] for cell in _cells(told.removeprefix(UNITS))]
+    cells = [_stripped(cell)[0] for cell in _cells(units_line.removeprefix(UNITS))]
     if len(cells) != len(columns):
         message = f"this line has {len(cells)} units, and {len(columns)} columns follow"
         helps = "give each column its unit, and 1 where it has none"
-        raise Problem(error("D197", message, Place(file, line, 1, max(len(told.rstrip()), 1)), help=helps))
-    return tuple(replace(each, unit=unit or None) for each, unit in zip(columns, cells, strict=True))
+        raise Problem(error("D197", message, Place(file, line, 1, max(len(units_line.rstrip()), 1)), help=helps))
+    return tuple(replace(column, unit=unit or None) for column, unit in zip(columns, cells, strict=True))
 
 
 def _lines_with_cells(text: str) -> Iterator[tuple[int, str]]:
@@ -320,7 +322,7 @@ def _columns(file: str, line: int, row: str, declared: Collection[str]) -> Itera
                 )
             )
         seen[name] = place
-        own = tuple(each for each in re.findall(r"\w+", unit) if each in declared)
+        own = tuple(word for word in re.findall(r"\w+", unit) if word in declared)
         yield CsvColumn(number, name, unit or None, place, own)
 
 
@@ -345,8 +347,8 @@ def _stripped(cell: str) -> tuple[str, int]:
 def _measure(column: CsvColumn, text: str, dimension: Dimension, label: Label) -> Measure:
     """The measure of a column's unit. Raises Problem D193 where it has none, or a different one from the wanted one."""
     usual = in_degrees(text)
-    helps = write_either((f"{column.name} [{each}]" for each in usual), old=column.name)
-    others = [each for each in units_of(dimension) if each not in usual]
+    helps = write_either((f"{column.name} [{unit}]" for unit in usual), old=column.name)
+    others = [unit for unit in units_of(dimension) if unit not in usual]
     further = [f"other units of this kind: {', '.join(others)}"] if others else []
     if column.unit is None:
         if dimension == PURE:
@@ -357,11 +359,11 @@ def _measure(column: CsvColumn, text: str, dimension: Dimension, label: Label) -
     in_it = [f"{helps}, with numbers in that unit", *further]
     measure = _meaning(column, in_it, [label], dimension)
     if not units.same(measure.dimension, dimension):
-        found = "a pure number" if measure.dimension == PURE else f"in {units.text(measure.dimension)}"
+        unit_words = "a pure number" if measure.dimension == PURE else f"in {units.text(measure.dimension)}"
         raise Problem(
             error(
                 "D193",
-                f"column `{column.name}` is {found}, and {text} is needed",
+                f"column `{column.name}` is {unit_words}, and {text} is needed",
                 column.place,
                 also=[label],
                 help=in_it,
@@ -396,7 +398,7 @@ def _short(name: str) -> str:
 def missing_column(table: CsvTable, name: str, place: Place, why: str = "") -> Problem:
     """The error that a file lacks a column that is needed at this place. why: the reason, in words"""
     names = [_short(column.name) for column in table.columns]
-    round_brackets = next((each for each in names if each.startswith(f"{name} (") and each.endswith(")")), None)
+    round_brackets = next((head for head in names if head.startswith(f"{name} (") and head.endswith(")")), None)
     near = did_you_mean(name, names)
     if round_brackets is not None:
         near = (f"a unit stands in square brackets: write `{name} [{round_brackets[len(name) + 2 : -1]}]`",)

@@ -155,9 +155,11 @@ class _Merger:
                 )
             if [word.text for word in entry.words[1:2]] == ["like"] and len(entry.words) == 3:  # `hinge like drive { }`
                 joint, _, servo = (word.text for word in entry.words)
-                made = write(f"{joint} = {servo}", f"write `{joint} = {servo} {{ ... }};`", old=f"{joint} like {servo}")
+                remedy = write(
+                    f"{joint} = {servo}", f"write `{joint} = {servo} {{ ... }};`", old=f"{joint} like {servo}"
+                )
                 raise Problem(
-                    error("D052", "`like` belongs to definitions, not to the blocks inside", entry.place, help=[made])
+                    error("D052", "`like` belongs to definitions, not to the blocks inside", entry.place, help=[remedy])
                 )
             words, name = entry.words[:-1][:1], entry.words[min(1, len(entry.words) - 1)].text
         detail = entry.words[2:]
@@ -177,13 +179,13 @@ class _Merger:
             if not details:
                 helps.insert(0, write("", f"leave out the word `{kind}` to change it", old=f"{kind} "))
             elif details == [word.text for word in earlier.detail]:
-                old, out = " ".join((kind, name, *details)), " and ".join(f"`{each}`" for each in (kind, *details))
+                old, out = " ".join((kind, name, *details)), " and ".join(f"`{word}`" for word in (kind, *details))
                 helps.insert(0, write(name, f"leave out the words {out} to change it", old=old))
             what = f"{kind} `{name}` is in {self.base_name or 'the base'} already"
             raise Problem(error("D053", what, entry.place, also=[Label(earlier.place, "here")], help=helps))
         self.written[key] = entry.place
         self.names.setdefault(name, []).append(key) if earlier is None else None
-        self.items[key] = self._made(entry, kind, name, detail, earlier)
+        self.items[key] = self._item(entry, kind, name, detail, earlier)
 
     def _state(self, entry: Statement) -> None:
         """Take a statement; one with a name replaces the base's of that name."""
@@ -206,11 +208,11 @@ class _Merger:
         )
 
     def _drop(self, statement: Statement) -> None:
-        at = next(at for at, each in enumerate(self.statements) if each is statement)
-        del self.statements[at]
-        self.removed = [replace(each, before=each.before - (at < each.before)) for each in self.removed]
+        index = next(n for n, other in enumerate(self.statements) if other is statement)
+        del self.statements[index]
+        self.removed = [replace(removal, before=removal.before - (index < removal.before)) for removal in self.removed]
 
-    def _made(
+    def _item(
         self, entry: Setting | Group, kind: str, name: str, detail: tuple[Word, ...], earlier: Item | None
     ) -> Item:
         if isinstance(entry, Setting):
@@ -316,16 +318,16 @@ def _meant(entry: Statement) -> Name:
     return entry.value
 
 
-def _name_of(each: Item | Statement) -> str:
+def _name_of(entry: Item | Statement) -> str:
     """The name of an entry; "" of a statement that has none."""
-    if isinstance(each, Item):
-        return each.name
-    return each.name.text if each.name is not None else ""
+    if isinstance(entry, Item):
+        return entry.name
+    return entry.name.text if entry.name is not None else ""
 
 
-def _nothing(entry: Statement, there: Iterable[Item | Statement]) -> Diagnostic:
+def _nothing(entry: Statement, entries: Iterable[Item | Statement]) -> Diagnostic:
     """The error that a `remove` finds nothing of its name."""
-    name, known = _meant(entry), [_name_of(each) for each in there]
+    name, known = _meant(entry), [_name_of(other) for other in entries]
     return error(
         "D058",
         f"nothing named `{name.text}` to remove",
@@ -343,7 +345,7 @@ def overlay(base: MergedBlock, over: MergedBlock, complaints: Complaints) -> Mer
         if named is not None:
             del items[named.key]
             removed.append(Removed(named.key, len(base.statements), entry.place))
-        elif not any(each.key == _meant(entry).text for each in over.removed):
+        elif not any(removal.key == _meant(entry).text for removal in over.removed):
             complaints.add(_nothing(entry, items.values()))
     for item in over.items.values():
         earlier = items.get(item.key) if item.kind else _of_name(items, item.name)
@@ -356,7 +358,7 @@ def overlay(base: MergedBlock, over: MergedBlock, complaints: Complaints) -> Mer
         else:
             overrides = (*item.overrides, earlier.place, *earlier.overrides)
             items[earlier.key] = replace(item, kind=earlier.kind, homes=(), overrides=overrides)
-    removed += (replace(each, before=len(base.statements) + each.before) for each in over.removed)
+    removed += (replace(removal, before=len(base.statements) + removal.before) for removal in over.removed)
     return MergedBlock(items, (*base.statements, *over.statements), tuple(removed))
 
 

@@ -89,13 +89,13 @@ class Definitions:
         other.lets = {**self.lets, **{let.name.text: let for let in lets}}
         other._by_kind = {kind: dict(known) for kind, known in self._by_kind.items()}
         other._merged, other._failed, other._meant = {}, set(), dict(self._meant)
-        if not lets and all(each.kind in EXPERIMENTS for each in changed):  # arms and servos do not change
+        if not lets and all(definition.kind in EXPERIMENTS for definition in changed):  # arms and servos do not change
             other._merged = {key: block for key, block in self._merged.items() if key[0] not in EXPERIMENTS}
             other._failed = {key for key in self._failed if key[0] not in EXPERIMENTS}
         else:
             other.memo = {}
-        for each in changed:
-            other._by_kind[each.kind][each.name] = each
+        for definition in changed:
+            other._by_kind[definition.kind][definition.name] = definition
         return other
 
     def reporting_to(self, complaints: Complaints) -> Definitions:
@@ -112,16 +112,16 @@ class Definitions:
 
     def row_table(self, call: Call) -> RowTable:
         """The table of rows with names that `csv("FILE.csv")` means. Raises Problem, the same each time."""
-        found = self._row_tables.get(call.place)
-        if found is None:
+        table = self._row_tables.get(call.place)
+        if table is None:
             try:
-                found = row_table(call, self.csv_files.get)
+                table = row_table(call, self.csv_files.get)
             except Problem as problem:
-                found = problem
-            self._row_tables[call.place] = found
-        if isinstance(found, Problem):
-            raise found
-        return found
+                table = problem
+            self._row_tables[call.place] = table
+        if isinstance(table, Problem):
+            raise table
+        return table
 
     def edition_at(self, place: Place) -> int:
         """The edition of the deck language in which the file of a place is written."""
@@ -216,10 +216,10 @@ class Definitions:
             return self.find(kind, name, roof)
         except Problem as problem:
             known = [
-                each
-                for each in self._by_kind[kind]
-                if (user is None or user.name not in self.homes(self._by_kind[kind][each]))
-                and (not roof or each.startswith(f"{roof}."))
+                candidate
+                for candidate in self._by_kind[kind]
+                if (user is None or user.name not in self.homes(self._by_kind[kind][candidate]))
+                and (not roof or candidate.startswith(f"{roof}."))
             ]
             near = meant(name.text, known)
             if near is None or any(diagnostic.code != "D041" for diagnostic in problem.diagnostics):
@@ -231,51 +231,53 @@ class Definitions:
     def block(self, definition: Definition) -> MergedBlock | None:
         """The definition merged with its bases; None where that failed (already reported)."""
         chain: list[Definition] = []
-        at: Definition | None = definition
-        while at is not None and (at.kind, at.name) not in self._merged:
-            key = (at.kind, at.name)
+        current: Definition | None = definition
+        while current is not None and (current.kind, current.name) not in self._merged:
+            key = (current.kind, current.name)
             if key in self._failed:
                 return None
-            if any(at is seen for seen in chain):
+            if any(current is seen for seen in chain):
                 self._failed.update((d.kind, d.name) for d in chain)
-                loop = [*chain[next(i for i, d in enumerate(chain) if d is at) :], at]
+                loop = [*chain[next(i for i, d in enumerate(chain) if d is current) :], current]
                 self._complaints.error(
                     "D043",
-                    f"{at.kind} `{at.name}` is like itself: " + " like ".join(f"`{d.name}`" for d in loop),
-                    at.place,
+                    f"{current.kind} `{current.name}` is like itself: " + " like ".join(f"`{d.name}`" for d in loop),
+                    current.place,
                     also=[Label(d.place, f"`{d.name}`") for d in loop[1:-1]],
                     help="let one of them stand alone, or be like something else",
                 )
                 return None
-            chain.append(at)
+            chain.append(current)
             base = None
-            if at.group.like is not None:
+            if current.group.like is not None:
                 try:
-                    like = at.group.like
+                    like = current.group.like
                     word = Word(like.text, like.place) if self.roofs else _single(like)
-                    base = self.find_or_meant(at.kind, word, self._complaints, user=at)
+                    base = self.find_or_meant(current.kind, word, self._complaints, user=current)
                 except Problem as problem:
                     self._complaints.add(*problem.diagnostics)
                     self._failed.update((d.kind, d.name) for d in chain)
                     return None
-            at = base
-        block = self._merged[(at.kind, at.name)] if at is not None else None
-        above = at
-        for each in reversed(chain):
-            base_name = f"{each.kind} `{above.name}`" if above is not None else None
-            if each.group.made_from is not None:
-                base_name = f"`{each.name}`"
-                block = self._made_from(each, each.group.made_from)
+            current = base
+        block = self._merged[(current.kind, current.name)] if current is not None else None
+        above = current
+        for ancestor in reversed(chain):
+            base_name = f"{ancestor.kind} `{above.name}`" if above is not None else None
+            if ancestor.group.made_from is not None:
+                base_name = f"`{ancestor.name}`"
+                block = self._made_from(ancestor, ancestor.group.made_from)
                 if block is None:
                     self._failed.update((d.kind, d.name) for d in chain)
                     return None
             if above is not None:
-                self._complaints.note_base(each.place, above.place)
-            block = merge(block, each.group.body, home=each.home, base_name=base_name, complaints=self._complaints)
-            for entry in each.extra_entries:
-                block = merge(block, (entry,), home=each.home, base_name=base_name, complaints=self._complaints)
-            self._merged[(each.kind, each.name)] = block
-            above = each
+                self._complaints.note_base(ancestor.place, above.place)
+            block = merge(
+                block, ancestor.group.body, home=ancestor.home, base_name=base_name, complaints=self._complaints
+            )
+            for entry in ancestor.extra_entries:
+                block = merge(block, (entry,), home=ancestor.home, base_name=base_name, complaints=self._complaints)
+            self._merged[(ancestor.kind, ancestor.name)] = block
+            above = ancestor
         return block
 
     def _made_from(self, definition: Definition, call: Call) -> MergedBlock | None:
@@ -301,14 +303,14 @@ class Definitions:
     def homes(self, definition: Definition) -> tuple[str, ...]:
         """Names of the definition and its bases, outermost base first."""
         names = [definition.name]
-        at = definition
-        while at.group.like is not None:
-            like = at.group.like.text
-            base = self._by_kind[at.kind].get(self._meant.get((at.kind, like), like))
+        current = definition
+        while current.group.like is not None:
+            like = current.group.like.text
+            base = self._by_kind[current.kind].get(self._meant.get((current.kind, like), like))
             if base is None or base.name in names:
                 break
             names.append(base.name)
-            at = base
+            current = base
         return tuple(reversed(names))
 
     def _enter(self, entry: Entry) -> None:
@@ -466,12 +468,12 @@ class Definitions:
                 )
             )
         parts: list[Name] = []
-        at = entry.value
-        while isinstance(at, Binary) and at.operator == "+" and isinstance(at.right, Name):
-            parts.append(at.right)
-            at = at.left
-        if not isinstance(at, Name) or any(len(part.path) > 1 for part in (*parts, at)):
-            place = at.place if not isinstance(at, Binary) else at.right.place
+        term = entry.value
+        while isinstance(term, Binary) and term.operator == "+" and isinstance(term.right, Name):
+            parts.append(term.right)
+            term = term.left
+        if not isinstance(term, Name) or any(len(part.path) > 1 for part in (*parts, term)):
+            place = term.place if not isinstance(term, Binary) else term.right.place
             raise Problem(
                 error(
                     "D120",
@@ -481,7 +483,7 @@ class Definitions:
                 )
             )
         group = Group((*entry.words, entry.path[0]), None, None, (), entry.place)
-        self._add(Definition("sweep", entry.path[0].text, group, len(entry.words) > 1, (at, *reversed(parts))))
+        self._add(Definition("sweep", entry.path[0].text, group, len(entry.words) > 1, (term, *reversed(parts))))
 
     def _add(self, definition: Definition) -> None:
         """Enter a definition under its name, which must be unique in its kind; everything with cases shares one space
@@ -518,29 +520,29 @@ class Definitions:
 
     def default(self) -> Definition | None:
         """The run or sweep marked `default`: the deck's own, else that of the one included file that has one."""
-        found = self._defaults()
-        own = [each for each in found if self.writes(each)]
-        return own[0] if own else found[0] if len({each.place.file for each in found}) == 1 else None
+        defaults = self._defaults()
+        own = [definition for definition in defaults if self.writes(definition)]
+        return own[0] if own else defaults[0] if len({definition.place.file for definition in defaults}) == 1 else None
 
 
 def _includes(outer: Let, inner: Let) -> bool:
     """Return True if the file of `outer` includes that of `inner`, directly or not."""
-    at = shown_place(outer.place)
-    return any(file == at.file and line > at.line for file, line in shown_place(inner.place).included)
+    outer_place = shown_place(outer.place)
+    return any(file == outer_place.file and line > outer_place.line for file, line in shown_place(inner.place).included)
 
 
 def _let_twice(entry: Let, earlier: Let) -> Diagnostic:
     """The error that a `let` or `param` is written twice."""
     kind = "param" if entry.is_param else "let"
-    found = defined_twice(kind, entry.name.text, entry.name.place, earlier.name.place)
+    diagnostic = defined_twice(kind, entry.name.text, entry.name.place, earlier.name.place)
     file = shown_place(entry.place).file
-    if earlier.is_param and any(each == file for each, _ in shown_place(earlier.place).included):
+    if earlier.is_param and any(included == file for included, _ in shown_place(earlier.place).included):
         how = "move this line up" if entry.is_param else f"write `param {entry.name.text} = ...;` there"
-        return replace(found, help=(f"a deck sets a `param` of a file before it includes it: {how}",))
+        return replace(diagnostic, help=(f"a deck sets a `param` of a file before it includes it: {how}",))
     if entry.is_param and _includes(earlier, entry):
         change = write("param", f"write `param {earlier.name.text}` to set it", old="let", at=earlier.place)
-        return replace(found, help=(change,))
-    return found
+        return replace(diagnostic, help=(change,))
+    return diagnostic
 
 
 def _single(name: Name) -> Word:

@@ -71,13 +71,13 @@ class RowTable:
             near = did_you_mean(row.text, self.rows)
             raise Problem(error("D382", message, row.place, help=[*near, known_words("rows", self.rows)]))
         columns = self._columns(words)
-        found = tuple(self.csv.cell(column, number) for column in columns)
-        for cell in found:
+        cells = tuple(self.csv.cell(column, number) for column in columns)
+        for cell in cells:
             if not cell.text:
                 also = [Label(name.place, f"`{name.text}`"), Label(cell.column.place, f"column `{cell.column.name}`")]
                 helps = "fill it in, or leave the entry that asks for it out"
                 raise Problem(error("D383", f"row `{row.text}` has no value here", cell.place, also=also, help=helps))
-        return found
+        return cells
 
     def paths(self) -> Iterator[str]:
         """The paths of all values, without the table's name: `boom.mass`; for a vector also its own."""
@@ -89,9 +89,9 @@ class RowTable:
     def _columns(self, words: Sequence[Word]) -> tuple[CsvColumn, ...]:
         """The column of this name, or those of the vector of this name."""
         text = ".".join(word.text for word in words)
-        one = self.csv.column(text)
-        if one is not None and one.number > 0:
-            return (one,)
+        column = self.csv.column(text)
+        if column is not None and column.number > 0:
+            return (column,)
         for parts in VECTORS:
             several = [self.csv.column(f"{text}.{part}") for part in parts]
             columns = tuple(column for column in several if column is not None)
@@ -104,10 +104,10 @@ class RowTable:
         what = "a table" if len(name.path) == 1 else "a row of a table"
         columns = [column.name for column in self.csv.columns[1:]]
         rest = f".{columns[0] if columns else 'COLUMN'}"
-        shown = name.text + (rest if len(name.path) > 1 else f".{next(iter(self.rows), 'ROW')}{rest}")
+        example = name.text + (rest if len(name.path) > 1 else f".{next(iter(self.rows), 'ROW')}{rest}")
         known = known_words("columns", columns) if len(name.path) > 1 else known_words("rows", self.rows)
         message = f"`{name.text}` is {what}, and a value is needed here"
-        return Problem(error("D381", message, name.place, help=[f"a value of it is `{shown}`", known]))
+        return Problem(error("D381", message, name.place, help=[f"a value of it is `{example}`", known]))
 
 
 def row_table(call: Call, get: Callable[[String], CsvTable]) -> RowTable:

@@ -19,9 +19,9 @@ def misspelt_params(entries: Sequence[Entry]) -> Iterator[Diagnostic]:
     near: dict[str, tuple[Let, Let]] = {}
     for let in params:
         others = {other.name.text: other for other in params if _is_included(other, shown_place(let.place).file)}
-        found = None if let.name.text in others else meant(let.name.text, others)
-        if found is not None:
-            near[let.name.text] = let, others[found]
+        near_name = None if let.name.text in others else meant(let.name.text, others)
+        if near_name is not None:
+            near[let.name.text] = let, others[near_name]
     named = _named(entries) if near else set()
     for name, (let, other) in near.items():
         if name not in named:

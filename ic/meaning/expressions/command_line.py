@@ -45,7 +45,7 @@ def written_origin(place: Place, overrides: tuple[Place, ...], note: str = "") -
 
 def evaluate_setting(entry: Setting, path: str, names: Names) -> CommandLineValue:
     """The number that an entry sets. Raises Problem where it is not a number."""
-    found = names.evaluate(entry.value)
-    if not isinstance(found, Value):
-        raise no_single_number(f"`{path}`", found)
-    return CommandLineValue(path, found, entry.value, entry.overrides)
+    value = names.evaluate(entry.value)
+    if not isinstance(value, Value):
+        raise no_single_number(f"`{path}`", value)
+    return CommandLineValue(path, value, entry.value, entry.overrides)

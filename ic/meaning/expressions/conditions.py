@@ -96,10 +96,10 @@ class Checks:
     def of_other_cases(self) -> Checks:
         """The same checks for cases of another table, without failures yet, except those that warn or concern the whole
         arm."""
-        found = Checks(Complaints(), self.graph, self.varied)
-        found._waiting = [check for check in self._waiting if not check.warns and check.code not in PROVISIONAL]
-        found._tested = found._formulas()
-        return found
+        checks = Checks(Complaints(), self.graph, self.varied)
+        checks._waiting = [check for check in self._waiting if not check.warns and check.code not in PROVISIONAL]
+        checks._tested = checks._formulas()
+        return checks
 
     def errors(self, cases: Mapping[str, CaseValues], count: int) -> tuple[Diagnostic, ...]:
         """The errors of `count` cases with these values, independent of former calls."""
@@ -107,10 +107,10 @@ class Checks:
             columns = {path: np.asarray(values) for path, values in cases.items()}
             if not any(check.test(table)[0].any() for check, table in self._tables(columns, count)):
                 return ()
-        asked = copy.copy(self)
-        asked.complaints, asked._failed = Complaints(), set()
-        asked.run(cases, count)
-        return asked.complaints.errors
+        checks = copy.copy(self)
+        checks.complaints, checks._failed = Complaints(), set()
+        checks.run(cases, count)
+        return checks.complaints.errors
 
     def broken(self, cases: Mapping[str, np.ndarray], count: int) -> np.ndarray:
         """A truth for each of `count` cases with these values: whether `errors` would report it, [n]."""
@@ -132,11 +132,15 @@ class Checks:
         self._failed.add(path)
 
     def failed(self, path: str) -> bool:
-        return bool(path) and any(each == path or each.startswith(path + ".") for each in self._failed)
+        return bool(path) and any(
+            failed_path == path or failed_path.startswith(path + ".") for failed_path in self._failed
+        )
 
     def touches_failed(self, path: str) -> bool:
         """Return True if a failed path is this one, inside it, or around it."""
-        return self.failed(path) or any(path.startswith(each + ".") for each in self._failed if each)
+        return self.failed(path) or any(
+            path.startswith(failed_path + ".") for failed_path in self._failed if failed_path
+        )
 
     def require(
         self,
@@ -168,8 +172,8 @@ class Checks:
         bad, causes = test(np.array([values], dtype=float))
         if bad[0]:
             self.fail(path)
-            at = Label(place, causes[0] if causes else "")
-            self.complaints.error(code, message, at, also=also, help=check.help)
+            label = Label(place, causes[0] if causes else "")
+            self.complaints.error(code, message, label, also=also, help=check.help)
 
     def observe(
         self, values: tuple[Real, ...], act: Callable[[np.ndarray], None], place: Place, needs: tuple[str, ...] = ()
@@ -226,15 +230,15 @@ class Checks:
     def _run_in_pieces(self, cases: Mapping[str, CaseValues], count: int) -> None:
         """Run the waiting checks on a long table: each is tested on all of it, and gives its reason, or warnings, for
         some rows."""
-        shown = _shown_rows(cases, count)
+        shown_rows = _shown_rows(cases, count)
         some: list[list[np.ndarray]] = [[] for _ in self._waiting]
         rows: list[list[np.ndarray]] = [[] for _ in self._waiting]
         failing = [0] * len(self._waiting)
         for piece in blocks(count):
-            here = shown[np.searchsorted(shown, piece.start) : np.searchsorted(shown, piece.stop)]
+            piece_rows = shown_rows[np.searchsorted(shown_rows, piece.start) : np.searchsorted(shown_rows, piece.stop)]
             values, length = {path: column[piece] for path, column in cases.items()}, piece.stop - piece.start
             for number, (check, table) in enumerate(self._tables(values, length)):
-                taken = here - piece.start
+                taken = piece_rows - piece.start
                 if not check.warns:
                     self._rows = np.empty(0)
                     bad = np.flatnonzero(check.test(table)[0])
@@ -257,7 +261,7 @@ class Checks:
         if any(self.failed(need) for need in check.needs):
             return
         self.fail(check.path)
-        where = ", ".join(f"{path} = {self.shown(path, cases[path][row])}" for path in cases)
+        where = ", ".join(f"{path} = {self.value_words(path, cases[path][row])}" for path in cases)
         more = f", and {count - 1} more" if count > 1 else ""
         case = self._case(row)
         self.complaints.error(
@@ -277,7 +281,7 @@ class Checks:
                 return (f"a normal distribution has no bounds: `truncated(mean, deviation, from, to){unit}` has two",)
         return ()
 
-    def shown(self, path: str, value: float) -> str:
+    def value_words(self, path: str, value: float) -> str:
         """A coordinate's value in the unit of the deck."""
         varied = self.varied[path]
         return f"{measure_of(varied.unit).decimal(value)} {varied.unit.text}" if varied.unit else ONE.decimal(value)

@@ -284,7 +284,7 @@ def _of_numbers(node: Binary, left: Value, right: Value) -> Value:
 def _made_alike(node: Binary, left: Value, right: Value) -> Help:
     """The remedy where a bare number is added to a quantity, or two dimensions are."""
     of_macro = [macro.macro for macro in node.place.macros]
-    outside = [each for each in (node.left, node.right) if not place_of(each).macros]
+    outside = [side for side in (node.left, node.right) if not place_of(side).macros]
     if of_macro and (outside or any(place_of(child).expansions != node.place.expansions for child in children(node))):
         return Help(f"`{node.operator}` comes from macro `{of_macro[0]}`: put brackets around the macro's body")
     other, bare_one, written = (right, left, node.left) if left.bare else (left, right, node.right)

@@ -23,13 +23,13 @@ COMPONENTS = ("x", "y", "z")
 Arithmetic = Callable[[Binary, Value, Value], Value]
 
 
-def no_single_number(what: str, found: ValueList) -> Problem:
+def no_single_number(what: str, listed: ValueList) -> Problem:
     """The error where a list stands in the place of one number. what: it is given, in words"""
-    count = len(found.items)
+    count = len(listed.items)
     help = "leave the brackets out" if count == 1 else f"write one number: these are {count}"
-    if count > 1 and found.place.file == COMMAND_LINE:
+    if count > 1 and listed.place.file == COMMAND_LINE:
         help = f"`--set` takes one number, and these are {count}; `--vary`, in its place, runs each of them"
-    return Problem(error("D071", f"{what} is one number, and this is a list", found.place, help=help))
+    return Problem(error("D071", f"{what} is one number, and this is a list", listed.place, help=help))
 
 
 def list_arithmetic(
@@ -48,13 +48,13 @@ def list_arithmetic(
             helps = "lists are added and subtracted number by number, so both have as many"
             raise Problem(error("D071", message, node.place, also=_labels(left, right), help=helps))
         pairs = [(a, b) for a, b in zip(_numbers(left), _numbers(right), strict=True)]
-        return _made([of_numbers(node, a, b) for a, b in pairs], place)
+        return _list_of([of_numbers(node, a, b) for a, b in pairs], place)
     if isinstance(left, ValueList) and isinstance(right, Value) and operator in ("*", "/"):
-        kept = left.unit if right.dimension == PURE else None
-        return replace(_made([of_numbers(node, number, right) for number in _numbers(left)], place), unit=kept)
+        unit = left.unit if right.dimension == PURE else None
+        return replace(_list_of([of_numbers(node, number, right) for number in _numbers(left)], place), unit=unit)
     if isinstance(left, Value) and isinstance(right, ValueList) and operator == "*":
-        kept = right.unit if left.dimension == PURE else None
-        return replace(_made([of_numbers(node, left, number) for number in _numbers(right)], place), unit=kept)
+        unit = right.unit if left.dimension == PURE else None
+        return replace(_list_of([of_numbers(node, left, number) for number in _numbers(right)], place), unit=unit)
     message = f"`{operator}` of {_what(left)} and {_what(right)}"
     helps = "a list is multiplied with a number and divided by one; lists of as many numbers are added and subtracted"
     raise Problem(error("D071", message, node.place, also=_labels(left, right), help=helps))
@@ -65,7 +65,7 @@ def signed(operator: str, written: ValueList, place: Place) -> ValueList:
     if operator == "+":
         return replace(written, place=place)
     items = [replace(number, number=-number.number, decimal="") for number in _numbers(written)]
-    return replace(_made(items, place), unit=written.unit)
+    return replace(_list_of(items, place), unit=written.unit)
 
 
 def component(name: Name, vector: Value | ValueList) -> Value:
@@ -89,17 +89,17 @@ def indexed(node: Indexed, written: Value | ValueList, index: Value) -> Value | 
         raise Problem(error("D286", "which value of a list is taken cannot vary", index.place, help=helps))
     count = len(written.items)
     if index.dimension != PURE or number != int(number) or not 0 <= number < count:
-        shown = f"{number:g}" if index.dimension == PURE else f"a quantity in {units.text(index.dimension)}"
+        index_words = f"{number:g}" if index.dimension == PURE else f"a quantity in {units.text(index.dimension)}"
         helps = (
             f"`{name}` has {count} values, `{name}[0]` to `{name}[{count - 1}]`"
             if count != 1
             else (f"`{name}` has one value, `{name}[0]`")
         )
-        raise Problem(error("D286", f"`{name}` has no value with the index {shown}", index.place, help=helps))
+        raise Problem(error("D286", f"`{name}` has no value with the index {index_words}", index.place, help=helps))
     return replace(written.items[int(number)], place=node.place)
 
 
-def _made(items: list[Value], place: Place) -> ValueList:
+def _list_of(items: list[Value], place: Place) -> ValueList:
     """The list of computed numbers, each at the place of the whole, where its unit would be corrected."""
     bare = len(items) > 1 and all(item.bare for item in items)
     return ValueList(tuple(replace(item, place=place, bare=bare) for item in items), place)
@@ -118,4 +118,4 @@ def _what(value: Value | ValueList) -> str:
 
 
 def _labels(left: Value | ValueList, right: Value | ValueList) -> list[Label]:
-    return [Label(each.place, _what(each)) for each in (left, right)]
+    return [Label(side.place, _what(side)) for side in (left, right)]

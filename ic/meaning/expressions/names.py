@@ -56,7 +56,7 @@ class FoundNames:
     @property
     def is_plain(self) -> bool:
         """True where it contains no mistake, and nothing by identity."""
-        return not self.cells and not self.read and not any(isinstance(each, Problem) for each in self.worth.values())
+        return not self.cells and not self.read and not any(isinstance(worth, Problem) for worth in self.worth.values())
 
 
 class Names:
@@ -77,17 +77,17 @@ class Names:
         self._read: dict[int, tuple[float, Label]] = {}  # the numbers of such cells, by identity
 
     @property
-    def found(self) -> FoundNames:
+    def found_names(self) -> FoundNames:
         """The values that were found so far."""
         return FoundNames(self._worth, self.cells, self._read)
 
-    def take_over(self, found: FoundNames) -> None:
+    def take_over(self, others: FoundNames) -> None:
         """Take over values that were found elsewhere, and are the same here."""
-        for name, worth in found.worth.items():
+        for name, worth in others.worth.items():
             self._worth.setdefault(name, worth)
-        if found.cells or found.read:
-            self.cells = {**found.cells, **self.cells}
-            self._read = {**found.read, **self._read}
+        if others.cells or others.read:
+            self.cells = {**others.cells, **self.cells}
+            self._read = {**others.read, **self._read}
 
     def evaluate(self, expression: Expression) -> Value | ValueList:
         return evaluate(expression, self.find)
@@ -98,8 +98,8 @@ class Names:
 
     def is_value(self, name: Name) -> bool:
         """Return True if a name is a single word with a value at its place."""
-        found = self.definitions.in_full(name)
-        return self.knows(found.text) if not found.roof else found.text in CONSTANTS
+        name_in_full = self.definitions.in_full(name)
+        return self.knows(name_in_full.text) if not name_in_full.roof else name_in_full.text in CONSTANTS
 
     def find(self, name: Name) -> Value | ValueList:
         """The value of a name. Raises Problem D065 where there is none, D073 where it depends on itself."""
@@ -128,9 +128,9 @@ class Names:
             raise Problem(
                 error(
                     "D073",
-                    f"`{text}` needs itself: " + " needs ".join(f"`{each}`" for each in loop),
+                    f"`{text}` needs itself: " + " needs ".join(f"`{needed}`" for needed in loop),
                     name.place,
-                    also=[Label(self._open[each], f"`{each}`") for each in loop[1:-1]],
+                    also=[Label(self._open[needed], f"`{needed}`") for needed in loop[1:-1]],
                     help="write one of them as a number",
                 )
             )
@@ -145,15 +145,15 @@ class Names:
             )
         self._open[text] = name.place
         try:
-            found = self.evaluate(self._expression(name))
+            value = self.evaluate(self._expression(name))
         except Problem as problem:
             if text in self.definitions.lets:
                 self._worth[text] = problem
             raise
         finally:
             self._open.pop(text, None)
-        self._worth[text] = found
-        return found
+        self._worth[text] = value
+        return value
 
     def row_table(self, let: str, words: int = 1) -> RowTable | None:
         """The table of a `let`; None where it is not one, or a servo of its name is meant. words: of the path that
@@ -169,14 +169,14 @@ class Names:
         """The value of a cell, or the vector of several."""
         cells = table.cells(name)
         self.cells[name.text] = cells
-        made = []
+        values = []
         for cell in cells:
             number, measure = table.csv.quantity(cell)
             bare, place = cell.column.unit is None, name.place if len(cells) == 1 else cell.place
             value = Value(number, measure.dimension, place, bare, hertz=measure.hertz)
             self._read[id(number)] = number, Label(cell.place, f"`{name.text}` is read here")
-            made.append(value)
-        return made[0] if len(made) == 1 else ValueList(tuple(made), name.place)
+            values.append(value)
+        return values[0] if len(values) == 1 else ValueList(tuple(values), name.place)
 
     def names_a_component(self, name: Name) -> bool:
         """Return True for `v.x` of a `let`: a servo of that name, or a path that a sweep varies, takes precedence."""
@@ -200,8 +200,8 @@ class Names:
 
     def label_of_cell(self, number: Real, place: Place) -> list[Label]:
         """The cell of a table with this number, as a label for messages about it at another place."""
-        found = self._read.get(id(number))
-        return [found[1]] if found is not None and found[1].place != place else []
+        read = self._read.get(id(number))
+        return [read[1]] if read is not None and read[1].place != place else []
 
     def label(self, value: Value) -> list[Label]:
         """The place that defines the name in this value, as a label for messages about it."""
@@ -263,7 +263,7 @@ class Names:
             ]
         elif not helps:
             unit = other_units.remedy(first) if len(first) > 1 else ()
-            helps = [f"define it: `let {first} = ...;`", *(_if_a_unit(each) for each in unit)]
+            helps = [f"define it: `let {first} = ...;`", *(_if_a_unit(word) for word in unit)]
         raise Problem(error("D065", f"no value `{name.text}`", name.place, help=helps))
 
     def _unknown_in_used(self, name: Name) -> Problem:
@@ -271,7 +271,7 @@ class Names:
         first, *rest = (word.text for word in name.path)
         definitions = self.definitions
         known = definitions.under(name.roof, definitions.lets)
-        known += [*CONSTANTS, *(f"{each}." for each in definitions.under(name.roof, definitions.of_kind("servo")))]
+        known += [*CONSTANTS, *(f"{servo}." for servo in definitions.under(name.roof, definitions.of_kind("servo")))]
         helps: list[str] = list(did_you_mean(name.text if rest else first, known))
         if not helps and not rest:
             helps = [f"define it there: `let {first} = ...;`"]

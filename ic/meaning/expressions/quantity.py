@@ -67,8 +67,8 @@ def in_unit(value: Value, unit: Unit) -> Value:
     """A pure number in a unit, rounded once. Raises D067 where it is too large in SI, or so small that it would be
     0."""
     measure = measure_of(unit)
-    made = measure.to_si(cast(float, value.number), value.decimal)  # a scalar divides and multiplies too
-    number = representable(made, value.place, value.number)
+    in_si = measure.to_si(cast(float, value.number), value.decimal)  # a scalar divides and multiplies too
+    number = representable(in_si, value.place, value.number)
     return Value(number, measure.dimension, value.place, unit=unit, hertz=measure.hertz)
 
 

@@ -27,7 +27,7 @@ def range_of(expression: Range, first: Value, last: Value, step: Value) -> Value
                     "D063",
                     f"a range from {in_words(first)} to {in_words(last)} by {in_words(step)}",
                     expression.place,
-                    also=[Label(each.place, in_words(each)) for each in (first, last, step)],
+                    also=[Label(end.place, in_words(end)) for end in (first, last, step)],
                     help="all three must be of one dimension",
                 )
             )
@@ -49,8 +49,8 @@ def range_of(expression: Range, first: Value, last: Value, step: Value) -> Value
     else:
         points = _steps(a, b, by, expression, first)
     bare = first.bare and last.bare and step.bare
-    made = (Value(x, first.dimension, place, bare, first.unit, hertz=first.hertz) for x in points)
-    return ValueList(tuple(made), place, first.unit)
+    values = (Value(x, first.dimension, place, bare, first.unit, hertz=first.hertz) for x in points)
+    return ValueList(tuple(values), place, first.unit)
 
 
 def _turning(value: Value) -> Measure | None:
@@ -62,7 +62,7 @@ def _turning(value: Value) -> Measure | None:
 def _steps(a: float, b: float, step: float, expression: Range, first: Value, scale: float = 1.0) -> Iterable[float]:
     """The points of a range. scale: SI units in one of the numbers' unit"""
 
-    def shown(number: float) -> str:
+    def written(number: float) -> str:
         """The number in the unit of the first value, where that has one of its own."""
         number *= scale
         if first.unit is None or measure_of(first.unit).dimension != first.dimension:
@@ -75,32 +75,32 @@ def _steps(a: float, b: float, step: float, expression: Range, first: Value, sca
         raise Problem(
             error(
                 "D072",
-                f"steps of {shown(step)} do not lead from {shown(a)} to {shown(b)}",
+                f"steps of {written(step)} do not lead from {written(a)} to {written(b)}",
                 place_of(expression.step),
                 help="give the step the other sign, or change the ends about",
             )
         )
-    found = series.Steps.between(a, b, step)
-    if found.count > MOST_POINTS:
+    steps = series.Steps.between(a, b, step)
+    if steps.count > MOST_POINTS:
         raise Problem(
             error(
                 "D072",
-                f"a range of {min(found.count, 10**300):.3g} values",
+                f"a range of {min(steps.count, 10**300):.3g} values",
                 place_of(expression),
                 help=f"up to {MOST_POINTS} are possible",
             )
         )
-    if not found.meet:
+    if not steps.meet:
         raise Problem(
             error(
                 "D220",
-                f"the steps do not meet the end: they reach {shown(found.last)}, and {shown(b)} "
+                f"the steps do not meet the end: they reach {written(steps.last)}, and {written(b)} "
                 "is not a whole number of steps from the first",
                 place_of(expression.last),
                 help="end where the steps do, or `linspace(from, to, count)`, whose ends are met",
             )
         )
-    return found.points
+    return steps.points
 
 
 def spaced(call: Call, start: Value, end: Value, count: Value) -> ValueList:
@@ -154,8 +154,8 @@ def spaced(call: Call, start: Value, end: Value, count: Value) -> ValueList:
     else:
         points = made_by(a, b, n)
     bare = start.bare and end.bare
-    made = (Value(x, start.dimension, call.place, bare, start.unit, hertz=start.hertz) for x in points)
-    return ValueList(tuple(made), call.place, start.unit)
+    values = (Value(x, start.dimension, call.place, bare, start.unit, hertz=start.hertz) for x in points)
+    return ValueList(tuple(values), call.place, start.unit)
 
 
 def _not_exponents(start: Value, end: Value, count: int) -> list[str]:
@@ -163,5 +163,5 @@ def _not_exponents(start: Value, end: Value, count: int) -> list[str]:
     ends = [float(cast(float, value.number)) for value in (start, end)]
     if not (start.bare and end.bare) or any(not x.is_integer() or abs(x) > 300 for x in ends):
         return []
-    shown = ", ".join(f"{10.0**x:g}" for x in ends)
-    return [f"it takes the ends themselves, not their exponents: `logspace({shown}, {count})`"]
+    powers = ", ".join(f"{10.0**x:g}" for x in ends)
+    return [f"it takes the ends themselves, not their exponents: `logspace({powers}, {count})`"]

@@ -26,9 +26,9 @@ class Steps:
     @classmethod
     def between(cls, a: float, b: float, step: float) -> Steps:
         """The steps from a to b; the step is not zero, and has the right sign. 0 to 1 by 0.1 includes 0.3."""
-        made = [_shortest(x) for x in (a, b, step)]
-        below = math.prod(under for _, under in made)
-        first, last, by = (top * (below // under) for top, under in made)
+        fractions = [_shortest(x) for x in (a, b, step)]
+        below = math.prod(under for _, under in fractions)
+        first, last, by = (top * (below // under) for top, under in fractions)
         count, left = divmod(abs(last - first), abs(by))
         return cls(first, by, below, count + 1, not left)
 

@@ -43,10 +43,10 @@ def need_one_dimension(comparison: Binary, left: Value, right: Value) -> None:
     if units.same(left.dimension, right.dimension):
         return
     helps = Help("both must be of one dimension")
-    for one, other in ((left, right), (right, left)):
-        if one.bare and one.dimension == PURE and not isinstance(one.number, Scalar):
-            told = f"{units.ONE.decimal(one.number)} {units.text(other.dimension)}"
-            helps = write(told, at=one.place, where="value")
+    for side, other in ((left, right), (right, left)):
+        if side.bare and side.dimension == PURE and not isinstance(side.number, Scalar):
+            in_unit = f"{units.ONE.decimal(side.number)} {units.text(other.dimension)}"
+            helps = write(in_unit, at=side.place, where="value")
     message = f"`{comparison.operator}` of {in_words(left)} and {in_words(right)}"
     also = [Label(side.place, in_words(side)) for side in (left, right)]
     raise Problem(error("D063", message, comparison.place, also=also, help=helps))
@@ -79,21 +79,21 @@ class Truths:
         """Take a piece of the table with `length` rows. columns: the values of the graph's inputs by name, [row]"""
         self.columns, self.length = columns, length
 
-    def of(self, expression: Expression, asked: np.ndarray) -> np.ndarray:
-        """Rows for which it holds. asked: rows for which the answer matters, as after an `and` those that may still
+    def of(self, expression: Expression, mask: np.ndarray) -> np.ndarray:
+        """Rows for which it holds. mask: rows for which the answer matters, as after an `and` those that may still
         hold. Raises Problem D130 where it is not a condition, D063 where the sides of a comparison have two
         dimensions."""
         if isinstance(expression, Unary) and expression.operator == "not":
-            return ~self.of(expression.operand, asked)
+            return ~self.of(expression.operand, mask)
         if isinstance(expression, Binary) and expression.operator in ("and", "or"):
-            left = self.of(expression.left, asked)
+            left = self.of(expression.left, mask)
             if expression.operator == "and":
-                return left & self.of(expression.right, asked & left)
-            return left | self.of(expression.right, asked & ~left)
+                return left & self.of(expression.right, mask & left)
+            return left | self.of(expression.right, mask & ~left)
         if not isinstance(expression, Binary) or expression.operator not in COMPARISONS:
             raise Problem(error("D130", "a comparison is needed here", place_of(expression), help=EXAMPLE))
         of_words = self._of_words(expression)
-        return self._of_numbers(expression, asked) if of_words is None else of_words
+        return self._of_numbers(expression, mask) if of_words is None else of_words
 
     def _of_words(self, expression: Binary) -> np.ndarray | None:
         """The truth of a comparison of a choice with a word; None for other comparisons, and for a word that is a
@@ -101,7 +101,9 @@ class Truths:
         for side, other in ((expression.left, expression.right), (expression.right, expression.left)):
             if isinstance(side, Name) and side.text in self.words:
                 text = self.words[side.text]
-                if self.numeric and any(each[:1].isdigit() or each[:1] in "-." for each in np.unique(text).tolist()):
+                if self.numeric and any(
+                    option[:1].isdigit() or option[:1] in "-." for option in np.unique(text).tolist()
+                ):
                     return None
                 if expression.operator not in ("==", "!="):
                     message = f"`{side.text}` is a word, which is not less or more than another"
@@ -115,14 +117,14 @@ class Truths:
                 return np.array(np.broadcast_to(holds, self.length))
         return None
 
-    def _of_numbers(self, expression: Binary, asked: np.ndarray) -> np.ndarray:
+    def _of_numbers(self, expression: Binary, mask: np.ndarray) -> np.ndarray:
         compared = self._read.get(id(expression))
         if compared is None:
             compared = self._read[id(expression)] = self._comparison(expression)
         left, right = (
             np.broadcast_to(np.asarray(x, float), self.length) for x in compared.formulas.replay(self.columns)
         )
-        self.look_at(compared, left, right, asked)
+        self.look_at(compared, left, right, mask)
         return np.asarray(HOLDS[expression.operator](left, right)) & ~(np.isnan(left) | np.isnan(right))
 
     def _comparison(self, expression: Binary) -> NumberComparison:
@@ -138,8 +140,8 @@ class Truths:
             self.warn(error("D305", message, expression.place, help=helps_hertz))
         return NumberComparison(expression, (left, right), Formulas.of(self.graph, [left.number, right.number]))
 
-    def warn(self, found: Diagnostic) -> None:
+    def warn(self, diagnostic: Diagnostic) -> None:
         """Handle a possible misreading; ignored here."""
 
-    def look_at(self, compared: NumberComparison, left: np.ndarray, right: np.ndarray, asked: np.ndarray) -> None:
+    def look_at(self, compared: NumberComparison, left: np.ndarray, right: np.ndarray, mask: np.ndarray) -> None:
         """Handle the numbers of each comparison of a piece before it is decided."""

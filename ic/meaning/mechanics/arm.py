@@ -468,7 +468,7 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
         )
         scope.checks.fail(owner.join("axis"))
         return
-    written = scope.vector(owner, AXIS, item if named is None else replace(item, value=None), given=named)
+    written = scope.vector(owner, AXIS, item if named is None else replace(item, value=None), replacements=named)
     if written is None:
         return
     scope.checks.require(

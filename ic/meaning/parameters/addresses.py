@@ -63,10 +63,10 @@ def _in_its_block(block: MergedBlock, item: Item, helps: list[str]) -> list[str]
     it."""
     for help in helps:
         head, _, inner = help.removeprefix("write `").partition(" { ")
-        there = block.get(head) if inner else None
-        if there is not None and there.body is not None and there.homes == item.homes:
+        entry = block.get(head) if inner else None
+        if entry is not None and entry.body is not None and entry.homes == item.homes:
             inner = inner.removesuffix(" }`")
-            instead = ", in place of what is there" if there.body.get(inner.split()[0]) is not None else ""
+            instead = ", in place of what is there" if entry.body.get(inner.split()[0]) is not None else ""
             return [f"write `{inner}` in the run's `{head} {{ ... }}`{instead}"]
     return helps
 
@@ -87,4 +87,4 @@ def _of_arm(definitions: Definitions, block: MergedBlock) -> tuple[list[str], li
     body = definitions.block(arm) if arm is not None else None
     if arm is None or body is None:
         return [], [], ""
-    return [each.name for each in body.of_kind("joint")], [each.name for each in body.of_kind("link")], arm.name
+    return [joint.name for joint in body.of_kind("joint")], [link.name for link in body.of_kind("link")], arm.name

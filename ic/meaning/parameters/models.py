@@ -37,14 +37,14 @@ def value_place(item: Item) -> Place:
 def overriding_place(item: Item) -> Place | None:
     """The place of the first entry of a block over an entry's value, of the block where it is empty; None where there
     is none."""
-    return next((each.place for each in item.body.items.values()), item.upon) if item.body is not None else None
+    return next((entry.place for entry in item.body.items.values()), item.upon) if item.body is not None else None
 
 
 def words_chosen(parameters: Sequence[Parameter], body: MergedBlock) -> tuple[tuple[str, str], ...]:
     """The words that a body writes for these parameters, without defaults."""
-    found = ((parameter.name, word_written(parameter, body)) for parameter in parameters)
+    words = ((parameter.name, word_written(parameter, body)) for parameter in parameters)
     defaults = {parameter.name: parameter.default for parameter in parameters}
-    return tuple((name, word) for name, word in found if word != defaults[name])
+    return tuple((name, word) for name, word in words if word != defaults[name])
 
 
 def word_written(wanted: Parameter, body: MergedBlock) -> str:
@@ -63,7 +63,7 @@ def _check_unused(
     if item is None or (word is not None and word.overrides):
         return
     also = [Label(place_of(word.value), "chosen here")] if word is not None and word.value is not None else []
-    needed = " or ".join(f"`{only[0]} = {each};`" for each in only[1])
+    needed = " or ".join(f"`{only[0]} = {needed_word};`" for needed_word in only[1])
     scope.complaints.error(
         "D141",
         f"{owner.label} has no `{wanted.name}` with `{only[0]} = {words[only[0]]}`",
@@ -78,7 +78,7 @@ def refuse_values(scope: Scope, expression: Expression | None, names: Iterable[s
     if not isinstance(expression, Call) or not expression.positional:
         return False
     name = word_of(expression)
-    usage = f"{name}({', '.join(f'{each} = ...' for each in names)})"
+    usage = f"{name}({', '.join(f'{parameter} = ...' for parameter in names)})"
     scope.complaints.error(
         "D153", f"`{name}` takes its values by name", place_of(expression.positional[0]), help=f"write `{usage}`"
     )
@@ -119,7 +119,9 @@ def check_keys(
             )
     refuse_statements(scope, body, owner.label)
     refuse_pending(body, scope.complaints)
-    scope.removed.update((owner.join(each.key), each.place) for each in body.removed if body.get(each.key) is None)
+    scope.removed.update(
+        (owner.join(removed.key), removed.place) for removed in body.removed if body.get(removed.key) is None
+    )
 
 
 def refuse_statements(scope: Scope, body: MergedBlock, label: str) -> None:
@@ -183,7 +185,7 @@ def use_model(
         scope.complaints.known_missing |= {
             (owner.place, parameter.name) for parameter in parameters if parameter.shape == "list"
         }
-    here = [p.name for p in parameters if is_present(p, words)]
+    present = [p.name for p in parameters if is_present(p, words)]
     owner = replace(owner, others=parameters)
     values: dict[str, Any] = {}
     for wanted in parameters:
@@ -192,7 +194,7 @@ def use_model(
             scope.checks.fail(owner.join(wanted.name))  # a missing word is reported where words are read
             continue
         if wanted.only is not None and not is_present(wanted, words):
-            if wanted.name not in here:
+            if wanted.name not in present:
                 _check_unused(scope, owner, wanted, wanted.only, body, words)
             continue
         if wanted.shape == "vector":

@@ -62,8 +62,10 @@ class Owner:
     def paths(self, name: str, homes: Iterable[str]) -> tuple[str, ...]:
         """Every path of a parameter: its own first, then those under definitions."""
         names = [name, name.removeprefix(f"{self.short}.")] if self.short else [name]
-        made = [path for each in names for path in (self.join(each), *(self.join_local(home, each) for home in homes))]
-        return tuple(dict.fromkeys(made))
+        paths = [
+            path for other in names for path in (self.join(other), *(self.join_local(home, other) for home in homes))
+        ]
+        return tuple(dict.fromkeys(paths))
 
     def join_local(self, home: str, name: str) -> str:
         local = self.path if self.local is None else self.local
@@ -87,6 +89,6 @@ class Settled:
 
     def __copy__(self) -> Settled:
         """A copy, in a third of the time of the default `copy`: long arms have thousands."""
-        made = object.__new__(Settled)
-        made.__dict__.update(self.__dict__)
-        return made
+        copied = object.__new__(Settled)
+        copied.__dict__.update(self.__dict__)
+        return copied

@@ -91,7 +91,7 @@ def check_names(
                 help="give the link another name",
             )
         elif word not in (*names, *failed):
-            others = [f"or {' or '.join(f'`{each}`' for each in wanted.words)}"] if wanted.words else []
+            others = [f"or {' or '.join(f'`{other_word}`' for other_word in wanted.words)}"] if wanted.words else []
             if word == BASE:
                 others.append("the base is a link where it moves: `base = free;` in the run")
             scope.complaints.error(

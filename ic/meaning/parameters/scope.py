@@ -141,32 +141,32 @@ class Scope:
         *,
         names: Sequence[str] = XYZ,
         short: int = 0,
-        given: Sequence[Real] | None = None,
+        replacements: Sequence[Real] | None = None,
         record: bool = True,
     ) -> tuple[Real, ...] | None:
         """The parameter's numbers, `names` of them, or the first `short`, the rest zero.
 
-        given  numbers made of what the item says, in its stead
+        replacements  numbers made of what the item says, in its stead
         """
         heads = [owner.path] * (wanted.name == owner.short) + [owner.join(wanted.name)]
         for head in heads:
             self.not_sweepable.setdefault(head, not_sweepable.several([f"{heads[0]}.{name}" for name in names]))
         values: list[Value | None] = [None] * len(names)
-        if item is not None and given is None:
+        if item is not None and replacements is None:
             with self.complaints.gather():
-                found = self.evaluate(item)
-                values = list(self.value_checks.components(owner, wanted, item.name, found, names, short))
+                value = self.evaluate(item)
+                values = list(self.value_checks.components(owner, wanted, item.name, value, names, short))
             if all(value is None for value in values):
                 self.checks.fail(owner.join(wanted.name))
                 return None
-        elif given is not None and item is not None:
+        elif replacements is not None and item is not None:
             place = place_of(item.value) if item.value is not None else item.place
-            values = [Value(x, PURE, place) for x in given]
+            values = [Value(x, PURE, place) for x in replacements]
         elif wanted.default is None:
             self._missing(owner, wanted)
             return None
         defaults = wanted.default if isinstance(wanted.default, tuple) else (None,) * len(names)
-        parts = components(item, len(names)) if given is None else (None,) * len(names)
+        parts = components(item, len(names)) if replacements is None else (None,) * len(names)
         numbers = [
             self._settle(owner, wanted, f"{wanted.name}.{name}", item, value, default, record, part)
             for name, value, default, part in zip(names, values, defaults, parts, strict=True)
@@ -181,23 +181,23 @@ class Scope:
             self.not_sweepable[known] = not_sweepable.COMPILED
         number = None
         with self.complaints.gather():
-            found = self._one_number(owner, wanted, item)
-            self.value_checks.dimension(owner, wanted, found)
-            if isinstance(found.number, Scalar):
+            value = self._one_number(owner, wanted, item)
+            self.value_checks.dimension(owner, wanted, value)
+            if isinstance(value.number, Scalar):
                 raise Problem(
                     error(
                         "D122",
                         f"`{wanted.name}` of {owner.label} varies with the sweep",
-                        found.place,
+                        value.place,
                         help=instead or f"it decides the program: vary `{path}` itself",
                     )
                 )
             before = self.complaints.error_count
-            self.value_checks.range(owner, wanted, found.number, found.place)
-            number = float(found.number) if self.complaints.error_count == before else None
+            self.value_checks.range(owner, wanted, value.number, value.place)
+            number = float(value.number) if self.complaints.error_count == before else None
             if number is not None:
                 self.auxiliary[path] = Settled(
-                    number, owner.unit(wanted)[0], self._origin(item, found.place), wanted.doc, item.value
+                    number, owner.unit(wanted)[0], self._origin(item, value.place), wanted.doc, item.value
                 )
         if number is None:
             self.checks.fail(path)
@@ -231,18 +231,18 @@ class Scope:
             return None
         numbers: tuple[float, ...] | None = None
         with self.complaints.gather():
-            found = self.evaluate(item)
-            if isinstance(found, Value):
+            listed = self.evaluate(item)
+            if isinstance(listed, Value):
                 raise Problem(
                     error(
                         "D071",
                         f"`{wanted.name}` of {owner.label} is a list",
-                        found.place,
+                        listed.place,
                         help=f"write `{wanted.name} = [...] {owner.unit(wanted)[0]};`",
                     )
                 )
-            made = []
-            for value in found.items:
+            floats = []
+            for value in listed.items:
                 if isinstance(value, ValueList):
                     raise Problem(error("D071", "a list inside a list", value.place))
                 self.value_checks.dimension(owner, wanted, value)
@@ -254,10 +254,10 @@ class Scope:
                         )
                     )
                 self.value_checks.range(owner, wanted, value.number, value.place)
-                made.append(float(value.number))
-            numbers = tuple(made)
+                floats.append(float(value.number))
+            numbers = tuple(floats)
             self.parameters[path] = Settled(
-                numbers, owner.unit(wanted)[0], self._origin(item, found.place), wanted.doc, item.value
+                numbers, owner.unit(wanted)[0], self._origin(item, listed.place), wanted.doc, item.value
             )
         if numbers is None:
             self.checks.fail(path)
@@ -295,8 +295,8 @@ class Scope:
             word = named
             place = place_of(item.value) if item.value else item.place
             origin = written_origin(place, item.overrides)  # a word is not a name for a value
-        kept = self.parameters if record else self.auxiliary
-        kept[path] = Settled(word, "", origin, wanted.doc, item.value if item else None)
+        table = self.parameters if record else self.auxiliary
+        table[path] = Settled(word, "", origin, wanted.doc, item.value if item else None)
         return word
 
     def keep_in_deck(self, path: str, value: str, item: Item) -> None:
@@ -335,24 +335,24 @@ class Scope:
         origin = Origin("derived", owner.place, (), note)
         return self._finish(owner, wanted, name, owner.homes, self._plain(value), origin, owner.place, True)
 
-    def copied(self, owner: Owner, wanted: Parameter, of: str, over: Real | None = None) -> Real | None:
+    def copied(self, owner: Owner, wanted: Parameter, base: str, over: Real | None = None) -> Real | None:
         """A parameter that copies another one, of this path, unless a sweep varies it itself; None where the other
         failed.
 
         over  a scale: the parameter is then the other's value over it
         """
-        other = self.parameters.get(of)
-        if other is None or isinstance(other.value, str | tuple) or self.checks.failed(of):
+        other = self.parameters.get(base)
+        if other is None or isinstance(other.value, str | tuple) or self.checks.failed(base):
             self.checks.fail(owner.join(wanted.name))
             return None
         paths = owner.paths(wanted.name, owner.homes)
-        own = self._coordinate(owner, wanted.name, owner.homes, paths) is not None or bool(self._given(paths))
-        origin = replace(other.origin, note="" if own else f"that of `{of}`")
+        own = self._coordinate(owner, wanted.name, owner.homes, paths) is not None or bool(self._settings_of(paths))
+        origin = replace(other.origin, note="" if own else f"that of `{base}`")
         if over is not None and not own:
-            note = f"that of `{of}` over its scale"
+            note = f"that of `{base}` over its scale"
             return self._finish(
                 owner, wanted, wanted.name, owner.homes, self._plain(other.value / over),
-                Origin("derived", other.origin.place, (), note), other.origin.place or owner.place, True, needs=(of,),
+                Origin("derived", other.origin.place, (), note), other.origin.place or owner.place, True, needs=(base,),
             )  # fmt: skip
         value = self._finish(
             owner,
@@ -364,11 +364,11 @@ class Scope:
             origin.place or owner.place,
             True,
             other.expression,
-            needs=(of,),
+            needs=(base,),
             paths=paths,
         )
         for taken in self.targets.values():
-            if not own and of in taken:
+            if not own and base in taken:
                 taken.append(owner.join(wanted.name))
         return value
 
@@ -385,10 +385,10 @@ class Scope:
             raise Problem(no_block(item.name, item.place))
         if isinstance(expression, Call) and item.body is not None:
             expression = replace(expression, body=())  # with names, which no function takes
-        found = self.names.evaluate(expression)
+        evaluated = self.names.evaluate(expression)
         if not item.appended:
-            return found
-        if isinstance(found, Value):
+            return evaluated
+        if isinstance(evaluated, Value):
             raise Problem(
                 error(
                     "D056",
@@ -397,18 +397,18 @@ class Scope:
                     help=f"write `{item.name} = ...;`",
                 )
             )
-        items = list(found.items)
+        items = list(evaluated.items)
         for more in item.appended:
             value = self.names.evaluate(more)
             items.extend(value.items if isinstance(value, ValueList) else (value,))
-        return ValueList(tuple(items), found.place, found.unit)
+        return ValueList(tuple(items), evaluated.place, evaluated.unit)
 
     def _one_number(self, owner: Owner, wanted: Parameter, item: Item, expression: Expression | None = None) -> Value:
         """The value of the item's expression. Raises Problem, D071 where it is a list."""
-        found = self.evaluate(item, expression)
-        if isinstance(found, ValueList):
-            raise no_single_number(f"`{wanted.name}` of {owner.label}", found)
-        return found
+        value = self.evaluate(item, expression)
+        if isinstance(value, ValueList):
+            raise no_single_number(f"`{wanted.name}` of {owner.label}", value)
+        return value
 
     def _missing(self, owner: Owner, wanted: Parameter) -> None:
         self.checks.fail(owner.join(wanted.name))
@@ -419,13 +419,13 @@ class Scope:
         if any(self.complaints.is_known_to_lack(place, wanted.name) for place in (lacks, *bases)):
             return  # already reported: in another use, or in a base, or another word was taken for it
         also = [Label(owner.place, f"{owner.label} stands here")] if removed is not None else []
-        at = Label(removed, "removed here") if removed is not None else owner.place
+        place = Label(removed, "removed here") if removed is not None else owner.place
         self.complaints.lack(
             lacks,
             wanted.name,
             "D075",
             f"{owner.label} has no `{wanted.name}`",
-            at,
+            place,
             also=also,
             help=how_to_write(owner, wanted),
         )
@@ -456,7 +456,7 @@ class Scope:
             origin = self._origin(item, place)
         paths = owner.paths(name, homes)
         coordinate = self._coordinate(owner, name, homes, paths)
-        if value is None and (item is not None or coordinate is None) and not self._given(paths):
+        if value is None and (item is not None or coordinate is None) and not self._settings_of(paths):
             if item is None:
                 self._missing(owner, wanted)
             for path in (owner.join(name), *(owner.join_local(home, name) for home in homes)):
@@ -484,19 +484,19 @@ class Scope:
         paths = owner.paths(name, homes) if paths is None else paths
         for known in paths:
             self.known.setdefault(known, []).append(path)
-        for number, given in enumerate(self._given(paths)):  # those of the run first
-            if origin.note == ON_COMMAND_LINE if is_on_command_line(given.value.place) else number > 0:
+        for number, setting in enumerate(self._settings_of(paths)):  # those of the run first
+            if origin.note == ON_COMMAND_LINE if is_on_command_line(setting.value.place) else number > 0:
                 self.complaints.error(
                     "D232",
                     f"this sets `{path}`, which is set already",
-                    given.value.place,
+                    setting.value.place,
                     also=[Label(origin.place, "here")] if origin.place is not None else [],
                     help="leave one of the two out",
                 )
-            self.targets.setdefault(given.path, []).append(path)
-            value, expression, place = self._plain(given.value.number), given.expression, given.value.place
-            self._check_instead(owner, wanted, given.value, path)
-            origin = given.overriding(origin)
+            self.targets.setdefault(setting.path, []).append(path)
+            value, expression, place = self._plain(setting.value.number), setting.expression, setting.value.place
+            self._check_instead(owner, wanted, setting.value, path)
+            origin = setting.overriding(origin)
         coordinate = self._coordinate(owner, name, homes, paths)
         if coordinate is not None:
             if origin.note == ON_COMMAND_LINE and not is_on_command_line(coordinate.place):
@@ -517,9 +517,9 @@ class Scope:
         endless = not isinstance(value, Scalar) and math.isinf(value)
         if origin.kind != "default" or not endless:  # a model's own default may be: never
             self.value_checks.range(owner, wanted, value, place, path, needs)
-        kept = self.parameters if record and not (wanted.timing and origin.kind == "default") else self.auxiliary
+        table = self.parameters if record and not (wanted.timing and origin.kind == "default") else self.auxiliary
         if record or owner.called is None:
-            kept[path] = Settled(value, owner.unit(wanted)[0], origin, wanted.doc, expression)
+            table[path] = Settled(value, owner.unit(wanted)[0], origin, wanted.doc, expression)
         return value
 
     def _check_instead(self, owner: Owner, wanted: Parameter, value: Value, path: str) -> None:
@@ -530,32 +530,32 @@ class Scope:
             self.complaints.add(*problem.diagnostics)
             self.checks.fail(path)
 
-    def _given(self, paths: Iterable[str]) -> list[CommandLineValue]:
+    def _settings_of(self, paths: Iterable[str]) -> list[CommandLineValue]:
         """The numbers that the run and `--set` give for a parameter with these paths; several where several are set."""
-        found = [path for path in paths if path in self.settings] if self.settings else []
-        found.sort(key=lambda path: is_on_command_line(self.settings[path].place))
-        for path in found:
+        own_paths = [path for path in paths if path in self.settings] if self.settings else []
+        own_paths.sort(key=lambda path: is_on_command_line(self.settings[path].place))
+        for path in own_paths:
             if path not in self.evaluated_settings:
                 self.evaluated_settings[path] = None
                 with self.complaints.gather():
                     self.evaluated_settings[path] = evaluate_setting(self.settings[path], path, self.names)
-        return [given for path in found if (given := self.evaluated_settings[path]) is not None]
+        return [setting for path in own_paths if (setting := self.evaluated_settings[path]) is not None]
 
     def _coordinate(self, owner: Owner, name: str, homes: tuple[str, ...], paths: tuple[str, ...]) -> VariedPath | None:
         """The coordinate that varies a parameter; paths: all of it."""
         if not self.varied:
             return None
-        found = [varied for path, varied in self.varied.items() if path in paths]
-        for other in found[1:]:
+        coordinates = [varied for path, varied in self.varied.items() if path in paths]
+        for other in coordinates[1:]:
             self.targets.setdefault(other.path, [])
             self.complaints.error(
                 "D123",
-                f"`{found[0].path}` and `{other.path}` both set `{owner.join(name)}`",
+                f"`{coordinates[0].path}` and `{other.path}` both set `{owner.join(name)}`",
                 other.place,
-                also=[Label(found[0].place, "the first")],
-                help=["vary one of them, or different joints", *self._own(owner, name, homes, (found[0], other))],
+                also=[Label(coordinates[0].place, "the first")],
+                help=["vary one of them, or different joints", *self._own(owner, name, homes, (coordinates[0], other))],
             )
-        return found[0] if found else None
+        return coordinates[0] if coordinates else None
 
     def _own(self, owner: Owner, name: str, homes: tuple[str, ...], both: tuple[VariedPath, ...]) -> list[str]:
         """The remedy for two coordinates that belong to a servo's definition and to its base; none otherwise."""
@@ -576,22 +576,22 @@ class Scope:
         from met.plan import Formula
 
         outputs: list[Scalar] = []
-        made = {}
+        quantities = {}
         for path, settled in {**self.parameters, **(self.auxiliary if auxiliary else {})}.items():
             value: Any = settled.value
             if isinstance(value, Scalar):
                 outputs.append(value)
                 value = Formula(len(outputs) - 1)
-            made[path] = Quantity(value, settled.unit, settled.origin)
-        return made, outputs
+            quantities[path] = Quantity(value, settled.unit, settled.origin)
+        return quantities, outputs
 
     def _origin(self, item: Item, place: Place) -> Origin:
         """The origin of an item's value; for a cell of a table with its line and column in the file."""
         name = self.definitions.in_full(item.value) if isinstance(item.value, Name) else None
         note = f"from `{name.text}`" if name is not None else self.definitions.robot_files.note_at(place)
         cells = self.names.cells.get(name.text, ()) if name is not None else ()
-        at = f" ({cells[0].place})" if len(cells) == 1 else ""
-        return written_origin(place, item.overrides, note + at)
+        cell_place = f" ({cells[0].place})" if len(cells) == 1 else ""
+        return written_origin(place, item.overrides, note + cell_place)
 
 
 @lru_cache(maxsize=1024)

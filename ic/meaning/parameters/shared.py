@@ -30,7 +30,7 @@ class SharedEntries:
         """The entries of a scope; None where it has a remark, a check or anything else that is of one run alone."""
         if alone.notes or alone.targets or alone.removed or alone.joint_kinds or not alone.checks.is_clear:
             return None
-        return cls(alone.parameters, alone.auxiliary, alone.known, alone.not_sweepable, alone.names.found)
+        return cls(alone.parameters, alone.auxiliary, alone.known, alone.not_sweepable, alone.names.found_names)
 
     def enter(self, scope: Scope) -> None:
         """Enter them in the scope of a run."""
@@ -44,9 +44,9 @@ class SharedEntries:
 
     def has_names_as_written(self, scope: Scope) -> bool:
         """True where neither a sweep nor a setting, of a run or from outside, changes a name that they are made of."""
-        given, named, lets = {*scope.varied, *scope.settings}, self.names.named, scope.definitions.lets
-        return not given or (
-            given.isdisjoint(named)
+        changed, named, lets = {*scope.varied, *scope.settings}, self.names.named, scope.definitions.lets
+        return not changed or (
+            changed.isdisjoint(named)
             and not any("." in name and name not in lets for name in named)
-            and not any(path.partition(".")[0] in named for path in given)
+            and not any(path.partition(".")[0] in named for path in changed)
         )

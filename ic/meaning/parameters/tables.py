@@ -28,13 +28,13 @@ TIME = "time"
 def use_table(scope: Scope, owner: Owner, environment: Environment, body: MergedBlock) -> dict[str, Any] | None:
     """Every parameter of a model whose body names a file, entered in the scope; None where one is missing or wrong."""
     lists = [parameter for parameter in environment.parameters if parameter.shape == "list"]
-    check_keys(scope, body, [each.name for each in environment.written], owner)
-    for each in lists:
-        item = body.get(each.name)
+    check_keys(scope, body, [parameter.name for parameter in environment.written], owner)
+    for parameter in lists:
+        item = body.get(parameter.name)
         if item is not None:
             scope.complaints.error(
                 "D242",
-                f"`{each.name}` of {owner.label} stands in the file",
+                f"`{parameter.name}` of {owner.label} stands in the file",
                 item.place,
                 also=[Label(body.items[FILE.name].place, "which is named here")],
                 help=leave_out("leave one of the two out"),
@@ -46,32 +46,32 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Merged
         [parameter for parameter in environment.parameters if parameter.shape != "list"],
         MergedBlock({key: item for key, item in body.items.items() if key in own}),
     )
-    for name in (FILE.name, *(each.name for each in lists)):
+    for name in (FILE.name, *(parameter.name for parameter in lists)):
         scope.not_sweepable[owner.join(name)] = not_sweepable.FILE
     columns: dict[str, tuple[float, ...]] | None = None
     with scope.complaints.gather():
         columns = _columns(scope, owner, lists, body.items[FILE.name])
     if columns is None:
-        for each in lists:
-            scope.checks.fail(owner.join(each.name))
+        for parameter in lists:
+            scope.checks.fail(owner.join(parameter.name))
     return None if values is None or columns is None else {**values, **columns}
 
 
 def report_named_lists(scope: Scope, owner: Owner, lists: list[Parameter], body: MergedBlock) -> bool:
     """Report a file's name in place of a list; return True if there is one."""
-    found = False
-    for each in lists:
-        item = body.get(each.name)
+    is_named = False
+    for parameter in lists:
+        item = body.get(parameter.name)
         if item is not None and isinstance(item.value, String):
-            found = True
+            is_named = True
             scope.complaints.error(
                 "D064",
-                f"`{each.name}` of {owner.label} is a list of numbers, not text",
+                f"`{parameter.name}` of {owner.label} is a list of numbers, not text",
                 item.value.place,
                 help=f'write `file = "{item.value.value}";` for a CSV file that '
-                f"has it in a column `{TIME if each.rises else each.name}`",
+                f"has it in a column `{TIME if parameter.rises else parameter.name}`",
             )
-    return found
+    return is_named
 
 
 def named_file(owner: Owner, item: Item) -> String:
@@ -117,7 +117,7 @@ def _columns(scope: Scope, owner: Owner, lists: list[Parameter], item: Item) -> 
     """The lists. Raises Problem."""
     named = named_file(owner, item)
     table = scope.definitions.csv_files.get(named)
-    by_column = {TIME if each.rises else each.name: each for each in lists}
+    by_column = {TIME if parameter.rises else parameter.name: parameter for parameter in lists}
     label = Label(named.place, "read here")
     for column in table.columns:
         if column.name not in by_column:
@@ -136,9 +136,9 @@ def _columns(scope: Scope, owner: Owner, lists: list[Parameter], item: Item) -> 
             )
     columns = {}
     for name, wanted in by_column.items():
-        found = table.column(name)
-        if found is not None:
-            columns[wanted.name] = keep_column(scope, owner, wanted, table, found, label)
+        cells = table.column(name)
+        if cells is not None:
+            columns[wanted.name] = keep_column(scope, owner, wanted, table, cells, label)
         elif isinstance(wanted.default, tuple) and name != TIME:
             text, _ = owner.unit(wanted)
             columns[wanted.name] = wanted.default

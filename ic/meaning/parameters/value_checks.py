@@ -29,10 +29,10 @@ from met.units import PURE
 def how_to_write(owner: Owner, wanted: Parameter) -> list[str]:
     """The help where a parameter is missing."""
     unit = owner.unit(wanted)[0]
-    shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
-    shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {unit}"
+    example = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
+    example = example if unit == "1" or wanted.shape == "word" else f"{example} {unit}"
     doc = f" ({wanted.doc})" if wanted.doc != wanted.name else ""
-    return [f"write `{wanted.name} = {shown}{'' if owner.call else ';'}`{doc}", *of_a_rate(owner)]
+    return [f"write `{wanted.name} = {example}{'' if owner.call else ';'}`{doc}", *of_a_rate(owner)]
 
 
 def of_a_rate(owner: Owner) -> list[str]:
@@ -84,9 +84,11 @@ class ValueChecks:
                     help=apart or (wrote if value.bare else f"a unit is missing on the way here: {text}"),
                 )
             )
-        found = units.text(value.dimension)
+        unit_text = units.text(value.dimension)
         apart = apart or self._of_another_command(owner, wanted, value, text)
-        message = f"{what} is " + ("a pure number" if dimension == PURE else f"in {text}") + f", and this is in {found}"
+        message = (
+            f"{what} is " + ("a pure number" if dimension == PURE else f"in {text}") + f", and this is in {unit_text}"
+        )
         other = self._other(owner, wanted, value) if dimension == PURE else []
         raise Problem(
             error("D061", message, value.place, also=also, help=apart or [*other, unit_remedy(value, text, dimension)])
@@ -97,7 +99,7 @@ class ValueChecks:
         owner: Owner,
         wanted: Parameter,
         key: str,
-        found: Value | ValueList,
+        listed: Value | ValueList,
         names: Sequence[str],
         short: int,
     ) -> Iterable[Value]:
@@ -108,28 +110,28 @@ class ValueChecks:
         count = len(names)
         text, dimension = owner.unit(wanted)
         expected = f"{short} or {count}" if short else f"{count}"
-        if isinstance(found, Value):
+        if isinstance(listed, Value):
             unit = "" if text == "1" else f" {text}"
             raise Problem(
                 error(
                     "D071",
                     f"{owner.what(wanted)} is a list of {expected} numbers",
-                    found.place,
+                    listed.place,
                     help=f"write `{key} = [...]{unit};`",
                 )
             )
-        if len(found.items) not in (short, count):
-            shown = ", ".join(names)
+        if len(listed.items) not in (short, count):
+            components = ", ".join(names)
             raise Problem(
                 error(
                     "D071",
-                    f"{owner.what(wanted)} has {expected} numbers, not {len(found.items)}",
-                    found.place,
-                    help=f"they are [{shown}]",
+                    f"{owner.what(wanted)} has {expected} numbers, not {len(listed.items)}",
+                    listed.place,
+                    help=f"they are [{components}]",
                 )
             )
         numbers = []
-        for value in found.items:
+        for value in listed.items:
             if isinstance(value, ValueList):
                 raise Problem(error("D071", "a list inside a list", value.place))
             numbers.append(value)
@@ -138,14 +140,14 @@ class ValueChecks:
                 error(
                     "D060",
                     f"{owner.what(wanted)} is in {text}, and these are bare numbers",
-                    found.place,
+                    listed.place,
                     help=_one_unit_for_all(in_degrees(text)),
                 )
             )
         dimensions = {value.dimension for value in numbers}
-        if found.unit is not None and len(dimensions) == 1:  # one unit for all: where it is wrong, it is so once
-            self.dimension(owner, wanted, replace(numbers[0], place=found.place))
-        numbers += [Value(0.0, dimension, found.place)] * (count - len(numbers))
+        if listed.unit is not None and len(dimensions) == 1:  # one unit for all: where it is wrong, it is so once
+            self.dimension(owner, wanted, replace(numbers[0], place=listed.place))
+        numbers += [Value(0.0, dimension, listed.place)] * (count - len(numbers))
         return numbers
 
     def range(
@@ -184,8 +186,8 @@ class ValueChecks:
             return bad, [f"this is {x:g}{unit}" for x in values[bad, 0][:1]]
 
         limits = " and ".join(f"{word} {bound:g}" for bound, word, _ in bounds) or "finite"
-        of = "of " if limits.startswith("at ") else ""
-        remedy = f"write a number {of}{limits}{unit}" if bounds else "write a finite number"
+        preposition = "of " if limits.startswith("at ") else ""
+        remedy = f"write a number {preposition}{limits}{unit}" if bounds else "write a finite number"
         if wanted.whole:
             limits, remedy = f"whole and {limits}", remedy.replace("a number", "a whole number")
         limits += unit if bounds else ""
@@ -215,13 +217,13 @@ class ValueChecks:
             if kind != owner.command
             and units.same(value.dimension, unit_here(wanted.unit, owner.joint, kind, owner.of)[1])
         ]
-        found = units.text(value.dimension)
+        unit_text = units.text(value.dimension)
         if not owner.label.startswith("`"):  # no course: the command is this number
-            return [f"`{owner.command}(...)` takes {text}; `{kind}(...)` takes {found}" for kind in fits]
+            return [f"`{owner.command}(...)` takes {text}; `{kind}(...)` takes {unit_text}" for kind in fits]
         course = owner.label.strip("`")
         return [
             f"of a `{owner.command}` command it is in {text}; with `{kind}({course}(...))` it would be in "
-            f"{found}, like all of that course"
+            f"{unit_text}, like all of that course"
             for kind in fits
         ] + of_a_rate(owner) * bool(fits)
 
@@ -229,14 +231,14 @@ class ValueChecks:
         """Report a unit that may mean cycles in place of radians, or the reverse."""
         if wanted.ticks:
             return
-        found = ambiguous_unit(value, text, measure_here(wanted.unit, owner.joint, owner.command, owner.of))
-        if found is not None:
+        ambiguity = ambiguous_unit(value, text, measure_here(wanted.unit, owner.joint, owner.command, owner.of))
+        if ambiguity is not None:
             self.complaints.warn(
                 "D305",
-                f"{owner.what(wanted)} is {found.taken}",
+                f"{owner.what(wanted)} is {ambiguity.taken}",
                 value.place,
                 also=self.names.label(value),
-                help=found.helps,
+                help=ambiguity.helps,
             )
 
     def _remark_share(self, owner: Owner, wanted: Parameter, value: Value) -> None:
@@ -245,13 +247,13 @@ class ValueChecks:
             return
         number = value.number
         if isinstance(number, Scalar):
-            found = (each.values for each in self.checks.varied.values() if each.value.number is value.number)
-            number = max(next(found, np.zeros(1)).tolist(), key=abs, default=0.0)
+            values = (varied.values for varied in self.checks.varied.values() if varied.value.number is value.number)
+            number = max(next(values, np.zeros(1)).tolist(), key=abs, default=0.0)
         if abs(number) <= 1.0:
             return
-        shown, per_cent = units.ONE.decimal(number), f"{parse_unit('%').decimal(number)} %"
+        bare, per_cent = units.ONE.decimal(number), f"{parse_unit('%').decimal(number)} %"
         helps: list[str] = [
-            write(f"{shown} %", f"if per cent are meant, write `{shown} %`", where="value"),
+            write(f"{bare} %", f"if per cent are meant, write `{bare} %`", where="value"),
         ]
         if all(bound is None or abs(number) < bound for bound in (wanted.below, wanted.at_most)):
             helps.append(write(per_cent, f"if that is meant, write `{per_cent}`", where="value"))
@@ -261,12 +263,12 @@ class ValueChecks:
                 f"if that is meant, write the values in per cent, such as `{per_cent}`",
             ]
         self.complaints.warn(
-            "D307", f"{owner.what(wanted)} is a share, and {shown} is {per_cent}", value.place, help=helps
+            "D307", f"{owner.what(wanted)} is a share, and {bare} is {per_cent}", value.place, help=helps
         )
 
     def _other(self, owner: Owner, wanted: Parameter, value: Value) -> list[str]:
         """The one optional parameter of the model for which a number with this unit may be meant."""
-        found = [
+        fitting = [
             other
             for other in owner.others
             if other.shape == "number"
@@ -274,9 +276,9 @@ class ValueChecks:
             and other.name != wanted.name
             and units.same(value.dimension, owner.unit(other)[1])
         ]
-        if len(found) != 1:
+        if len(fitting) != 1:
             return []
-        return [f"`{found[0].name}` is what is in {owner.unit(found[0])[0]}: {found[0].doc}"]
+        return [f"`{fitting[0].name}` is what is in {owner.unit(fitting[0])[0]}: {fitting[0].doc}"]
 
     def _of_its_own(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> str:
         """The remedy where a value fits the other joints of its servo definition, which move differently."""
@@ -286,9 +288,9 @@ class ValueChecks:
             return ""
         joint = owner.path.partition(".servo")[0]
         key = wanted.name if owner.command is None else "command"
-        shown = f"{value.number:g}" if value.bare and not isinstance(value.number, Scalar) else "..."
-        shown += "" if text == "1" else f" {text}"
-        written = f"{key} = {shown};" if owner.command is None else f"{key} = {owner.command}(...);"
+        example = f"{value.number:g}" if value.bare and not isinstance(value.number, Scalar) else "..."
+        example += "" if text == "1" else f" {text}"
+        written = f"{key} = {example};" if owner.command is None else f"{key} = {owner.command}(...);"
         moves, others = ("slides", "turn") if owner.joint == "prismatic" else ("turns", "slide")
         why = f"joint `{joint}` {moves}, and others of servo `{both[-1]}` {others}"
         if owner.homes[-1] != both[-1]:
@@ -298,6 +300,6 @@ class ValueChecks:
 
 def _one_unit_for_all(written: Iterable[str]) -> Help:
     """The help for a list of bare numbers that needs a unit after its bracket."""
-    shown = either(f"[...] {each}" for each in written)
-    changes = (TextChange(f" {each}", where="behind") for each in written)
-    return Help(f"write {shown}: a unit after the bracket is for all of them", *changes)
+    examples = either(f"[...] {unit}" for unit in written)
+    changes = (TextChange(f" {unit}", where="behind") for unit in written)
+    return Help(f"write {examples}: a unit after the bracket is for all of them", *changes)
