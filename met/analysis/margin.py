@@ -185,9 +185,9 @@ class BedExperiment:
         """The loop of a joint in a case."""
         if joint not in self.loops:
             self.loops[joint] = BedLoop(self.experiment, joint)
-        return self.loops[joint].of_case(self.given(case), motor)
+        return self.loops[joint].of_case(self.inputs_of(case), motor)
 
-    def given(self, case: int) -> dict[str, float]:
+    def inputs_of(self, case: int) -> dict[str, float]:
         """The inputs of a case. Any value serves as its noise seed: beds have no faults here."""
         cases = self.experiment.cases
         values = {coordinate.path: float(coordinate.values[case]) for coordinate in cases.coordinates}
@@ -195,7 +195,7 @@ class BedExperiment:
 
     def begun(self, case: int) -> PlainTape:
         """A case after its first tick, in plain numbers; the loop for an observer's covariance runs only once."""
-        tape = PlainTape(self.program, self.given(case), 1)
+        tape = PlainTape(self.program, self.inputs_of(case), 1)
         with np.errstate(all="ignore"):
             follow(tape, self.program.start, settled=np.inf)
             follow(tape, self.program.tick)

@@ -328,7 +328,7 @@ class StepPhases:
             time=self._time(tape, fraction),
             begin=tape.read("instant"),
             part=tape.part,
-            prescribed_qdd=self.beds.given(tape, fraction) if prescribed_qdd is None else prescribed_qdd,
+            prescribed_qdd=self.beds.accelerations(tape, fraction) if prescribed_qdd is None else prescribed_qdd,
         )
 
     def _time(self, tape: Tape, fraction: Real) -> Real:

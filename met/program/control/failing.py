@@ -36,7 +36,7 @@ def coupled(system: System, actuator: Actuator, read: ReadCell, begin: Real) -> 
 
 
 def law_outputs(
-    system: System, actuator: Actuator, read: ReadCell, p: NamedValues, time: Real, found: Control
+    system: System, actuator: Actuator, read: ReadCell, p: NamedValues, time: Real, control: Control
 ) -> Control:
     """Outputs of the servo's law, some replaced by environment models."""
     for owner, model, own in _about(system, actuator, read):
@@ -46,9 +46,9 @@ def law_outputs(
             message = f"{owner}: {actuator.owner} has no drive that could run away"
             raise Problem(error("E219", message, actuator.use.place, help="leave it out for this joint"))
         full = answer(actuator.owner, actuator.servo.full, p)
-        outputs = answer(owner, model.replaced_outputs, own, time, found.outputs, full)
-        found = replace(found, outputs=returned(owner, "replaced_outputs", outputs, found.outputs))
-    return found
+        outputs = answer(owner, model.replaced_outputs, own, time, control.outputs, full)
+        control = replace(control, outputs=returned(owner, "replaced_outputs", outputs, control.outputs))
+    return control
 
 
 def seen(system: System, actuator: Actuator, read: ReadCell, seen: Seen, last: str | None) -> Seen:
@@ -59,13 +59,13 @@ def seen(system: System, actuator: Actuator, read: ReadCell, seen: Seen, last: s
     for owner, model, p in _about(system, actuator, read):
         if model.replaced_reading is None:
             continue
-        for of in quantities(actuator):
-            before = math.nan if last is None else read(f"{last}{of}")
+        for quantity in quantities(actuator):
+            before = math.nan if last is None else read(f"{last}{quantity}")
             seen = with_value(
                 actuator,
                 seen,
-                of,
-                answer(owner, model.replaced_reading, p, seen.time, of, true_value(seen, of), before),
+                quantity,
+                answer(owner, model.replaced_reading, p, seen.time, quantity, true_value(seen, quantity), before),
             )
     return seen
 

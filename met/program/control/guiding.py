@@ -54,8 +54,8 @@ def start(system: System, tape: Tape) -> None:
         for memory in guide.memory:
             tape.write(f"guides.{use.name}.{memory.name}", memory.start)
         if guide.components is not None:
-            found = _ArmAt(system, use, tape.read, *_state(system, tape, 0.0)).stance(answers=False)
-            for name, value in zip(_begun(use), (*(x for row in found.R for x in row), *found.p), strict=True):
+            stance = _ArmAt(system, use, tape.read, *_state(system, tape, 0.0)).stance(answers=False)
+            for name, value in zip(_begun(use), (*(x for row in stance.R for x in row), *stance.p), strict=True):
                 tape.write(name, value)
 
 
@@ -65,23 +65,25 @@ def tick(system: System, tape: Tape, use: GuideUse) -> None:
     assert guide.steer is not None
     period = use.divisor / system.structure.schedule.base_hz
     begun = {joint: tape.read(cell_names.GUIDE_POSITION(joint)) for joint in use.joints}
-    positions = {joint: at + period * tape.read(cell_names.GUIDE_RATE(joint)) for joint, at in begun.items()}
+    positions = {
+        joint: position + period * tape.read(cell_names.GUIDE_RATE(joint)) for joint, position in begun.items()
+    }
     y, stands = _state(system, tape, tape.time)
     number = {joint.name: i for i, joint in enumerate(system.joints)}
     q = [positions.get(joint.name, y.q[i]) for i, joint in enumerate(system.joints)]
-    asked = Motion((*q, *y.q[len(q) :]), y.qd, y.x)
+    commanded = Motion((*q, *y.q[len(q) :]), y.qd, y.x)
     sight = Sight(
         time=tape.time,
         slides=tuple(system.joints[number[joint]].kind == "prismatic" for joint in use.joints),
         arm=_ArmAt(system, use, tape.read, y, stands),
-        asked=_ArmAt(system, use, tape.read, system.followed(tape.read, asked), stands),
+        asked=_ArmAt(system, use, tape.read, system.followed(tape.read, commanded), stands),
         wanted=_wanted(system, tape, use),
     )
-    found = answer(owner(use), guide.steer, *own(system, use, tape.read), sight)
-    shown = returned(owner(use), "steer", found.memory, (memory.name for memory in guide.memory))
-    for name, value in shown.items():
+    steered = answer(owner(use), guide.steer, *own(system, use, tape.read), sight)
+    new_memory = returned(owner(use), "steer", steered.memory, (memory.name for memory in guide.memory))
+    for name, value in new_memory.items():
         tape.write(f"guides.{use.name}.{name}", value)
-    for joint, rate in zip(use.joints, found.rates, strict=True):
+    for joint, rate in zip(use.joints, steered.rates, strict=True):
         tape.write(cell_names.GUIDE_POSITION(joint), positions[joint])
         tape.write(cell_names.GUIDE_RATE(joint), rate)
     tape.write(cell_names.GUIDE_TIME(use.name), tape.time)
@@ -127,19 +129,19 @@ class _ArmAt:
         return Stance(self._R, self._p, w, v)
 
     def columns(self, *, answers: bool) -> Sequence[tuple[Vector, Vector]]:
-        found = [self._moves[i] for i in self._own]
+        moves = [self._moves[i] for i in self._own]
         if not (self._free and answers):
-            return found
+            return moves
         theirs = [self._answers[i] for i in self._own]
-        return [(add(w, more), add(v, far)) for (w, v), (more, far) in zip(found, theirs, strict=True)]
+        return [(add(w, more), add(v, far)) for (w, v), (more, far) in zip(moves, theirs, strict=True)]
 
     @cached_property
     def _answers(self) -> list[tuple[Vector, Vector]]:
         """The reaction of a free base to joint rates: the frame's angular velocity and velocity for each unit of each
         rate; with the payloads that the links carry at this time."""
         arm = sub(self._p, self._base.pose.p)
-        found = at_leaders(self._ratios, base_answers(self._loaded_tree, self._q, self._base.pose))
-        return [(w, add(v, cross(w, arm))) for w, v in found]
+        answers = at_leaders(self._ratios, base_answers(self._loaded_tree, self._q, self._base.pose))
+        return [(w, add(v, cross(w, arm))) for w, v in answers]
 
 
 def _state(system: System, tape: Tape, time: Real) -> tuple[Motion, BaseMotion]:

@@ -80,12 +80,12 @@ class Aboard(ArmWorld):
 
     def spin(self, link: str) -> Vector:
         motion = self.link(link)
-        found = motion.w
+        w = motion.w
         for name, model in self._system.environment:
             if model.world_rate is not None:
                 owner, p = environment_values(self._system, name, model, self._read)
-                found = add(found, motion.to_link(answer(owner, model.world_rate, p, self)))
-        return found
+                w = add(w, motion.to_link(answer(owner, model.world_rate, p, self)))
+        return w
 
     def _acceleration(self, link: str, point: Vector) -> Vector:
         """Acceleration of a point given in the link's frame, m, in the link's axes, m/s^2."""
@@ -130,13 +130,13 @@ def free_fall(
     system: System, read: ReadCell, world: World, gravity: Vector, motion: LinkMotion, point: Vector = ZERO
 ) -> Vector:
     """Acceleration of a freely falling body at a point of a frame, with the point's velocity; world axes, m/s^2."""
-    found = gravity
+    acceleration = gravity
     for name, model in system.environment:
         if model.free_fall is not None:
             owner, p = environment_values(system, name, model, read)
-            there = motion.position(point), motion.velocity(point)
-            found = add(found, answer(owner, model.free_fall, p, world, *there))
-    return found
+            point_motion = motion.position(point), motion.velocity(point)
+            acceleration = add(acceleration, answer(owner, model.free_fall, p, world, *point_motion))
+    return acceleration
 
 
 def start(system: System, tape: Tape, gravity: Callable[[Motion], Vector]) -> None:
@@ -165,11 +165,11 @@ def start(system: System, tape: Tape, gravity: Callable[[Motion], Vector]) -> No
 
 def slopes(system: System, read: ReadCell, felt: Aboard, own: Mapping[str, Real]) -> tuple[Real, ...]:
     """Slopes of the sensors' states at a stage, in their order. own: the states, by channel."""
-    found: dict[str, Real] = {}
+    by_channel: dict[str, Real] = {}
     for fitted in system.sensors:
         if fitted.sensor.follow is not None:
-            found.update(sensing.sensor_slopes(system, fitted, read, own, measured(system, fitted, read, felt)))
-    return tuple(found[name] for fitted in system.sensors for name in fitted.channels)
+            by_channel.update(sensing.sensor_slopes(system, fitted, read, own, measured(system, fitted, read, felt)))
+    return tuple(by_channel[name] for fitted in system.sensors for name in fitted.channels)
 
 
 def tick(system: System, tape: Tape, divisor: int) -> None:

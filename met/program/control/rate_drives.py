@@ -48,41 +48,43 @@ class RateDrives:
     system: System
     period: float
 
-    def begin(self, tape: Tape, each: Mounted) -> None:
+    def begin(self, tape: Tape, joint: Mounted) -> None:
         """Start the loop of an armed drive with an integral of 0."""
-        tape.write(cell_names.LOOP_INTEGRAL(each.joint), 0.0)
+        tape.write(cell_names.LOOP_INTEGRAL(joint.joint), 0.0)
 
-    def integral(self, tape: Tape, each: Mounted) -> Real:
+    def integral(self, tape: Tape, joint: Mounted) -> Real:
         """The integral of the drive's loop at this tick, rad; 0 where it has no loop."""
-        return tape.read(cell_names.LOOP_INTEGRAL(each.joint)) if each.closes_rate_loop else 0.0
+        return tape.read(cell_names.LOOP_INTEGRAL(joint.joint)) if joint.closes_rate_loop else 0.0
 
-    def want(self, tape: Tape, each: Mounted, seen: Seen) -> None:
+    def want(self, tape: Tape, joint: Mounted, seen: Seen) -> None:
         """Keep the joint rate that the servo's law gives its rate loop at this tick, rad/s (m/s)."""
-        assert each.actuator.servo.rate_wanted is not None
-        p = self.system.servo_values(each.actuator, tape.read)
-        wanted = answer(each.actuator.owner, each.actuator.servo.rate_wanted, p, seen.q, seen.setpoint)
-        tape.write(cell_names.RATE_WANTED(each.joint), wanted)
+        assert joint.actuator.servo.rate_wanted is not None
+        p = self.system.servo_values(joint.actuator, tape.read)
+        wanted = answer(joint.actuator.owner, joint.actuator.servo.rate_wanted, p, seen.q, seen.setpoint)
+        tape.write(cell_names.RATE_WANTED(joint.joint), wanted)
 
-    def told(self, tape: Tape, each: Mounted, motor: Motor) -> Real:
+    def commanded_rate(self, tape: Tape, joint: Mounted, motor: Motor) -> Real:
         """The rate of the shaft that the drive is commanded at this tick, rad/s."""
-        return motor.ratio * tape.read(cell_names.RATE_WANTED(each.joint))
+        return motor.ratio * tape.read(cell_names.RATE_WANTED(joint.joint))
 
-    def torque(self, tape: Tape, each: Mounted, motor: Motor, told: Real, integral: Real, w: Real) -> drive.LoopTorque:
-        """Torque of the motor under the loop, N m. integral: rad;  told, w: rates of the shaft, rad/s"""
-        return drive.loop_torque(motor, self.loop(tape, each), integral, told, w, self.period)
+    def torque(
+        self, tape: Tape, joint: Mounted, motor: Motor, commanded: Real, integral: Real, w: Real
+    ) -> drive.LoopTorque:
+        """Torque of the motor under the loop, N m. integral: rad;  commanded, w: rates of the shaft, rad/s"""
+        return drive.loop_torque(motor, self.loop(tape, joint), integral, commanded, w, self.period)
 
-    def wound(self, tape: Tape, each: Mounted, told: Real, integral: Real, w: Real, after: Real) -> Real:
+    def wound(self, tape: Tape, joint: Mounted, commanded: Real, integral: Real, w: Real, after: Real) -> Real:
         """The integral one tick on, rad, under a commanded rate, while the shaft's rate goes from w to `after`,
         rad/s."""
-        return drive.wound(self.loop(tape, each), integral, told - 0.5 * (w + after), self.period)
+        return drive.wound(self.loop(tape, joint), integral, commanded - 0.5 * (w + after), self.period)
 
-    def wind(self, tape: Tape, each: Mounted, told: Real, w: Real, after: Real) -> None:
+    def wind(self, tape: Tape, joint: Mounted, commanded: Real, w: Real, after: Real) -> None:
         """Advance the kept integral to the next tick, as `wound` does."""
-        found = self.wound(tape, each, told, self.integral(tape, each), w, after)
-        tape.write(cell_names.LOOP_INTEGRAL(each.joint), found)
+        wound = self.wound(tape, joint, commanded, self.integral(tape, joint), w, after)
+        tape.write(cell_names.LOOP_INTEGRAL(joint.joint), wound)
 
-    def loop(self, tape: Tape, each: Mounted) -> RateLoop:
+    def loop(self, tape: Tape, joint: Mounted) -> RateLoop:
         """The rate loop of the joint's servo."""
-        assert each.actuator.servo.rate_loop is not None
-        p = self.system.servo_values(each.actuator, tape.read)
-        return answer(each.actuator.owner, each.actuator.servo.rate_loop, p)
+        assert joint.actuator.servo.rate_loop is not None
+        p = self.system.servo_values(joint.actuator, tape.read)
+        return answer(joint.actuator.owner, joint.actuator.servo.rate_loop, p)

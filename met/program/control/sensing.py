@@ -29,10 +29,10 @@ def measured(actuator: Actuator, p: NamedValues, q: Real, qd: Real, states: Name
     return answer(actuator.owner, actuator.servo.measured, p, q, qd, states)
 
 
-def true_value(seen: Seen, of: str) -> Real:
+def true_value(seen: Seen, name: str) -> Real:
     """The true value of a quantity."""
-    found: Real = getattr(seen, of) if of in ("q", "qd") else getattr(seen.states, of)
-    return found
+    value: Real = getattr(seen, name) if name in ("q", "qd") else getattr(seen.states, name)
+    return value
 
 
 def start(system: System, tape: Tape, actuator: Actuator, seen: Seen) -> None:
@@ -44,12 +44,12 @@ def start(system: System, tape: Tape, actuator: Actuator, seen: Seen) -> None:
 
 def slopes(system: System, actuator: Actuator, read: ReadCell, seen: Seen, own: Mapping[str, Real]) -> dict[str, Real]:
     """Slopes of the sensors' states at a stage, by channel. own: the states, by channel."""
-    found: dict[str, Real] = {}
+    by_channel: dict[str, Real] = {}
     for fitted in actuator.sensors:
         if fitted.sensor.follow is None:
             continue
-        found.update(sensor_slopes(system, fitted, read, own, true_value(seen, quantity(fitted))))
-    return found
+        by_channel.update(sensor_slopes(system, fitted, read, own, true_value(seen, quantity(fitted))))
+    return by_channel
 
 
 def seen_at_stage(system: System, actuator: Actuator, read: ReadCell, seen: Seen, own: Mapping[str, Real]) -> Seen:
@@ -68,12 +68,12 @@ def seen_at_stage(system: System, actuator: Actuator, read: ReadCell, seen: Seen
 
 def seen_at_tick(system: System, tape: Tape, actuator: Actuator, seen: Seen, state: Callable[[str], Real]) -> Seen:
     """Inputs of a sampled law at a tick, through its sensors. state: gives their states, by channel."""
-    found = seen
+    through = seen
     for fitted in actuator.sensors:
-        of = quantity(fitted)
-        value = tick(system, tape, fitted, partial(true_value, seen, of), actuator.use.divisor, seen.period, state)
-        found = with_value(actuator, found, of, value)
-    return found
+        name = quantity(fitted)
+        value = tick(system, tape, fitted, partial(true_value, seen, name), actuator.use.divisor, seen.period, state)
+        through = with_value(actuator, through, name, value)
+    return through
 
 
 # One sensor
@@ -81,10 +81,10 @@ def seen_at_tick(system: System, tape: Tape, actuator: Actuator, seen: Seen, sta
 
 def begin(system: System, tape: Tape, fitted: Fitted, value: Real) -> None:
     """Write states, memory and reading where a run begins, after the quantity has been at this value."""
-    found = answer(fitted.owner, fitted.sensor.begin, values(system, fitted, tape.read), value)
+    memory = answer(fitted.owner, fitted.sensor.begin, values(system, fitted, tape.read), value)
     names = [*(state.name for state in fitted.states), *(memory.name for memory in fitted.memory)]
-    returned(fitted.owner, "begin", found, names)
-    for name, number in found.items():
+    returned(fitted.owner, "begin", memory, names)
+    for name, number in memory.items():
         tape.write(f"{fitted.path}.{name}", number)
     tape.write(fitted.path, value)
 
@@ -144,9 +144,9 @@ def _states(fitted: Fitted, state: Callable[[str], Real]) -> NamedValues:
     return NamedValues(fitted.owner, {part.name: state(f"{fitted.path}.{part.name}") for part in fitted.states})
 
 
-def with_value(actuator: Actuator, seen: Seen, of: str, value: Real) -> Seen:
+def with_value(actuator: Actuator, seen: Seen, name: str, value: Real) -> Seen:
     """The inputs of a law with this quantity replaced."""
-    if of in ("q", "qd"):
-        return replace(seen, q=value) if of == "q" else replace(seen, qd=value)
+    if name in ("q", "qd"):
+        return replace(seen, q=value) if name == "q" else replace(seen, qd=value)
     numbers: dict[str, Any] = {part.name: getattr(seen.states, part.name) for part in actuator.parts.natural}
-    return replace(seen, states=NamedValues(actuator.owner, numbers | {of: value}))
+    return replace(seen, states=NamedValues(actuator.owner, numbers | {name: value}))

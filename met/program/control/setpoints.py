@@ -64,6 +64,6 @@ def _of_guide(system: System, joint: str, kind: str, use: GuideUse, read: ReadCe
             kind, read(cell_names.GUIDE_POSITION(joint)) + rate * (time - read(cell_names.GUIDE_TIME(use.name))), rate
         )
     p, joints = own(system, use, read)
-    begins = [system.value(f"initial.{each}.q", read) for each in use.joints]
+    begins = [system.value(f"initial.{guided}.q", read) for guided in use.joints]
     value, slope = answer(owner(use), guide.course, p, joints, begins, time)[use.joints.index(joint)]
     return Setpoint(kind, value, slope)

@@ -83,25 +83,25 @@ class Substituted:
         self.period = self.divisor / self.base_hz
         self.rate_drives = RateDrives(system, self.period)
 
-    def alone(self, each: Mounted) -> Substituted:
+    def alone(self, joint: Mounted) -> Substituted:
         """The phases of one joint alone."""
-        found = copy.copy(self)
-        found.mounted = (each,)
-        return found
+        phases = copy.copy(self)
+        phases.mounted = (joint,)
+        return phases
 
     @property
     def wire_inputs(self) -> tuple[str, ...]:
         """Names of the program's inputs that come over the wires at each tick."""
-        return tuple(f"wire:{each.joint}.rate" for each in self.mounted) if self.wire else ()
+        return tuple(f"wire:{joint.joint}.rate" for joint in self.mounted) if self.wire else ()
 
     @property
     def wire_outputs(self) -> dict[str, str]:
         """Names of the outputs that go over the wires, by the cells that hold them."""
         return (
             {
-                f"wire:{each.joint}.{name}": cell_names.SENT(each.joint, name)
-                for each in self.mounted
-                for name in (each.bed.drive, "current")
+                f"wire:{joint.joint}.{name}": cell_names.SENT(joint.joint, name)
+                for joint in self.mounted
+                for name in (joint.bed.drive, "current")
             }
             if self.wire
             else {}
@@ -150,44 +150,45 @@ class Substituted:
     def start(self, tape: Tape) -> None:
         """Start each shaft turning with its joint, as if for long; the observer knows that, and nothing else."""
         tape.write("always", 1.0)
-        for each in self.mounted:
-            motor = self.motor(tape, each)
-            w = motor.ratio * tape.read(f"{each.joint}.qd")
-            self.begin_bed(tape, each, w / self.scale(tape, each).rate)
+        for joint in self.mounted:
+            motor = self.motor(tape, joint)
+            w = motor.ratio * tape.read(f"{joint.joint}.qd")
+            self.begin_bed(tape, joint, w / self.scale(tape, joint).rate)
             if self.wire:  # the inner state of a real bed is unknown
-                for memory in each.bed.memory:
-                    tape.write(f"{each.joint}.bed.{memory.name}", math.nan)
+                for memory in joint.bed.memory:
+                    tape.write(f"{joint.joint}.bed.{memory.name}", math.nan)
             for cell in (cell_names.READ, cell_names.READ_BEFORE, cell_names.SHAFT_RATE, cell_names.REFERENCE_RATE):
-                tape.write(cell(each.joint), w)
+                tape.write(cell(joint.joint), w)
             for part in "wy":
-                tape.write(cell_names.OBSERVED(each.joint, part), w)
-            tape.write(cell_names.SHAFT_ANGLE(each.joint), motor.ratio * tape.read(f"{each.joint}.q"))
-            if each.closes_rate_loop:
-                self.rate_drives.begin(tape, each)
+                tape.write(cell_names.OBSERVED(joint.joint, part), w)
+            tape.write(cell_names.SHAFT_ANGLE(joint.joint), motor.ratio * tape.read(f"{joint.joint}.q"))
+            if joint.closes_rate_loop:
+                self.rate_drives.begin(tape, joint)
             for i in range(4):
                 for j in range(i + 1):
-                    tape.write(cell_names.COVARIANCE(each.joint, i, j), _UNKNOWN[i] if i == j else 0.0)
+                    tape.write(cell_names.COVARIANCE(joint.joint, i, j), _UNKNOWN[i] if i == j else 0.0)
 
-    def begin_bed(self, tape: Tape, each: Mounted, w: Real) -> None:
+    def begin_bed(self, tape: Tape, joint: Mounted, w: Real) -> None:
         """Start the emulated bed of a shaft, its own, which has turned at w rad/s for long."""
-        begun = answer(self._owner(each), each.bed.begin, self._bed_values(tape, each), w)
-        returned(self._owner(each), "begin", begun, (memory.name for memory in each.bed.memory))
+        begun = answer(self._owner(joint), joint.bed.begin, self._bed_values(tape, joint), w)
+        returned(self._owner(joint), "begin", begun, (memory.name for memory in joint.bed.memory))
         for name, value in begun.items():
-            tape.write(f"{each.joint}.bed.{name}", value)
+            tape.write(f"{joint.joint}.bed.{name}", value)
 
     def covariance(self, tape: Tape) -> None:
         """Run one turn of the Riccati recursion."""
-        for each in self.mounted:
-            P = observer.next_covariance(self._model(tape, each), self._covariance(tape, each), self._noise(tape, each))
+        for joint in self.mounted:
+            model, P, noise = self._model(tape, joint), self._covariance(tape, joint), self._noise(tape, joint)
+            P = observer.next_covariance(model, P, noise)
             for i in range(4):
                 for j in range(i + 1):
-                    tape.write(cell_names.COVARIANCE(each.joint, i, j), P[i][j])
+                    tape.write(cell_names.COVARIANCE(joint.joint, i, j), P[i][j])
 
     def gain(self, tape: Tape) -> None:
-        for each in self.mounted:
-            found = observer.gain_of(self._covariance(tape, each), self._noise(tape, each))
-            for i, value in enumerate(found):
-                tape.write(cell_names.OBSERVER_GAIN(each.joint, i), value)
+        for joint in self.mounted:
+            gains = observer.gain_of(self._covariance(tape, joint), self._noise(tape, joint))
+            for i, value in enumerate(gains):
+                tape.write(cell_names.OBSERVER_GAIN(joint.joint, i), value)
 
     # A tick.
 
@@ -197,41 +198,41 @@ class Substituted:
         cases = self.system.experiment.cases
         seed = tape.input(SEED) if SEED in cases.noise else float(cases.seed)
         repeat = tape.input(REPEAT) if REPEAT in cases.noise else 0.0
-        for each in self.mounted:
-            self.advance_bed(tape, each, self.period, seed=seed, repeat=repeat, tick=tick)
+        for joint in self.mounted:
+            self.advance_bed(tape, joint, self.period, seed=seed, repeat=repeat, tick=tick)
 
-    def advance_bed(self, tape: Tape, each: Mounted, period: float, *, seed: Real, repeat: Real, tick: Real) -> None:
+    def advance_bed(self, tape: Tape, joint: Mounted, period: float, *, seed: Real, repeat: Real, tick: Real) -> None:
         """Advance one emulated bed by period s with its amplifiers' held outputs; its noise is that of the number
         `tick`."""
-        p = self._bed_values(tape, each)
-        held = (f"drive_{each.bed.drive}", "load_current")
-        wire = Wire(*(tape.read(f"{each.joint}.bed.{name}") for name in held))
+        p = self._bed_values(tape, joint)
+        held = (f"drive_{joint.bed.drive}", "load_current")
+        wire = Wire(*(tape.read(f"{joint.joint}.bed.{name}") for name in held))
 
         def draw(name: str) -> Real:
-            return normal(Stream(seed, repeat, f"{each.joint}.bed.{name}"), tick)
+            return normal(Stream(seed, repeat, f"{joint.joint}.bed.{name}"), tick)
 
-        new = answer(self._owner(each), each.bed.advance, p, self._bed(tape, each), wire, period, draw)
-        returned(self._owner(each), "advance", new, (memory.name for memory in each.bed.memory))
+        new = answer(self._owner(joint), joint.bed.advance, p, self._bed(tape, joint), wire, period, draw)
+        returned(self._owner(joint), "advance", new, (memory.name for memory in joint.bed.memory))
         for name, value in new.items():
-            tape.write(f"{each.joint}.bed.{name}", value)
+            tape.write(f"{joint.joint}.bed.{name}", value)
 
-    def reading(self, tape: Tape, each: Mounted) -> Real:
+    def reading(self, tape: Tape, joint: Mounted) -> Real:
         """The filtered rate of an emulated bed's shaft, rad/s, as the computer reads it."""
-        p, held = self._bed_values(tape, each), self._bed(tape, each)
+        p, held = self._bed_values(tape, joint), self._bed(tape, joint)
         with tape.part(READING):
-            return answer(self._owner(each), each.bed.read, p, held)
+            return answer(self._owner(joint), joint.bed.read, p, held)
 
     def read(self, tape: Tape) -> None:
         """Read the filtered rate, correct the observer, and read the shaft's angle."""
-        for each in self.mounted:
-            name = each.joint
-            read = tape.input(f"wire:{name}.rate") if self.wire else self.reading(tape, each)
-            rate = read * self.scale(tape, each).rate
+        for joint in self.mounted:
+            name = joint.joint
+            read = tape.input(f"wire:{name}.rate") if self.wire else self.reading(tape, joint)
+            rate = read * self.scale(tape, joint).rate
             w: Real = rate
-            if each.law.observer:
+            if joint.law.observer:
                 gain = tuple(tape.read(cell_names.OBSERVER_GAIN(name, i)) for i in range(4))
-                x = observer.corrected(self._observed(tape, each), gain, rate)  # type: ignore[arg-type]
-                self._observe(tape, each, x)
+                x = observer.corrected(self._observed(tape, joint), gain, rate)  # type: ignore[arg-type]
+                self._observe(tape, joint, x)
                 w = x[0]
                 tape.write(f"{name}.law.unknown_torque", x[3])
             turned = 0.5 * self.period * (w + tape.read(cell_names.SHAFT_RATE(name)))
@@ -246,193 +247,193 @@ class Substituted:
 
     def follow(self, tape: Tape) -> None:
         """Set the arm's joints to the shafts' positions and rates."""
-        for each in self.mounted:
-            ratio = self.motor(tape, each).ratio
-            tape.write(f"{each.joint}.q", tape.read(cell_names.SHAFT_ANGLE(each.joint)) / ratio)
-            tape.write(f"{each.joint}.qd", tape.read(cell_names.SHAFT_RATE(each.joint)) / ratio)
+        for joint in self.mounted:
+            ratio = self.motor(tape, joint).ratio
+            tape.write(f"{joint.joint}.q", tape.read(cell_names.SHAFT_ANGLE(joint.joint)) / ratio)
+            tape.write(f"{joint.joint}.qd", tape.read(cell_names.SHAFT_RATE(joint.joint)) / ratio)
 
     def seen(self, tape: Tape, actuator: Actuator) -> tuple[Real, Real] | None:
         """Position and filtered rate of a substituted joint, as its servo's computer sees them; None for others. Where
         the drive closes the rate loop the rate is not filtered: the drive measures its shaft itself."""
-        for each in self.mounted:
-            if each.actuator is actuator:
-                ratio = self.motor(tape, each).ratio
-                q = tape.read(cell_names.SHAFT_ANGLE(each.joint)) / ratio
-                rate = cell_names.SHAFT_RATE if each.closes_rate_loop else cell_names.READ
-                return q, tape.read(rate(each.joint)) / ratio
+        for joint in self.mounted:
+            if joint.actuator is actuator:
+                ratio = self.motor(tape, joint).ratio
+                q = tape.read(cell_names.SHAFT_ANGLE(joint.joint)) / ratio
+                rate = cell_names.SHAFT_RATE if joint.closes_rate_loop else cell_names.READ
+                return q, tape.read(rate(joint.joint)) / ratio
         return None
 
     def want(self, tape: Tape, actuator: Actuator, seen: Seen) -> None:
         """Keep the command of a drive with a rate loop of its own, once its servo has seen its joint at this tick."""
-        for each in self.mounted:
-            if each.actuator is actuator and each.closes_rate_loop:
-                self.rate_drives.want(tape, each, seen)
+        for joint in self.mounted:
+            if joint.actuator is actuator and joint.closes_rate_loop:
+                self.rate_drives.want(tape, joint, seen)
 
     def arm(self, tape: Tape) -> None:
         """Write Lambda and b_0 at this instant: the load of the arm on the substituted joints."""
         Lambda, b_0 = self.loads(tape)
-        for each, row, b in zip(self.mounted, Lambda, b_0, strict=True):
-            tape.write(cell_names.ARM_TORQUE(each.joint), b)
+        for joint, row, b in zip(self.mounted, Lambda, b_0, strict=True):
+            tape.write(cell_names.ARM_TORQUE(joint.joint), b)
             for other, entry in zip(self.mounted, row, strict=True):
-                tape.write(cell_names.ARM_INERTIA(each.joint, other.joint), entry)
+                tape.write(cell_names.ARM_INERTIA(joint.joint, other.joint), entry)
 
     def act(self, tape: Tape) -> None:
         """Run the law: load torque, commands over the wire, the joint's acceleration; the observer looks ahead."""
         assert self.law is not None
         Lambda = [[tape.read(cell_names.ARM_INERTIA(a.joint, b.joint)) for b in self.mounted] for a in self.mounted]
-        b_0 = [tape.read(cell_names.ARM_TORQUE(each.joint)) for each in self.mounted]
-        ahead = [self._ahead(tape, each) for each in self.mounted]
-        found: Sequence[balance.Balanced | None] = [None] * len(self.mounted)
+        b_0 = [tape.read(cell_names.ARM_TORQUE(joint.joint)) for joint in self.mounted]
+        ahead = [self._ahead(tape, joint) for joint in self.mounted]
+        motions: Sequence[balance.Balanced | None] = [None] * len(self.mounted)
         if self.law.balance != "none":
-            sides = [self._own_side(tape, each, one) for each, one in zip(self.mounted, ahead, strict=True)]
+            sides = [self._own_side(tape, joint, shaft) for joint, shaft in zip(self.mounted, ahead, strict=True)]
             solve = balance.bare if self.law.balance == "bare" else balance.balanced
-            found = solve(sides, Lambda, b_0)
-        commands = [self._command(tape, *each) for each in zip(self.mounted, ahead, found, strict=True)]
+            motions = solve(sides, Lambda, b_0)
+        commands = [self._command(tape, *parts) for parts in zip(self.mounted, ahead, motions, strict=True)]
         inputs = [
-            self._law_input(tape, each, self._on_bed(tape, each, told, at, one), at)
-            for each, told, at, one in zip(self.mounted, commands, ahead, found, strict=True)
+            self._law_input(tape, joint, self._on_bed(tape, joint, command, shaft, motion), shaft)
+            for joint, command, shaft, motion in zip(self.mounted, commands, ahead, motions, strict=True)
         ]
-        p = [self._law_values(tape, each) for each in self.mounted]
+        p = [self._law_values(tape, joint) for joint in self.mounted]
         held = [
             NamedValues(
-                f"law `{each.law.name}`", {m.name: tape.read(f"{each.joint}.law.{m.name}") for m in each.law.memory}
+                f"law `{joint.law.name}`", {m.name: tape.read(f"{joint.joint}.law.{m.name}") for m in joint.law.memory}
             )
-            for each in self.mounted
+            for joint in self.mounted
         ]
         owner = f"law `{self.law.name}`"
-        given = answer(owner, self.law.give, p, held, inputs, lambda qdd: balance.loads(Lambda, b_0, qdd))
+        answers = answer(owner, self.law.give, p, held, inputs, lambda qdd: balance.loads(Lambda, b_0, qdd))
         applied = []
-        for each, told, (one, memory) in zip(self.mounted, commands, given, strict=True):
-            returned(owner, "give", memory, (m.name for m in each.law.memory))
+        for joint, command, (output, memory) in zip(self.mounted, commands, answers, strict=True):
+            returned(owner, "give", memory, (m.name for m in joint.law.memory))
             for name, value in memory.items():
-                tape.write(f"{each.joint}.law.{name}", value)
-            applied.append(self._send(tape, each, told, one))
-            tape.write(cell_names.GIVEN(each.joint), one.qdd)
-            tape.write(f"{each.joint}.law.torque", one.torque)
+                tape.write(f"{joint.joint}.law.{name}", value)
+            applied.append(self._send(tape, joint, command, output))
+            tape.write(cell_names.GIVEN(joint.joint), output.qdd)
+            tape.write(f"{joint.joint}.law.torque", output.torque)
         if self.law.observer:
             self._look_ahead(tape, Lambda, b_0, applied)
-        for each, wire, motion in zip(self.mounted, applied, found, strict=True):
-            if each.closes_rate_loop:
-                self._wind(tape, each, wire, motion)
+        for joint, wire, motion in zip(self.mounted, applied, motions, strict=True):
+            if joint.closes_rate_loop:
+                self._wind(tape, joint, wire, motion)
 
     def first(self, tape: Tape) -> None:
         """The acceleration with which the step begins; a servo faster than the dynamics changes it during the step."""
-        for each in self.mounted:
-            tape.write(cell_names.GIVEN_FIRST(each.joint), tape.read(cell_names.GIVEN(each.joint)))
+        for joint in self.mounted:
+            tape.write(cell_names.GIVEN_FIRST(joint.joint), tape.read(cell_names.GIVEN(joint.joint)))
 
-    def given(self, tape: Tape, fraction: Real) -> dict[int, Real]:
+    def accelerations(self, tape: Tape, fraction: Real) -> dict[int, Real]:
         """Accelerations of the substituted joints at a share of the step, by number."""
-        found = {}
-        for each in self.mounted:
-            now = tape.read(cell_names.GIVEN(each.joint))
+        qdd = {}
+        for joint in self.mounted:
+            now = tape.read(cell_names.GIVEN(joint.joint))
             if self.divisor % self.dynamics:
-                first = tape.read(cell_names.GIVEN_FIRST(each.joint))
+                first = tape.read(cell_names.GIVEN_FIRST(joint.joint))
                 now = first + fraction * (now - first)
-            found[each.index] = now
-        return found
+            qdd[joint.index] = now
+        return qdd
 
     # Parts of a tick.
 
-    def _ahead(self, tape: Tape, each: Mounted) -> _Ahead:
+    def _ahead(self, tape: Tape, joint: Mounted) -> _Ahead:
         """The shaft when the present output acts: the observer's, over the delay; else the one just read."""
-        integral = self.rate_drives.integral(tape, each)
-        if not each.law.observer:
-            return _Ahead(tape.read(cell_names.READ(each.joint)), integral)
-        delay, x = self._delay(tape, each), self._observed(tape, each)
+        integral = self.rate_drives.integral(tape, joint)
+        if not joint.law.observer:
+            return _Ahead(tape.read(cell_names.READ(joint.joint)), integral)
+        delay, x = self._delay(tape, joint), self._observed(tape, joint)
         for turn in range(QUEUE):
-            wire = self._queued(tape, each, delay - float(turn))
-            new = self._predicted(tape, each, x, wire, integral)
-            if each.closes_rate_loop:
-                told = wire.drive * self.scale(tape, each).rate
-                wound = self.rate_drives.wound(tape, each, told, integral, x[0], new[0])
+            wire = self._queued(tape, joint, delay - float(turn))
+            new = self._predicted(tape, joint, x, wire, integral)
+            if joint.closes_rate_loop:
+                commanded = wire.drive * self.scale(tape, joint).rate
+                wound = self.rate_drives.wound(tape, joint, commanded, integral, x[0], new[0])
                 integral = where(delay > float(turn), wound, integral)
             w, y, z, d = (where(delay > float(turn), b, a) for a, b in zip(x, new, strict=True))
             x = (w, y, z, d)
         return _Ahead(x[0], integral)
 
-    def _queued(self, tape: Tape, each: Mounted, ago: Real) -> Wire:
+    def _queued(self, tape: Tape, joint: Mounted, ago: Real) -> Wire:
         """The pair that was commanded this many ticks ago, from 1 to `QUEUE`."""
-        told: Real = 0.0
+        commanded: Real = 0.0
         current: Real = 0.0
         for i in range(QUEUE):
             due = ago == float(i + 1)
-            told = where(due, tape.read(cell_names.QUEUED(each.joint, i, each.bed.drive)), told)
-            current = where(due, tape.read(cell_names.QUEUED(each.joint, i, "current")), current)
-        return Wire(told, current)
+            commanded = where(due, tape.read(cell_names.QUEUED(joint.joint, i, joint.bed.drive)), commanded)
+            current = where(due, tape.read(cell_names.QUEUED(joint.joint, i, "current")), current)
+        return Wire(commanded, current)
 
-    def _own_torque(self, tape: Tape, each: Mounted, w: Real) -> Real:
+    def _own_torque(self, tape: Tape, joint: Mounted, w: Real) -> Real:
         """Torque of the joint's own motor at its servo's voltage and a rate of its shaft, N m."""
-        motor = self.motor(tape, each)
-        return torque(motor.kt, motor.resistance, motor.tau_max, self._voltage(tape, each), w)
+        motor = self.motor(tape, joint)
+        return torque(motor.kt, motor.resistance, motor.tau_max, self._voltage(tape, joint), w)
 
-    def _own_side(self, tape: Tape, each: Mounted, ahead: _Ahead) -> balance.JointSide:
+    def _own_side(self, tape: Tape, joint: Mounted, ahead: _Ahead) -> balance.JointSide:
         """A joint's side of the balance with its own motor, under its drive's rate loop where the drive has one."""
-        if each.closes_rate_loop:
-            driving, falls = self._under_loop(tape, each, ahead)
-            return self._side(tape, each, ahead.w, driving, self._band(tape, each), falls=falls)
-        return self._side(tape, each, ahead.w, self._own_torque(tape, each, ahead.w), self._band(tape, each))
+        if joint.closes_rate_loop:
+            driving, falls = self._under_loop(tape, joint, ahead)
+            return self._side(tape, joint, ahead.w, driving, self._band(tape, joint), falls=falls)
+        return self._side(tape, joint, ahead.w, self._own_torque(tape, joint, ahead.w), self._band(tape, joint))
 
-    def _command(self, tape: Tape, each: Mounted, ahead: _Ahead, found: balance.Balanced | None) -> Real | None:
+    def _command(self, tape: Tape, joint: Mounted, ahead: _Ahead, motion: balance.Balanced | None) -> Real | None:
         """The torque or rate that the bed's drive is commanded at this tick, of the joint's size; None where it is
         commanded the servo's voltage."""
-        if each.bed.drive == "voltage":
+        if joint.bed.drive == "voltage":
             return None
-        if each.closes_rate_loop:
-            return self.rate_drives.told(tape, each, self.motor(tape, each))
-        mean = 0.5 * self.period if each.law.balance == "full" else 0.0
-        return drive.mean_torque(self.motor(tape, each), self._own_torque(tape, each, ahead.w), found, mean)
+        if joint.closes_rate_loop:
+            return self.rate_drives.commanded_rate(tape, joint, self.motor(tape, joint))
+        mean = 0.5 * self.period if joint.law.balance == "full" else 0.0
+        return drive.mean_torque(self.motor(tape, joint), self._own_torque(tape, joint, ahead.w), motion, mean)
 
-    def _under_loop(self, tape: Tape, each: Mounted, at: _Ahead, told: Real | None = None) -> tuple[Real, Real]:
+    def _under_loop(self, tape: Tape, joint: Mounted, shaft: _Ahead, w_cmd: Real | None = None) -> tuple[Real, Real]:
         """Torque of a motor under its drive's rate loop, N m, and its decrease, with viscous friction, by the shaft's
-        rate, N m s/rad. told: commanded rate of the shaft, rad/s; None: the one of this tick."""
-        motor = self.motor(tape, each)
-        told = self.rate_drives.told(tape, each, motor) if told is None else told
-        of = self.rate_drives.torque(tape, each, motor, told, at.integral, at.w)
-        return of.torque, motor.f_v + of.brakes
+        rate, N m s/rad. w_cmd: commanded rate of the shaft, rad/s; None: the one of this tick."""
+        motor = self.motor(tape, joint)
+        w_cmd = self.rate_drives.commanded_rate(tape, joint, motor) if w_cmd is None else w_cmd
+        loop = self.rate_drives.torque(tape, joint, motor, w_cmd, shaft.integral, shaft.w)
+        return loop.torque, motor.f_v + loop.brakes
 
-    def _wind(self, tape: Tape, each: Mounted, wire: Wire, found: balance.Balanced | None) -> None:
+    def _wind(self, tape: Tape, joint: Mounted, wire: Wire, motion: balance.Balanced | None) -> None:
         """Advance the modelled integral of the drive's rate loop to the next tick."""
-        w: Real = tape.read(cell_names.SHAFT_RATE(each.joint))
-        after = w if found is None else w + self.period * self.motor(tape, each).ratio * found.qdd
-        if each.law.observer:
-            after = self._observed(tape, each)[0]
-        self.rate_drives.wind(tape, each, wire.drive * self.scale(tape, each).rate, w, after)
+        w: Real = tape.read(cell_names.SHAFT_RATE(joint.joint))
+        after = w if motion is None else w + self.period * self.motor(tape, joint).ratio * motion.qdd
+        if joint.law.observer:
+            after = self._observed(tape, joint)[0]
+        self.rate_drives.wind(tape, joint, wire.drive * self.scale(tape, joint).rate, w, after)
 
     def _on_bed(
-        self, tape: Tape, each: Mounted, told: Real | None, ahead: _Ahead, found: balance.Balanced | None
+        self, tape: Tape, joint: Mounted, command: Real | None, ahead: _Ahead, motion: balance.Balanced | None
     ) -> balance.Balanced | None:
         """The joint's motion, with the torque that the bed's motor is commanded for the coming tick in place of its
         own."""
-        if found is None or told is None or each.closes_rate_loop:
-            return found
-        net = found.net - self._own_torque(tape, each, ahead.w) + told
-        return balance.Balanced(found.qdd, found.friction, found.s, net)
+        if motion is None or command is None or joint.closes_rate_loop:
+            return motion
+        net = motion.net - self._own_torque(tape, joint, ahead.w) + command
+        return balance.Balanced(motion.qdd, motion.friction, motion.s, net)
 
-    def _send(self, tape: Tape, each: Mounted, command: Real | None, given: LawOutput) -> Wire:
+    def _send(self, tape: Tape, joint: Mounted, command: Real | None, output: LawOutput) -> Wire:
         """Put a command on the wire; returns the pair that the amplifiers hold from now on, which is an older one if
         delayed. command: to the drive, of the joint's size; None: the servo's voltage."""
-        name, tells = each.joint, each.bed.drive
-        p = self._bed_values(tape, each)
-        scale = self.scale(tape, each)
-        told = self._voltage(tape, each) if command is None else command
-        asked = Wire(told / scale.of(DRIVES[tells][0]), given.torque / scale.torque / p.kt_load)
+        name, tells = joint.joint, joint.bed.drive
+        p = self._bed_values(tape, joint)
+        scale = self.scale(tape, joint)
+        to_drive = self._voltage(tape, joint) if command is None else command
+        wanted = Wire(to_drive / scale.of(DRIVES[tells][0]), output.torque / scale.torque / p.kt_load)
         with tape.part(READING):
-            asked, limited = answer(self._owner(each), each.bed.taken, p, asked)
+            wanted, limited = answer(self._owner(joint), joint.bed.taken, p, wanted)
         cells.count(tape, limited, LIMITED)
-        delay = self._delay(tape, each)
-        late = self._queued(tape, each, delay)
+        delay = self._delay(tape, joint)
+        late = self._queued(tape, joint, delay)
         at_once = delay == 0.0
-        applied = Wire(where(at_once, asked.drive, late.drive), where(at_once, asked.current, late.current))
+        applied = Wire(where(at_once, wanted.drive, late.drive), where(at_once, wanted.current, late.current))
         if self.wire:
-            early = self._queued(tape, each, delay - float(self.late))
+            early = self._queued(tape, joint, delay - float(self.late))
             now = delay <= float(self.late)
-            tape.write(cell_names.SENT(name, tells), where(now, asked.drive, early.drive))
-            tape.write(cell_names.SENT(name, "current"), where(now, asked.current, early.current))
+            tape.write(cell_names.SENT(name, tells), where(now, wanted.drive, early.drive))
+            tape.write(cell_names.SENT(name, "current"), where(now, wanted.current, early.current))
         for i in reversed(range(1, QUEUE)):
             tape.write(cell_names.QUEUED(name, i, tells), tape.read(cell_names.QUEUED(name, i - 1, tells)))
             tape.write(cell_names.QUEUED(name, i, "current"), tape.read(cell_names.QUEUED(name, i - 1, "current")))
-        tape.write(cell_names.QUEUED(name, 0, tells), asked.drive)
-        tape.write(cell_names.QUEUED(name, 0, "current"), asked.current)
+        tape.write(cell_names.QUEUED(name, 0, tells), wanted.drive)
+        tape.write(cell_names.QUEUED(name, 0, "current"), wanted.current)
         tape.write(f"{name}.bed.drive_{tells}", applied.drive)
         tape.write(f"{name}.bed.load_current", applied.current)
         return applied
@@ -440,55 +441,55 @@ class Substituted:
     def _look_ahead(self, tape: Tape, Lambda: list[list[Real]], b_0: list[Real], applied: Sequence[Wire]) -> None:
         """The observer's state at the next tick, and the rate that the joint's own motor would have then."""
         sides = []
-        for each, wire in zip(self.mounted, applied, strict=True):
-            w_ref = tape.read(cell_names.REFERENCE_RATE(each.joint))
-            integral = self.rate_drives.integral(tape, each)
-            driving, falls = self._bed_torque(tape, each, wire, w_ref, integral)
-            sides.append(self._side(tape, each, w_ref, driving, 0.0, falls=falls))
-            self._observe(tape, each, self._predicted(tape, each, self._observed(tape, each), wire, integral))
-        for each, side, one in zip(self.mounted, sides, balance.balanced(sides, Lambda, b_0), strict=True):
-            after = side.w + self.period * side.ratio * one.qdd
-            after = where(one.s * after < 0.0, 0.0, after)
-            tape.write(cell_names.REFERENCE_RATE(each.joint), after)
-            tape.write(f"{each.joint}.law.reference_rate", side.w)
+        for joint, wire in zip(self.mounted, applied, strict=True):
+            w_ref = tape.read(cell_names.REFERENCE_RATE(joint.joint))
+            integral = self.rate_drives.integral(tape, joint)
+            driving, falls = self._bed_torque(tape, joint, wire, w_ref, integral)
+            sides.append(self._side(tape, joint, w_ref, driving, 0.0, falls=falls))
+            self._observe(tape, joint, self._predicted(tape, joint, self._observed(tape, joint), wire, integral))
+        for joint, side, motion in zip(self.mounted, sides, balance.balanced(sides, Lambda, b_0), strict=True):
+            after = side.w + self.period * side.ratio * motion.qdd
+            after = where(motion.s * after < 0.0, 0.0, after)
+            tape.write(cell_names.REFERENCE_RATE(joint.joint), after)
+            tape.write(f"{joint.joint}.law.reference_rate", side.w)
 
-    def _bed_torque(self, tape: Tape, each: Mounted, wire: Wire, w: Real, integral: Real) -> tuple[Real, Real | None]:
+    def _bed_torque(self, tape: Tape, joint: Mounted, wire: Wire, w: Real, integral: Real) -> tuple[Real, Real | None]:
         """The law's estimate of a motor's torque under the amplifiers' outputs at a rate of its shaft, N m; and its
         decrease, with viscous friction, by that rate, N m s/rad, None: as at a voltage.
 
         integral  of the drive's rate loop, where it has one, rad
         """
-        told, motor = wire.drive * self.scale(tape, each).of(DRIVES[each.bed.drive][0]), self.motor(tape, each)
-        if each.closes_rate_loop:
-            return self._under_loop(tape, each, _Ahead(w, integral), told)
-        falls = None if each.bed.drive == "voltage" else motor.f_v
-        return drive.bed_torque(each.bed.drive, motor, told, w), falls
+        commanded, motor = wire.drive * self.scale(tape, joint).of(DRIVES[joint.bed.drive][0]), self.motor(tape, joint)
+        if joint.closes_rate_loop:
+            return self._under_loop(tape, joint, _Ahead(w, integral), commanded)
+        falls = None if joint.bed.drive == "voltage" else motor.f_v
+        return drive.bed_torque(joint.bed.drive, motor, commanded, w), falls
 
     def _side(
-        self, tape: Tape, each: Mounted, w: Real, driving: Real, band: Real, *, falls: Real | None = None
+        self, tape: Tape, joint: Mounted, w: Real, driving: Real, band: Real, *, falls: Real | None = None
     ) -> balance.JointSide:
         """A joint's side of the balance at a rate of its shaft and a torque of its motor, N m.
 
         falls  what that torque and viscous friction fall by as the shaft gains speed, N m s/rad; None: by back-EMF
         """
-        motor = self.motor(tape, each)
+        motor = self.motor(tape, joint)
         brakes = motor.damping if falls is None else falls
-        mean = 0.0 if each.law.balance == "bare" else 0.5 * brakes * self.period
-        unknown = self._observed(tape, each)[3] if each.law.observer else 0.0
-        viscous = 0.0 if each.law.balance == "bare" else motor.f_v * w
+        mean = 0.0 if joint.law.balance == "bare" else 0.5 * brakes * self.period
+        unknown = self._observed(tape, joint)[3] if joint.law.observer else 0.0
+        viscous = 0.0 if joint.law.balance == "bare" else motor.f_v * w
         net = driving + unknown - viscous
         return balance.JointSide(
             motor.ratio, motor.ratio * motor.ratio * (motor.inertia + mean), net, motor.f_c, w, band
         )
 
-    def _law_input(self, tape: Tape, each: Mounted, found: balance.Balanced | None, ahead: _Ahead) -> LawInput:
-        motor, inertia, name = self.motor(tape, each), self._shaft_inertia(tape, each), each.joint
-        mean = each.law.balance == "full"
+    def _law_input(self, tape: Tape, joint: Mounted, motion: balance.Balanced | None, ahead: _Ahead) -> LawInput:
+        motor, inertia, name = self.motor(tape, joint), self._shaft_inertia(tape, joint), joint.joint
+        mean = joint.law.balance == "full"
         extra: Real = 0.0
         if mean:
-            brakes = drive.bed_damping(each.bed.drive, motor, inertia, self.period)
-            if each.closes_rate_loop:
-                falls = self._under_loop(tape, each, ahead)[1]
+            brakes = drive.bed_damping(joint.bed.drive, motor, inertia, self.period)
+            if joint.closes_rate_loop:
+                falls = self._under_loop(tape, joint, ahead)[1]
                 brakes = drive.at_least(falls, drive.LEAST * inertia / self.period)
             extra = inertia * (self.period / lasting(brakes / inertia, self.period) - 1.0)
         return LawInput(
@@ -497,103 +498,103 @@ class Substituted:
             rate=tape.read(cell_names.READ(name)),
             before=tape.read(cell_names.READ_BEFORE(name)),
             w=tape.read(cell_names.SHAFT_RATE(name)),
-            d=self._observed(tape, each)[3] if each.law.observer else 0.0,
-            w_ref=tape.read(cell_names.REFERENCE_RATE(name)) if each.law.observer else 0.0,
+            d=self._observed(tape, joint)[3] if joint.law.observer else 0.0,
+            w_ref=tape.read(cell_names.REFERENCE_RATE(name)) if joint.law.observer else 0.0,
             period=self.period,
-            balance=found,
+            balance=motion,
             extra=extra,
         )
 
-    def _predicted(self, tape: Tape, each: Mounted, x: observer.Four, wire: Wire, integral: Real) -> observer.Four:
+    def _predicted(self, tape: Tape, joint: Mounted, x: observer.Four, wire: Wire, integral: Real) -> observer.Four:
         """The observer's state one tick on, under the amplifiers' held outputs. integral: of the drive's rate loop,
         rad"""
-        motor, band, scale = self.motor(tape, each), self._band(tape, each), self.scale(tape, each)
-        load = self._bed_values(tape, each).kt_load * wire.current * scale.torque
+        motor, band, scale = self.motor(tape, joint), self._band(tape, joint), self.scale(tape, joint)
+        load = self._bed_values(tape, joint).kt_load * wire.current * scale.torque
         w, d = x[0], x[3]
-        driving, falls = self._bed_torque(tape, each, wire, w, integral)
+        driving, falls = self._bed_torque(tape, joint, wire, w, integral)
         rest = clip(driving + d + load - motor.f_v * w, -motor.f_c, motor.f_c)
         dry = where(absolute(w) > band, sign(w) * motor.f_c, rest)
         # Back-EMF is in the model; where the drive is at its limit, it is taken out again.
-        own = driving + motor.kt * motor.kt / motor.resistance * w if each.bed.drive == "voltage" else driving
+        own = driving + motor.kt * motor.kt / motor.resistance * w if joint.bed.drive == "voltage" else driving
         u = own - dry + load
-        if falls is not None and each.closes_rate_loop:
+        if falls is not None and joint.closes_rate_loop:
             # the loop's gain is in the model too, and is taken out where it is at a limit
-            inertia = self._shaft_inertia(tape, each)
-            slope = drive.bed_damping("rate", motor, inertia, self.period, self.rate_drives.loop(tape, each))
+            inertia = self._shaft_inertia(tape, joint)
+            slope = drive.bed_damping("rate", motor, inertia, self.period, self.rate_drives.loop(tape, joint))
             gained = self.period / inertia * (driving + d + load - dry - motor.f_v * w)
             u = driving + (slope - motor.f_v) * w + (slope - falls) * (0.5 * gained) - dry + load
-        return observer.predicted(self._model(tape, each), x, u)
+        return observer.predicted(self._model(tape, joint), x, u)
 
     # Parameters of a joint.
 
-    def motor(self, tape: Tape, each: Mounted) -> Motor:
+    def motor(self, tape: Tape, joint: Mounted) -> Motor:
         """The joint's motor with the servo's parameters."""
-        assert each.actuator.servo.motor is not None
-        p = self.system.servo_values(each.actuator, tape.read)
-        return answer(each.actuator.owner, each.actuator.servo.motor, p)
+        assert joint.actuator.servo.motor is not None
+        p = self.system.servo_values(joint.actuator, tape.read)
+        return answer(joint.actuator.owner, joint.actuator.servo.motor, p)
 
-    def scale(self, tape: Tape, each: Mounted) -> BedScale:
+    def scale(self, tape: Tape, joint: Mounted) -> BedScale:
         """The scales of the joint's bed; 1 where it has none."""
-        if not each.scaled:
+        if not joint.scaled:
             return BedScale()
-        p = self._values(tape, self._owner(each), f"{each.joint}.bed.scale", bed_scale.PARAMETERS)
+        p = self._values(tape, self._owner(joint), f"{joint.joint}.bed.scale", bed_scale.PARAMETERS)
         return BedScale(p.torque, p.rate, p.voltage)
 
-    def _shaft_inertia(self, tape: Tape, each: Mounted) -> Real:
+    def _shaft_inertia(self, tape: Tape, joint: Mounted) -> Real:
         """The inertia of the bed's shaft at the joint's motor, kg m^2."""
-        inertia: Real = self._bed_values(tape, each).inertia
-        return inertia * self.scale(tape, each).inertia
+        inertia: Real = self._bed_values(tape, joint).inertia
+        return inertia * self.scale(tape, joint).inertia
 
-    def _model(self, tape: Tape, each: Mounted) -> observer.DiscreteModel:
-        inertia, f_cut = self._shaft_inertia(tape, each), self._bed_values(tape, each).f_cut
-        loop = self.rate_drives.loop(tape, each) if each.closes_rate_loop else None
-        damping = drive.bed_damping(each.bed.drive, self.motor(tape, each), inertia, self.period, loop)
+    def _model(self, tape: Tape, joint: Mounted) -> observer.DiscreteModel:
+        inertia, f_cut = self._shaft_inertia(tape, joint), self._bed_values(tape, joint).f_cut
+        loop = self.rate_drives.loop(tape, joint) if joint.closes_rate_loop else None
+        damping = drive.bed_damping(joint.bed.drive, self.motor(tape, joint), inertia, self.period, loop)
         return observer.model(inertia=inertia, damping=damping, f_cut=f_cut, period=self.period)
 
-    def _noise(self, tape: Tape, each: Mounted) -> observer.Noise:
-        p, T = self._law_values(tape, each), self.period
+    def _noise(self, tape: Tape, joint: Mounted) -> observer.Noise:
+        p, T = self._law_values(tape, joint), self.period
         return observer.Noise(torque=p.torque_noise / T, drift=p.drift * T, reading=p.reading_noise / T)
 
-    def _covariance(self, tape: Tape, each: Mounted) -> observer.Square:
+    def _covariance(self, tape: Tape, joint: Mounted) -> observer.Square:
         entries = [
-            [tape.read(cell_names.COVARIANCE(each.joint, max(i, j), min(i, j))) for j in range(4)] for i in range(4)
+            [tape.read(cell_names.COVARIANCE(joint.joint, max(i, j), min(i, j))) for j in range(4)] for i in range(4)
         ]
         return tuple(tuple(row) for row in entries)  # type: ignore[return-value]
 
-    def _observed(self, tape: Tape, each: Mounted) -> observer.Four:
-        w, y, z, d = (tape.read(cell_names.OBSERVED(each.joint, name)) for name in "wyzd")
+    def _observed(self, tape: Tape, joint: Mounted) -> observer.Four:
+        w, y, z, d = (tape.read(cell_names.OBSERVED(joint.joint, name)) for name in "wyzd")
         return w, y, z, d
 
-    def _observe(self, tape: Tape, each: Mounted, x: observer.Four) -> None:
+    def _observe(self, tape: Tape, joint: Mounted, x: observer.Four) -> None:
         for name, value in zip("wyzd", x, strict=True):
-            tape.write(cell_names.OBSERVED(each.joint, name), value)
+            tape.write(cell_names.OBSERVED(joint.joint, name), value)
 
-    def _voltage(self, tape: Tape, each: Mounted) -> Real:
-        return tape.read(f"{each.actuator.path}.voltage")
+    def _voltage(self, tape: Tape, joint: Mounted) -> Real:
+        return tape.read(f"{joint.actuator.path}.voltage")
 
-    def _band(self, tape: Tape, each: Mounted) -> Real:
-        p = self._law_values(tape, each)
-        return p.band if each.law.balance == "full" else 0.0
+    def _band(self, tape: Tape, joint: Mounted) -> Real:
+        p = self._law_values(tape, joint)
+        return p.band if joint.law.balance == "full" else 0.0
 
-    def _delay(self, tape: Tape, each: Mounted) -> Real:
-        delay: Real = self._bed_values(tape, each).delay
+    def _delay(self, tape: Tape, joint: Mounted) -> Real:
+        delay: Real = self._bed_values(tape, joint).delay
         return delay
 
-    def _bed_values(self, tape: Tape, each: Mounted) -> Any:
-        declared = [parameter for parameter in each.bed.parameters if parameter.shape != "text"]
-        return self._values(tape, self._owner(each), f"{each.joint}.bed", declared)
+    def _bed_values(self, tape: Tape, joint: Mounted) -> Any:
+        declared = [parameter for parameter in joint.bed.parameters if parameter.shape != "text"]
+        return self._values(tape, self._owner(joint), f"{joint.joint}.bed", declared)
 
-    def _law_values(self, tape: Tape, each: Mounted) -> Any:
-        owner = f"law `{each.law.name}` of joint `{each.joint}`"
-        return self._values(tape, owner, f"{each.joint}.law", each.law.parameters)
+    def _law_values(self, tape: Tape, joint: Mounted) -> Any:
+        owner = f"law `{joint.law.name}` of joint `{joint.joint}`"
+        return self._values(tape, owner, f"{joint.joint}.law", joint.law.parameters)
 
     def _values(self, tape: Tape, owner: str, prefix: str, declared: Iterable[Parameter]) -> Any:
         return parameters(owner, prefix, declared, lambda path: self.system.value(path, tape.read))
 
-    def _bed(self, tape: Tape, each: Mounted) -> NamedValues:
+    def _bed(self, tape: Tape, joint: Mounted) -> NamedValues:
         return NamedValues(
-            self._owner(each), {m.name: tape.read(f"{each.joint}.bed.{m.name}") for m in each.bed.memory}
+            self._owner(joint), {m.name: tape.read(f"{joint.joint}.bed.{m.name}") for m in joint.bed.memory}
         )
 
-    def _owner(self, each: Mounted) -> str:
-        return f"bed `{each.bed.name}` of joint `{each.joint}`"
+    def _owner(self, joint: Mounted) -> str:
+        return f"bed `{joint.bed.name}` of joint `{joint.joint}`"
