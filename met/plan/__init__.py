@@ -556,9 +556,9 @@ class Experiment:
 
     def column(self, formula: Formula) -> CaseValues:
         """The values of a parameter that varies, one a case."""
-        one = Formulas(self.formulas.inputs, self.formulas.nodes, (self.formulas.outputs[formula.output],))
+        alone = Formulas(self.formulas.inputs, self.formulas.nodes, (self.formulas.outputs[formula.output],))
         inputs = {coordinate.path: coordinate.values for coordinate in self.cases.coordinates}
-        return listed(FormulaColumn(one, inputs, self.cases.count))
+        return listed(FormulaColumn(alone, inputs, self.cases.count))
 
     @property
     def name_in_deck(self) -> str:

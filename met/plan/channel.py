@@ -182,10 +182,10 @@ def joint_unit(unit: str, joint: Joint, command: str | None = None) -> str:
     return _unit_of(unit, joint.kind == "prismatic", command)
 
 
-def ratio_unit(kind: str, of: str) -> str:
-    """The unit of a ratio of the position of a joint of one kind to that of a joint `of` another."""
+def ratio_unit(kind: str, leader_kind: str) -> str:
+    """The unit of a ratio of the position of a joint of one kind to that of another kind, which leads."""
     units = {"prismatic": "m", "revolute": "rad"}
-    return "1" if kind == of else f"{units.get(kind, '1')}/{units.get(of, '1')}"
+    return "1" if kind == leader_kind else f"{units.get(kind, '1')}/{units.get(leader_kind, '1')}"
 
 
 @lru_cache(maxsize=4096)
@@ -203,11 +203,11 @@ def _unit_of(unit: str, slides: bool, command: str | None) -> str:
     return REPEATED.sub(_per_time, out.strip())
 
 
-def watched_unit(declared: str, of: str) -> str:
+def watched_unit(declared: str, watched: str) -> str:
     """A metric's declared unit with `of` replaced by the unit of the watched channel: for `rad/s`, `of*s` is `rad`."""
     if declared == "of" or "of" not in re.findall(r"[A-Za-z_]+", declared):
-        return of if declared == "of" else declared
-    return units.text(parse_unit(declared, {"of": parse_unit(of)}).dimension)
+        return watched if declared == "of" else declared
+    return units.text(parse_unit(declared, {"of": parse_unit(watched)}).dimension)
 
 
 def _per_time(repeated: re.Match[str]) -> str:
@@ -241,14 +241,14 @@ def _channels(structure: Structure, names: list[str], *, all_owners: bool) -> di
     servos = {use.joint: use for use in structure.servos}
     on_beds = {use.joint: use for use in structure.substitutions}
     dynamics = structure.schedule.dynamics
-    found: dict[str, Channel] = {}
+    by_path: dict[str, Channel] = {}
 
     def add(path: str, unit: str, doc: str, divisor: int, joint: str, frame: str = "") -> None:
-        found[path] = Channel(path, unit, doc, divisor, joint, (), frame)
+        by_path[path] = Channel(path, unit, doc, divisor, joint, (), frame)
 
     def derive(path: str, unit: str, doc: str, components: tuple[str, ...], frame: str, joint: str = "") -> None:
-        for each in [f"{path}.{component}" for component in components] or [path]:
-            found[each] = Channel(each, unit, doc, dynamics, joint, components, frame, True)
+        for part_path in [f"{path}.{component}" for component in components] or [path]:
+            by_path[part_path] = Channel(part_path, unit, doc, dynamics, joint, components, frame, True)
 
     mentions = [*names, *(path for expression in structure.expressions for path in expression.channels)]
     joints = {name.partition(".")[0] for name in mentions}
@@ -319,9 +319,9 @@ def _channels(structure: Structure, names: list[str], *, all_owners: bool) -> di
         if limited or name != "limits.margin":
             derive(name, unit, doc, components, frame)
     for expression in structure.expressions:
-        divisor = math.gcd(*(found[path].divisor for path in expression.channels)) or dynamics
+        divisor = math.gcd(*(by_path[path].divisor for path in expression.channels)) or dynamics
         add(expression.name, expression.unit, expression.text, divisor, "")
-    return found
+    return by_path
 
 
 def _carrying(structure: Structure, link: str) -> list[Joint]:
@@ -333,13 +333,13 @@ def _carrying(structure: Structure, link: str) -> list[Joint]:
         chain.add(holds[link].name)
         link = holds[link].parent
     for joint in reversed(structure.moving):  # leaders of leaders, in whatever order the deck has them
-        chain |= {name for each in structure.moving if each.name in chain for name in each.follows} & {joint.name}
+        chain |= {name for moving in structure.moving if moving.name in chain for name in moving.follows} & {joint.name}
     return [joint for joint in structure.independent if joint.name in chain]
 
 
 def carries(structure: Structure, link: str, joint: str) -> bool:
     """True where a moving joint lies between the link and the base."""
-    return joint in {each.name for each in _carrying(structure, link)}
+    return joint in {carrying.name for carrying in _carrying(structure, link)}
 
 
 def channel_paths(name: str, joints: tuple[str, ...], components: tuple[str, ...]) -> tuple[str, ...]:
@@ -386,22 +386,22 @@ def recordable(
                 continue  # of a boom's spring only what draws it belongs to all joints' values
             if group:
                 joints.setdefault(group, []).append(channel.joint)
-    found: dict[str, tuple[Recorded, ...]] = {}
+    by_name: dict[str, tuple[Recorded, ...]] = {}
 
     def is_wanted(name: str) -> bool:
         return wanted is None or name in wanted or name.rpartition(".")[0] in wanted
 
     for name, channel in own.items():
         if is_wanted(name):
-            _enter(found, known, name, (), () if name in known else channel.components)
-    for name, of in joints.items():
+            _enter(by_name, known, name, (), () if name in known else channel.components)
+    for name, joint_names in joints.items():
         if not is_wanted(name):
             continue
-        (one,) = channel_paths(name, (of[0],), ())
-        _enter(found, known, name, tuple(of), () if one in known else own[one].components)
+        (first_path,) = channel_paths(name, (joint_names[0],), ())
+        _enter(by_name, known, name, tuple(joint_names), () if first_path in known else own[first_path].components)
     if structure.sensors and wanted is None:
-        found["sensors"] = tuple(found[f"sensors.{use.name}"][0] for use in structure.sensors)
-    return found if wanted is None else {name: each for name, each in found.items() if name in wanted}
+        by_name["sensors"] = tuple(by_name[f"sensors.{use.name}"][0] for use in structure.sensors)
+    return by_name if wanted is None else {name: recorded for name, recorded in by_name.items() if name in wanted}
 
 
 def _of_all(name: str, channel: Channel) -> str:
@@ -413,7 +413,7 @@ def _of_all(name: str, channel: Channel) -> str:
 
 
 def _enter(
-    found: dict[str, tuple[Recorded, ...]],
+    by_name: dict[str, tuple[Recorded, ...]],
     known: Mapping[str, Channel],
     name: str,
     joints: tuple[str, ...],
@@ -422,8 +422,8 @@ def _enter(
     """Enter a variable, and add it to its family, which comes before its members."""
     scalars = channel_paths(name, joints, components)
     units = tuple(known[path].unit for path in scalars) if joints else (known[scalars[0]].unit,)
-    made = Recorded(name, scalars, joints, units, known[scalars[0]].doc, components)
+    recorded = Recorded(name, scalars, joints, units, known[scalars[0]].doc, components)
     family, _, member = name.rpartition(".")
     if member in FAMILIES.get(family.rpartition(".")[2], ()):
-        found[family] = (*found.get(family, ()), made)
-    found[name] = (made,)
+        by_name[family] = (*by_name.get(family, ()), recorded)
+    by_name[name] = (recorded,)

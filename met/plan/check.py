@@ -108,7 +108,7 @@ def _group_name(experiment: Experiment, where: str, before: Collection[str]) -> 
 
 def _check_requirements(experiment: Experiment, where: str) -> None:
     metrics = {use.name for use in experiment.metrics}
-    said: dict[str, Requirement] = {}
+    by_text: dict[str, Requirement] = {}
     for index, requirement in enumerate(experiment.requirements):
         if requirement.metric not in metrics:
             raise Damaged(f"{where}[{index}].metric", f"there is no metric `{requirement.metric}`")
@@ -119,7 +119,7 @@ def _check_requirements(experiment: Experiment, where: str) -> None:
             raise Damaged(f"{where}[{index}].share", "it should be above 0 and at most 1")
         if confidence is not None and not (share is not None and can_be_shown(share) and 0.0 < confidence < 1.0):
             raise Damaged(f"{where}[{index}].confidence", "it should be between 0 and 1, of a share between 0 and 1")
-        first = said.setdefault(requirement.text, requirement)
+        first = by_text.setdefault(requirement.text, requirement)
         if (first.metric, first.comparison, first.limit) != (
             requirement.metric,
             requirement.comparison,
@@ -130,10 +130,10 @@ def _check_requirements(experiment: Experiment, where: str) -> None:
 
 def _check_step_errors(experiment: Experiment, where: str) -> None:
     metrics = {use.name for use in experiment.structure.metrics}
-    for index, each in enumerate(experiment.step_errors):
-        if each.metric not in metrics:
-            raise Damaged(f"{where}[{index}].metric", f"there is no metric `{each.metric}`")
-        if not 0.0 < each.limit < math.inf:
+    for index, limit in enumerate(experiment.step_errors):
+        if limit.metric not in metrics:
+            raise Damaged(f"{where}[{index}].metric", f"there is no metric `{limit.metric}`")
+        if not 0.0 < limit.limit < math.inf:
             raise Damaged(f"{where}[{index}].limit", "it should be a finite number above 0")
     if len({step_error.text for step_error in experiment.step_errors}) < len(experiment.step_errors):
         raise Damaged(where, "two have the same text")
@@ -282,11 +282,15 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
 
 def _words(model: Any, chosen: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
     """Every word of a model that a structure decides: the chosen one, else the default."""
-    deciding = getattr(model, "deciding", [each.name for each in model.parameters if each.shape == "word"])
-    given = dict(chosen)
+    deciding = getattr(
+        model,
+        "deciding",
+        [word_parameter.name for word_parameter in model.parameters if word_parameter.shape == "word"],
+    )
+    words = dict(chosen)
     for parameter in model.parameters:
         if parameter.name in deciding and isinstance(parameter.default, str):
-            yield parameter.name, given.get(parameter.name, parameter.default)
+            yield parameter.name, words.get(parameter.name, parameter.default)
 
 
 def _is_word(parameters: Mapping[str, Quantity], path: str, word: str, where: str) -> None:
@@ -296,16 +300,16 @@ def _is_word(parameters: Mapping[str, Quantity], path: str, word: str, where: st
 
 def _check_pivots(experiment: Experiment, where: str) -> set[str]:
     """Paths of the pivots of revolute joints, each with all three numbers or none."""
-    found: set[str] = set()
+    pivots: set[str] = set()
     for joint in experiment.structure.joints:
         paths = [f"{joint.name}.pivot.{axis}" for axis in "xyz"] if joint.kind == "revolute" else []
-        there = [path for path in paths if path in experiment.parameters]
-        if there and len(there) < len(paths):
+        present = [path for path in paths if path in experiment.parameters]
+        if present and len(present) < len(paths):
             raise Damaged(f"{where}.{joint.name}.pivot", "it is made of three numbers, .x .y .z")
-        for path in there:
+        for path in present:
             _check_quantity(experiment.parameters[path], "m", None, f"{where}.{path}")
-        found.update(there)
-    return found
+        pivots.update(present)
+    return pivots
 
 
 def _check_quantity(quantity: Quantity, unit: str, parameter: Parameter | None, where: str) -> None:
@@ -375,9 +379,9 @@ def _is_whole(values: np.ndarray) -> np.ndarray:
     return np.asarray(values[:, 0] == np.rint(values[:, 0]))
 
 
-def _same_unit(one: str, other: str) -> bool:
+def _same_unit(unit: str, other: str) -> bool:
     try:
-        mine, theirs = parse_unit(one), parse_unit(other)
+        mine, theirs = parse_unit(unit), parse_unit(other)
     except ValueError:
         return False
     return mine.scale == theirs.scale and units.same(mine.dimension, theirs.dimension)
@@ -385,9 +389,9 @@ def _same_unit(one: str, other: str) -> bool:
 
 def _check_table(experiment: Experiment, prefix: str, fewest: int, where: str) -> None:
     """Check that times rise, and that there are as many values, at least `fewest`."""
-    found = [experiment.parameters.get(f"{prefix}.{name}") for name in ("times", "values")]
-    times, values = (quantity.value if quantity is not None else () for quantity in found)
-    if not isinstance(times, tuple) or not isinstance(values, tuple) or None in found:
+    quantities = [experiment.parameters.get(f"{prefix}.{name}") for name in ("times", "values")]
+    times, values = (quantity.value if quantity is not None else () for quantity in quantities)
+    if not isinstance(times, tuple) or not isinstance(values, tuple) or None in quantities:
         return  # missing: E304
     if len(times) < fewest or len(times) != len(values):
         needed = f", and {fewest} are needed" if len(times) == len(values) else ""

@@ -40,7 +40,7 @@ def check_linear(experiment: Experiment, where: str) -> None:
         for path in (*use.inputs, *use.opened):
             if path not in known or (path in use.opened and not known[path].is_output):
                 raise Damaged(f"{place}.{'opened' if path in use.opened else 'inputs'}", f"`{path}` is none")
-    of = {use.name: use for use in experiment.linear}
+    answers = {use.name: use for use in experiment.linear}
     taken = [use.name for use in structure.metrics]
     for index, metric in enumerate(experiment.linear_metrics):
         place = f"{where}.linear_metrics[{index}]"
@@ -48,7 +48,7 @@ def check_linear(experiment: Experiment, where: str) -> None:
         taken.append(metric.name)
         if metric.model not in FIGURES:
             raise Damaged(f"{place}.model", f"there is no figure `{metric.model}`")
-        if metric.of not in of:
+        if metric.of not in answers:
             raise Damaged(f"{place}.of", f"there is no `{metric.of}` among the linear answers")
-        if FIGURES[metric.model].of_loops and not of[metric.of].opened:
+        if FIGURES[metric.model].of_loops and not answers[metric.of].opened:
             raise Damaged(f"{place}.of", f"`{metric.of}` opens no loop")

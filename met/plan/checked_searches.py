@@ -35,10 +35,10 @@ def check_search(experiment: Experiment, search: Search, where: str) -> None:
         raise Damaged(f"{where}.starts", "they should rise, and lie among the cases")
     if search.confirmation and not (search.fresh and search.complete):
         raise Damaged(f"{where}.confirmation", "a tuning alone that has run is confirmed, by cases that it has")
-    for each in search.confirmation:
-        check_whole(each.cases, len(search.fresh), len(search.fresh), f"{where}.confirmation.cases")
-        check_whole(each.failed, 0, each.cases, f"{where}.confirmation.failed")
-        check_whole(each.missed, 0, each.cases - each.failed, f"{where}.confirmation.missed")
+    for confirmation in search.confirmation:
+        check_whole(confirmation.cases, len(search.fresh), len(search.fresh), f"{where}.confirmation.cases")
+        check_whole(confirmation.failed, 0, confirmation.cases, f"{where}.confirmation.failed")
+        check_whole(confirmation.missed, 0, confirmation.cases - confirmation.failed, f"{where}.confirmation.missed")
     check_whole(search.along_slopes, 0, search.at_most, f"{where}.along_slopes")
     if search.gradients and search.kind != "tune":
         raise Damaged(f"{where}.gradients", "a tuning alone goes by slopes")
@@ -62,20 +62,20 @@ def _check_parameters(experiment: Experiment, search: Search, where: str) -> Non
     paths = [coordinate.path for coordinate in experiment.cases.coordinates]
     if not search.parameters:
         raise Damaged(where, "there is none")
-    for index, each in enumerate(search.parameters):
-        if index >= len(paths) or each.path != paths[index]:
-            raise Damaged(f"{where}[{index}].path", f"`{each.path}` is not coordinate {index} of the cases")
-        if not -math.inf < each.low < each.high < math.inf:
+    for index, parameter in enumerate(search.parameters):
+        if index >= len(paths) or parameter.path != paths[index]:
+            raise Damaged(f"{where}[{index}].path", f"`{parameter.path}` is not coordinate {index} of the cases")
+        if not -math.inf < parameter.low < parameter.high < math.inf:
             raise Damaged(f"{where}[{index}].low", "the ends should be finite, and rise")
-        if each.high - each.low == math.inf:
+        if parameter.high - parameter.low == math.inf:
             raise Damaged(f"{where}[{index}].low", "the ends are too far apart")
-        if each.logarithmic and not (each.low > 0.0 or each.high < 0.0):
+        if parameter.logarithmic and not (parameter.low > 0.0 or parameter.high < 0.0):
             raise Damaged(f"{where}[{index}].low", "both ends should be above or below 0")
         try:
-            if each.unit:
-                parse_unit(each.unit)
+            if parameter.unit:
+                parse_unit(parameter.unit)
         except ValueError as reason:
-            raise Damaged(f"{where}[{index}].unit", f"{each.unit!r} is no unit") from reason
+            raise Damaged(f"{where}[{index}].unit", f"{parameter.unit!r} is no unit") from reason
 
 
 def _check_plants(experiment: Experiment, search: Search, where: str) -> None:

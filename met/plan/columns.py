@@ -132,12 +132,12 @@ class PositionColumn(ComputedColumn):
 class ShiftedColumn(ComputedColumn):
     """The numbers of another column plus a constant; as whole numbers where `dtype` says so."""
 
-    def __init__(self, of: CaseValues, by: int, dtype: Any = np.float64) -> None:
-        super().__init__(len(of), dtype)
-        self.of, self.by = of, by
+    def __init__(self, values: CaseValues, by: int, dtype: Any = np.float64) -> None:
+        super().__init__(len(values), dtype)
+        self.values, self.by = values, by
 
     def at(self, rows: np.ndarray) -> np.ndarray:
-        return (self.of[rows] + self.by).astype(self.dtype)
+        return (self.values[rows] + self.by).astype(self.dtype)
 
 
 class FormulaColumn(ComputedColumn):
@@ -148,8 +148,8 @@ class FormulaColumn(ComputedColumn):
         self.formula, self.values = formula, {name: values[name] for name in formula.inputs}
 
     def at(self, rows: np.ndarray) -> np.ndarray:
-        found = self.formula.replay({name: np.asarray(column[rows]) for name, column in self.values.items()})[0]
-        return np.array(np.broadcast_to(np.asarray(found, dtype=float), len(rows)))
+        numbers = self.formula.replay({name: np.asarray(column[rows]) for name, column in self.values.items()})[0]
+        return np.array(np.broadcast_to(np.asarray(numbers, dtype=float), len(rows)))
 
 
 def listed(column: ComputedColumn) -> CaseValues:

@@ -29,14 +29,16 @@ def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity |
     for path, unit, default, parameter in declared(experiment):
         if path in experiment.parameters or (parameter is not None and parameter.timing):
             continue
-        found = None if default is None else Quantity(default, unit, Origin("default", note="not in the plan file"))
+        default_quantity = (
+            None if default is None else Quantity(default, unit, Origin("default", note="not in the plan file"))
+        )
         joint = path.partition(".")[0]
-        if found is None and parameter is not None and parameter.of_servo and joint not in scaled:
+        if default_quantity is None and parameter is not None and parameter.of_servo and joint not in scaled:
             of_servo = f"{joint}.servo.{parameter.of_servo}"
-            found = experiment.parameters.get(of_servo, defaults.get(of_servo))
-        if found is not None:
-            defaults[path] = found
-        yield path, found
+            default_quantity = experiment.parameters.get(of_servo, defaults.get(of_servo))
+        if default_quantity is not None:
+            defaults[path] = default_quantity
+        yield path, default_quantity
 
 
 def unknown_parameters(experiment: Experiment) -> Iterator[tuple[str, str | None]]:
@@ -71,8 +73,12 @@ def of_environment(experiment: Experiment) -> Iterator[tuple[str, tuple[Paramete
     held = experiment.parameters
     for use in experiment.structure.environment:
         prefix, declared = f"environment.{use.name}", models.find("environment", use.model, use.place).parameters
-        words = {each.name: str(held[path].value) for each in declared if (path := f"{prefix}.{each.name}") in held}
-        yield prefix, tuple(each for each in declared if is_present(each, words))
+        words = {
+            parameter.name: str(held[path].value)
+            for parameter in declared
+            if (path := f"{prefix}.{parameter.name}") in held
+        }
+        yield prefix, tuple(parameter for parameter in declared if is_present(parameter, words))
 
 
 def timing_defaults(experiment: Experiment) -> dict[str, Quantity]:
@@ -81,10 +87,10 @@ def timing_defaults(experiment: Experiment) -> dict[str, Quantity]:
     metrics = experiment.structure.metrics
     watching = ((f"metrics.{use.name}", models.find("metric", use.model, use.place).parameters) for use in metrics)
     return {
-        f"{prefix}.{each.name}": Quantity(each.default, each.unit, Origin("default"))
+        f"{prefix}.{parameter.name}": Quantity(parameter.default, parameter.unit, Origin("default"))
         for prefix, declared in (*of_environment(experiment), *watching)
-        for each in declared
-        if each.timing and each.default is not None
+        for parameter in declared
+        if parameter.timing and parameter.default is not None
     }
 
 
@@ -131,10 +137,10 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
             held = parameter if use.command is None else under(parameter, use.command.kind)
             yield from _numbers(f"{use.joint}.servo", held, joint_unit(parameter.unit, joint))
         for sensor in use.sensors:
-            of = joint_unit(quantities(use)[sensor.of], joint)
+            watched_unit_of = joint_unit(quantities(use)[sensor.of], joint)
             head = f"{use.joint}.servo.sensor.{sensor.of}"
             for parameter in sensor_parts(sensor, "parameters"):
-                yield from _numbers(head, parameter, watched_unit(parameter.unit, of))
+                yield from _numbers(head, parameter, watched_unit(parameter.unit, watched_unit_of))
         if use.command is not None and not use.command.guide:
             for parameter in models.find("command", use.command.model, use.place).parameters:
                 unit = joint_unit(parameter.unit, joint, use.command.kind)
@@ -163,9 +169,9 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
             yield from _numbers(f"sensors.{on_link.name}", parameter, watched_unit(parameter.unit, unit))
     watched = channels(structure) if structure.metrics else {}
     for metric in structure.metrics:
-        of = watched[metric.of].unit if metric.of in watched else "1"
+        watched_unit_of = watched[metric.of].unit if metric.of in watched else "1"
         for parameter in models.find("metric", metric.model, metric.place).parameters:
-            yield from _numbers(f"metrics.{metric.name}", parameter, watched_unit(parameter.unit, of))
+            yield from _numbers(f"metrics.{metric.name}", parameter, watched_unit(parameter.unit, watched_unit_of))
 
 
 def _of_payloads(structure: Structure) -> Iterator[Declared]:

@@ -56,16 +56,16 @@ def within(drawn: np.ndarray) -> np.ndarray:
 
 
 def drawn_values(
-    distribution: str, arguments: tuple[float, ...], measure: units.Measure | None, at: np.ndarray
+    distribution: str, arguments: tuple[float, ...], measure: units.Measure | None, levels: np.ndarray
 ) -> np.ndarray:
     """Quantiles at these points of (0, 1), SI, rounded in a unit; None: the number 1. arguments: SI."""
     scale = measure.scale if measure is not None else 1.0
-    exact = QUANTILES[distribution](at, *(x / scale for x in arguments))
-    found = rounded(exact, measure if measure is not None else units.ONE)
+    exact = QUANTILES[distribution](levels, *(x / scale for x in arguments))
+    values = rounded(exact, measure if measure is not None else units.ONE)
     if distribution == "normal":
-        return found
+        return values
     low, high = arguments[-2:]
-    return np.clip(found, low, high)
+    return np.clip(values, low, high)
 
 
 def is_sound(distribution: str, arguments: tuple[float, ...]) -> bool:
@@ -109,10 +109,10 @@ class DrawnColumn(ComputedColumn):
         is the first, unless there are too many to compare."""
         low, high = _Nearest(), _Nearest()
         for rows in blocks(self.size):
-            at = points(self.seed, self.path, self.number, rows.start, rows.stop)
-            low.add(at, rows.start)
-            high.add(-at, rows.start)
-        values = [self.at(np.sort(each.rows)) for each in (low, high)]
+            levels = points(self.seed, self.path, self.number, rows.start, rows.stop)
+            low.add(levels, rows.start)
+            high.add(-levels, rows.start)
+        values = [self.at(np.sort(extreme.rows)) for extreme in (low, high)]
         first, last = int(np.argmin(values[0])), int(np.argmax(values[1]))
         return int(np.sort(low.rows)[first]), int(np.sort(high.rows)[last])
 
@@ -120,21 +120,21 @@ class DrawnColumn(ComputedColumn):
         """Draws `first` to `last` (exclusive). The last few blocks are kept, since names of cases, inputs and
         comparisons ask for the same draws again."""
         if last - first < CHUNK:
-            return self._made(first, last)
+            return self._draw(first, last)
         parts = []
         for number in range(first // BLOCK, (last - 1) // BLOCK + 1):
             block = self._drawn.get(number)
             if block is None:
-                block = self._made(number * BLOCK, min((number + 1) * BLOCK, self.size))
+                block = self._draw(number * BLOCK, min((number + 1) * BLOCK, self.size))
                 self._drawn[number] = block  # threads that draw it at once all draw the same
                 for old in list(self._drawn)[:-KEPT_BLOCKS]:
                     self._drawn.pop(old, None)
             parts.append(block[max(0, first - number * BLOCK) : last - number * BLOCK])
         return np.concatenate(parts)
 
-    def _made(self, first: int, last: int) -> np.ndarray:
-        at = points(self.seed, self.path, self.number, first, last)
-        return drawn_values(self.distribution, self.arguments, self._measure, at)
+    def _draw(self, first: int, last: int) -> np.ndarray:
+        levels = points(self.seed, self.path, self.number, first, last)
+        return drawn_values(self.distribution, self.arguments, self._measure, levels)
 
 
 class _Nearest:
@@ -143,14 +143,14 @@ class _Nearest:
     MOST = 64
 
     def __init__(self) -> None:
-        self._at, self.rows = np.zeros(0), np.zeros(0, np.int64)
+        self._levels, self.rows = np.zeros(0), np.zeros(0, np.int64)
 
-    def add(self, at: np.ndarray, first: int) -> None:
-        some = np.flatnonzero(at < self._at[-1]) if len(self._at) == self.MOST else np.arange(len(at))
+    def add(self, levels: np.ndarray, first: int) -> None:
+        some = np.flatnonzero(levels < self._levels[-1]) if len(self._levels) == self.MOST else np.arange(len(levels))
         if len(some):
-            both = np.concatenate([self._at, at[some]])
+            both = np.concatenate([self._levels, levels[some]])
             order = np.argsort(both, kind="stable")[: self.MOST]
-            self._at, self.rows = both[order], np.concatenate([self.rows, first + some])[order]
+            self._levels, self.rows = both[order], np.concatenate([self.rows, first + some])[order]
 
 
 # Rounding
@@ -162,15 +162,15 @@ def rounded(exact: np.ndarray, measure: units.Measure) -> np.ndarray:
     All numbers are rounded at once in 64-bit arithmetic; those where it cannot tell which of two doubles is nearest are
     done one by one: 1 % of them, or all on a machine with only 53 bits.
     """
-    found, extended, scale = np.empty(len(exact)), np.finfo(np.longdouble).nmant >= 63, _scale(measure)
+    numbers, extended, scale = np.empty(len(exact)), np.finfo(np.longdouble).nmant >= 63, _scale(measure)
     for first in range(0, len(exact), CHUNK):  # chunks that fit into the processor's cache take a tenth of the time
         some, left = exact[first : first + CHUNK], list(range(min(CHUNK, len(exact) - first)))
         if extended:
-            made, sure = _in_extended(some, scale)
-            found[first : first + CHUNK], left = made, np.flatnonzero(~sure).tolist()
+            converted, sure = _in_extended(some, scale)
+            numbers[first : first + CHUNK], left = converted, np.flatnonzero(~sure).tolist()
         for n in left:
-            found[first + n] = measure.to_si(float(f"{some[n]:.{DIGITS}g}"))
-    return found
+            numbers[first + n] = measure.to_si(float(f"{some[n]:.{DIGITS}g}"))
+    return numbers
 
 
 def _in_extended(exact: np.ndarray, scale: np.longdouble) -> tuple[np.ndarray, np.ndarray]:
@@ -201,35 +201,35 @@ def _scale(measure: units.Measure) -> np.longdouble:
     return np.longdouble(high) + np.longdouble(float(whole - Fraction(high)))
 
 
-def _truncated(at: np.ndarray, mean: float, deviation: float, low: float, high: float) -> np.ndarray:
+def _truncated(levels: np.ndarray, mean: float, deviation: float, low: float, high: float) -> np.ndarray:
     from scipy.stats import truncnorm
 
-    found = truncnorm.ppf(at, (low - mean) / deviation, (high - mean) / deviation, loc=mean, scale=deviation)
-    return np.asarray(found, dtype=float)
+    quantiles = truncnorm.ppf(levels, (low - mean) / deviation, (high - mean) / deviation, loc=mean, scale=deviation)
+    return np.asarray(quantiles, dtype=float)
 
 
-def _normal(at: np.ndarray, mean: float, deviation: float) -> np.ndarray:
+def _normal(levels: np.ndarray, mean: float, deviation: float) -> np.ndarray:
     from scipy.special import ndtri
 
-    return np.asarray(mean + deviation * ndtri(at), dtype=float)
+    return np.asarray(mean + deviation * ndtri(levels), dtype=float)
 
 
-def _loguniform(at: np.ndarray, low: float, high: float) -> np.ndarray:
+def _loguniform(levels: np.ndarray, low: float, high: float) -> np.ndarray:
     """Quantiles by equal ratios, with both ends on one side of 0; by their logarithms where no double holds their
     ratio."""
     with np.errstate(over="ignore", under="ignore"):
         ratio = np.float64(high) / low
     if np.finfo(float).tiny <= ratio < np.inf:
-        return np.asarray(low * np.exp(np.log(ratio) * at))
+        return np.asarray(low * np.exp(np.log(ratio) * levels))
     first, last = np.log(np.abs([low, high]))
-    return np.asarray(np.sign(low) * np.exp(first + (last - first) * at))
+    return np.asarray(np.sign(low) * np.exp(first + (last - first) * levels))
 
 
 ARGUMENTS: Mapping[str, int] = {"uniform": 2, "loguniform": 2, "normal": 2, "truncated": 4}
 """Number of arguments of each distribution."""
 
 QUANTILES: Mapping[str, Callable[..., np.ndarray]] = {
-    "uniform": lambda at, low, high: low + (high - low) * at,
+    "uniform": lambda levels, low, high: low + (high - low) * levels,
     "loguniform": _loguniform,
     "normal": _normal,
     "truncated": _truncated,

@@ -208,10 +208,10 @@ def completed(plan: Plan, name: str = "plan", version: int = VERSION) -> Plan:
                 problems.append(error("E304", message, help="make the plan again from its deck"))
                 continue
             added[path] = quantity
-            shown = quantity.value if isinstance(quantity.value, str) else f"{quantity.value!r} {quantity.unit}"
+            value_text = quantity.value if isinstance(quantity.value, str) else f"{quantity.value!r} {quantity.unit}"
             if isinstance(quantity.value, Formula):
-                shown = "that of the joint's servo"
-            notes.append(f"`{path}` is not in the plan (schema {version}): its default, {shown}, is taken")
+                value_text = "that of the joint's servo"
+            notes.append(f"`{path}` is not in the plan (schema {version}): its default, {value_text}, is taken")
         if len(added) > len(experiment.parameters):
             experiment = replace(experiment, parameters=added, notes=tuple(notes))
         experiments.append(experiment)
@@ -235,8 +235,8 @@ def array_bytes(array: np.ndarray) -> bytes:
 def columns(experiment: Experiment) -> list[CaseValues]:
     """The values of all coordinates, SI, then repeats and positions if there are any."""
     cases = experiment.cases
-    found = [coordinate.values for coordinate in cases.coordinates]
-    return found + [column for column in (cases.repeats, cases.positions) if column is not None]
+    values = [coordinate.values for coordinate in cases.coordinates]
+    return values + [column for column in (cases.repeats, cases.positions) if column is not None]
 
 
 def table_pieces(experiment: Experiment) -> Iterator[tuple[int, slice, np.ndarray]]:

@@ -57,10 +57,10 @@ def check_paths(experiment: Experiment, where: str) -> None:
     components."""
     structure = experiment.structure
     for use in structure.guides:
-        found = guided_components(experiment, use)
-        if found is None:
+        guided = guided_components(experiment, use)
+        if guided is None:
             continue  # missing: E304
-        link, components = found
+        link, components = guided
         for course in use.courses:
             if course.component not in components:
                 raise Damaged(f"{where}.guides.{use.name}.{course.component}", "this component is not guided")

@@ -66,7 +66,7 @@ def case_names(experiment: Experiment, rows: np.ndarray, head: bytes | None = No
 
 
 def _words(digests: np.ndarray) -> list[str]:
-    return [each.decode("ascii") for each in digests.tolist()]
+    return [digest.decode("ascii") for digest in digests.tolist()]
 
 
 def _case_key_digests(experiment: Experiment, rows: np.ndarray) -> np.ndarray:
@@ -122,25 +122,25 @@ def content_digest(question: str, experiment: Experiment, rows: Sequence[int] = 
     cases, formulas = experiment.cases, experiment.formulas
     parameters = [(path, _value(quantity.value)) for path, quantity in experiment.parameters.items()]
     head, table = _row_table(experiment, np.asarray(rows, np.int64))
-    asked = [
+    parts = [
         question, _described(experiment.structure), list(inputs(experiment)), [int(row) for row in rows],
         sorted(parameters, key=itemgetter(0)), cases.seed, cases.seeds, formulas.inputs, formulas.nodes,
         formulas.outputs, head, table.tobytes(),
     ]  # fmt: skip
     try:
-        packed = marshal.dumps(asked, MARSHAL)
+        packed = marshal.dumps(parts, MARSHAL)
     except ValueError:  # numbers of numpy
-        packed = marshal.dumps([_bytes(asked[:-2]), *asked[-2:]], MARSHAL)
+        packed = marshal.dumps([_bytes(parts[:-2]), *parts[-2:]], MARSHAL)
     return hashlib.sha256(packed).digest()
 
 
 def id_numbers(experiment: Experiment) -> np.ndarray:
     """case_id of every case as a whole number, in the order of the table: the same bits in a tenth of the memory."""
-    found = np.empty(experiment.cases.count, ">u8")
+    numbers = np.empty(experiment.cases.count, ">u8")
     for piece in blocks(experiment.cases.count):
         ids = _case_id_digests(experiment, _case_key_digests(experiment, _rows(piece)))
-        found[piece] = np.frombuffer(bytes.fromhex(ids.tobytes().decode("ascii")), ">u8")
-    return found
+        numbers[piece] = np.frombuffer(bytes.fromhex(ids.tobytes().decode("ascii")), ">u8")
+    return numbers
 
 
 def case_seeds(experiment: Experiment, rows: Sequence[int] | np.ndarray | None = None) -> np.ndarray:
@@ -162,12 +162,12 @@ def _row_digests(head: bytes, rows: np.ndarray) -> np.ndarray:
     if not len(rows):
         return np.zeros(0, f"S{2 * DIGEST_BYTES}")
     begun = hashlib.blake2b(hashlib.sha256(head).digest(), digest_size=DIGEST_BYTES).copy
-    found = []
+    digests = []
     for row in np.ascontiguousarray(rows).view(f"V{rows.shape[1]}").ravel().tolist():
-        each = begun()
-        each.update(row)
-        found.append(each.digest())
-    return np.frombuffer(b"".join(found).hex().encode("ascii"), f"S{2 * DIGEST_BYTES}")
+        hasher = begun()
+        hasher.update(row)
+        digests.append(hasher.digest())
+    return np.frombuffer(b"".join(digests).hex().encode("ascii"), f"S{2 * DIGEST_BYTES}")
 
 
 def _value(value: Any) -> Any:

@@ -46,25 +46,25 @@ class LimitUse:
 
 def limits(structure: Structure, parameters: Mapping[str, Quantity]) -> tuple[LimitUse, ...]:
     """All limits that can be reached in a case: of joints, of their servos and commands, of environment models."""
-    found = (
+    uses = (
         *_of_joints(structure),
         *_of_servos(structure),
         *_of_commands(structure),
         *_of_environment(structure, parameters),
     )
-    return tuple(each for each in found if _is_one(parameters.get(each.path)))
+    return tuple(use for use in uses if _is_one(parameters.get(use.path)))
 
 
 def extremes(experiment: Experiment) -> dict[str, tuple[LimitUse, ...]]:
     """The required metrics that state an extreme, by name, each with the machines' limits that may have cut it: those
     of its channel's joint, or all where the channel belongs to no joint."""
     required = {requirement.metric for requirement in experiment.requirements}
-    known, found = channels(experiment.structure), limits(experiment.structure, experiment.parameters)
+    known, uses = channels(experiment.structure), limits(experiment.structure, experiment.parameters)
     out = {}
     for use in experiment.structure.metrics:
         if use.name in required and models.find("metric", use.model, use.place).extreme:
             joint = known[use.of].joint
-            if those := tuple(each for each in found if each.machine and joint in ("", each.joint)):
+            if those := tuple(limit_use for limit_use in uses if limit_use.machine and joint in ("", limit_use.joint)):
                 out[use.name] = those
     return out
 
@@ -107,5 +107,7 @@ def _of_environment(structure: Structure, parameters: Mapping[str, Quantity]) ->
         named = next((parameter.name for parameter in model.parameters if parameter.names == "joint"), "")
         joint = parameters[f"{path}.{named}"].value if named and f"{path}.{named}" in parameters else ""
         for limit in model.limits:
-            table = any(one.name == limit.parameter and one.shape == "list" for one in model.parameters)
+            table = any(
+                parameter.name == limit.parameter and parameter.shape == "list" for parameter in model.parameters
+            )
             yield LimitUse(f"{path}.{limit.parameter}", str(joint), declared=limit, owner=use.name, machine=not table)

@@ -33,8 +33,8 @@ def _of_servo(use: ServoUse) -> list[InputSignal]:
     parts = servo_parts(use)
     if models.find("servo", use.model, use.place).control is None or parts.continuous:
         return []
-    asked = [InputSignal(f"{use.joint}.servo.command", use.joint, use.divisor, False)] if use.command else []
-    return asked + [
+    signals = [InputSignal(f"{use.joint}.servo.command", use.joint, use.divisor, False)] if use.command else []
+    return signals + [
         InputSignal(f"{use.joint}.servo.{output.name}", use.joint, use.divisor, True) for output in parts.outputs
     ]
 

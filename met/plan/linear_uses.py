@@ -64,8 +64,8 @@ class LinearFigure:
 
 
 FIGURES: Mapping[str, LinearFigure] = {
-    each.name: each
-    for each in (
+    figure.name: figure
+    for figure in (
         LinearFigure("gain_margin", "1", "factor by which the loop's gain may rise or fall; 1 if the loop is unstable",
                      least=1.0, one_rate=False, unstable=1.0),
         LinearFigure("phase_margin", "rad", "angle by which the loop's phase may change in either direction; 0 if "

@@ -36,8 +36,8 @@ def metric_units(structure: Structure, linear: Sequence[MetricUse] = ()) -> dict
     return own | {use.name: FIGURES[use.model].unit for use in linear}
 
 
-def _metric_unit(use: MetricUse, of: str) -> str:
-    return watched_unit(str(models.find("metric", use.model, use.place).unit), of)
+def _metric_unit(use: MetricUse, watched: str) -> str:
+    return watched_unit(str(models.find("metric", use.model, use.place).unit), watched)
 
 
 def joint_parts(name: str, joints: tuple[str, ...]) -> tuple[str, ...]:

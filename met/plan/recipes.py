@@ -32,14 +32,14 @@ class ArrayKeeper:
     """Storage that keeps each array once, by a function of its number and the array that returns its place."""
 
     def __init__(self, put: Callable[[int, np.ndarray], Any]) -> None:
-        self._put, self._kept = put, list[tuple[np.ndarray, Any]]()
+        self._put, self._stored = put, list[tuple[np.ndarray, Any]]()
 
     def keep(self, array: np.ndarray) -> Any:
-        for known, where in self._kept:
+        for known, where in self._stored:
             if known is array:
                 return where
-        where = self._put(len(self._kept), array)
-        self._kept.append((array, where))
+        where = self._put(len(self._stored), array)
+        self._stored.append((array, where))
         return where
 
 
@@ -61,7 +61,7 @@ def encoded(column: CaseValues, keep: Keep) -> Any:
             among = column.among and {"bits": keep(column.among.packed), "count": column.among.count}
             return {"positions": _rows(column.rows, keep), "among": among}
         case columns.ShiftedColumn():
-            return {"shifted": encoded(column.of, keep), "by": column.by, "whole": column.dtype == np.int64}
+            return {"shifted": encoded(column.values, keep), "by": column.by, "whole": column.dtype == np.int64}
         case drawing.DrawnColumn():
             return {
                 "seed": column.seed,
@@ -127,11 +127,11 @@ class RecipeReader:
         if isinstance(data, Mapping):
             if data.keys() & {"axis", "first", "positions", "shifted", "seed"}:
                 return self.column(data)
-            found = self._find(data)
-            if found.ndim != 1:
+            column = self._find(data)
+            if column.ndim != 1:
                 raise ValueError("an axis is a row of numbers")
-            return np.asarray(found, dtype=float)
-        return np.array([_number(each) for each in data], dtype=float)
+            return np.asarray(column, dtype=float)
+        return np.array([_number(number) for number in data], dtype=float)
 
     def _rows(self, data: Mapping[str, Any]) -> SweptRows:
         known = json.dumps(data, sort_keys=True)

@@ -36,11 +36,11 @@ class RunKey:
             return written == self.true
         return int(written) if self.parameter.whole else written
 
-    def in_deck(self, kept: Any) -> str | float:
+    def in_deck(self, value: Any) -> str | float:
         """Return the deck's value, in SI, for the plan's value."""
         if self.true:
-            return next(word for word in self.parameter.words if (word == self.true) is kept)
-        return kept if isinstance(kept, str) else float(kept)
+            return next(word for word in self.parameter.words if (word == self.true) is value)
+        return value if isinstance(value, str) else float(value)
 
 
 def run_key(key: RunKey) -> Any:

@@ -212,7 +212,7 @@ class Search:
 
     def values(self, points: np.ndarray) -> np.ndarray:
         """Values of the chosen parameters, [candidate, parameter], SI, at these points of the unit cube."""
-        columns = [each.values(points[:, number]) for number, each in enumerate(self.parameters)]
+        columns = [parameter.values(points[:, number]) for number, parameter in enumerate(self.parameters)]
         return np.stack(columns, axis=1) if len(points) else np.empty((0, len(self.parameters)))
 
     def generation_of(self, rows: np.ndarray) -> np.ndarray:

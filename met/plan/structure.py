@@ -74,12 +74,12 @@ def _check_arm(structure: Structure, where: str) -> None:
     standing = {BASE}
     for joint_index, joint in enumerate(structure.joints):
         passed: set[str] = set()
-        at = joint.child
-        while at not in standing:
-            if at in passed:
-                raise Damaged(f"{where}.joints[{joint_index}].parent", f"link `{at}` hangs on itself")
-            passed.add(at)
-            at = parents[at]
+        below = joint.child
+        while below not in standing:
+            if below in passed:
+                raise Damaged(f"{where}.joints[{joint_index}].parent", f"link `{below}` hangs on itself")
+            passed.add(below)
+            below = parents[below]
         standing |= passed
 
 
@@ -197,17 +197,20 @@ def _check_expressions(structure: Structure, where: str) -> None:
     """Check that expressions are computed from existing channels, and have names of their own and one output."""
     known = channels(replace(structure, expressions=())) if structure.expressions else {}
     names: list[str] = []
-    for index, each in enumerate(structure.expressions):
+    for index, expression in enumerate(structure.expressions):
         path = f"{where}[{index}]"
-        if each.name in known or each.name in names:
-            raise Damaged(f"{path}.name", f"there is a channel `{each.name}` already")
-        names.append(each.name)
-        if not each.channels:
+        if expression.name in known or expression.name in names:
+            raise Damaged(f"{path}.name", f"there is a channel `{expression.name}` already")
+        names.append(expression.name)
+        if not expression.channels:
             raise Damaged(f"{path}.formula", "it is computed of no channel")
-        for channel in each.channels:
+        for channel in expression.channels:
             if channel not in known:
                 raise Damaged(f"{path}.formula", f"there is no channel `{channel}`")
-        if len(each.formula.outputs) != 1 or each.formula.nodes[each.formula.outputs[0] >> 1][0] in TRUTHS:
+        if (
+            len(expression.formula.outputs) != 1
+            or expression.formula.nodes[expression.formula.outputs[0] >> 1][0] in TRUTHS
+        ):
             raise Damaged(f"{path}.formula", "it should have one output, a number")
 
 

@@ -54,22 +54,22 @@ class RowBits:
     def select(self, places: np.ndarray) -> np.ndarray:
         """The rows at these places among the counting ones."""
         block = np.searchsorted(self._before, places, side="right") - 1
-        found = np.empty(len(places), np.int64)
-        for number, here in _alike(block):
+        selected = np.empty(len(places), np.int64)
+        for number, in_block in _alike(block):
             first = number * BLOCK
             rows = np.flatnonzero(self[slice(first, min(first + BLOCK, self.count))])
-            found[here] = first + rows[places[here] - self._before[number]]
-        return found
+            selected[in_block] = first + rows[places[in_block] - self._before[number]]
+        return selected
 
     def rank(self, rows: np.ndarray) -> np.ndarray:
         """The number of counting rows before each of these."""
-        found = np.empty(len(rows), np.int64)
-        for number, here in _alike(rows // BLOCK):
+        ranks = np.empty(len(rows), np.int64)
+        for number, in_block in _alike(rows // BLOCK):
             first = number * BLOCK
             flags = self[slice(first, min(first + BLOCK, self.count))]
             before = np.cumsum(flags, dtype=np.int64) - flags
-            found[here] = self._before[number] + before[rows[here] - first]
-        return found
+            ranks[in_block] = self._before[number] + before[rows[in_block] - first]
+        return ranks
 
 
 def _alike(numbers: np.ndarray) -> Iterator[tuple[int, np.ndarray | slice]]:
@@ -111,9 +111,9 @@ class SweptRows:
     def count(self) -> int:
         return self.product if self.kept is None else self.kept.set
 
-    def only(self, kept: RowBits) -> SweptRows:
+    def only(self, bits: RowBits) -> SweptRows:
         """These rows, of which none is left out yet, restricted to the kept ones."""
-        return SweptRows(self.sizes, self.chosen, kept)
+        return SweptRows(self.sizes, self.chosen, bits)
 
     def index(self, axis: int, rows: np.ndarray) -> np.ndarray:
         """The value of an axis in each of these rows, by its place."""
@@ -129,10 +129,10 @@ class SweptRows:
         inner = rows if self.kept is None else self.kept.select(rows)
         if all(chosen is None for chosen in self.chosen):
             return inner
-        found = np.zeros(len(rows), np.int64)
+        numbers = np.zeros(len(rows), np.int64)
         for axis, size in enumerate(self.sizes):
-            found = found * size + self._index(axis, inner)
-        return found
+            numbers = numbers * size + self._index(axis, inner)
+        return numbers
 
     def present(self, axis: int) -> np.ndarray:
         """The places of the axis' values that occur in these rows, ascending."""
@@ -140,8 +140,8 @@ class SweptRows:
         if self.kept is None:
             return np.arange(size) if chosen is None else chosen
         seen = np.zeros(size, bool)
-        for here in blocks(self.count):
-            seen[self.index(axis, np.arange(here.start, here.stop))] = True
+        for piece in blocks(self.count):
+            seen[self.index(axis, np.arange(piece.start, piece.stop))] = True
         return np.flatnonzero(seen)
 
     def _index(self, axis: int, inner: np.ndarray) -> np.ndarray:

@@ -53,8 +53,10 @@ def packages(structures: Iterable[Structure]) -> tuple[str, ...]:
         used["integrator"].add(structure.integrator)
         used["bed"] |= {use.bed for use in structure.substitutions}
         used["law"] |= {use.law for use in structure.substitutions}
-    found = set()
+    used_packages = set()
     for kind, names in used.items():
         if theirs := names - models.find_own(kind).keys():
-            found |= {point.package for point in offered(models.GROUPS[kind].entry_points) if point.name in theirs}
-    return tuple(sorted(found))
+            used_packages |= {
+                point.package for point in offered(models.GROUPS[kind].entry_points) if point.name in theirs
+            }
+    return tuple(sorted(used_packages))
