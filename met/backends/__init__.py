@@ -26,8 +26,8 @@ DEFAULT = "llvm"
 
 def find(name: str = DEFAULT) -> Backend:
     """The back end of that name; it is imported when it is first asked for. Raises KeyError."""
-    found: Backend = import_module(HOMES[name]).BACKEND
-    return found
+    backend: Backend = import_module(HOMES[name]).BACKEND
+    return backend
 
 
 def load(recording: Recording, lanes: int | None = None, *, name: str = DEFAULT) -> Kernel:

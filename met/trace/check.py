@@ -47,7 +47,7 @@ def check_nodes(where: str, nodes: Sequence[Node]) -> None:
             raise ValueError(f"{where}: node {i} is {op!r}, which is no operation")
         count = OPERANDS[op]
         rest = node[1 + count :]
-        if len(node) < 1 + count or [type(each) for each in rest] != ([_REST[op]] if op in _REST else []):
+        if len(node) < 1 + count or [type(part) for part in rest] != ([_REST[op]] if op in _REST else []):
             raise ValueError(f"{where}: node {i} is {node!r}, and `{op}` has {count} operands")
         for position, ref in enumerate(node[1 : 1 + count], start=1):
             if not isinstance(ref, int) or not 0 <= ref >> 1 < i:
@@ -58,13 +58,13 @@ def check_nodes(where: str, nodes: Sequence[Node]) -> None:
 
 
 def _check_results(section: CodeSection, cells: set[str], columns: int, outputs: int) -> None:
-    for kind, there, results in (
+    for kind, known, results in (
         ("cell", cells, section.stores),
         ("column", range(columns), section.records),
         ("output", range(outputs), section.outputs),
     ):
         for name, ref in results:
-            if name not in there:
+            if name not in known:
                 raise ValueError(f"{section.name}: it sets the {kind} {name!r}, which there is not")
             if section.nodes[ref >> 1][0] in TRUTHS:
                 raise ValueError(f"{section.name}: the {kind} {name!r} is set to a truth")

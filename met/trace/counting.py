@@ -33,23 +33,23 @@ def counting(program: Program) -> tuple[Program, tuple[Loop, ...]]:
     loops: list[Loop] = []
 
     def counted(body: tuple[Control, ...], outer: bool) -> tuple[Control, ...]:
-        made: list[Control] = []
+        steps: list[Control] = []
         for node in body:
             if isinstance(node, WhileAny):
                 number = len(loops)
                 loop = Loop(node.cell, f"loop.{number}.entries", f"loop.{number}.turns", outer)
                 loops.append(loop)
                 inner = counted(node.body, False)
-                made += [RunPhase(_come_to(loop)), WhileAny(node.cell, node.at_most, (RunPhase(_turn(loop)), *inner))]
+                steps += [RunPhase(_come_to(loop)), WhileAny(node.cell, node.at_most, (RunPhase(_turn(loop)), *inner))]
             elif isinstance(node, (Every, Unless0)):
-                made.append(replace(node, body=counted(node.body, outer)))
+                steps.append(replace(node, body=counted(node.body, outer)))
             else:
-                made.append(node)
-        return tuple(made)
+                steps.append(node)
+        return tuple(steps)
 
     start, tick = counted(program.start, True), counted(program.tick, True)
     names = tuple(name for loop in loops for name in (loop.entries, loop.turns))
-    end = (*program.end, RunPhase(_told(names)))
+    end = (*program.end, RunPhase(_giving(names)))
     return replace(program, start=start, tick=tick, end=end, outputs=(*program.outputs, *names)), tuple(loops)
 
 
@@ -70,7 +70,7 @@ def _turn(loop: Loop) -> Phase:
     return Phase(f"turn of {loop.cell}", body)
 
 
-def _told(names: tuple[str, ...]) -> Phase:
+def _giving(names: tuple[str, ...]) -> Phase:
     def body(tape: Tape) -> None:
         for name in names:
             tape.output(name, tape.read(name))

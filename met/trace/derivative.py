@@ -23,8 +23,8 @@ ROUNDS = 2.0**51
 def derivative(x: Scalar, name: str) -> Scalar:
     """d x / d `name`, an input of x's graph; its other inputs, cells, tick and time are held."""
     graph = x.graph
-    found = slopes(graph, graph.live([x.ref]), lambda node: graph.constant(float(node == ("input", name))))
-    return Scalar(graph, found[x.ref >> 1] ^ (x.ref & 1))
+    tangents = slopes(graph, graph.live([x.ref]), lambda node: graph.constant(float(node == ("input", name))))
+    return Scalar(graph, tangents[x.ref >> 1] ^ (x.ref & 1))
 
 
 def slopes(
@@ -41,33 +41,33 @@ def slopes(
     straight  tells of a `floor` or `rint` by its position whether it counts as the straight line through its steps
     known     derivatives that are known in closed form; None: each operation goes by its own rule
     """
-    found: dict[int, int] = {}
+    tangents: dict[int, int] = {}
     closed: dict[int, int] = {}
 
     def tangent(ref: int) -> int:
-        return found.get(ref >> 1, ZERO) ^ (ref & 1)
+        return tangents.get(ref >> 1, ZERO) ^ (ref & 1)
 
     for i in order:
         if known is not None:
             if i not in closed:
                 closed |= known.at(i, tangent)
             if i in closed:
-                found[i] = closed[i]
+                tangents[i] = closed[i]
                 continue
         op, *rest = graph.nodes[i]
         operands = [ref for ref in rest[: OPERANDS[op]] if graph.nodes[ref >> 1][0] not in TRUTHS]
-        moving = any(found[ref >> 1] & -2 != ZERO for ref in operands)
+        moving = any(tangents[ref >> 1] & -2 != ZERO for ref in operands)
         if op in ("input", "cell"):
-            found[i] = leaf(graph.nodes[i])
+            tangents[i] = leaf(graph.nodes[i])
         elif moving and op in STEPS and straight(i):
-            found[i] = found[rest[0] >> 1] ^ (rest[0] & 1)
+            tangents[i] = tangents[rest[0] >> 1] ^ (rest[0] & 1)
         elif moving and op in _RULES and not rounds(graph, op, rest):
             numbers = [Scalar(graph, ref) for ref in rest[: OPERANDS[op]]]
-            moves = [Scalar(graph, found.get(ref >> 1, ZERO) ^ (ref & 1)) for ref in rest[: OPERANDS[op]]]
-            found[i] = _RULES[op](graph, [*rest[OPERANDS[op] :]], Scalar(graph, 2 * i), numbers, moves).ref
+            moves = [Scalar(graph, tangents.get(ref >> 1, ZERO) ^ (ref & 1)) for ref in rest[: OPERANDS[op]]]
+            tangents[i] = _RULES[op](graph, [*rest[OPERANDS[op] :]], Scalar(graph, 2 * i), numbers, moves).ref
         else:
-            found[i] = ZERO
-    return found
+            tangents[i] = ZERO
+    return tangents
 
 
 def rounds(graph: Nodes, op: str, operands: Sequence[int]) -> bool:
@@ -101,7 +101,7 @@ def sign_of(graph: Nodes, chosen: Sequence[int]) -> int | None:
 
 
 def _choice(graph: Nodes, x: list[Scalar], dx: list[Scalar]) -> Scalar:
-    if sign_of(graph, [each.ref for each in x]) is not None:
+    if sign_of(graph, [operand.ref for operand in x]) is not None:
         return Scalar(graph, ZERO)
     return Scalar(graph, graph.where(x[0].ref, dx[1].ref, dx[2].ref))
 

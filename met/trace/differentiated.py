@@ -26,10 +26,14 @@ def differentiated(recording: Recording, inputs: Collection[str], straight: Stra
     does not move has the tangent 0."""
     program = recording.program
     moving = moving_cells(recording, inputs, straight)
-    made = [_section(one, moving, inputs, straight, len(program.outputs)) for one in recording.sections]
-    asked = {node.cell for node in walk((*program.start, *program.tick, *program.end)) if isinstance(node, WhileAny)}
-    sections = without_dead_stores(made, asked)
-    found = Recording(
+    tangent_sections = [
+        _section(section, moving, inputs, straight, len(program.outputs)) for section in recording.sections
+    ]
+    condition_cells = {
+        node.cell for node in walk((*program.start, *program.tick, *program.end)) if isinstance(node, WhileAny)
+    }
+    sections = without_dead_stores(tangent_sections, condition_cells)
+    tangent_recording = Recording(
         replace(
             program,
             inputs=(*program.inputs, *(HEAD + name for name in program.inputs if name in inputs)),
@@ -40,17 +44,17 @@ def differentiated(recording: Recording, inputs: Collection[str], straight: Stra
         recording.start,
         recording.tick,
         recording.end,
-        used_cells(sections, asked),
+        used_cells(sections, condition_cells),
     )
     if check.wanted():
-        check.check(found)
-    return found
+        check.check(tangent_recording)
+    return tangent_recording
 
 
 def moving_cells(recording: Recording, inputs: Collection[str], straight: Straight) -> frozenset[str]:
     """The cells that move with these inputs at any tick."""
-    found: set[str] = set()
-    return _closed(recording, found, lambda section: moved_by(section, found, inputs, straight))
+    cells: set[str] = set()
+    return _closed(recording, cells, lambda section: moved_by(section, cells, inputs, straight))
 
 
 @frozen
@@ -70,7 +74,9 @@ def dependence(recording: Recording, name: str, straight: Straight) -> Dependenc
 
     def of(reached: Callable[[CodeSection], bytearray]) -> frozenset[str]:
         ends = ((section, reached(section)) for section in recording.sections if section.outputs)
-        return frozenset(outputs[number] for section, at in ends for number, ref in section.outputs if at[ref >> 1])
+        return frozenset(
+            outputs[number] for section, marks in ends for number, ref in section.outputs if marks[ref >> 1]
+        )
 
     return Dependence(
         of(lambda section: moving_nodes(section, moving, (name,), straight)),
@@ -78,36 +84,38 @@ def dependence(recording: Recording, name: str, straight: Straight) -> Dependenc
     )
 
 
-def _closed(recording: Recording, found: set[str], more: Callable[[CodeSection], Iterable[str]]) -> frozenset[str]:
+def _closed(recording: Recording, cells: set[str], more: Callable[[CodeSection], Iterable[str]]) -> frozenset[str]:
     """All cells that follow from those found before, section by section; a section is examined again only where it
     reads a new one."""
-    reads = [{one.nodes[i][1] for i in one.order if one.nodes[i][0] == "cell"} for one in recording.sections]
+    reads = [
+        {section.nodes[i][1] for i in section.order if section.nodes[i][0] == "cell"} for section in recording.sections
+    ]
     waiting = list(range(len(recording.sections)))
     while waiting:
-        before = set(found)
+        before = set(cells)
         for number in waiting:
-            found |= set(more(recording.sections[number]))
-        new = found - before
+            cells |= set(more(recording.sections[number]))
+        new = cells - before
         waiting = [number for number, cells in enumerate(reads) if cells & new]
-    return frozenset(found)
+    return frozenset(cells)
 
 
-def _stored(section: CodeSection, at: bytearray) -> Iterator[str]:
-    return (cell for cell, ref in section.stores if at[ref >> 1])
+def _stored(section: CodeSection, marks: bytearray) -> Iterator[str]:
+    return (cell for cell, ref in section.stores if marks[ref >> 1])
 
 
 def _changing(section: CodeSection, cells: Collection[str], name: str) -> bytearray:
     """By position, 1 for each live node that depends on these cells or on the input, through truths too."""
-    found = bytearray(len(section.nodes))
+    marks = bytearray(len(section.nodes))
     for i in section.order:
         op, *rest = section.nodes[i]
         if op == "cell":
-            found[i] = rest[0] in cells
+            marks[i] = rest[0] in cells
         elif op == "input":
-            found[i] = rest[0] == name
+            marks[i] = rest[0] == name
         else:
-            found[i] = any(found[ref >> 1] for ref in rest[: OPERANDS[op]])
-    return found
+            marks[i] = any(marks[ref >> 1] for ref in rest[: OPERANDS[op]])
+    return marks
 
 
 def _section(
@@ -119,13 +127,13 @@ def _section(
 ) -> CodeSection:
     """A section with tangents as stores and outputs of their own; a cell whose new value does not move gets the tangent
     0, since it may have had another."""
-    found = with_tangents(section, moving, straight, inputs)
-    tangents, of_outputs = dict(found.tangents), dict(found.output_tangents)
+    moved = with_tangents(section, moving, straight, inputs)
+    tangents, of_outputs = dict(moved.tangents), dict(moved.output_tangents)
     stores = (
         *section.stores,
         *((HEAD + cell, tangents.get(cell, 0)) for cell, _ in section.stores if cell in moving),
     )
     ends = (*section.outputs, *((outputs + number, of_outputs.get(number, 0)) for number, _ in section.outputs))
     roots = [ref for _, ref in (*stores, *ends)]
-    nodes = fused_from(found.nodes, roots, len(section.nodes))
+    nodes = fused_from(moved.nodes, roots, len(section.nodes))
     return CodeSection(section.name, tuple(nodes), stores, (), ends, section.parts)

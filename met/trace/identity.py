@@ -32,11 +32,11 @@ def result_keys(recording: Recording, results: Mapping[str, Collection[int] | st
     state = _state_writer(recording)
     state.key()
     keys = {}
-    for name, of in results.items():
-        if isinstance(of, str):
-            writer = _Writer(recording, {recording.program.outputs.index(of): 0}, state=state.cells)
+    for name, wanted in results.items():
+        if isinstance(wanted, str):
+            writer = _Writer(recording, {recording.program.outputs.index(wanted): 0}, state=state.cells)
         else:
-            writer = _Writer(recording, {}, {column: place for place, column in enumerate(of)}, state.cells)
+            writer = _Writer(recording, {}, {column: place for place, column in enumerate(wanted)}, state.cells)
         keys[name] = writer.key()
     return keys
 
@@ -85,17 +85,17 @@ class _Writer:
 
     def _control(self, body: Iterable[RecordedControl]) -> list[Any]:
         """A body of control, without unneeded parts."""
-        kept: list[Any] = []
+        needed: list[Any] = []
         for step in body:
             if isinstance(step, Branch):
                 inner = self._control(step.body)
                 if inner:
-                    kept.append([*self._condition(step.condition), inner])
+                    needed.append([*self._condition(step.condition), inner])
                 continue
             section = self._section(step.section)
             if section is not None:
-                kept.append(["row", step.divisor, section] if isinstance(step, RecordSection) else section)
-        return kept
+                needed.append(["row", step.divisor, section] if isinstance(step, RecordSection) else section)
+        return needed
 
     def _condition(self, condition: Any) -> list[Any]:
         if isinstance(condition, WhileAny):

@@ -35,19 +35,19 @@ class KnownTangents:
 
     def __init__(self, graph: Nodes, known: Sequence[KnownDerivative]) -> None:
         self._graph, self._known = graph, known
-        self._made: dict[int, Callable[[Tangent], Sequence[int]]] = {}
-        self._of = {ref >> 1: number for number, each in enumerate(known) for ref in each.results}
+        self._moves: dict[int, Callable[[Tangent], Sequence[int]]] = {}
+        self._number_of = {ref >> 1: number for number, derivative in enumerate(known) for ref in derivative.results}
 
     def at(self, position: int, tangent: Tangent) -> dict[int, int]:
         """By position, the derivatives of all results of the computation that gives a node; none where they are not
         known. tangent: of nodes before it"""
-        number = self._of.get(position)
+        number = self._number_of.get(position)
         if number is None:
             return {}
-        each = self._known[number]
-        if any(tangent(ref) & -2 != ZERO for ref in each.held):
+        derivative = self._known[number]
+        if any(tangent(ref) & -2 != ZERO for ref in derivative.held):
             return {}
-        if number not in self._made:
-            self._made[number] = each.moves(self._graph)
-        found = self._made[number](tangent)
-        return {ref >> 1: move ^ (ref & 1) for ref, move in zip(each.results, found, strict=True)}
+        if number not in self._moves:
+            self._moves[number] = derivative.moves(self._graph)
+        moves = self._moves[number](tangent)
+        return {ref >> 1: move ^ (ref & 1) for ref, move in zip(derivative.results, moves, strict=True)}

@@ -67,40 +67,40 @@ ZERO, ONE, FALSE, TRUE = 0, 2, 4, 5
 class Nodes:
     """Nodes made so far, and the rules by which new ones are made (head of this file), all by reference."""
 
-    __slots__ = ("_constants", "_literals", "_made", "known", "nodes")
+    __slots__ = ("_constants", "_literals", "_refs", "known", "nodes")
 
     def __init__(self) -> None:
         self.known: list[Any] = []  # of `met.trace.known`
         self.nodes: list[Node] = [("const", 0.0), ("const", 1.0), ("false",)]
-        self._made: dict[Node, int] = {}
+        self._refs: dict[Node, int] = {}
         self._literals: dict[float, int] = {0.0: ZERO, 1.0: ONE}
         self._constants: dict[int, float] = {0: 0.0, 1: 1.0}
 
     @classmethod
     def of(cls, nodes: Iterable[Node]) -> Self:
         """The graph of nodes that were made in another one, at the same positions."""
-        made = cls()
-        for i, node in islice(enumerate(nodes), len(made.nodes), None):
-            made.nodes.append(node)
+        graph = cls()
+        for i, node in islice(enumerate(nodes), len(graph.nodes), None):
+            graph.nodes.append(node)
             if node[0] != "const":
-                made._made.setdefault(node, 2 * i)
+                graph._refs.setdefault(node, 2 * i)
             elif node[1] == node[1]:
-                made._constants[i] = node[1]
-                made._literals.setdefault(node[1], 2 * i)
+                graph._constants[i] = node[1]
+                graph._literals.setdefault(node[1], 2 * i)
             else:
-                made._constants[i] = node[1]
-                made._made.setdefault(("nan",), 2 * i)
-        return made
+                graph._constants[i] = node[1]
+                graph._refs.setdefault(("nan",), 2 * i)
+        return graph
 
     # Making nodes
 
     def make(self, *node: Any) -> int:
         """The reference of a non-constant node, made unless it exists already."""
-        ref = self._made.get(node)
+        ref = self._refs.get(node)
         if ref is None:
             ref = 2 * len(self.nodes)
             self.nodes.append(node)
-            self._made[node] = ref
+            self._refs[node] = ref
         return ref
 
     def constant(self, value: float) -> int:
@@ -108,7 +108,7 @@ class Nodes:
         value = float(value)
         sign = int(math.copysign(1.0, value) < 0.0)
         value = abs(value)
-        ref = self._literals.get(value) if value == value else self._made.get(("nan",))
+        ref = self._literals.get(value) if value == value else self._refs.get(("nan",))
         if ref is None:
             ref = 2 * len(self.nodes)
             self._constants[len(self.nodes)] = value
@@ -116,7 +116,7 @@ class Nodes:
             if value == value:
                 self._literals[value] = ref
             else:
-                self._made[("nan",)] = ref
+                self._refs[("nan",)] = ref
         return ref | sign
 
     def truth(self, value: bool) -> int:

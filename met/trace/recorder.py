@@ -89,7 +89,7 @@ class SectionRecorder:
     def __init__(self, program: Program) -> None:
         self.program = program
         self.sections: list[CodeSection] = []
-        self._made: dict[tuple[tuple[int, ...], str], int] = {}
+        self._section_numbers: dict[tuple[tuple[int, ...], str], int] = {}
 
     def steps(self, body: tuple[Control, ...], where: str) -> tuple[RecordedControl, ...]:
         """A body with its phases recorded, neighbours in one section; where: start, tick or end."""
@@ -120,12 +120,12 @@ class SectionRecorder:
     def _section(self, phases: list[Phase], where: str) -> int:
         """The number of the section of these phases."""
         key = (tuple(map(id, phases)), where)
-        if key not in self._made:
+        if key not in self._section_numbers:
             tape = RecordingTape(self.program, where)
             for phase in phases:
                 with tape.part(phase.name):
                     phase.body(tape)
-            self._made[key] = len(self.sections)
+            self._section_numbers[key] = len(self.sections)
             names = list(dict.fromkeys(phase.name for phase in phases))
             self.sections.append(
                 CodeSection(
@@ -142,7 +142,7 @@ class SectionRecorder:
                     tuple(tape.graph.known),
                 )
             )
-        return self._made[key]
+        return self._section_numbers[key]
 
 
 def record(program: Program, *, fuse: bool = True) -> Recording:
@@ -151,23 +151,25 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
     Stores that no phase and no condition ever reads are dropped, with everything that only they need; then, unless
     `fuse` is false, products are fused into sums (`met.trace.fuse`).
     """
-    made = SectionRecorder(program)
+    recorder = SectionRecorder(program)
     _refuse_nested_records(program)
     start, tick, end = (
-        made.steps(body, where)
+        recorder.steps(body, where)
         for body, where in ((program.start, "start"), (program.tick, "tick"), (program.end, "end"))
     )
-    sections = made.sections
+    sections = recorder.sections
     _check_complete(program, sections)
-    asked = {node.cell for node in walk((*program.start, *program.tick, *program.end)) if isinstance(node, WhileAny)}
-    kept = without_dead_stores(sections, asked)
-    _check_written(program, kept, asked)
-    cells = used_cells(kept, asked)
+    condition_cells = {
+        node.cell for node in walk((*program.start, *program.tick, *program.end)) if isinstance(node, WhileAny)
+    }
+    live_sections = without_dead_stores(sections, condition_cells)
+    _check_written(program, live_sections, condition_cells)
+    cells = used_cells(live_sections, condition_cells)
     if check.wanted():
-        check.check(Recording(program, tuple(kept), start, tick, end, cells))
+        check.check(Recording(program, tuple(live_sections), start, tick, end, cells))
     if fuse:
-        kept = _fused(kept, program, (*start, *tick, *end))
-    recording = Recording(program, tuple(kept), start, tick, end, cells)
+        live_sections = _fused(live_sections, program, (*start, *tick, *end))
+    recording = Recording(program, tuple(live_sections), start, tick, end, cells)
     if check.wanted():
         check.check(recording)
     return recording
@@ -193,41 +195,45 @@ def _refuse_nested_records(program: Program) -> None:
 
 
 def _check_complete(program: Program, sections: list[CodeSection]) -> None:
-    columns = {column for one in sections for column, _ in one.records}
+    columns = {column for section in sections for column, _ in section.records}
     missing = sorted(set(range(program.columns)) - columns)
     if missing:
         raise ValueError(f"no phase records columns {missing}")
-    missing = sorted(set(range(len(program.outputs))) - {number for one in sections for number, _ in one.outputs})
+    missing = sorted(
+        set(range(len(program.outputs))) - {number for section in sections for number, _ in section.outputs}
+    )
     if missing:
         raise ValueError(f"no phase writes the outputs {[program.outputs[number] for number in missing]}")
     if program.record_divisor < 1:
         raise ValueError("a record divisor is at least 1")
 
 
-def _check_written(program: Program, sections: list[CodeSection], asked: set[str]) -> None:
+def _check_written(program: Program, sections: list[CodeSection], condition_cells: set[str]) -> None:
     """Raise ValueError where a cell is read that nothing writes: a misspelt name would be 0 for ever."""
-    written = {cell for one in sections for cell, _ in one.stores}.union(program.counters)
-    for one in sections:
-        for i in one.order:
-            if one.nodes[i][0] == "cell" and one.nodes[i][1] not in written:
-                raise ValueError(f"{one.name!r} reads the cell {one.nodes[i][1]!r}, which nothing writes")
-    for cell in sorted(asked - written):
+    written = {cell for section in sections for cell, _ in section.stores}.union(program.counters)
+    for section in sections:
+        for i in section.order:
+            if section.nodes[i][0] == "cell" and section.nodes[i][1] not in written:
+                raise ValueError(f"{section.name!r} reads the cell {section.nodes[i][1]!r}, which nothing writes")
+    for cell in sorted(condition_cells - written):
         raise ValueError(f"a loop goes by the cell {cell!r}, which nothing writes")
 
 
-def without_dead_stores(sections: list[CodeSection], asked: set[str]) -> list[CodeSection]:
+def without_dead_stores(sections: list[CodeSection], condition_cells: set[str]) -> list[CodeSection]:
     """The sections without stores to cells that nothing live reads."""
-    read = set(asked)
-    kept = [_storing(one, read) for one in sections]
+    read = set(condition_cells)
+    live_sections = [_storing(section, read) for section in sections]
     while True:
-        now = {one.nodes[i][1] for one in kept for i in one.order if one.nodes[i][0] == "cell"} | asked
+        now = {
+            section.nodes[i][1] for section in live_sections for i in section.order if section.nodes[i][0] == "cell"
+        } | condition_cells
         if now == read:
-            return kept
+            return live_sections
         more = now - read
         read |= now
-        kept = [
-            _storing(one, read) if any(name in more for name, _ in one.stores) else old
-            for one, old in zip(sections, kept, strict=True)
+        live_sections = [
+            _storing(section, read) if any(name in more for name, _ in section.stores) else old
+            for section, old in zip(sections, live_sections, strict=True)
         ]
 
 
@@ -247,22 +253,22 @@ def _fused(sections: list[CodeSection], program: Program, body: tuple[RecordedCo
         outputs = frozenset(program.outputs.index(name) for name in program.state_outputs)
         cells = cells_behind(sections, body, outputs)
     result = []
-    for one in sections:
-        leading = None if program.state_outputs is None else slice_roots(one, cells, outputs)
-        nodes = fused(one.nodes, one.roots, leading)
-        result.append(replace(one, nodes=tuple(nodes)))
+    for section in sections:
+        leading = None if program.state_outputs is None else slice_roots(section, cells, outputs)
+        nodes = fused(section.nodes, section.roots, leading)
+        result.append(replace(section, nodes=tuple(nodes)))
     return result
 
 
-def used_cells(sections: list[CodeSection], asked: set[str]) -> tuple[str, ...]:
+def used_cells(sections: list[CodeSection], condition_cells: set[str]) -> tuple[str, ...]:
     """Every cell in use, in order of first use over the program, so that neighbours in time are in memory."""
     names: dict[str, None] = {}
-    for one in sections:
-        for i in one.order:
-            if one.nodes[i][0] == "cell":
-                names.setdefault(one.nodes[i][1])
-        for name, _ in one.stores:
+    for section in sections:
+        for i in section.order:
+            if section.nodes[i][0] == "cell":
+                names.setdefault(section.nodes[i][1])
+        for name, _ in section.stores:
             names.setdefault(name)
-    for name in sorted(asked):
+    for name in sorted(condition_cells):
         names.setdefault(name)
     return tuple(names)

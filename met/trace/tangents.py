@@ -79,10 +79,10 @@ class TangentSection:
     def last_uses(self) -> Mapping[int, list[int]]:
         """By position of a live node, the nodes that are not used after it."""
         last = {ref >> 1: i for i in self.order for ref in self.nodes[i][1 : 1 + OPERANDS[self.nodes[i][0]]]}
-        found: dict[int, list[int]] = {}
+        by_node: dict[int, list[int]] = {}
         for node in last.keys() - {ref >> 1 for ref in self.roots}:
-            found.setdefault(last[node], []).append(node)
-        return found
+            by_node.setdefault(last[node], []).append(node)
+        return by_node
 
     @cached_property
     def plain_order(self) -> list[int]:
@@ -109,16 +109,16 @@ def moving_nodes(
 ) -> bytearray:
     """By position, 1 for each live node of a section that moves with these cells and inputs, as for `moved_by`."""
     nodes = section.nodes
-    found = bytearray(len(nodes))
+    marks = bytearray(len(nodes))
     for i in section.order:
         op, *rest = nodes[i]
         if op == "cell":
-            found[i] = rest[0] in moving
+            marks[i] = rest[0] in moving
         elif op == "input":
-            found[i] = rest[0] in inputs
+            marks[i] = rest[0] in inputs
         elif op in MOVES or (op in STEPS and (straight is None or straight(section, i))):
-            found[i] = any(found[ref >> 1] for ref in rest[: OPERANDS[op]])
-    return found
+            marks[i] = any(marks[ref >> 1] for ref in rest[: OPERANDS[op]])
+    return marks
 
 
 def with_tangents(
@@ -135,23 +135,23 @@ def with_tangents(
         moves = node[1] in (moving if node[0] == "cell" else inputs)
         return graph.make(node[0], HEAD + node[1]) if moves else ZERO
 
-    found = slopes(graph, section.order, leaf, lambda i: straight(section, i), KnownTangents(graph, section.known))
+    slope_refs = slopes(graph, section.order, leaf, lambda i: straight(section, i), KnownTangents(graph, section.known))
 
     def tangent(ref: int) -> int:
-        return found.get(ref >> 1, ZERO) ^ (ref & 1)
+        return slope_refs.get(ref >> 1, ZERO) ^ (ref & 1)
 
     def moved(pairs: Iterable[tuple[Any, int]]) -> tuple[tuple[Any, int], ...]:
         return tuple((name, tangent(ref)) for name, ref in pairs if tangent(ref) & -2 != ZERO)
 
     tangents, record_tangents, output_tangents = map(moved, (section.stores, section.records, section.outputs))
-    kinks = _kinks(graph, section.order, found, [ref for _, ref in (*tangents, *record_tangents)])
+    kinks = _kinks(graph, section.order, slope_refs, [ref for _, ref in (*tangents, *record_tangents)])
     return TangentSection(
         section.name, tuple(graph.nodes), section.stores, tangents, section.records, record_tangents,
         section.outputs, output_tangents, kinks,
     )  # fmt: skip
 
 
-def _kinks(graph: Nodes, order: Iterable[int], found: Mapping[int, int], roots: Iterable[int]) -> tuple[Kink, ...]:
+def _kinks(graph: Nodes, order: Iterable[int], slope_refs: Mapping[int, int], roots: Iterable[int]) -> tuple[Kink, ...]:
     """The kinks on which these tangents depend: comparisons by size, and the bit of a sign; and all signs of moving
     numbers, which jump. A test of two numbers for equality is not a kink: it keeps a quotient from 0/0 where it has a
     limit."""
@@ -160,13 +160,13 @@ def _kinks(graph: Nodes, order: Iterable[int], found: Mapping[int, int], roots: 
     for i in order:
         op, *rest = graph.nodes[i]
         x = sign_of(graph, rest) if op == "where" else None
-        if x is not None and (found.get(x >> 1, ZERO) & -2) != ZERO:
-            kinks.append(Kink((x, ZERO), found[x >> 1] ^ (x & 1), (rest[0] >> 1,)))
+        if x is not None and (slope_refs.get(x >> 1, ZERO) & -2) != ZERO:
+            kinks.append(Kink((x, ZERO), slope_refs[x >> 1] ^ (x & 1), (rest[0] >> 1,)))
     for i in sorted(needed):
         op, *rest = graph.nodes[i]
         if op in ("lt", "le"):
             sides = (rest[0], rest[1])
-            a, b = (found.get(ref >> 1, ZERO) ^ (ref & 1) for ref in sides)
+            a, b = (slope_refs.get(ref >> 1, ZERO) ^ (ref & 1) for ref in sides)
             move = graph.add(a, b ^ 1)
             if move & -2 != ZERO:
                 kinks.append(Kink(sides, move, (i,)))
@@ -175,7 +175,7 @@ def _kinks(graph: Nodes, order: Iterable[int], found: Mapping[int, int], roots: 
         elif op == "bit" and rest[1] == SIGN:
             of_sign.setdefault(rest[0] & -2, []).append(i)
     for ref, nodes in of_sign.items():
-        move = found.get(ref >> 1, ZERO)
+        move = slope_refs.get(ref >> 1, ZERO)
         if move & -2 != ZERO:
             kinks.append(Kink((ref, ZERO), move, tuple(nodes)))
     return tuple(kinks)
@@ -195,25 +195,25 @@ def values(
     opposite  positions of nodes of kinks that take the other side
     """
     nodes = section.nodes
-    found: list[Any] = [None] * len(nodes)
+    node_values: list[Any] = [None] * len(nodes)
     for i in section.plain_order if plain else section.order:
         node = nodes[i]
         op, count = node[0], OPERANDS[node[0]]
         if count == 0:
-            found[i] = node[1] if op == "const" else False if op == "false" else leaf(node)
+            node_values[i] = node[1] if op == "const" else False if op == "false" else leaf(node)
             continue
         operands = []
         for ref in node[1 : 1 + count]:
-            value = found[ref >> 1]
+            value = node_values[ref >> 1]
             if ref & 1:
                 value = (not value) if nodes[ref >> 1][0] in TRUTHS else -value
             operands.append(value)
         value = PRODUCTS[op](*operands, *node[1 + count :])
         if i in opposite:
             value = (not value) if op in TRUTHS else -value
-        found[i] = value
+        node_values[i] = value
 
     def value_of(ref: int) -> Any:
-        return -found[ref >> 1] if ref & 1 else found[ref >> 1]
+        return -node_values[ref >> 1] if ref & 1 else node_values[ref >> 1]
 
     return value_of

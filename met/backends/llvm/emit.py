@@ -285,9 +285,9 @@ class _LlvmEmitter:
             whole = op(f"fptosi {V} {held} to <{L} x i32>")
             place = op(f"getelementptr double, ptr {symbol}, <{L} x i32> {whole}")
             call = self._intrinsic(f"llvm.masked.gather.{suffix}.v{L}p0", V, f"<{L} x ptr>", "i32", truth, V)
-            there = op(f"call {V} {call}(<{L} x ptr> {place}, i32 8, {truth} splat (i1 true), {V} poison)")
+            inside = op(f"call {V} {call}(<{L} x ptr> {place}, i32 8, {truth} splat (i1 true), {V} poison)")
             nan = op(f"fcmp uno {V} {index}, {index}")
-            return op(f"select {truth} {nan}, {V} splat (double {number(float('nan'))}), {V} {there}")
+            return op(f"select {truth} {nan}, {V} splat (double {number(float('nan'))}), {V} {inside}")
 
         def keep(i: int) -> None:
             value = have[i]

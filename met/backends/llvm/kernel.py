@@ -192,8 +192,8 @@ class LlvmKernel:
 
         def work(start: int, between: Callable[[], None] = lambda: None) -> int:
             stop = min(start + chunk, cases)
-            kept = None if rows is None else rows[start:stop]
-            self._run_chunk(inputs[start:stop], ticks, kept, outputs[start:stop], ended, between)
+            own_rows = None if rows is None else rows[start:stop]
+            self._run_chunk(inputs[start:stop], ticks, own_rows, outputs[start:stop], ended, between)
             return stop - start
 
         if threads == 1 or len(starts) <= 1:
@@ -238,13 +238,13 @@ class LlvmKernel:
                 return
             if first:
                 between()
-            at = None
+            pointer = None
             if record and rows is not None:
-                at = rows.ctypes.data + self.rows(0, first - 1) * rows.strides[1] if first else rows.ctypes.data
+                pointer = rows.ctypes.data + self.rows(0, first - 1) * rows.strides[1] if first else rows.ctypes.data
             self.entry(
                 packed.ctypes.data,
                 state.ctypes.data,
-                at,
+                pointer,
                 results.ctypes.data,
                 blocks,
                 first,
@@ -270,14 +270,16 @@ class LlvmBlock:
     """
 
     def __init__(self, kernel: LlvmKernel, inputs: np.ndarray | Sequence[Sequence[float]]) -> None:
-        given = np.atleast_2d(np.asarray(inputs, dtype=np.float64))
+        case_inputs = np.atleast_2d(np.asarray(inputs, dtype=np.float64))
         program = kernel.program
-        if not 1 <= len(given) <= kernel.lanes or given.shape[1] != len(program.inputs):
-            raise ValueError(f"inputs of shape {given.shape} for {kernel.lanes} lanes, {len(program.inputs)} inputs")
+        if not 1 <= len(case_inputs) <= kernel.lanes or case_inputs.shape[1] != len(program.inputs):
+            raise ValueError(
+                f"inputs of shape {case_inputs.shape} for {kernel.lanes} lanes, {len(program.inputs)} inputs"
+            )
         self.kernel = kernel
-        self.cases = len(given)
-        packed = _aligned((1, given.shape[1], kernel.lanes))
-        _pack(given, packed)
+        self.cases = len(case_inputs)
+        packed = _aligned((1, case_inputs.shape[1], kernel.lanes))
+        _pack(case_inputs, packed)
         self.inputs = packed[0]
         self.state = _aligned((max(1, len(kernel.recording.cells)), kernel.lanes))
         self.outputs = _aligned((len(program.outputs), kernel.lanes))
@@ -314,10 +316,10 @@ class LlvmBlock:
         return {name: self.state[slot] for slot, name in enumerate(self.kernel.recording.cells)}
 
 
-def _threads(asked: int | None) -> int:
+def _threads(wanted: int | None) -> int:
     """The number of threads to use: as many as asked for, else as many as this process may run on."""
-    if asked is not None:
-        return max(1, asked)
+    if wanted is not None:
+        return max(1, wanted)
     if hasattr(os, "sched_getaffinity"):
         return max(1, len(os.sched_getaffinity(0)))
     return os.cpu_count() or 1

@@ -75,22 +75,22 @@ def cut(section: CodeSection, above: int = CUT_ABOVE, shortest: int = SHORTEST, 
     ]
     at_end = {nodes[ref >> 1][1] for _, _, ref in all_stores if nodes[ref >> 1][0] == "cell"}
 
-    asked: dict[int, int] = {}
+    last_use: dict[int, int] = {}
     for n, i in enumerate(body):
         for ref in nodes[i][1 : 1 + OPERANDS[nodes[i][0]]]:
             if ref >> 1 in number:
-                asked[ref >> 1] = max(asked.get(ref >> 1, 0), piece_of[n])
+                last_use[ref >> 1] = max(last_use.get(ref >> 1, 0), piece_of[n])
     for kind, where, ref in all_stores:
-        made = number.get(ref >> 1, -1)
-        when = max(made, loaded.get(where, -1)) if kind == "cell" else made
-        if made < 0 or (kind == "cell" and where in at_end):
+        defined = number.get(ref >> 1, -1)
+        when = max(defined, loaded.get(where, -1)) if kind == "cell" else defined
+        if defined < 0 or (kind == "cell" and where in at_end):
             pieces[last].tail.append((kind, where, ref))
-            if made >= 0:
-                asked[ref >> 1] = last
+            if defined >= 0:
+                last_use[ref >> 1] = last
         else:
             pieces[piece_of[when]].stores.setdefault(when, []).append((kind, where, ref))
-            asked[ref >> 1] = max(asked.get(ref >> 1, 0), piece_of[when])
-    _assign_scratch(pieces, body, piece_of, asked)
+            last_use[ref >> 1] = max(last_use.get(ref >> 1, 0), piece_of[when])
+    _assign_scratch(pieces, body, piece_of, last_use)
     for piece in pieces:
         piece.small = len(pieces) == 1 and len(body) <= SMALL
     return pieces
@@ -104,17 +104,17 @@ def check(section: CodeSection, pieces: list[Piece]) -> None:
         raise ValueError(f"{section.name}: its pieces are not its operations, once and in order")
     held: dict[int, int] = {}
     for number, piece in enumerate(pieces):
-        here: set[int] = set()
+        computed: set[int] = set()
 
-        def taken(ref: int, piece: Piece = piece, here: set[int] = here, number: int = number) -> None:
+        def taken(ref: int, piece: Piece = piece, computed: set[int] = computed, number: int = number) -> None:
             i = ref >> 1
-            if nodes[i][0] not in LEAVES and i not in here and held.get(piece.kept.get(i, -1)) != i:
+            if nodes[i][0] not in LEAVES and i not in computed and held.get(piece.kept.get(i, -1)) != i:
                 raise ValueError(f"{section.name}: piece {number} takes node {i}, which it does not have")
 
         for n, i in piece.body:
             for ref in nodes[i][1 : 1 + OPERANDS[nodes[i][0]]]:
                 taken(ref)
-            here.add(i)
+            computed.add(i)
             if i in piece.keep:
                 held[piece.keep[i]] = i
             for _, _, ref in piece.stores.get(n, ()):
@@ -150,14 +150,14 @@ def _bounds(section: CodeSection, body: list[int], number: dict[int, int], short
     return [*bounds, len(body)]
 
 
-def _assign_scratch(pieces: list[Piece], body: list[int], piece_of: list[int], asked: dict[int, int]) -> None:
+def _assign_scratch(pieces: list[Piece], body: list[int], piece_of: list[int], last_use: dict[int, int]) -> None:
     """A slot for each value that crosses between pieces, free again after the last piece that uses it."""
     free: list[int] = []
     slots = 0
     ending: dict[int, list[int]] = {}
     for p, piece in enumerate(pieces):
         for _, i in piece.body:
-            until = asked.get(i, p)
+            until = last_use.get(i, p)
             if until > p:
                 if free:
                     slot = free.pop()

@@ -56,11 +56,11 @@ class InterpretedBlock:
     """Cases that are stepped together, as a `met.backends.backend.Block`."""
 
     def __init__(self, recording: Recording, inputs: np.ndarray) -> None:
-        given = np.atleast_2d(np.asarray(inputs, dtype=np.float64))
+        case_inputs = np.atleast_2d(np.asarray(inputs, dtype=np.float64))
         self.recording = recording
-        self.inputs = np.ascontiguousarray(given.T)
-        self.state = np.zeros((len(recording.cells), len(given)))
-        self.outputs = np.zeros((len(recording.program.outputs), len(given)))
+        self.inputs = np.ascontiguousarray(case_inputs.T)
+        self.state = np.zeros((len(recording.cells), len(case_inputs)))
+        self.outputs = np.zeros((len(recording.program.outputs), len(case_inputs)))
         self._cell = {name: slot for slot, name in enumerate(recording.cells)}
         self._input = {name: slot for slot, name in enumerate(recording.program.inputs)}
         self._tick = 0

@@ -74,8 +74,8 @@ class _FmaWriter:
     def truth(self, kind: str, a: str, b: str) -> str:
         return self.op(f"{kind} {_T} {a}, {b}")
 
-    def where(self, truth: str, a: str, b: str, of: str = _V) -> str:
-        return self.op(f"select {_T} {truth}, {of} {a}, {of} {b}")
+    def where(self, truth: str, a: str, b: str, kind: str = _V) -> str:
+        return self.op(f"select {_T} {truth}, {kind} {a}, {kind} {b}")
 
     def clamped(self, x: str, least: int, most: int) -> str:
         low = self.op(f"icmp slt {_B} {x}, {_whole(least)}")

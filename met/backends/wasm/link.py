@@ -43,16 +43,16 @@ class LinkedModule:
 class _ByteReader:
     """Reader of an object file's bytes, from the start to the end."""
 
-    def __init__(self, data: bytes, at: int = 0) -> None:
-        self.data, self.at = data, at
+    def __init__(self, data: bytes, start: int = 0) -> None:
+        self.data, self.position = data, start
 
     def byte(self) -> int:
-        self.at += 1
-        return self.data[self.at - 1]
+        self.position += 1
+        return self.data[self.position - 1]
 
     def take(self, count: int) -> bytes:
-        self.at += count
-        return self.data[self.at - count : self.at]
+        self.position += count
+        return self.data[self.position - count : self.position]
 
     def number(self) -> int:
         """Read an unsigned number, LEB128."""
@@ -65,8 +65,8 @@ class _ByteReader:
                 return value
 
     def signed(self) -> int:
-        begun = self.at
-        value, bits = self.number(), 7 * (self.at - begun)
+        begun = self.position
+        value, bits = self.number(), 7 * (self.position - begun)
         return value - (1 << bits) if value >> (bits - 1) else value
 
     def name(self) -> str:
@@ -84,8 +84,8 @@ def number(value: int, width: int = 1) -> bytes:
 
 def _signed(value: int) -> bytes:
     """A non-negative number as signed LEB128."""
-    made = number(value)
-    return number(value, len(made) + 1) if made[-1] & 0x40 else made
+    encoded = number(value)
+    return number(value, len(encoded) + 1) if encoded[-1] & 0x40 else encoded
 
 
 def _named(text: str) -> bytes:
@@ -107,7 +107,7 @@ class _Relocation:
     """A number to be written at `at`, counted from the beginning of its section."""
 
     kind: int
-    at: int
+    offset: int
     index: int
     addend: int
 
@@ -122,7 +122,7 @@ class _ObjectFile:
         self.alignments: list[int] = []
         self.relocations: dict[int, list[_Relocation]] = {}
         order: list[int] = []
-        while read.at < len(data):
+        while read.position < len(data):
             kind = read.byte()
             body = read.take(read.number())
             order.append(kind)
@@ -139,12 +139,12 @@ class _ObjectFile:
         self._only_globals_and_memory()
 
     def _relocation(self, read: _ByteReader) -> _Relocation:
-        kind, at, index = read.byte(), read.number(), read.number()
-        return _Relocation(kind, at, index, read.signed() if kind in _WITH_ADDEND else 0)
+        kind, offset, index = read.byte(), read.number(), read.number()
+        return _Relocation(kind, offset, index, read.signed() if kind in _WITH_ADDEND else 0)
 
     def _linking(self, read: _ByteReader) -> None:
         read.number()  # version
-        while read.at < len(read.data):
+        while read.position < len(read.data):
             kind = read.byte()
             part = _ByteReader(read.take(read.number()))
             if kind == _SYMBOLS:
@@ -176,7 +176,7 @@ class _ObjectFile:
             read.name()
             name, kind = read.name(), read.byte()
             if kind == 2:
-                read.take(2 if read.data[read.at] == 0 else 3)
+                read.take(2 if read.data[read.position] == 0 else 3)
             elif kind == 3 and name == "__stack_pointer":
                 read.take(2)
             else:
@@ -190,17 +190,17 @@ def link(data: bytes, exported: str, fused: str) -> LinkedModule:
     fused     the function whose calls the section `SITES` lists
     Raises ValueError where the object needs more than it holds.
     """
-    found = _ObjectFile(data)
-    functions = {symbol.name: symbol.index for symbol in found.symbols if symbol.kind == _OF_FUNCTION}
+    object_file = _ObjectFile(data)
+    functions = {symbol.name: symbol.index for symbol in object_file.symbols if symbol.kind == _OF_FUNCTION}
     missing = {exported, fused} - functions.keys()
     if missing:
         raise ValueError(f"the object lacks the function {min(missing)}")
-    places, segments, heap = _data(found)
-    code, sites = _code(found, places, functions[fused])
+    places, segments, heap = _data(object_file)
+    code, sites = _code(object_file, places, functions[fused])
     pages = -(-heap // PAGE)
     sections = [
-        (_TYPE, found.sections[_TYPE]),
-        (_FUNCTION, found.sections[_FUNCTION]),
+        (_TYPE, object_file.sections[_TYPE]),
+        (_FUNCTION, object_file.sections[_FUNCTION]),
         (_MEMORY, b"\1\0" + number(pages)),
         (_GLOBAL, b"\1\x7f\1\x41" + _signed(STACK) + b"\x0b"),
         (_EXPORT, b"\2" + _named("memory") + b"\2\0" + _named(exported) + b"\0" + number(functions[exported])),
@@ -218,72 +218,72 @@ def link(data: bytes, exported: str, fused: str) -> LinkedModule:
     return LinkedModule(head + bytes([_CUSTOM]) + number(len(listed)) + listed, heap, len(sites))
 
 
-def _data(found: _ObjectFile) -> tuple[list[int], bytes, int]:
+def _data(object_file: _ObjectFile) -> tuple[list[int], bytes, int]:
     """The address of each segment of data, the section of data, and the first byte after it, in whole cache lines."""
-    read = _ByteReader(found.sections.get(_DATA, b"\0"))
-    places, parts, at = [], [], STACK
-    moved = {relocation.at for relocation in found.relocations.get(_DATA, [])}
+    read = _ByteReader(object_file.sections.get(_DATA, b"\0"))
+    places, parts, address = [], [], STACK
+    moved = {relocation.offset for relocation in object_file.relocations.get(_DATA, [])}
     if moved:
         raise ValueError("data of the object holds addresses")
     count = read.number()
-    for alignment in found.alignments[:count]:
+    for alignment in object_file.alignments[:count]:
         if read.byte() != 0 or read.byte() != 0x41:
             raise ValueError("data of the object has no place in memory")
         read.signed()
         read.byte()  # end of the expression
         body = read.take(read.number())
-        at = -(-at // alignment) * alignment
-        places.append(at)
-        parts.append(b"\0\x41" + _signed(at) + b"\x0b" + number(len(body)) + body)
-        at += len(body)
-    return places, number(count) + b"".join(parts) if count else b"", -(-at // 64) * 64
+        address = -(-address // alignment) * alignment
+        places.append(address)
+        parts.append(b"\0\x41" + _signed(address) + b"\x0b" + number(len(body)) + body)
+        address += len(body)
+    return places, number(count) + b"".join(parts) if count else b"", -(-address // 64) * 64
 
 
-def _code(found: _ObjectFile, places: list[int], fused: int) -> tuple[bytes, list[int]]:
+def _code(object_file: _ObjectFile, places: list[int], fused: int) -> tuple[bytes, list[int]]:
     """The section of code with its relocations applied, and the places in it where the function `fused` is called."""
-    body = found.sections[_CODE]
-    written = iter(sorted(found.relocations.get(_CODE, []), key=lambda each: each.at))
+    body = object_file.sections[_CODE]
+    written = iter(sorted(object_file.relocations.get(_CODE, []), key=lambda relocation: relocation.offset))
     following = next(written, None)
     read = _ByteReader(body)
     count = read.number()
     bodies: list[tuple[bytes, list[int]]] = []
     for _ in range(count):
         size = read.number()
-        end = read.at + size
-        made, calls = bytearray(), []
-        while following is not None and following.at < end:
-            made += read.take(following.at - read.at)
-            put = _written(found, following, places, fused)
+        end = read.position + size
+        code, calls = bytearray(), []
+        while following is not None and following.offset < end:
+            code += read.take(following.offset - read.position)
+            put = _written(object_file, following, places, fused)
             if (
                 following.kind == _FUNCTION_INDEX
-                and made[-1] == _CALL
-                and found.symbols[following.index].index == fused
+                and code[-1] == _CALL
+                and object_file.symbols[following.index].index == fused
             ):
-                calls.append(len(made) - 1)
-            made += put
-            read.at += _PADDED
+                calls.append(len(code) - 1)
+            code += put
+            read.position += _PADDED
             following = next(written, None)
-        made += read.take(end - read.at)
-        bodies.append((bytes(made), calls))
+        code += read.take(end - read.position)
+        bodies.append((bytes(code), calls))
     out, sites = number(count), []
-    for one, calls in bodies:
-        out += number(len(one))
+    for function, calls in bodies:
+        out += number(len(function))
         sites += [len(out) + call for call in calls]
-        out += one
+        out += function
     return out, sites
 
 
-def _written(found: _ObjectFile, asked: _Relocation, places: list[int], fused: int) -> bytes:
+def _written(object_file: _ObjectFile, relocation: _Relocation, places: list[int], fused: int) -> bytes:
     """The number for a relocation, as short as it can be; in two bytes where `fused` is called."""
-    symbol = found.symbols[asked.index]
-    if asked.kind == _FUNCTION_INDEX:
-        made = number(symbol.index, 2 if symbol.index == fused else 1)
-        if symbol.index == fused and len(made) > 2:
+    symbol = object_file.symbols[relocation.index]
+    if relocation.kind == _FUNCTION_INDEX:
+        encoded = number(symbol.index, 2 if symbol.index == fused else 1)
+        if symbol.index == fused and len(encoded) > 2:
             raise ValueError("the object has too many functions")
-        return made
-    if asked.kind == _GLOBAL_INDEX:
+        return encoded
+    if relocation.kind == _GLOBAL_INDEX:
         return number(symbol.index)
-    if asked.kind in (_ADDRESS, _SIGNED_ADDRESS):
-        address = places[symbol.index] + symbol.offset + asked.addend
-        return number(address) if asked.kind == _ADDRESS else _signed(address)
-    raise ValueError(f"the object asks for a relocation of kind {asked.kind}")
+    if relocation.kind in (_ADDRESS, _SIGNED_ADDRESS):
+        address = places[symbol.index] + symbol.offset + relocation.addend
+        return number(address) if relocation.kind == _ADDRESS else _signed(address)
+    raise ValueError(f"the object asks for a relocation of kind {relocation.kind}")

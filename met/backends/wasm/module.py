@@ -74,15 +74,13 @@ class WasmModule:
 
 def text(recording: Recording) -> str:
     """The program as LLVM IR, with all functions that it calls."""
-    made = llvm_text.emit(recording, LANES, vector=LANES, width=LANES)
+    ir = llvm_text.emit(recording, LANES, vector=LANES, width=LANES)
     lines = [
-        line
-        for line in made.splitlines()
-        if line not in _LIBRARY and not line.startswith(f"declare {_VECTOR} {_FUSED}(")
+        line for line in ir.splitlines() if line not in _LIBRARY and not line.startswith(f"declare {_VECTOR} {_FUSED}(")
     ]
-    made = "\n".join(lines).replace(_FUSED, f"@{fma.NAME}")
+    ir = "\n".join(lines).replace(_FUSED, f"@{fma.NAME}")
     numbers = [len(llvm_text.ATTRIBUTES) + n for n in range(len(_ATTRIBUTES))]
-    parts = [made, fma.function(f"#{numbers[0]}"), _memory(f"#{numbers[1]}")]
+    parts = [ir, fma.function(f"#{numbers[0]}"), _memory(f"#{numbers[1]}")]
     fabs = f"declare {_VECTOR} @llvm.fabs.v2f64({_VECTOR})"
     if fabs not in lines:
         parts.append(fabs)
@@ -137,9 +135,9 @@ def begun(recording: Recording, *, quick: bool = False) -> Callable[[], WasmModu
     """Start to compile in a thread; the returned function waits for `compiled`'s result. LLVM does not hold Python's
     lock."""
     with_one = ThreadPoolExecutor(1)
-    made = with_one.submit(cache.kept, *_object(recording, quick))
+    future = with_one.submit(cache.kept, *_object(recording, quick))
     with_one.shutdown(wait=False)
-    return lambda: _linked(recording, *made.result())
+    return lambda: _linked(recording, *future.result())
 
 
 def _object(recording: Recording, quick: bool) -> tuple[str, Callable[[], bytes]]:

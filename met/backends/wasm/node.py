@@ -72,19 +72,19 @@ def ask(
     done = subprocess.run([program, str(_SCRIPT)], input=data, capture_output=True, check=False)
     if done.returncode != 0:
         raise RuntimeError(f"node refuses the module:\n{done.stderr.decode(errors='replace')}")
-    said = json.loads(done.stderr.decode().splitlines()[-1])
+    report = json.loads(done.stderr.decode().splitlines()[-1])
     numbers = np.frombuffer(done.stdout, "<f8")
-    made, cells = module.recording.program, len(module.recording.cells)
-    rows = _rows(made, first, last) if record else 0
-    split = len(inputs) * rows * made.columns
-    until = split + len(inputs) * len(made.outputs)
+    own_program, cells = module.recording.program, len(module.recording.cells)
+    rows = _rows(own_program, first, last) if record else 0
+    split = len(inputs) * rows * own_program.columns
+    until = split + len(inputs) * len(own_program.outputs)
     return NodeRun(
-        numbers[:split].reshape(len(inputs), rows, made.columns),
-        numbers[split:until].reshape(len(inputs), len(made.outputs)),
+        numbers[:split].reshape(len(inputs), rows, own_program.columns),
+        numbers[split:until].reshape(len(inputs), len(own_program.outputs)),
         numbers[until:].reshape(cells, LANES),
-        said["fused"],
-        said["compile_ms"],
-        tuple(said["run_ms"]),
+        report["fused"],
+        report["compile_ms"],
+        tuple(report["run_ms"]),
     )
 
 
@@ -138,10 +138,10 @@ class WasmKernel:
         some = max(1, _ROWS // max(1, _rows(program, 0, ticks) * program.columns)) if record else max(1, len(inputs))
         for begin in range(0, len(inputs), some):
             part = slice(begin, begin + some)
-            found = ask(self.module, inputs[part], 0, ticks, record=record)
+            node_run = ask(self.module, inputs[part], 0, ticks, record=record)
             if rows is not None:
-                rows[part] = found.rows
-            outputs[part] = found.outputs
+                rows[part] = node_run.rows
+            outputs[part] = node_run.outputs
             if progress is not None:
                 progress(min(begin + some, len(inputs)))
         return rows, outputs
@@ -154,25 +154,25 @@ class WasmBlock:
     """At most two cases that are stepped call by call, as a `met.backends.backend.Block`."""
 
     def __init__(self, module: WasmModule, inputs: np.ndarray) -> None:
-        given = np.atleast_2d(np.asarray(inputs, dtype=np.float64))
+        case_inputs = np.atleast_2d(np.asarray(inputs, dtype=np.float64))
         program = module.recording.program
-        if not 1 <= len(given) <= LANES or given.shape[1] != len(program.inputs):
-            raise ValueError(f"inputs of shape {given.shape} for {LANES} lanes, {len(program.inputs)} inputs")
+        if not 1 <= len(case_inputs) <= LANES or case_inputs.shape[1] != len(program.inputs):
+            raise ValueError(f"inputs of shape {case_inputs.shape} for {LANES} lanes, {len(program.inputs)} inputs")
         self.module = module
-        self.inputs = np.ascontiguousarray(given.T)
+        self.inputs = np.ascontiguousarray(case_inputs.T)
         self.state = np.zeros((len(module.recording.cells), LANES))
-        self.outputs = np.zeros((len(program.outputs), len(given)))
+        self.outputs = np.zeros((len(program.outputs), len(case_inputs)))
 
     def step(self, first: int, last: int) -> None:
         self._take(ask(self.module, self.inputs.T, first, last, state=self.state, record=False))
 
     def recorded(self, first: int, last: int) -> np.ndarray:
-        found = ask(self.module, self.inputs.T, first, last, state=self.state)
-        self._take(found)
-        return found.rows.copy()
+        node_run = ask(self.module, self.inputs.T, first, last, state=self.state)
+        self._take(node_run)
+        return node_run.rows.copy()
 
-    def _take(self, found: NodeRun) -> None:
-        self.state[:], self.outputs[:] = found.state, found.outputs.T
+    def _take(self, node_run: NodeRun) -> None:
+        self.state[:], self.outputs[:] = node_run.state, node_run.outputs.T
 
     def cells(self) -> Mapping[str, np.ndarray]:
         return {name: self.state[slot] for slot, name in enumerate(self.module.recording.cells)}
