@@ -17,13 +17,13 @@ from met.program.unheld import Unheld, unheld
 def causes_of(experiment: Experiment, inputs: np.ndarray, outputs: Mapping[str, np.ndarray]) -> list[str]:
     """The causes of failed cases, in words. inputs: of their program, [case, input]; outputs: of it, by name,
     [case]."""
-    each = [{name: float(of[case]) for name, of in outputs.items()} for case in range(len(inputs))]
-    found = ["" if of["failure"] == UNBALANCED else _cause_of(experiment, of) for of in each]
+    by_case = [{name: float(column[case]) for name, column in outputs.items()} for case in range(len(inputs))]
+    causes = ["" if figures["failure"] == UNBALANCED else _cause_of(experiment, figures) for figures in by_case]
     unbalanced = np.flatnonzero(outputs["failure"] == UNBALANCED)
     if len(unbalanced):
         for case, joints in zip(unbalanced.tolist(), unheld(experiment, inputs[unbalanced]), strict=True):
-            found[case] = _cause_of_balance(experiment, int(outputs["failure.joint"][case]), joints)
-    return found
+            causes[case] = _cause_of_balance(experiment, int(outputs["failure.joint"][case]), joints)
+    return causes
 
 
 def _cause_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
@@ -96,7 +96,7 @@ def _of_rate(experiment: Experiment, number: int) -> tuple[str, str, str]:
         return f"joint {joint.name}", "m/s" if joint.kind == "prismatic" else "rad/s", _where(joint.place)
     if structure.free and number == len(joints):
         return "the base", "rad/s (m/s)", _where(structure.base.place if structure.base is not None else None)
-    payload = [each for each in structure.payloads if each.flies][number - len(joints) - structure.free]
+    payload = [flying for flying in structure.payloads if flying.flies][number - len(joints) - structure.free]
     return f"payload {payload.name}", "rad/s (m/s)", _where(payload.place)
 
 
@@ -119,19 +119,19 @@ def _cause_of_balance(experiment: Experiment, number: int, joints: Sequence[Unhe
     number: of the first of the joints;  joints: what is known of all that are not held
     """
     joint = experiment.structure.moving[number].name
-    found = {each.joint.name: each for each in joints}
+    by_name = {candidate.joint.name: candidate for candidate in joints}
     if joint in experiment.structure.springs:
         return (
             f"t = 0 s: joint {joint}: it cannot begin balanced: no bend was found at which the boom stands still. It "
             "is so soft that its load bends it far, or buckles it: make it stiffer, or leave `servos = balanced` out."
         )
-    if joint not in found:
+    if joint not in by_name:
         return f"t = 0 s: joint {joint}: it cannot begin balanced: its servo holds just less than the joint takes."
-    each = found[joint]
-    where = f" ({each.servo.place.file}:{each.servo.place.line})" if each.servo.place else ""
+    weak = by_name[joint]
+    where = f" ({weak.servo.place.file}:{weak.servo.place.line})" if weak.servo.place else ""
     return (
-        f"t = 0 s: joint {joint}: it cannot begin balanced{where}: it takes {each.wanted:.3g} {each.unit}, and its "
-        f"servo can hold {each.there:.3g} {each.unit}. {each.reason[0].upper()}{each.reason[1:]}."
+        f"t = 0 s: joint {joint}: it cannot begin balanced{where}: it takes {weak.wanted:.3g} {weak.unit}, and its "
+        f"servo can hold {weak.holdable:.3g} {weak.unit}. {weak.reason[0].upper()}{weak.reason[1:]}."
     )
 
 
@@ -148,7 +148,7 @@ def _of_guide(experiment: Experiment, joint: str) -> str:
 
 def _cause_of_payload(experiment: Experiment, number: int, tick: float) -> str:
     """The cause of a failure by one of the payloads that fly, in words."""
-    payload = [each for each in experiment.structure.payloads if each.flies][number]
+    payload = [flying for flying in experiment.structure.payloads if flying.flies][number]
     where = f" ({payload.place.file}:{payload.place.line})" if payload.place else ""
     return (
         f"t = {tick / experiment.structure.schedule.base_hz:g} s: payload {payload.name}: position, rate or "

@@ -44,11 +44,11 @@ def plant_program(experiment: Experiment, joint: str, *, case: int = 0, period: 
     case    row of the case table;  period: of the wire, s; the servo's where it is None
     """
     beds = _beds(experiment)
-    found = [each for each in beds.mounted if each.joint == joint]
-    if not found:
+    on_bed = [mounted for mounted in beds.mounted if mounted.joint == joint]
+    if not on_bed:
         raise ValueError(f"joint {joint!r} is not substituted")
     period = beds.period if period is None else period
-    return _Phases(beds, found[0], period, _settled(experiment, joint, case)).program()
+    return _Phases(beds, on_bed[0], period, _settled(experiment, joint, case)).program()
 
 
 class Plant:
@@ -138,9 +138,9 @@ def plant_c(experiment: Experiment, joint: str, *, case: int = 0, period: float 
 def bed_values(experiment: Experiment, joint: str, case: int = 0) -> dict[str, float]:
     """The numbers of a joint's bed in a case, SI, by the names of its parameters."""
     head = f"{joint}.bed."
-    found = {path: quantity.value for path, quantity in experiment.parameters.items() if path.startswith(head)}
-    found |= _settled(experiment, joint, case)
-    return {path.removeprefix(head): value for path, value in found.items() if isinstance(value, float)}
+    by_path = {path: quantity.value for path, quantity in experiment.parameters.items() if path.startswith(head)}
+    by_path |= _settled(experiment, joint, case)
+    return {path.removeprefix(head): value for path, value in by_path.items() if isinstance(value, float)}
 
 
 def _beds(experiment: Experiment) -> Substituted:
@@ -157,7 +157,7 @@ class _Phases:
     """The phases of one bed. settled: the case's values of the parameters that vary, by path."""
 
     beds: Substituted
-    each: Mounted
+    mounted: Mounted
     period: float
     settled: dict[str, float]
 
@@ -178,21 +178,21 @@ class _Phases:
             tape.write(PARAMETER + path, value)
 
     def begin(self, tape: Tape) -> None:
-        self.beds.begin_bed(tape, self.each, tape.input("rate"))
+        self.beds.begin_bed(tape, self.mounted, tape.input("rate"))
 
     def hold(self, tape: Tape) -> None:
-        tape.write(f"{self.each.joint}.bed.drive_{self.each.bed.drive}", tape.input("voltage"))
-        tape.write(f"{self.each.joint}.bed.load_current", tape.input("current"))
+        tape.write(f"{self.mounted.joint}.bed.drive_{self.mounted.bed.drive}", tape.input("voltage"))
+        tape.write(f"{self.mounted.joint}.bed.load_current", tape.input("current"))
 
     def bed(self, tape: Tape) -> None:
         seed, repeat, tick = tape.input("seed"), tape.input("repeat"), tape.tick - 1.0
-        self.beds.advance_bed(tape, self.each, self.period, seed=seed, repeat=repeat, tick=tick)
+        self.beds.advance_bed(tape, self.mounted, self.period, seed=seed, repeat=repeat, tick=tick)
 
     def read(self, tape: Tape) -> None:
-        tape.output("rate", self.beds.reading(tape, self.each))
-        tape.output("shaft_rate", tape.read(f"{self.each.joint}.bed.shaft_rate"))
-        knows_angle = any(memory.name == "shaft_angle" for memory in self.each.bed.memory)
-        tape.output("shaft_angle", tape.read(f"{self.each.joint}.bed.shaft_angle") if knows_angle else 0.0)
+        tape.output("rate", self.beds.reading(tape, self.mounted))
+        tape.output("shaft_rate", tape.read(f"{self.mounted.joint}.bed.shaft_rate"))
+        knows_angle = any(memory.name == "shaft_angle" for memory in self.mounted.bed.memory)
+        tape.output("shaft_angle", tape.read(f"{self.mounted.joint}.bed.shaft_angle") if knows_angle else 0.0)
 
 
 def _settled(experiment: Experiment, joint: str, case: int) -> dict[str, float]:

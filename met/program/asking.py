@@ -17,10 +17,10 @@ from met.trace import Graph, Real, Scalar
 
 @frozen
 class Question:
-    """The question of an integrator for the slope at `there`, at the share `share` of its step."""
+    """The question of an integrator for the slope at `state`, at the share `share` of its step."""
 
     share: Real
-    there: Motion
+    state: Motion
 
 
 def advance_with(integrator: Integrator, settled: Sequence[Slope], h: Real, y: Motion, k1: Slope) -> Motion | Question:
@@ -30,13 +30,13 @@ def advance_with(integrator: Integrator, settled: Sequence[Slope], h: Real, y: M
     """
     questions: list[Question] = []
 
-    def slope(c: Real, there: Motion) -> Slope:
+    def slope(c: Real, state: Motion) -> Slope:
         if not isinstance(c, (float, int, Scalar)):
             raise TypeError(f"slope(c, y) was given a {type(c).__name__} for the share of the step")
-        wrong = _wrong(there, y)
+        wrong = _wrong(state, y)
         if wrong:
             raise TypeError(f"slope(c, y) was given {wrong}")
-        questions.append(Question(c, there))
+        questions.append(Question(c, state))
         if len(questions) > len(settled):
             raise _Unanswered
         return settled[len(questions) - 1]

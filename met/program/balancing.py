@@ -88,13 +88,13 @@ def settle_booms(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapp
     """
     springs, steps = _springs(system), list[list[Real]]()
     for _ in range(SETTLINGS):
-        step = [-each for each in _turns_missing(system, tape, y, begun)]
+        step = [-missing for missing in _turns_missing(system, tape, y, begun)]
         for before, after in pairwise(steps):
             share = _share(before, step)
             step = [a + share * b for a, b in zip(step, after, strict=True)]
         if steps:
             rest = 1.0 - _share(steps[-1], step)
-            step = [each / where(absolute(rest) > LEAST_REST, rest, 1.0) for each in step]
+            step = [missing / where(absolute(rest) > LEAST_REST, rest, 1.0) for missing in step]
         steps.append(step)
         q = list(y.q)
         for spring, turn in zip(springs, step, strict=True):
@@ -124,7 +124,7 @@ def _turns_missing(system: System, tape: Tape, y: Motion, begun: Mapping[str, Ma
 
 def _share(before: Sequence[Real], step: Sequence[Real]) -> Real:
     """The share of an earlier step in this one: their product over the square of the earlier one, 0 where that is 0."""
-    square = sum((each * each for each in before), 0.0)
+    square = sum((change * change for change in before), 0.0)
     product = sum((a * b for a, b in zip(before, step, strict=True)), 0.0)
     return where(square > 0.0, product / where(square > 0.0, square, 1.0), 0.0)
 
@@ -159,23 +159,23 @@ def _loads(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[st
             prescribed_qdd={actuator.index: 0.0 for actuator in still},
         )
 
-    others = [each for each in sticking(system) if not each.state and each.actuator not in still]
+    others = [other for other in sticking(system) if not other.state and other.actuator not in still]
     levels = {other.name: _level(system, tape, y, other, held) for other in others}
     modes = {other.name: where(levels[other.name] > 0.0, sign(other.rate(y)), 1.0) for other in others}
-    found = moved(modes)
+    trial = moved(modes)
     if others:
         modes = {
             other.name: friction.decide(
                 modes[other.name],
                 both(levels[other.name] > 0.0, other.rate(y) == 0.0),
-                found.need[other.name],
+                trial.need[other.name],
                 levels[other.name],
-                found.slope.qdd[other.number],
+                trial.slope.qdd[other.number],
             )
             for other in others
         }
-        found = moved(modes)
-    return found.loads
+        trial = moved(modes)
+    return trial.loads
 
 
 def _demand(
@@ -194,12 +194,12 @@ def _demand(
     return Demand(actuator, torque, Seen(q, qd, setpoint, 0.0, 0.0, states), p, starts)
 
 
-def _level(system: System, tape: Tape, y: Motion, each: Sticking, held: Sequence[NamedValues]) -> Real:
+def _level(system: System, tape: Tape, y: Motion, part: Sticking, held: Sequence[NamedValues]) -> Real:
     """The level of dry friction at a joint, its servo's and its brakes', N m (N)."""
     on_joints = brake_levels(system, tape.read, y, 0.0, 0.0)
-    level = on_joints.get(each.name, 0.0)
-    if each.followers:
-        level = level + followers_level(system, tape.read, y, each.followers, on_joints, 0.0, 0.0)
-    if each.actuator is None:
+    level = on_joints.get(part.name, 0.0)
+    if part.followers:
+        level = level + followers_level(system, tape.read, y, part.followers, on_joints, 0.0, 0.0)
+    if part.actuator is None:
         return level
-    return level + servo_response(system, each.actuator, tape.read, y, held[each.number], 0.0, 0.0).drive.dry
+    return level + servo_response(system, part.actuator, tape.read, y, held[part.number], 0.0, 0.0).drive.dry

@@ -110,21 +110,21 @@ class Builder:
     @property
     def watched(self) -> tuple[str, ...]:
         """Outputs that describe a run without being part of its state."""
-        found = (*self.limits.outputs, *self.step.grapple.watch.outputs)
+        outputs = (*self.limits.outputs, *self.step.grapple.watch.outputs)
         if self.step.beds.wire:
-            return found
-        return (*plausible.OUTPUTS, *([UNHELD] if self.system.structure.balanced else []), *found)
+            return outputs
+        return (*plausible.OUTPUTS, *([UNHELD] if self.system.structure.balanced else []), *outputs)
 
     def computers(self) -> list[Control]:
         """The parts with clocks of their own, in this order: sensors of links, guides, servos."""
-        found: list[Control] = []
+        computers: list[Control] = []
         for divisor in sorted({use.divisor for use in self.system.structure.sensors}):
-            found.append(Every(divisor, (RunPhase(Phase(f"sensors_{divisor}", self._sensors(divisor))),)))
+            computers.append(Every(divisor, (RunPhase(Phase(f"sensors_{divisor}", self._sensors(divisor))),)))
         for divisor in sorted({use.divisor for use in guiding.ticking(self.system)}):
-            found.append(Every(divisor, (RunPhase(Phase(f"guides_{divisor}", self._guides(divisor))),)))
+            computers.append(Every(divisor, (RunPhase(Phase(f"guides_{divisor}", self._guides(divisor))),)))
         for divisor in sorted({actuator.use.divisor for actuator in self.system.working if actuator.ticks}):
-            found.append(Every(divisor, (RunPhase(Phase(f"servos_{divisor}", self._servos(divisor))),)))
-        return found
+            computers.append(Every(divisor, (RunPhase(Phase(f"servos_{divisor}", self._servos(divisor))),)))
+        return computers
 
     # The run's two ends.
 
@@ -174,8 +174,8 @@ class Builder:
         starts: dict[str, Real] = {part.name: part.start for part in (*parts.memory, *parts.states)}
         if servo.begin is not None:
             p = self.system.servo_values(actuator, tape.read)
-            found = answer(actuator.owner, servo.begin, p, *self._state_of(tape, self.joints[actuator.index]))
-            starts.update(returned(actuator.owner, "begin", found, (state.name for state in parts.natural)))
+            begun = answer(actuator.owner, servo.begin, p, *self._state_of(tape, self.joints[actuator.index]))
+            starts.update(returned(actuator.owner, "begin", begun, (state.name for state in parts.natural)))
         for name, value in starts.items():
             tape.write(f"{actuator.path}.{name}", value)
         return starts
@@ -187,8 +187,8 @@ class Builder:
         p, state = self.system.servo_values(actuator, tape.read), self._state_of(tape, self.joints[actuator.index])
         seen = Seen(*sensing.measured(actuator, p, *state, states), Setpoint("none", 0.0, 0.0), 0.0, 0.0, states)
         sensing.start(self.system, tape, actuator, seen)
-        for of in failing.quantities(actuator) if actuator.use.joint in self.system.failing else ():
-            tape.write(cell_names.SEEN(actuator.use.joint, of), sensing.true_value(seen, of))
+        for quantity in failing.quantities(actuator) if actuator.use.joint in self.system.failing else ():
+            tape.write(cell_names.SEEN(actuator.use.joint, quantity), sensing.true_value(seen, quantity))
 
     def end(self, tape: Tape) -> None:
         self.limits.keep_excess(tape)
@@ -238,7 +238,7 @@ class Builder:
             q, qd = on_bed
         else:
             q, qd = self._carried(tape, actuator) if between else self._state_of(tape, joint)
-        states = {each.name: state(f"{actuator.path}.{each.name}") for each in actuator.parts.natural}
+        states = {natural.name: state(f"{actuator.path}.{natural.name}") for natural in actuator.parts.natural}
         if on_bed is None:
             p = self.system.servo_values(actuator, tape.read)
             q, qd = sensing.measured(actuator, p, q, qd, NamedValues(actuator.owner, states))
@@ -246,8 +246,8 @@ class Builder:
         seen = sensing.seen_at_tick(self.system, tape, actuator, seen, state)
         if joint in self.system.failing:
             seen = failing.seen(self.system, actuator, tape.read, seen, cell_names.SEEN(joint, ""))
-            for of in failing.quantities(actuator):
-                tape.write(cell_names.SEEN(joint, of), sensing.true_value(seen, of))
+            for quantity in failing.quantities(actuator):
+                tape.write(cell_names.SEEN(joint, quantity), sensing.true_value(seen, quantity))
         for fitted in actuator.sensors:
             tape.write(fitted.path, sensing.true_value(seen, sensing.quantity(fitted)))
         if on_bed is not None:
@@ -278,11 +278,11 @@ class Builder:
             actuator.owner, {part.name: tape.read(f"{actuator.path}.{part.name}") for part in parts.memory}
         )
         p = self.system.servo_values(actuator, tape.read)
-        found = failing.law_outputs(self.system, actuator, tape.read, p, seen.time, law(actuator, p, held, seen))
-        for name, slope in found.slopes.items():
+        control = failing.law_outputs(self.system, actuator, tape.read, p, seen.time, law(actuator, p, held, seen))
+        for name, slope in control.slopes.items():
             path = f"{actuator.path}.{name}"
             tape.write(path, tape.read(path) + period * slope)
-        for name, value in found.outputs.items():
+        for name, value in control.outputs.items():
             tape.write(f"{actuator.path}.{name}", value)
 
     def _carried(self, tape: Tape, actuator: Actuator) -> tuple[Real, Real]:
@@ -364,8 +364,8 @@ class Builder:
 
     def _observe(self, held: list[Channel]) -> Body:
         def body(tape: Tape) -> None:
-            found = orientations.values(tape, self.step.observed(tape), held, orientations.INSTANT)
-            for path, value in found.items():
+            by_path = orientations.values(tape, self.step.observed(tape), held, orientations.INSTANT)
+            for path, value in by_path.items():
                 tape.write(path, value)
 
         return body

@@ -22,8 +22,8 @@ class CellFamily:
     holds: str
     unit: str
 
-    def __call__(self, *of: object) -> str:
-        return self.pattern.format(*of)
+    def __call__(self, *names: object) -> str:
+        return self.pattern.format(*names)
 
 
 # Friction, by joint or by a state of its servo.

@@ -87,8 +87,8 @@ def split_at_rest(y: Motion, k1: Slope, y_new: Motion, h: Real, s: Sequence[Real
     part = _part_way(y, k1, y_new, h, first)
     whole = not_(may_split)
     q, qd, x = (
-        tuple(where(whole, b, a) for a, b in zip(there, end, strict=True))
-        for there, end in ((part.q, y_new.q), (part.qd, y_new.qd), (part.x, y_new.x))
+        tuple(where(whole, b, a) for a, b in zip(rest, end, strict=True))
+        for rest, end in ((part.q, y_new.q), (part.qd, y_new.qd), (part.x, y_new.x))
     )
     rates = tuple(
         where(both(crossing, either(whole, share <= first)), 0.0, rate)
@@ -102,10 +102,10 @@ def first_root(rate: Real, slope: Real, end: Real) -> Real:
     curve = end - rate - slope
     reach = sqrt(slope * slope - 4.0 * curve * rate)
     half = -0.5 * (slope + where(slope >= 0.0, reach, -reach))
-    one, other = half / curve, rate / half
-    one = where(both(one > 0.0, one <= 1.0), one, 1.0)
+    root, other = half / curve, rate / half
+    root = where(both(root > 0.0, root <= 1.0), root, 1.0)
     other = where(both(other > 0.0, other <= 1.0), other, 1.0)
-    return minimum(one, other)
+    return minimum(root, other)
 
 
 def _part_way(y: Motion, k1: Slope, y_new: Motion, h: Real, share: Real) -> Motion:

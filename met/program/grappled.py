@@ -108,11 +108,11 @@ class GrappleWatch:
 
     def _way_to(self, link: str) -> list[str]:
         """The joints between a link and the base."""
-        carrying, found = {joint.child: joint for joint in self.system.structure.joints}, []
+        carrying, joints = {joint.child: joint for joint in self.system.structure.joints}, []
         while link in carrying and link != BASE:
-            found.append(carrying[link].name)
+            joints.append(carrying[link].name)
             link = carrying[link].parent
-        return found
+        return joints
 
     def _size(self, body: str, tape: Tape) -> Real:
         """The largest distance of a body's matter from its centre of mass, for usual shapes, m."""

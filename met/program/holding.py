@@ -88,8 +88,8 @@ def _slack(demand: Demand, own: Mapping[str, Real], outputs: Mapping[str, Real],
     slack: dict[str, Real] = dict.fromkeys(names, 0.0)
     moved = [({**own, name: (1.0 + SHARE) * own[name]}, outputs) for name in names]
     moved += [(dict(own), {**outputs, name: (1.0 + SHARE) * value}) for name, value in outputs.items()]
-    for states, given in moved:
-        other = _drive(demand, states, given)
+    for states, changed in moved:
+        other = _drive(demand, states, changed)
         for name in names:
             slack[name] = slack[name] + absolute(other.slopes[name] - drive.slopes[name])
     return slack

@@ -51,7 +51,7 @@ class LimitPhases:
 
     def _look(self, tape: Tape) -> None:
         """Note whether any limit is reached, which is rare: so counting costs next to nothing."""
-        tape.write_mask(ANY, any_of([each for _, each in self._at_begin(tape)]))
+        tape.write_mask(ANY, any_of([reached for _, reached in self._at_begin(tape)]))
 
     def _count(self, tape: Tape) -> None:
         for path, reached in self._at_begin(tape):
@@ -76,10 +76,10 @@ class LimitPhases:
     def at_extreme(self, tape: Tape, name: str, is_new: Truth) -> None:
         """Keep the number, from 1, of the limit that is reached where this metric has a new extreme: among several the
         last, which is nearest to the joint."""
-        at: Real = 0.0
+        last: Real = 0.0
         for number, use in enumerate(self.extremes[name], 1):
-            at = where(self._reached(tape, use, tape.time), float(number), at)
-        cells.keep(tape, is_new, cell_names.EXTREME_AT(name), at)
+            last = where(self._reached(tape, use, tape.time), float(number), last)
+        cells.keep(tape, is_new, cell_names.EXTREME_AT(name), last)
 
     def _reached(self, tape: Tape, use: LimitUse, time: Real) -> Truth:
         system = self.system
@@ -90,7 +90,7 @@ class LimitPhases:
             return any_of([absolute(tape.read(channel)) >= most for channel in use.channels])
         assert use.declared is not None
         if not use.owner:
-            actuator = next(each for each in system.working if each.use.joint == use.joint)
+            actuator = next(other for other in system.working if other.use.joint == use.joint)
             p = course_values(system, actuator, tape.read)
             return answer(actuator.owner, use.declared.reached, p, time)
         model = models.find("environment", next(e.model for e in system.structure.environment if e.name == use.owner))

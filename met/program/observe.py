@@ -56,13 +56,13 @@ class Observed:
     """
 
     def __init__(
-        self, system: System, read: ReadCell, y: Motion, base: BaseMotion, time: Real, found: Callable[[], Derivative]
+        self, system: System, read: ReadCell, y: Motion, base: BaseMotion, time: Real, derive: Callable[[], Derivative]
     ) -> None:
         self.system, self.read, self.y, self.time = system, read, y, time
         self.joints = tuple(joint.name for joint in system.joints)
         n = len(self.joints)
         self.tree, self.q, self.qd, self.base = system.tree(read), y.q[:n], y.qd[:n], base
-        self._found = found
+        self._derive = derive
         self._jacobians: dict[str, Sequence[tuple[Vector, Vector]]] = {}
 
     def value(self, channel: Channel) -> Real:
@@ -131,7 +131,7 @@ class Observed:
 
     def _of_payload(self, parts: list[str]) -> Real:
         name, kind, *rest = parts
-        payload, motion = next(each for each in self.system.structure.payloads if each.name == name), self.seen[name]
+        payload, motion = next(other for other in self.system.structure.payloads if other.name == name), self.seen[name]
         if kind == "carried":
             return choose(payloads.carried(payload, self.read), 1.0, 0.0) if payload.flies else 1.0
         if kind == "distance":
@@ -145,10 +145,10 @@ class Observed:
         owner, p = environment_values(self.system, name, model, self.read)
         tree = payloads.tree_with_payloads(self.system, self.read)
         world = ArmWorld(self.system, self.read, tree, self.y, self.base, self.time, self.time)
-        found: Mapping[str, Any] = returned(
-            owner, "signals", answer(owner, model.show, p, world), (each.name for each in model.signals)
+        signals: Mapping[str, Any] = returned(
+            owner, "signals", answer(owner, model.show, p, world), (declared.name for declared in model.signals)
         )
-        return found[signal][XYZ.index(axis)] if axis else found[signal]
+        return signals[signal][XYZ.index(axis)] if axis else signals[signal]
 
     def _of_arm(self, parts: list[str]) -> Real:
         match parts:
@@ -164,7 +164,7 @@ class Observed:
 
     def _margin(self, joint: str) -> Real:
         """The smallest margin of a joint to its limits, each as a share of the range, or of the limit."""
-        [limits] = [each.limits for each in self.system.joints if each.name == joint]
+        [limits] = [other.limits for other in self.system.joints if other.name == joint]
         value = {name: self.system.value(f"{joint}.{name}", self.read) for name in limits}
         shares = [
             excess(joint, name, value[name], self.read) / (value["q_min"] - value["q_max"])
@@ -182,15 +182,15 @@ class Observed:
 
     @cached_property
     def derivative(self) -> Derivative:
-        return self._found()
+        return self._derive()
 
     def effective(self, joint: int) -> tuple[Real, Real]:
         """J_eff and b of a joint, by its number."""
-        found = self.derivative
-        if found.felt is None:
+        derivative = self.derivative
+        if derivative.felt is None:
             return self._effective[joint]
-        inertia = found.felt(joint)
-        return inertia, found.solved.tau_load[joint] - inertia * found.solved.qdd[joint]
+        inertia = derivative.felt(joint)
+        return inertia, derivative.solved.tau_load[joint] - inertia * derivative.solved.qdd[joint]
 
     @cached_property
     def _effective(self) -> tuple[tuple[Real, Real], ...]:
@@ -217,20 +217,20 @@ class Observed:
     @cached_property
     def energy(self) -> Energy:
         """Energy and momentum of the arm, and of each payload that flies for a time, carried or not."""
-        found, base = self.derivative, self.base
+        derivative, base = self.derivative, self.base
         total = energy(
             self.tree,
             self.q,
             self.qd,
-            rotor=found.solved.rotor,
-            momenta=found.angular_momenta,
-            gravity=found.gravity,
+            rotor=derivative.solved.rotor,
+            momenta=derivative.angular_momenta,
+            gravity=derivative.gravity,
             base=base.pose,
             base_velocity=(base.w, base.v),
         )
         for payload in self.system.flying:
             body = payloads.body_of(self.system, payload, self.read)
-            own = energy_of(body, self.seen[payload.name], found.gravity)
+            own = energy_of(body, self.seen[payload.name], derivative.gravity)
             total = Energy(
                 total.kinetic + own.kinetic,
                 total.potential + own.potential,

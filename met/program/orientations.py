@@ -25,19 +25,19 @@ def vector(channel: Channel) -> str:
 
 def values(tape: Tape, arm: Observed, channels: list[Channel], last: str) -> dict[str, Real]:
     """Derived channels at this instant, by path. last: INSTANT or ROW, for the part that asks."""
-    found = {channel.path: arm.value(channel) for channel in channels if not vector(channel)}
+    by_path = {channel.path: arm.value(channel) for channel in channels if not vector(channel)}
     for name in dict.fromkeys(map(vector, channels)):
-        found |= _components(name, nearest(tape, name, arm.orientation(name), last)) if name else {}
-    return {channel.path: found[channel.path] for channel in channels}
+        by_path |= _components(name, nearest(tape, name, arm.orientation(name), last)) if name else {}
+    return {channel.path: by_path[channel.path] for channel in channels}
 
 
 def held(tape: Tape, channels: list[Channel]) -> dict[str, Real]:
     """Orientations in a row between instants, or beside a metric that watches them: those of the last instant."""
-    found: dict[str, Real] = {}
+    by_path: dict[str, Real] = {}
     for name in dict.fromkeys(filter(None, map(vector, channels))):
         seen = tuple(tape.read(cell) for cell in _cells(name, INSTANT))
-        found |= _components(name, nearest(tape, name, seen, ROW))  # type: ignore[arg-type]
-    return found
+        by_path |= _components(name, nearest(tape, name, seen, ROW))  # type: ignore[arg-type]
+    return by_path
 
 
 def nearest(tape: Tape, name: str, q: Quaternion, last: str) -> Quaternion:

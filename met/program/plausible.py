@@ -50,14 +50,14 @@ def start(tape: Tape, coordinates: Sequence[str]) -> None:
 def watch(tape: Tape, coordinates: Sequence[str], numbers: Sequence[int]) -> None:
     """Check the rates of these coordinates. numbers: those of their joints or bodies"""
     fastest: Real = 0.0
-    of: Real = 0.0
+    fastest_number: Real = 0.0
     for name, number in zip(coordinates, numbers, strict=True):
         size = absolute(tape.read(f"{name}.qd"))
         faster = size > fastest
-        fastest, of = where(faster, size, fastest), where(faster, float(number), of)
+        fastest, fastest_number = where(faster, size, fastest), where(faster, float(number), fastest_number)
     measure = tape.read(MEASURE)
     doubtful = both(fastest >= DOUBTFUL * measure, tape.read(DOUBTFUL_TICK) == 0.0)
-    cells.keep(tape, doubtful, OF, of)
+    cells.keep(tape, doubtful, OF, fastest_number)
     cells.keep(tape, doubtful, DOUBTFUL_TICK, tape.tick)
     failed = both(fastest >= FAILED * measure, tape.read(FAILED_TICK) == 0.0)
     cells.keep(tape, failed, FAILED_TICK, tape.tick)

@@ -75,7 +75,7 @@ class StepPhases:
         )
         # what may hide a non-finite number: joints whose acceleration may be given, and all that may stick
         gives = [a.use.joint for a in system.working if a.gives or a.level != 0.0]
-        self._needs = tuple(dict.fromkeys((*gives, *(each.name for each in self.sticking))))
+        self._needs = tuple(dict.fromkeys((*gives, *(part.name for part in self.sticking))))
         self._may_leave_range = [actuator for actuator in self.system.working if actuator.may_leave_range]
         self._split = WhileAny("crossing", 1, (RunPhase(Phase("split", self.split)),))
 
@@ -138,16 +138,16 @@ class StepPhases:
     def _modes(self, tape: Tape, active: Truth) -> None:
         """The modes s = sign(qd), and whether any joint is at rest so that its mode must be decided."""
         any_at_rest: Truth = False
-        for each, level in zip(self.sticking, self._levels(tape), strict=True):
-            rate = tape.read(each.cell)
+        for part, level in zip(self.sticking, self._levels(tape), strict=True):
+            rate = tape.read(part.cell)
             has_friction = level > 0.0
-            if each.level is None:
-                cells.keep(tape, active, cell_names.HAS_FRICTION(each.name), choose(has_friction, 1.0, 0.0))
+            if part.level is None:
+                cells.keep(tape, active, cell_names.HAS_FRICTION(part.name), choose(has_friction, 1.0, 0.0))
             # without friction at rest it moves freely; a level that rises later in the step opposes the motion at once
             cells.keep(
                 tape,
                 active,
-                cell_names.FRICTION_MODE(each.name),
+                cell_names.FRICTION_MODE(part.name),
                 where(either(has_friction, rate != 0.0), sign(rate), 1.0),
             )
             any_at_rest = either(any_at_rest, both(has_friction, rate == 0.0))
@@ -159,46 +159,46 @@ class StepPhases:
         fraction, y = tape.read("fraction"), self.state(tape)
         time, begin = self._time(tape, fraction), tape.read("instant")
         on_joints = brake_levels(self.system, tape.read, y, time, begin)
-        found: list[Real] = []
-        for each in self.sticking:
-            own: list[Real] = [] if each.level is None else [each.level]
-            if each.level is None and each.actuator is not None:
-                held = self._held(tape, each.actuator, fraction)
-                drive = servo_response(self.system, each.actuator, tape.read, y, held, time, begin).drive
-                own.append(drive.friction[each.state] if each.state else drive.dry)
-            if each.name in on_joints:
-                own.append(on_joints[each.name])
-            if each.followers:
-                own.append(followers_level(self.system, tape.read, y, each.followers, on_joints, time, begin))
-            found.append(reduce(add, own))
-        return found
+        levels: list[Real] = []
+        for part in self.sticking:
+            own: list[Real] = [] if part.level is None else [part.level]
+            if part.level is None and part.actuator is not None:
+                held = self._held(tape, part.actuator, fraction)
+                drive = servo_response(self.system, part.actuator, tape.read, y, held, time, begin).drive
+                own.append(drive.friction[part.state] if part.state else drive.dry)
+            if part.name in on_joints:
+                own.append(on_joints[part.name])
+            if part.followers:
+                own.append(followers_level(self.system, tape.read, y, part.followers, on_joints, time, begin))
+            levels.append(reduce(add, own))
+        return levels
 
     def has_dry_friction(self, tape: Tape, name: str) -> Truth:
         """True where the joint or state of this name has dry friction, as `modes` found it: a level above zero."""
-        found = next((each for each in self.sticking if each.name == name), None)
-        if found is None:
+        part = next((other for other in self.sticking if other.name == name), None)
+        if part is None:
             return False
-        return True if found.level is not None else tape.read_mask(cell_names.HAS_FRICTION(name))
+        return True if part.level is not None else tape.read_mask(cell_names.HAS_FRICTION(name))
 
     def decide(self, tape: Tape) -> None:
         """Decide modes at rest once, from the derivative just taken: breaking away, and turning back."""
-        self._decided(tape, one=False)
+        self._decided(tape, single=False)
 
     def decide_one(self, tape: Tape) -> None:
         """Change only the first mode that is wrong, as `decide` does for all."""
-        self._decided(tape, one=True)
+        self._decided(tape, single=True)
 
-    def _decided(self, tape: Tape, *, one: bool) -> None:
+    def _decided(self, tape: Tape, *, single: bool) -> None:
         active, y = tape.read_mask("undecided"), self.state(tape)
         changed: Truth = False
-        for each, level in zip(self.sticking, self._levels(tape), strict=True):
-            s = tape.read(cell_names.FRICTION_MODE(each.name))
-            slope = tape.read(cell_names.SLOPE(each.name) if each.state else f"{each.name}.qdd")
-            at_rest = both(self.has_dry_friction(tape, each.name), each.rate(y) == 0.0)
-            s_new = friction.decide(s, at_rest, tape.read(cell_names.HOLDING(each.name)), level, slope)
-            s_new = where(changed, s, s_new) if one else s_new
+        for part, level in zip(self.sticking, self._levels(tape), strict=True):
+            s = tape.read(cell_names.FRICTION_MODE(part.name))
+            slope = tape.read(cell_names.SLOPE(part.name) if part.state else f"{part.name}.qdd")
+            at_rest = both(self.has_dry_friction(tape, part.name), part.rate(y) == 0.0)
+            s_new = friction.decide(s, at_rest, tape.read(cell_names.HOLDING(part.name)), level, slope)
+            s_new = where(changed, s, s_new) if single else s_new
             changed = either(changed, s_new != s)
-            cells.keep(tape, active, cell_names.FRICTION_MODE(each.name), s_new)
+            cells.keep(tape, active, cell_names.FRICTION_MODE(part.name), s_new)
         tape.write_mask("undecided", both(active, changed))
 
     def left_open(self, tape: Tape) -> None:
@@ -210,41 +210,41 @@ class StepPhases:
     def derive(self, tape: Tape) -> None:
         """Compute the derivative at the state, with all recorded quantities, and check it."""
         y = self.state(tape)
-        found = self._derivative(tape, y, tape.read("fraction"))
+        answer = self._derivative(tape, y, tape.read("fraction"))
         for i, name in enumerate(self.coordinates):
-            tape.write(f"{name}.qdd", found.slope.qdd[i])
+            tape.write(f"{name}.qdd", answer.slope.qdd[i])
             if name in self.joints:
-                tape.write(f"{name}.tau", found.tau[i])
+                tape.write(f"{name}.tau", answer.tau[i])
         for name in self._needs:
-            tape.write(cell_names.HOLDING(name), found.need[name])
-        for name, slope in zip(self.states, found.slope.xd, strict=True):
+            tape.write(cell_names.HOLDING(name), answer.need[name])
+        for name, slope in zip(self.states, answer.slope.xd, strict=True):
             tape.write(cell_names.SLOPE(name), slope)
-        for channel, value in found.shown.items():
+        for channel, value in answer.shown.items():
             tape.write(channel, value)
-        singular: Real = where(found.solved.base_singular, float(len(self.joints) + 1), 0.0)
+        singular: Real = where(answer.solved.base_singular, float(len(self.joints) + 1), 0.0)
         for i in reversed(range(len(self.joints))):
-            singular = where(found.solved.singular[i], float(i + 1), singular)
+            singular = where(answer.solved.singular[i], float(i + 1), singular)
         tape.write("singular", singular)
         out_of_range: Real = 0.0
         for actuator in reversed(self._may_leave_range):
-            out_of_range = where(found.out_of_range[actuator.index], float(actuator.index + 1), out_of_range)
+            out_of_range = where(answer.out_of_range[actuator.index], float(actuator.index + 1), out_of_range)
         if self._may_leave_range:
             tape.write("astray", out_of_range)
         # Infinities that cancel leave a NaN, so a plain sum misses none; an overflowing sum of finite numbers only
         # makes `judge` look.
-        parts = (*found.slope.qdd, *found.slope.xd, *y.q, *y.qd, *(found.need[name] for name in self._needs))
+        parts = (*answer.slope.qdd, *answer.slope.xd, *y.q, *y.qd, *(answer.need[name] for name in self._needs))
         total: Real = sum((*parts, *bodies.orientation(self.system, tape)), 0.0)
         wrong = either(not_(isfinite(total)), singular != 0.0)
         tape.write_mask("suspect", either(wrong, out_of_range != 0.0) if self._may_leave_range else wrong)
 
     def slope(self, tape: Tape) -> None:
         """Compute the derivative at a stage within the step: slopes alone."""
-        found = self._derivative(tape, self.state(tape, STAGE), tape.read(f"{STAGE}fraction"))
-        for joint, qdd in zip(self.coordinates, found.slope.qdd, strict=True):
+        answer = self._derivative(tape, self.state(tape, STAGE), tape.read(f"{STAGE}fraction"))
+        for joint, qdd in zip(self.coordinates, answer.slope.qdd, strict=True):
             tape.write(f"{STAGE}{joint}.qdd", qdd)
-        for joint, qd in zip(self.coordinates[len(self.joints) :], found.slope.qd[len(self.joints) :], strict=True):
+        for joint, qd in zip(self.coordinates[len(self.joints) :], answer.slope.qd[len(self.joints) :], strict=True):
             tape.write(f"{STAGE}{joint}.qd", qd)  # a turn's rate is not a rate of the state
-        for name, slope in zip(self.states, found.slope.xd, strict=True):
+        for name, slope in zip(self.states, answer.slope.xd, strict=True):
             tape.write(STAGE + cell_names.SLOPE(name), slope)
 
     def judge(self, tape: Tape) -> None:
@@ -294,7 +294,7 @@ class StepPhases:
     def loads(self, tape: Tape) -> tuple[list[list[Real]], list[Real]]:
         """Compute the arm's load on the substituted joints: tau_load = Lambda qdd + b_0, all other joints in their
         modes."""
-        y, numbers = self.state(tape), [each.index for each in self.beds.mounted]
+        y, numbers = self.state(tape), [mounted.index for mounted in self.beds.mounted]
         at_rest = self._derivative(tape, y, 0.0, dict.fromkeys(numbers, 0.0)).solved.tau_load
         columns = []
         for j in numbers:
@@ -364,7 +364,7 @@ class StepPhases:
             question = self._integrate(tape, settled, fraction)
             if not isinstance(question, Question):
                 raise changed_count(self.system.integrator)
-            cells.store(tape, True, self.coordinates, self.states, question.there, STAGE)
+            cells.store(tape, True, self.coordinates, self.states, question.state, STAGE)
             tape.write(f"{STAGE}fraction", fraction + question.share * (1.0 - fraction))
 
         return body
@@ -466,13 +466,13 @@ class StepPhases:
         return y if copy == STAGE else bodies.with_zero_turn(self.system, y)
 
     def _friction(self, tape: Tape) -> dict[str, Real]:
-        return {each.name: tape.read(cell_names.FRICTION_MODE(each.name)) for each in self.sticking}
+        return {part.name: tape.read(cell_names.FRICTION_MODE(part.name)) for part in self.sticking}
 
     def _sliding(self, tape: Tape) -> list[Real | None]:
         """Friction modes for crossings: zero, so that it never crosses, where a case has no friction."""
         modes: list[Real | None] = [None] * (len(self.coordinates) + len(self.states))
-        for each in self.sticking:
-            mode = tape.read(cell_names.FRICTION_MODE(each.name))
-            number = each.number + (len(self.coordinates) if each.state else 0)
-            modes[number] = where(self.has_dry_friction(tape, each.name), mode, 0.0)
+        for part in self.sticking:
+            mode = tape.read(cell_names.FRICTION_MODE(part.name))
+            number = part.number + (len(self.coordinates) if part.state else 0)
+            modes[number] = where(self.has_dry_friction(tape, part.name), mode, 0.0)
         return modes

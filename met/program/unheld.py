@@ -29,7 +29,7 @@ HALVINGS = 20
 class Unheld:
     """A joint whose servo cannot hold it as a run begins.
 
-    wanted  torque that the joint takes, N m (N);  there: what of it the servo can hold, friction's help included
+    wanted  torque that the joint takes, N m (N);  holdable: what of it the servo can hold, friction's help included
     limits  the servo's limits that stop it, by name, and as text with their units: those that do so alone, where there
             are any; none where no limit is in the way, and an integral with a gain of 0 holds nothing
     """
@@ -37,7 +37,7 @@ class Unheld:
     joint: Joint
     servo: ServoUse
     wanted: float
-    there: float
+    holdable: float
     limits: tuple[tuple[str, str], ...]
 
     @property
@@ -60,9 +60,9 @@ class Unheld:
 def unheld(experiment: Experiment, values: np.ndarray, *, commanded: bool = False) -> list[tuple[Unheld, ...]]:
     """For each case of these inputs, [case, input], the joints that are to begin balanced and cannot be held, in the
     arm's order. commanded: as for `holding.holds`."""
-    found: list[tuple[Unheld, ...]] = [()] * len(values)
+    by_case: list[tuple[Unheld, ...]] = [()] * len(values)
     if not experiment.structure.balanced or not len(values):
-        return found
+        return by_case
     begun = _Begun.of(experiment, values.T if len(values) > 1 else values[0])
     system = begun.system
     with np.errstate(all="ignore"):
@@ -72,16 +72,20 @@ def unheld(experiment: Experiment, values: np.ndarray, *, commanded: bool = Fals
             brake = brakes.get(joint.name, 0.0)
             judged = _Judged(system, begun.tape, demand, brake, len(values), commanded)
             for case in np.flatnonzero(~judged.held).tolist():
-                found[case] = (*found[case], Unheld(joint, demand.actuator.use, *judged.of(case)))
-    return found
+                by_case[case] = (*by_case[case], Unheld(joint, demand.actuator.use, *judged.of(case)))
+    return by_case
 
 
 def holding_torques(experiment: Experiment, inputs: Mapping[str, float]) -> dict[str, float]:
     """By joint, the torque with which a servo that is commanded a torque keeps its joint from accelerating as a run
     begins, N m (N). inputs: of one case, by name."""
     with np.errstate(all="ignore"):
-        found = _Begun.of(experiment, tuple(inputs.values()), tuple(inputs)).demands()
-        return {each.actuator.use.joint: float(each.torque) for each in found if each.actuator.command_kind == "torque"}
+        all_demands = _Begun.of(experiment, tuple(inputs.values()), tuple(inputs)).demands()
+        return {
+            demand.actuator.use.joint: float(demand.torque)
+            for demand in all_demands
+            if demand.actuator.command_kind == "torque"
+        }
 
 
 @frozen

@@ -81,17 +81,17 @@ def answer(owner: str, function: Callable[..., T], *arguments: Any) -> T:
 
 
 def returned(
-    owner: str, what: str, given: Mapping[str, Real], declared: Iterable[str], *, all_of_them: bool = True
+    owner: str, what: str, numbers: Mapping[str, Real], declared: Iterable[str], *, all_of_them: bool = True
 ) -> Mapping[str, Real]:
     """The answer of a model's function, checked to hold exactly the names that the model declares, or some of them."""
     names = list(declared)
-    missing = [name for name in names if name not in given] if all_of_them else []
-    unknown = [name for name in given if name not in names]
+    missing = [name for name in names if name not in numbers] if all_of_them else []
+    unknown = [name for name in numbers if name not in names]
     if missing or unknown:
-        listed = ", ".join(given) or "nothing"
+        listed = ", ".join(numbers) or "nothing"
         message = f"{owner}: {what} gave back {listed}; declared are {', '.join(names) or 'none'}"
         remedy = "give back every declared name and no other" if all_of_them else "give back declared names alone"
         raise Problem(
             error("E212", message, help=[*(near for name in unknown for near in did_you_mean(name, names)), remedy])
         )
-    return given
+    return numbers

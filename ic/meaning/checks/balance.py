@@ -31,7 +31,7 @@ def check_balance(scope: Scope, experiment: Experiment) -> None:
                 "D343",
                 f"joint `{unheld_joint.joint.name}` cannot begin balanced: "
                 f"it takes {unheld_joint.wanted:.3g} {unheld_joint.unit}, and its servo can hold "
-                f"{unheld_joint.there:.3g} {unheld_joint.unit}",
+                f"{unheld_joint.holdable:.3g} {unheld_joint.unit}",
                 places[0] if places else use,
                 also=[Label(use, f"drives joint `{unheld_joint.joint.name}`")] if places and use is not None else [],
                 help=[*blamed, unheld_joint.reason, unloaded],

@@ -85,7 +85,7 @@ def weak(experiment: Experiment, inputs: np.ndarray) -> list[Reason]:
 
 
 def _of_unheld(joint: Unheld) -> str:
-    takes = f"`{joint.joint.name}` takes {joint.wanted:.3g} {joint.unit}, and its servo can hold {joint.there:.3g}"
+    takes = f"`{joint.joint.name}` takes {joint.wanted:.3g} {joint.unit}, and its servo can hold {joint.holdable:.3g}"
     return f"{takes} {joint.unit}: {joint.reason}"
 
 

@@ -67,22 +67,22 @@ def base_of(system: System, read: ReadCell, y: Motion, time: Real) -> BaseMotion
     body = free_base(system)
     if body is None:
         return prescribed(system, read, time)
-    found = flight(body, read, y)
-    return BaseMotion(found.pose, found.w, found.v, turned=found.turned)
+    flying = flight(body, read, y)
+    return BaseMotion(flying.pose, flying.w, flying.v, turned=flying.turned)
 
 
 def motions(tree: Tree, q: Sequence[Real], qd: Sequence[Real], base: BaseMotion) -> dict[str, LinkMotion]:
     """The motion of every link in the world, by name; that of the base, where it is a link, is the given one."""
-    found = link_motions(tree, q, qd, base.pose, (base.w, base.v))
-    return found | ({BASE: LinkMotion(base.pose, base.w, base.v)} if BASE in found else {})
+    by_link = link_motions(tree, q, qd, base.pose, (base.w, base.v))
+    return by_link | ({BASE: LinkMotion(base.pose, base.w, base.v)} if BASE in by_link else {})
 
 
 def prescribed(system: System, read: ReadCell, time: Real) -> BaseMotion:
     """The motion of the base from its courses at a time (`courses`)."""
     varying = {path: read(PARAMETER + path) for path in system.courses.inputs if path != TIME}
     numbers = system.courses.replay({TIME: time, **varying})
-    found = [settled(x) if isinstance(x, Scalar) else np.float64(x) for x in numbers]
-    rows: list[Any] = [tuple(found[i : i + 3]) for i in range(0, len(found), 3)]
+    settled_numbers = [settled(x) if isinstance(x, Scalar) else np.float64(x) for x in numbers]
+    rows: list[Any] = [tuple(settled_numbers[i : i + 3]) for i in range(0, len(settled_numbers), 3)]
     pose = Pose((rows[0], rows[1], rows[2]), rows[3])
     return BaseMotion(pose, *(turn_vector_back(pose.R, row) for row in rows[4:]))
 
@@ -93,10 +93,10 @@ def start(system: System, tape: Tape) -> None:
     if body is None:
         return
 
-    def given(name: str) -> Vector:
+    def parameter(name: str) -> Vector:
         x, y, z = (system.value(f"initial.base.{name}.{axis}", tape.read) for axis in "xyz")
         return x, y, z
 
-    turn = quaternion_rpy(*given("rpy"))
-    w = turn_vector_back(rotation_quaternion(*turn), given("rate"))
-    place(body, tape, True, turn, given("position"), given("velocity"), w)
+    turn = quaternion_rpy(*parameter("rpy"))
+    w = turn_vector_back(rotation_quaternion(*turn), parameter("rate"))
+    place(body, tape, True, turn, parameter("position"), parameter("velocity"), w)

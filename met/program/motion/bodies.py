@@ -89,7 +89,7 @@ class Flight:
 
 def bodies(system: System) -> tuple[FreeBody, ...]:
     """The base, where it is free, then the payloads that fly for a time."""
-    names = ([BASE] if system.structure.free else []) + [PAYLOAD + each.name for each in system.flying]
+    names = ([BASE] if system.structure.free else []) + [PAYLOAD + payload.name for payload in system.flying]
     joints = len(system.joints)
     return tuple(FreeBody(name, joints + SIX * number) for number, name in enumerate(names))
 
@@ -104,10 +104,10 @@ def flight(body: FreeBody, read: ReadCell, y: Motion) -> Flight:
     """Pose and velocities of a body at a state with its coordinates, theta included."""
     q, qd = body.q(y), body.qd(y)
     theta, v, w = q[3:], qd[:3], qd[3:]
-    there = _read(body, read, "")
+    quaternion = _read(body, read, "")
     if not all(is_zero(part) for part in theta):
-        there = _turned(there, theta)
-    R = rotation_quaternion(*there)
+        quaternion = _turned(quaternion, theta)
+    R = rotation_quaternion(*quaternion)
     return Flight(Pose(R, q[:3]), w, turn_vector_back(R, v), _slope(theta, w))  # type: ignore[arg-type]
 
 

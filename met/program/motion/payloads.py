@@ -93,8 +93,8 @@ def payload_motion(
 
 def flying_motion(system: System, payload: Payload, read: ReadCell, y: Motion) -> LinkMotion:
     """A payload that flies, in the world."""
-    found = flight(free_body(system, payload), read, y)
-    return LinkMotion(found.pose, found.w, found.v)
+    flying = flight(free_body(system, payload), read, y)
+    return LinkMotion(flying.pose, flying.w, flying.v)
 
 
 def carried_motion(payload: Payload, read: ReadCell, links: Mapping[str, LinkMotion]) -> LinkMotion:
@@ -131,15 +131,15 @@ def slopes_of_payloads(
     qdd: list[Real] = []
     for payload in system.flying:
         body = free_body(system, payload)
-        found = flight(body, read, y)
-        falling = turn_vector_back(found.pose.R, gravity)
+        flying = flight(body, read, y)
+        falling = turn_vector_back(flying.pose.R, gravity)
         wrench = wrenches.get(payload.name, NOTHING)
-        solved = free_acceleration(body_of(system, payload, read), found.w, wrench, falling)
+        solved = free_acceleration(body_of(system, payload, read), flying.w, wrench, falling)
         on = carried(payload, read)
-        for kept, free in zip(
-            (qd, qdd), slopes(body, y, pose=found.pose, turned=found.turned, solved=solved), strict=True
+        for collected, free in zip(
+            (qd, qdd), slopes(body, y, pose=flying.pose, turned=flying.turned, solved=solved), strict=True
         ):
-            kept += [choose(on, 0.0, slope) for slope in free]
+            collected += [choose(on, 0.0, slope) for slope in free]
     return tuple(qd), tuple(qdd)
 
 
@@ -151,18 +151,18 @@ def start(system: System, tape: Tape) -> None:
     for payload in system.flying:
         head = f"payloads.{payload.name}"
 
-        def given(name: str, head: str = head) -> Vector:
+        def parameter(name: str, head: str = head) -> Vector:
             return system.vector(f"{head}.{name}", tape.read)
 
         body = free_body(system, payload)
         if payload.grappled:
-            turn = quaternion_rpy(*given("attitude"))
-            w = turn_vector_back(rotation_quaternion(*turn), given("rate"))
-            place(body, tape, True, turn, given("position"), given("velocity"), w)
+            turn = quaternion_rpy(*parameter("attitude"))
+            w = turn_vector_back(rotation_quaternion(*turn), parameter("rate"))
+            place(body, tape, True, turn, parameter("position"), parameter("velocity"), w)
             tape.write(cell_names.PAYLOAD_STAGE(payload.name), FLYING)
         else:
             place(body, tape, True, (1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO)
-            attach(system, tape, True, payload, Pose(rotation_rpy(*given("rpy")), given("at")))
+            attach(system, tape, True, payload, Pose(rotation_rpy(*parameter("rpy")), parameter("at")))
 
 
 def attach(system: System, tape: Tape, active: Truth, payload: Payload, pose: Pose) -> None:
