@@ -61,12 +61,14 @@ def _edit(change: TextChange, place: Place, sources: Mapping[str, str]) -> Edit 
     line_end = line_at + len(text[line_at:].partition("\n")[0])
     first = line_at + place.column - 1
     last = min(first + place.length, line_end)
-    found = _stretch(change, text, (line_at, line_end), min(first, line_end), last)
-    if found is None or text[found[0] : found[1]] == found[2]:  # the new text stands there already
+    stretch = _stretch(change, text, (line_at, line_end), min(first, line_end), last)
+    if stretch is None or text[stretch[0] : stretch[1]] == stretch[2]:  # the new text stands there already
         return None
-    if any(iteration.macro in _names(text[found[0] : found[1]]) - _names(found[2]) for iteration in place.iterations):
+    if any(
+        iteration.macro in _names(text[stretch[0] : stretch[1]]) - _names(stretch[2]) for iteration in place.iterations
+    ):
         return None  # it would only concern this turn
-    return _between(place.file, starts, *found)
+    return _between(place.file, starts, *stretch)
 
 
 def _names(text: str) -> set[str]:
@@ -102,7 +104,7 @@ def _stretch(
 
 def _starts(text: str) -> list[int]:
     """The offset of each line's beginning."""
-    return [0, *(found.end() for found in re.finditer("\n", text))]
+    return [0, *(line_end.end() for line_end in re.finditer("\n", text))]
 
 
 def _between(file: str, starts: list[int], first: int, last: int, new: str) -> Edit:
@@ -112,13 +114,13 @@ def _between(file: str, starts: list[int], first: int, last: int, new: str) -> E
     return Edit(file, line, first - starts[line - 1] + 1, end_line, last - starts[end_line - 1] + 1, new)
 
 
-def _words(word: str, line: str, at: int) -> Iterator[tuple[int, int]]:
+def _words(word: str, line: str, offset: int) -> Iterator[tuple[int, int]]:
     """The stretches of a line that consist of these whole words, with or without blanks between them."""
     before = r"(?<!\w)" if word[:1].isalnum() or word[:1] == "_" else ""
     behind = r"(?!\w)" if word[-1:].isalnum() or word[-1:] == "_" else ""
     blanks = r"\s*".join(map(re.escape, word.split(" ")))
-    for found in re.finditer(before + blanks + behind, line):
-        yield at + found.start(), at + found.end()
+    for matched in re.finditer(before + blanks + behind, line):
+        yield offset + matched.start(), offset + matched.end()
 
 
 def _meet(stretch: tuple[int, int], first: int, last: int) -> bool:
@@ -148,8 +150,8 @@ def _at_the_head(text: str, new: str) -> tuple[int, int, str]:
     if edition is None:
         return 0, 0, f"{new}\n"
     rest = _REST.match(text, edition.end())
-    at, line = (rest.end(), f"{new}\n") if rest is not None else (edition.end(), f"\n{new}\n")
-    return at, at, line
+    offset, line = (rest.end(), f"{new}\n") if rest is not None else (edition.end(), f"\n{new}\n")
+    return offset, offset, line
 
 
 # Entries of blocks. Their kind does not matter here: brackets and semicolons part them, outside of texts.
@@ -161,10 +163,10 @@ _PIECES = re.compile(
 )
 
 
-def _at_its_end(text: str, at: int, new: str) -> tuple[int, int, str] | None:
+def _at_its_end(text: str, offset: int, new: str) -> tuple[int, int, str] | None:
     """The edit that adds an entry at the end of the next block; None where an entry ends before a block is opened."""
     depth = 0
-    for piece in _PIECES.finditer(text, at):
+    for piece in _PIECES.finditer(text, offset):
         sign = piece["sign"]
         depth += (sign == "{") - (sign == "}")
         if depth == 0 and sign in (";", "}"):
@@ -176,12 +178,12 @@ def _at_its_end(text: str, at: int, new: str) -> tuple[int, int, str] | None:
     end = piece.start()
     line = text.rfind("\n", 0, end) + 1
     indent = text[line:end]
-    if not indent.strip() and line > at:
+    if not indent.strip() and line > offset:
         return line, line, f"{indent}    {new}\n"
     return end, end, f"{new} " if text[end - 1].isspace() else f" {new} "
 
 
-def _entry(text: str, at: int) -> tuple[int, int] | None:
+def _entry(text: str, offset: int) -> tuple[int, int] | None:
     """The innermost entry of a block around an offset, with its `;` or its block; None where brackets do not match."""
     best: tuple[int, int] | None = None
     begun: list[int | None] = [None]  # start of the unfinished entry in each open block
@@ -204,7 +206,7 @@ def _entry(text: str, at: int) -> tuple[int, int] | None:
             begun.append(None)
         elif sign in (";", "}") and rounds <= 0:
             start = begun[-1]
-            if start is not None and start <= at < piece.end() and (best is None or start > best[0]):
+            if start is not None and start <= offset < piece.end() and (best is None or start > best[0]):
                 best = start, piece.end()
             begun[-1] = None
     return best

@@ -116,9 +116,9 @@ class Help(str):
     changes: tuple[TextChange, ...]
 
     def __new__(cls, text: str, *changes: TextChange) -> Help:
-        made = super().__new__(cls, text)
-        made.changes = changes
-        return made
+        help_text = super().__new__(cls, text)
+        help_text.changes = changes
+        return help_text
 
 
 def write(
@@ -131,8 +131,8 @@ def write(
 def write_either(news: Iterable[str], text: str = "", *, old: str | None = None, where: Where = "instead") -> Help:
     """The help that offers several texts to write, "write `30 deg` or `30 rad`", or a text that ends so."""
     texts = tuple(news)
-    said = f"{text}write {' or '.join(f'`{each}`' for each in texts)}"
-    return Help(said, *(TextChange(each, old, None, where) for each in texts))
+    offer = f"{text}write {' or '.join(f'`{new}`' for new in texts)}"
+    return Help(offer, *(TextChange(new, old, None, where) for new in texts))
 
 
 def leave_out(text: str, at: Place | None = None) -> Help:

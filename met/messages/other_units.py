@@ -229,13 +229,15 @@ def _splits(name: str) -> list[tuple[str, ...]]:
 
     A letter that is a prefix too begins none: `mdeg` is not m*deg. A plural may be meant where the last is a second.
     """
-    found: list[tuple[str, ...]] = [(name[:-1],)] if name.endswith("s") and len(name) > 2 and is_unit(name[:-1]) else []
+    splits: list[tuple[str, ...]] = (
+        [(name[:-1],)] if name.endswith("s") and len(name) > 2 and is_unit(name[:-1]) else []
+    )
     for cut in range(1, len(name)):
         if is_unit(name[:cut]) and name[:cut] not in ("m", *_NEVER_RUN_TOGETHER):
             rest = name[cut:]
-            found += [(name[:cut], rest)] if is_unit(rest) and rest not in _NEVER_RUN_TOGETHER else []
-            found += [(name[:cut], *more) for more in _splits(rest) if 1 < len(more) < 3]
-    return sorted((each for each in found if len(set(each)) == len(each)), key=len)
+            splits += [(name[:cut], rest)] if is_unit(rest) and rest not in _NEVER_RUN_TOGETHER else []
+            splits += [(name[:cut], *more) for more in _splits(rest) if 1 < len(more) < 3]
+    return sorted((split for split in splits if len(set(split)) == len(split)), key=len)
 
 
 def _times(number: str, factor: str) -> str:

@@ -37,12 +37,12 @@ def to_json(
     sources  the text of each file by the name that places give it; edits are given of these files alone
     allowed  the warnings of a deck that are not among them, for a run allows them, and why: `allowed` of the object
     """
-    found = tuple(diagnostics)
+    listed = tuple(diagnostics)
     result: dict[str, Any] = {
         "version": JSON_VERSION,
-        "errors": sum(d.severity == "error" for d in found),
-        "warnings": sum(d.severity == "warning" for d in found),
-        "diagnostics": [_diagnostic_json(d, sources) for d in found],
+        "errors": sum(d.severity == "error" for d in listed),
+        "warnings": sum(d.severity == "warning" for d in listed),
+        "diagnostics": [_diagnostic_json(d, sources) for d in listed],
     }
     if allowed is not None:
         result["allowed"] = [{**_diagnostic_json(d, sources), "because": because} for d, because in allowed]
@@ -50,13 +50,13 @@ def to_json(
 
 
 def _diagnostic_json(diagnostic: Diagnostic, sources: Mapping[str, str]) -> dict[str, Any]:
-    at = diagnostic.at
+    label = diagnostic.at
     return {
         "code": diagnostic.code,
         "severity": diagnostic.severity,
         "message": diagnostic.message,
-        "shown": _place_json(shown_place(at.place)) if at else None,
-        "at": _label_json(at) if at else None,
+        "shown": _place_json(shown_place(label.place)) if label else None,
+        "at": _label_json(label) if label else None,
         "also": [_label_json(label) for label in diagnostic.also],
         "help": list(diagnostic.help),
         "edits": [{"help": n, **_edit_json(edit)} for n, edit in edits(diagnostic, sources)],
@@ -79,19 +79,19 @@ def _label_json(label: Label) -> dict[str, Any]:
 
 
 def _place_json(place: Place) -> dict[str, Any]:
-    made: dict[str, Any] = {"file": place.file, "line": place.line, "column": place.column, "length": place.length}
+    record: dict[str, Any] = {"file": place.file, "line": place.line, "column": place.column, "length": place.length}
     if place.macros:
-        made["expansions"] = [{"macro": step.macro, "use": _place_json(step.use)} for step in place.macros]
+        record["expansions"] = [{"macro": step.macro, "use": _place_json(step.use)} for step in place.macros]
     if place.iterations:
-        made["iterations"] = [
+        record["iterations"] = [
             {"index": step.macro, "value": step.iteration, "loop": _place_json(step.use)} for step in place.iterations
         ]
     if place.included:
-        made["included"] = [
+        record["included"] = [
             {"file": file, "line": line, **({"used": True} if word == "used at" else {})}
             for file, line, word in place.came_by
         ]
-    return made
+    return record
 
 
 # SARIF
@@ -108,11 +108,13 @@ def to_sarif(
     allowed  warnings that a run allows: results that are suppressed in the source, with the reason
     titles   what each code is about, in a line; of a code without one, the message stands there
     """
-    found = [(each, None) for each in diagnostics] + [(each, because) for each, because in allowed]
-    codes = list(dict.fromkeys(each.code for each, _ in found))
-    about = {each.code: each.message for each, _ in reversed(found)} | dict(titles)
+    pairs = [(diagnostic, None) for diagnostic in diagnostics] + [
+        (diagnostic, because) for diagnostic, because in allowed
+    ]
+    codes = list(dict.fromkeys(diagnostic.code for diagnostic, _ in pairs))
+    about = {diagnostic.code: diagnostic.message for diagnostic, _ in reversed(pairs)} | dict(titles)
     results = []
-    for diagnostic, because in found:
+    for diagnostic, because in pairs:
         result = _result(diagnostic, sources, codes.index(diagnostic.code))
         if because is not None:
             result["suppressions"] = [{"kind": "inSource", "justification": because}]
@@ -146,14 +148,14 @@ def _result(diagnostic: Diagnostic, sources: Mapping[str, str], rule: int) -> di
     related = [_location(shown_place(label.place), label.text) for label in diagnostic.also]
     if diagnostic.at is not None:
         place = diagnostic.at.place
-        shown = shown_place(place)
-        result["locations"] = [_location(shown, diagnostic.at.text)]
+        shown_at = shown_place(place)
+        result["locations"] = [_location(shown_at, diagnostic.at.text)]
         loops = [
             _location(shown_place(iteration.use), f"in `for {iteration.macro}`, {iteration}")
             for iteration in place.iterations
         ]
         related = loops + related
-        if shown is not place:
+        if shown_at is not place:
             related.insert(0, _location(place, f"written here, in macro {place.expansions[0].macro}"))
     if related:
         result["relatedLocations"] = related
@@ -164,15 +166,15 @@ def _result(diagnostic: Diagnostic, sources: Mapping[str, str], rule: int) -> di
 
 
 def _location(place: Place, text: str) -> dict[str, Any]:
-    made: dict[str, Any] = {}
+    location: dict[str, Any] = {}
     if _is_of_the_command_line(place.file):
-        made["logicalLocations"] = [{"name": place.file}]
+        location["logicalLocations"] = [{"name": place.file}]
     else:
         region = _region(place.line, place.column, place.line, place.column + place.length)
-        made["physicalLocation"] = {"artifactLocation": _artifact(place.file), "region": region}
+        location["physicalLocation"] = {"artifactLocation": _artifact(place.file), "region": region}
     if text:
-        made["message"] = {"text": text}
-    return made
+        location["message"] = {"text": text}
+    return location
 
 
 def _artifact(file: str) -> dict[str, str]:

@@ -40,19 +40,19 @@ def render(
 
     sources: the text of each file by the name that places give it; a file that is not there is named, not shown.
     """
-    found = tuple(diagnostics)
+    listed = tuple(diagnostics)
     lines = {name: text.split("\n") for name, text in sources.items()}
     paint = _Paint(colour)
-    blocks = [_one(diagnostic, lines, paint) for diagnostic in found]
-    if found:
-        blocks.append(count_line(found) + "\n")
+    blocks = [_block(diagnostic, lines, paint) for diagnostic in listed]
+    if listed:
+        blocks.append(count_line(listed) + "\n")
     return "\n".join(blocks)
 
 
 def count_line(diagnostics: Iterable[Diagnostic]) -> str:
     """`2 errors, 1 warning`."""
-    found = tuple(diagnostics)
-    counts = ((sum(d.severity == kind for d in found), kind) for kind in ("error", "warning", "note"))
+    listed = tuple(diagnostics)
+    counts = ((sum(d.severity == kind for d in listed), kind) for kind in ("error", "warning", "note"))
     return ", ".join(f"{n} {kind}{'s' * (n != 1)}" for n, kind in counts if n)
 
 
@@ -69,33 +69,35 @@ class _Paint:
         return f"{_COLOURS[style]}{text}{_RESET}" if self.colour and text else text
 
 
-def _one(diagnostic: Diagnostic, lines: Mapping[str, list[str]], paint: _Paint) -> str:
+def _block(diagnostic: Diagnostic, lines: Mapping[str, list[str]], paint: _Paint) -> str:
     head = paint(diagnostic.severity, f"{diagnostic.severity}[{diagnostic.code}]")
     out = [head + paint("bold", f": {_safe(diagnostic.message)}")]
-    at = diagnostic.at
-    shown = shown_place(at.place) if at else None
-    number = str(shown.line) if shown else ""
+    own_label = diagnostic.at
+    shown_at = shown_place(own_label.place) if own_label else None
+    number = str(shown_at.line) if shown_at else ""
     gutter = " " * len(number)
-    if at and shown:
-        out.append(f"{gutter}{paint('frame', '-->')} {_safe(str(shown))}")
-        source = lines.get(shown.file, [])
-        if 0 < shown.line <= len(source):
+    if own_label and shown_at:
+        out.append(f"{gutter}{paint('frame', '-->')} {_safe(str(shown_at))}")
+        source = lines.get(shown_at.file, [])
+        if 0 < shown_at.line <= len(source):
             out.append(f"{gutter} {paint('frame', '|')}")
-            text, caret = _excerpt(source[shown.line - 1], shown)
+            text, caret = _excerpt(source[shown_at.line - 1], shown_at)
             out.append(f"{paint('frame', number)} {paint('frame', '|')} {text}".rstrip())
-            note = f" {_safe(at.text)}" if at.text else ""
+            note = f" {_safe(own_label.text)}" if own_label.text else ""
             out.append(f"{gutter} {paint('frame', '|')} {caret[0]}{paint(diagnostic.severity, caret[1] + note)}")
-        elif at.text:
-            out.append(f"{gutter} {paint('frame', '=')} {_safe(at.text)}")
-        if shown is not at.place:
-            macro = at.place.expansions[0].macro
-            out.append(f"{gutter}{paint('frame', ':::')} {_safe(str(at.place))}  written here, in macro {_safe(macro)}")
+        elif own_label.text:
+            out.append(f"{gutter} {paint('frame', '=')} {_safe(own_label.text)}")
+        if shown_at is not own_label.place:
+            macro = own_label.place.expansions[0].macro
+            out.append(
+                f"{gutter}{paint('frame', ':::')} {_safe(str(own_label.place))}  written here, in macro {_safe(macro)}"
+            )
     for label in diagnostic.also:
         place = shown_place(label.place)
         out.append(f"{gutter}{paint('frame', ':::')} {_safe(str(place))}  {_safe(label.text)}".rstrip())
     notes = [f"help: {text}" for text in diagnostic.help]
-    if at and shown:
-        notes += _came_through(at.place) + _came_in(shown)
+    if own_label and shown_at:
+        notes += _came_through(own_label.place) + _came_in(shown_at)
     for note in notes:
         kind, _, text = note.partition(": ")
         body = f"\n{gutter}   {' ' * len(kind)}  ".join(_safe(line) for line in text.split("\n"))

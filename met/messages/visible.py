@@ -34,6 +34,6 @@ def say(text: str = "", *, end: str = "\n", err: bool = False, exact: bool = Fal
     print(text if exact and not stream.isatty() else visible(text), end=end, file=stream, flush=True)
 
 
-def _escape(found: re.Match[str]) -> str:
-    code = ord(found[0])
+def _escape(matched: re.Match[str]) -> str:
+    code = ord(matched[0])
     return f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}"
