@@ -181,17 +181,17 @@ def check_options(
     """Refuse options that clash or would have no effect, as click refuses a value that it cannot read."""
     if names and everything:
         raise click.UsageError(f"--all and `{names[0]}` exclude each other: name runs and sweeps, or take all")
-    for option, given in (("-D", defines), ("-I", include_dirs)):
-        if given and names_plan(source):
+    for option, options in (("-D", defines), ("-I", include_dirs)):
+        if options and names_plan(source):
             raise click.UsageError(f"{option} is for decks: `{source}` is a plan, whose macros are expanded already")
     varied = [setting for setting in settings if varies(setting)]
     set_or_vary = "--vary" if settings and len(varied) == len(settings) else "--set"
     if varied and everything:
         raise click.UsageError("--vary is of one run, and --all of all: name the run")
     if settings and names_plan(source):
-        made = f"`met plan DECK {setting_option(settings[0])} -o {source}` makes another"
+        instead = f"`met plan DECK {setting_option(settings[0])} -o {source}` makes another"
         settled = "cases are listed" if set_or_vary == "--vary" else "values are settled"
-        raise click.UsageError(f"{set_or_vary} is for decks: `{source}` is a plan, whose {settled}; {made}")
+        raise click.UsageError(f"{set_or_vary} is for decks: `{source}` is a plan, whose {settled}; {instead}")
     if names_archive(source):
         for option, wanted in (("-D", defines), ("-I", include_dirs), (set_or_vary, settings)):
             if wanted:
@@ -207,10 +207,10 @@ class FiniteRange(click.FloatRange):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Read the number, as `click.FloatRange` does. Raises a usage error for one that is not in the range."""
-        found = super().convert(value, param, ctx)
-        if not math.isfinite(found):
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
             self.fail(f"{value} is not in the range {self._describe_range()}.", param, ctx)
-        return float(found)
+        return float(number)
 
 
 def format_option(face: Face) -> Face:
@@ -232,7 +232,7 @@ def loudness_options(face: Face) -> Face:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `met` with these arguments (those of the process by default) and return its exit status."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    argv = list(sys.argv[1:] if arguments is None else arguments)
     # numpy's linear algebra would start a thread a core while it is imported (a sixth of `met check`); MET has its own.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # HDF5 loads a library because a file names its filter, from wherever the environment says; archives have none.
@@ -240,22 +240,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # A start makes many objects and drops few: by default the garbage collector runs some 30 times, 15 ms of a start.
     gc.set_threshold(50_000)
     with standard_streams() as output:
-        status, said = BAD_INPUT, ""
+        status, words = BAD_INPUT, ""
         try:
-            with _without_library_warnings(given):
-                status = _run(given)
+            with _without_library_warnings(argv):
+                status = _run(argv)
             sys.stdout.flush()
         except OutputLost as lost:
-            said = str(lost)
+            words = str(lost)
         if output is None or output.refusal is None:
             return status
         if isinstance(output.refusal, BrokenPipeError):  # the reader of our output has gone (`met cases | head`)
-            if said:
-                say(said, err=True)
+            if words:
+                say(words, err=True)
             return PIPE_CLOSED
         message = f"cannot write the standard output: {refusal_text(output.refusal)}"
         helps = "send it elsewhere, or free the disk that it goes to"
-        complain([error("E338", message, help=[said, helps] if said else helps)], {})
+        complain([error("E338", message, help=[words, helps] if words else helps)], {})
         return BAD_INPUT
 
 
@@ -269,21 +269,21 @@ def _without_library_warnings(arguments: Sequence[str]) -> Iterator[None]:
         if category is UserWarning:
             say(f"met: warning: {message}", err=True)
 
-    shown = warnings.showwarning
+    show_warning = warnings.showwarning
     if not (sys.warnoptions or "-v" in arguments or "--verbose" in arguments):
         warnings.showwarning = show
     try:
         yield
     finally:
-        warnings.showwarning = shown
+        warnings.showwarning = show_warning
 
 
 def _form_asked(arguments: Sequence[str]) -> str:
     """The form in which a usage error is printed too: that of --format."""
     known = PROGRAM_FORMS if arguments[:1] == ["check"] else ("json",)
-    asked = [form for option, form in pairwise(arguments) if option == "--format"]
-    asked += [argument.removeprefix("--format=") for argument in arguments if argument.startswith("--format=")]
-    return asked[-1] if asked and asked[-1] in known else "text"
+    forms = [form for option, form in pairwise(arguments) if option == "--format"]
+    forms += [argument.removeprefix("--format=") for argument in arguments if argument.startswith("--format=")]
+    return forms[-1] if forms and forms[-1] in known else "text"
 
 
 def _run(arguments: list[str]) -> int:
@@ -306,9 +306,9 @@ def _run(arguments: list[str]) -> int:
         if form != "text":
             complain([error("U001", mistake.format_message())], {}, form=form)
         else:
-            shown = io.StringIO()
-            mistake.show(shown)
-            say(shown.getvalue(), end="", err=True)
+            text = io.StringIO()
+            mistake.show(text)
+            say(text.getvalue(), end="", err=True)
         return BAD_INPUT
     except OutputLost:
         raise

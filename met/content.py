@@ -71,16 +71,16 @@ class Hump:
 
 def humps_of_turns(points: Sequence[tuple[float, float]]) -> Iterator[Hump]:
     """The humps between the points at which a course turns back (`SMALL`); if there are very many, the highest."""
-    times, values = (list(each) for each in zip(*points, strict=True))
+    times, values = (list(column) for column in zip(*points, strict=True))
     every, heights = np.array(times), np.array(values)
     turned = list(_turned(values))
     if len(turned) > MOST_HUMPS:
-        rises = [min(abs(values[at] - values[each]) for each in (before, after)) for before, at, after in turned]
+        rises = [min(abs(values[peak] - values[side]) for side in (before, after)) for before, peak, after in turned]
         turned = [turned[place] for place in sorted(np.argsort(rises, kind="stable")[-MOST_HUMPS:].tolist())]
-    for before, at, after in turned:
-        sign = math.copysign(1.0, values[at] - values[before])
+    for before, peak, after in turned:
+        sign = math.copysign(1.0, values[peak] - values[before])
         foot = (max if sign > 0.0 else min)(values[before], values[after])  # one of the two values, without rounding
-        first, last = _crossing(times, values, at, -1, foot), _crossing(times, values, at, 1, foot)
+        first, last = _crossing(times, values, peak, -1, foot), _crossing(times, values, peak, 1, foot)
         inner = slice(int(np.searchsorted(every, first, "right")), int(np.searchsorted(every, last, "left")))
         yield Hump(
             np.concatenate([[first], every[inner], [last]]),
@@ -108,12 +108,12 @@ def humps_from_zero(points: Sequence[tuple[float, float]], until: float) -> Iter
 def _pulses(times: Sequence[float], values: Sequence[float]) -> list[tuple[float, float]]:
     """The pulses between turns of the lines: each from half of the smaller of rise and fall until the same height
     again."""
-    found = []
-    for before, at, after in _turned(values):
-        height = min(abs(values[at] - values[before]), abs(values[at] - values[after]))
-        half = values[at] - math.copysign(0.5 * height, values[at] - values[before])
-        found.append((_crossing(times, values, at, -1, half), _crossing(times, values, at, 1, half)))
-    return found
+    pulses = []
+    for before, peak, after in _turned(values):
+        height = min(abs(values[peak] - values[before]), abs(values[peak] - values[after]))
+        half = values[peak] - math.copysign(0.5 * height, values[peak] - values[before])
+        pulses.append((_crossing(times, values, peak, -1, half), _crossing(times, values, peak, 1, half)))
+    return pulses
 
 
 def _turned(values: Sequence[float]) -> Iterator[tuple[int, int, int]]:
@@ -135,9 +135,9 @@ def _turns(values: Sequence[float], least: float) -> list[int]:
     return [*turns, extreme]
 
 
-def _crossing(times: Sequence[float], values: Sequence[float], at: int, way: int, half: float) -> float:
+def _crossing(times: Sequence[float], values: Sequence[float], point: int, way: int, half: float) -> float:
     """The time at which the lines pass this value, searched from a point backwards (way -1) or forwards (1)."""
-    above, k = values[at] > half, at
+    above, k = values[point] > half, point
     while (values[k + way] > half) == above and values[k + way] != half:
         k += way
     share = (values[k] - half) / (values[k] - values[k + way])

@@ -47,12 +47,12 @@ def frozen(cls: type[T] | None = None, /, *, kw_only: bool = False) -> type[T] |
 
     def make(cls: type[T]) -> type[T]:
         cls.__doc__ = cls.__doc__ or ""  # else dataclasses writes one, from a signature that is slow to make
-        made = dataclasses.dataclass(init=False, eq=False, repr=False, kw_only=kw_only)(cls)
-        _compile_later(made)
+        frozen_class = dataclasses.dataclass(init=False, eq=False, repr=False, kw_only=kw_only)(cls)
+        _compile_later(frozen_class)
         for method in (__setattr__, __delattr__, __eq__, __hash__, __repr__):
             if method.__name__ not in cls.__dict__ or method.__name__ == "__hash__":
-                setattr(made, method.__name__, method)
-        return made
+                setattr(frozen_class, method.__name__, method)
+        return frozen_class
 
     return make if cls is None else make(cls)
 
@@ -79,16 +79,16 @@ def _compiled_init(cls: type) -> Callable[..., None]:
     Names of its own begin with an underscore and a verb, as `_set_on`, so that a field may have any usual name.
     """
     fields = [field for field in dataclasses.fields(cls) if field.init]
-    given: dict[str, Any] = {"_MISSING": dataclasses.MISSING}
+    namespace: dict[str, Any] = {"_MISSING": dataclasses.MISSING}
     head = {False: ["_set_on"], True: ["*"]}
     body = ["_keep_in = _set_on.__dict__"]
     for field in fields:
         name, value = field.name, field.name
         default = ""
         if field.default is not dataclasses.MISSING:
-            given[f"_default_{name}"], default = field.default, f"=_default_{name}"
+            namespace[f"_default_{name}"], default = field.default, f"=_default_{name}"
         elif field.default_factory is not dataclasses.MISSING:
-            given[f"_make_{name}"], default = field.default_factory, "=_MISSING"
+            namespace[f"_make_{name}"], default = field.default_factory, "=_MISSING"
             value = f"_make_{name}() if {name} is _MISSING else {name}"
         head[bool(field.kw_only)].append(f"{name}{default}")
         body.append(f"_keep_in[{name!r}] = {value}")
@@ -96,8 +96,8 @@ def _compiled_init(cls: type) -> Callable[..., None]:
         body.append("_set_on.__post_init__()")
     parameters = [*head[False], *(head[True] if len(head[True]) > 1 else [])]
     text = f"def __init__({', '.join(parameters)}):\n" + "".join(f"    {line}\n" for line in body)
-    exec(compile(text, f"<{cls.__qualname__}.__init__>", "exec"), given)
-    compiled: Callable[..., None] = given["__init__"]
+    exec(compile(text, f"<{cls.__qualname__}.__init__>", "exec"), namespace)
+    compiled: Callable[..., None] = namespace["__init__"]
     return compiled
 
 
@@ -137,5 +137,5 @@ def __hash__(self: Any) -> int:
 
 
 def __repr__(self: Any) -> str:
-    shown = (f"{name}={getattr(self, name)!r}" for name, field in self.__dataclass_fields__.items() if field.repr)
-    return f"{type(self).__qualname__}({', '.join(shown)})"
+    fields = (f"{name}={getattr(self, name)!r}" for name, field in self.__dataclass_fields__.items() if field.repr)
+    return f"{type(self).__qualname__}({', '.join(fields)})"

@@ -86,7 +86,7 @@ def available(kind: Kind) -> dict[str, Any]:
     """
     group = GROUPS[kind]
     own, declaration = group.own()
-    found: dict[str, Any] = {model.name: model for model in own}
+    by_name: dict[str, Any] = {model.name: model for model in own}
     for point in offered(group.entry_points):
         found_at = f"entry point `{point.name} = {point.value}` of {point.package} in group `{group.entry_points}`"
         try:
@@ -106,11 +106,11 @@ def available(kind: Kind) -> dict[str, Any]:
             _check_bed(model, found_at)
         if kind == "law":
             _check_law(model, found_at)
-        if model.name in found and found[model.name] is not model:
+        if model.name in by_name and by_name[model.name] is not model:
             message = f"{found_at} offers {kind} `{model.name}`, which exists already"
             raise Problem(error("E215", message, help="give the model another name"))
-        found[model.name] = model
-    return found
+        by_name[model.name] = model
+    return by_name
 
 
 def _check_names(kind: Kind, model: Any, found_at: str) -> None:
@@ -120,9 +120,9 @@ def _check_names(kind: Kind, model: Any, found_at: str) -> None:
         taken = [name for name, *_ in _of_engine(kind, model)]
     else:
         taken = ["command"]
-    shown = [part.name for group in HELD for part in getattr(model, group, ())]
+    held = [part.name for group in HELD for part in getattr(model, group, ())]
     parameters = [*getattr(model, "parameters", ()), *getattr(model, "of_joint", ())]
-    for names in ([*taken, *shown], distinct_names(parameters)):
+    for names in ([*taken, *held], distinct_names(parameters)):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             message = f"{found_at} declares `{twice[0]}` twice"
@@ -144,13 +144,13 @@ def distinct_names(parameters: Sequence[Parameter]) -> list[str]:
     """Names of parameters; a name that appears several times, under different words of one parameter, is listed
     once."""
     names: list[str] = []
-    for n, one in enumerate(parameters):
-        others = [each for each in parameters[:n] if each.name == one.name]
-        apart = one.only is not None and all(
-            other.only is not None and other.only[0] == one.only[0] and not {*other.only[1]} & {*one.only[1]}
+    for n, own in enumerate(parameters):
+        others = [other for other in parameters[:n] if other.name == own.name]
+        apart = own.only is not None and all(
+            other.only is not None and other.only[0] == own.only[0] and not {*other.only[1]} & {*own.only[1]}
             for other in others
         )
-        names += [] if others and apart else [one.name]
+        names += [] if others and apart else [own.name]
     return names
 
 
@@ -188,10 +188,10 @@ def _check_law(model: Any, found_at: str) -> None:
     """Check that a law declares the parameters that its observer, and a balance with friction, read by name."""
     from met.substitution.law import BAND, OBSERVER
 
-    needed = [(each, "with an observer") for each in OBSERVER if model.observer]
+    needed = [(name, "with an observer") for name in OBSERVER if model.observer]
     needed += [(BAND, "of full balance")] if model.balance == "full" else []
     for parameter, kind in needed:
-        if all(each.name != parameter.name for each in model.parameters):
+        if all(declared.name != parameter.name for declared in model.parameters):
             message = f"{found_at} declares no parameter `{parameter.name}`, which every law {kind} has"
             help = f"`{parameter.name}`, {parameter.unit}: {parameter.doc}"
             raise Problem(error("E215", message, help=help))

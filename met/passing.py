@@ -51,7 +51,7 @@ def run_past(
     kernel: Kernel,
     inputs: np.ndarray,
     ticks: int,
-    at: Sequence[int],
+    instants: Sequence[int],
     *,
     record: bool,
     threads: int | None = None,
@@ -63,16 +63,16 @@ def run_past(
     """
     program = kernel.program
     cases, record = len(inputs), record and program.columns > 0
-    ends = sorted({*at, *range(LONGEST, ticks, LONGEST), ticks})
+    ends = sorted({*instants, *range(LONGEST, ticks, LONGEST), ticks})
     outputs = np.empty((cases, len(program.outputs)))
-    memory = np.empty((cases, len(at), len(kernel.recording.cells)))
+    memory = np.empty((cases, len(instants), len(kernel.recording.cells)))
     pieces: dict[int, list[np.ndarray]] = {}
-    wanted, starts, done, ended = frozenset(at), range(0, cases, kernel.lanes), 0, threading.Event()
+    wanted, starts, done, ended = frozenset(instants), range(0, cases, kernel.lanes), 0, threading.Event()
 
     def work(start: int) -> int:
         block = kernel.block(inputs[start : start + kernel.lanes])
-        here = slice(start, min(start + kernel.lanes, cases))
-        width, first, kept = here.stop - here.start, 0, iter(range(len(at)))
+        lanes = slice(start, min(start + kernel.lanes, cases))
+        width, first, instant_numbers = lanes.stop - lanes.start, 0, iter(range(len(instants)))
         rows = pieces[start] = []
         for last in ends:
             if ended.is_set():
@@ -82,9 +82,9 @@ def run_past(
             else:
                 block.step(first, last)
             if last in wanted:
-                memory[here, next(kept)] = block.state[: memory.shape[2], :width].T
+                memory[lanes, next(instant_numbers)] = block.state[: memory.shape[2], :width].T
             first = last + 1
-        outputs[here] = block.outputs[: outputs.shape[1], :width].T
+        outputs[lanes] = block.outputs[: outputs.shape[1], :width].T
         return width
 
     with ThreadPoolExecutor(max(1, min(threads or len(os.sched_getaffinity(0)), len(starts)))) as pool:

@@ -148,10 +148,12 @@ class Prepared:
     @property
     def _linear_keys(self) -> dict[str, str]:
         """Keys of the metrics of linear answers: of the motion from which they are derived, and of the question."""
-        asked = {use.name: (use.at, use.inputs, use.outputs, use.opened, use.pose) for use in self.experiment.linear}
+        questions = {
+            use.name: (use.at, use.inputs, use.outputs, use.opened, use.pose) for use in self.experiment.linear
+        }
         return {
             f"metrics.{use.name}": _code_key(
-                hashlib.sha256(f"{self.code_key} {LINEAR_VERSION} {use.model} {asked[use.of]}".encode()).hexdigest()
+                hashlib.sha256(f"{self.code_key} {LINEAR_VERSION} {use.model} {questions[use.of]}".encode()).hexdigest()
             )
             for use in self.experiment.linear_metrics
         }
@@ -163,8 +165,8 @@ class Prepared:
         known = (*(self.program.state_outputs or ()), *(METRIC + use.name for use in self.experiment.structure.metrics))
         watched = {name: name for name in self.program.outputs if name not in known and not name.startswith(COORDINATE)}
         of_watched = result_keys(self.recording, watched) if watched else {}
-        given = self.result_keys | {name: _code_key(key) for name, key in of_watched.items()}
-        keys = [self.code_key, *(f"{name} {key}" for name, key in given.items())]
+        all_keys = self.result_keys | {name: _code_key(key) for name, key in of_watched.items()}
+        keys = [self.code_key, *(f"{name} {key}" for name, key in all_keys.items())]
         return _code_key(hashlib.sha256("\n".join(keys).encode()).hexdigest())
 
     @cached_property
@@ -177,10 +179,10 @@ class Prepared:
 
     def of_cases(self, experiment: Experiment) -> Prepared:
         """The same program, ready to run the cases of an experiment that differs only in its case table."""
-        made = Prepared(experiment, self.lanes, self.wire, self.late, self.furthest)
+        prepared = Prepared(experiment, self.lanes, self.wire, self.late, self.furthest)
         ready = (*_OF_ANY_CASES, "kernel", "work_key", "old_code_key")
-        made.__dict__.update({name: self.__dict__[name] for name in ready if name in self.__dict__})
-        return made
+        prepared.__dict__.update({name: self.__dict__[name] for name in ready if name in self.__dict__})
+        return prepared
 
     def is_work(self, key: str) -> bool:
         """True where the key is this work's, in this version of keys or the one before."""
@@ -198,9 +200,9 @@ class Prepared:
 
     def with_cases(self, cases: Cases) -> Prepared:
         """The same program for other values of the same coordinates; compiled code is shared."""
-        made = replace(self, experiment=replace(self.experiment, cases=cases))
-        made.__dict__.update({name: getattr(self, name) for name in _OF_PROGRAM})
-        return made
+        prepared = replace(self, experiment=replace(self.experiment, cases=cases))
+        prepared.__dict__.update({name: getattr(self, name) for name in _OF_PROGRAM})
+        return prepared
 
 
 _OF_ANY_CASES = ("program", "recording", "outputs", "companions", "code_key", "result_keys")
@@ -215,9 +217,9 @@ KEY_VERSION = 2
 """Prefix of code keys: the version of their ingredients. Older keys have none."""
 
 
-def _code_key(of: str) -> str:
+def _code_key(recording_key: str) -> str:
     """A key of a recording, with everything else that decides its bits: how the back end runs it."""
-    return f"{KEY_VERSION}:{hashlib.sha256(f'{of} {backends.find().version}'.encode()).hexdigest()}"
+    return f"{KEY_VERSION}:{hashlib.sha256(f'{recording_key} {backends.find().version}'.encode()).hexdigest()}"
 
 
 def comparable(key: str | None, other: str | None) -> bool:
@@ -264,20 +266,20 @@ def compute(
 
     memories  gets the memory of those of these cases that it wants
     """
-    given, ticks = inputs(prepared.experiment, rows), prepared.experiment.structure.schedule.ticks
+    case_inputs, ticks = inputs(prepared.experiment, rows), prepared.experiment.structure.schedule.ticks
     record = record and prepared.program.columns > 0
     watched = np.zeros(len(rows), bool) if memories is None else np.isin(rows, list(memories.cases))
     if memories is None or not watched.any():
-        history, outputs = prepared.kernel.run(given, ticks, record=record, threads=threads, progress=progress)
+        history, outputs = prepared.kernel.run(case_inputs, ticks, record=record, threads=threads, progress=progress)
     else:
-        history, outputs, found = run_past(
-            prepared.kernel, given[watched], ticks, memories.ticks, record=record, threads=threads
+        history, outputs, memory = run_past(
+            prepared.kernel, case_inputs[watched], ticks, memories.ticks, record=record, threads=threads
         )
-        memories.by_case.update(zip(rows[watched].tolist(), found, strict=True))
+        memories.by_case.update(zip(rows[watched].tolist(), memory, strict=True))
         if progress is not None:
             progress(int(watched.sum()))
         if not watched.all():
-            others, ended = prepared.kernel.run(given[~watched], ticks, record=record, threads=threads)
+            others, ended = prepared.kernel.run(case_inputs[~watched], ticks, record=record, threads=threads)
             outputs = _together(watched, outputs, ended)
             if history is not None and others is not None:
                 history = _together(watched, history, others)
@@ -297,9 +299,9 @@ def with_linear(prepared: Prepared, outputs: np.ndarray) -> np.ndarray:
 
 def _together(first: np.ndarray, of_first: np.ndarray, of_others: np.ndarray) -> np.ndarray:
     """Arrays of the cases where `first` is True, and of the others, merged in the cases' order."""
-    made = np.empty((len(first), *of_first.shape[1:]))
-    made[first], made[~first] = of_first, of_others
-    return made
+    merged = np.empty((len(first), *of_first.shape[1:]))
+    merged[first], merged[~first] = of_first, of_others
+    return merged
 
 
 def inputs(experiment: Experiment, rows: np.ndarray) -> np.ndarray:
@@ -339,8 +341,8 @@ def results(
     failures = np.flatnonzero(failed & (out["failure"] != STOPPED))
     if len(failures):
         of_failures = {name: values[failures] for name, values in out.items()}
-        found = causes_of(experiment, inputs(experiment, rows[failures]), of_failures)
-        for case, cause in zip(failures.tolist(), found, strict=True):
+        words = causes_of(experiment, inputs(experiment, rows[failures]), of_failures)
+        for case, cause in zip(failures.tolist(), words, strict=True):
             causes[case] = cause
     status = np.where(failed, FAILED, DONE).astype(np.int8)
     for fated, (ended, why) in (fates or {}).items():
@@ -353,7 +355,7 @@ def results(
         status[case], failed[case], n_valid[case], causes[case] = FAILED, True, 0, cause
     warnings = [""] * len(rows)
     for case in np.flatnonzero(~failed & (out.get(plausible.DOUBTFUL_TICK, failed) != 0.0)).tolist():
-        warnings[case] = doubt_of(experiment, {name: float(of[case]) for name, of in out.items()})
+        warnings[case] = doubt_of(experiment, {name: float(figures[case]) for name, figures in out.items()})
     for case, why in _unanswered(experiment, out, failed).items():
         warnings[case] = "; ".join([*([warnings[case]] if warnings[case] else []), why])
     signals: dict[str, np.ndarray] = {}
@@ -392,36 +394,36 @@ def results(
 
 def _grapples(experiment: Experiment, out: Mapping[str, np.ndarray], failed: np.ndarray) -> dict[str, np.ndarray]:
     """The figures of grapples for `Run`."""
-    found = {}
+    figures = {}
     for payload in grappled_payloads(experiment.structure):
         never = failed | (out[cell_names.GRAPPLED(payload, "near")] == 0.0)
         for name in GRAPPLE_FIGURES:
-            found[f"{payload}.{name}"] = np.where(never, math.nan, out[cell_names.GRAPPLED(payload, name)])
-    return found
+            figures[f"{payload}.{name}"] = np.where(never, math.nan, out[cell_names.GRAPPLED(payload, name)])
+    return figures
 
 
 def _unanswered(experiment: Experiment, out: Mapping[str, np.ndarray], failed: np.ndarray) -> dict[int, str]:
     """The cases that lack one of their linear answers, with the reasons in words."""
-    found: dict[int, list[str]] = {}
+    reasons: dict[int, list[str]] = {}
     for use in experiment.linear:
         why = out.get(WHY_ANSWER + use.name)
         for case in np.flatnonzero(~failed & (why != ANSWERED)).tolist() if why is not None else ():
             reason = WHY_NONE.get(int(why[case]), "") if why is not None else ""
-            found.setdefault(case, []).append(f"no answer of `{use.name}` {use.where}: {reason}")
-    return {case: "; ".join(each) for case, each in found.items()}
+            reasons.setdefault(case, []).append(f"no answer of `{use.name}` {use.where}: {reason}")
+    return {case: "; ".join(parts) for case, parts in reasons.items()}
 
 
 def _misapplied(experiment: Experiment, rows: np.ndarray, out: Mapping[str, np.ndarray]) -> dict[int, str]:
     """The cases that were run with a value other than that of the case table, in words; such a case is a defect."""
-    found: dict[int, str] = {}
+    words: dict[int, str] = {}
     for coordinate in experiment.cases.coordinates:
         used, wanted = out[COORDINATE + coordinate.path], coordinate.values[rows]
         for case in np.flatnonzero((used != wanted) & ~(np.isnan(used) & np.isnan(wanted))).tolist():
-            found[case] = (
+            words[case] = (
                 f"a defect of MET: the engine used {used[case]!r} for {coordinate.path}, and the case table has "
                 f"{wanted[case]!r}. Please report it"
             )
-    return found
+    return words
 
 
 def _met(metric: np.ndarray, comparison: str, limit: float) -> np.ndarray:

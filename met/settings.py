@@ -26,10 +26,10 @@ def to_set(text: str) -> str:
 
 def settings_of(settings: Iterable[str]) -> dict[str, Any]:
     """The settings as the arguments `set` and `vary` of `ic.compile`."""
-    found = tuple(settings)
+    texts = tuple(settings)
     return {
-        "set": tuple(each for each in found if not varies(each)),
-        "vary": tuple(each.removeprefix(f"{VARY} ") for each in found if varies(each)),
+        "set": tuple(text for text in texts if not varies(text)),
+        "vary": tuple(text.removeprefix(f"{VARY} ") for text in texts if varies(text)),
     }
 
 

@@ -32,29 +32,29 @@ class _UnitReader:
         self.written = written
         self.names = names
         self.pieces: list[str] = []
-        at = 0
-        while written[at:].strip():
-            match = _PIECE.match(written, at)
+        start = 0
+        while written[start:].strip():
+            match = _PIECE.match(written, start)
             if match is None:
-                raise ValueError(f"unit `{written}`: cannot read `{written[at:].strip()}`")
+                raise ValueError(f"unit `{written}`: cannot read `{written[start:].strip()}`")
             self.pieces.append(match.group().strip())
-            at = match.end()
-        self.at = 0
+            start = match.end()
+        self.position = 0
 
     def whole(self) -> Measure:
         result = self.product()
-        if self.at < len(self.pieces):
-            raise ValueError(f"unit `{self.written}`: cannot read `{self.pieces[self.at]}`")
+        if self.position < len(self.pieces):
+            raise ValueError(f"unit `{self.written}`: cannot read `{self.pieces[self.position]}`")
         return result
 
     def take(self) -> str:
-        if self.at >= len(self.pieces):
+        if self.position >= len(self.pieces):
             raise ValueError(f"unit `{self.written}` ends too early")
-        self.at += 1
-        return self.pieces[self.at - 1]
+        self.position += 1
+        return self.pieces[self.position - 1]
 
     def next_is(self, *wanted: str) -> bool:
-        return self.at < len(self.pieces) and self.pieces[self.at] in wanted
+        return self.position < len(self.pieces) and self.pieces[self.position] in wanted
 
     def product(self) -> Measure:
         result = self.factor()

@@ -80,12 +80,12 @@ def clamped_slopes(times: Sequence[float], values: Sequence[float]) -> Numbers:
     return tuple(slopes)
 
 
-def ends(of: Callable[[Any, Any], Real]) -> Limit:
-    """The limit of a model with points at `p.times`: it is reached outside of them. of: (p, t or world) -> time in the
-    table, s."""
+def ends(time_of: Callable[[Any, Any], Real]) -> Limit:
+    """The limit of a model with points at `p.times`: it is reached outside of them. time_of: (p, t or world) -> time in
+    the table, s."""
 
-    def beyond(p: Any, at: Any) -> Truth:
-        time = of(p, at)
+    def beyond(p: Any, instant: Any) -> Truth:
+        time = time_of(p, instant)
         return either(not_(has_come(time, p.times[0])), has_come(time, p.times[-1]))
 
     return Limit(parameter="times", reached=beyond)

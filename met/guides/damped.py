@@ -24,11 +24,11 @@ rounding."""
 
 def gram(rows: Sequence[Sequence[Real]]) -> Rows:
     """J J' of the rows of J."""
-    made: Rows = [[0.0] * len(rows) for _ in rows]
+    matrix: Rows = [[0.0] * len(rows) for _ in rows]
     for i, row in enumerate(rows):
         for j in range(i + 1):
-            made[i][j] = made[j][i] = dot(row, rows[j])
-    return made
+            matrix[i][j] = matrix[j][i] = dot(row, rows[j])
+    return matrix
 
 
 def damped(rows: Sequence[Sequence[Real]], square: Rows, damping: Real, task: Sequence[Real]) -> list[Real]:

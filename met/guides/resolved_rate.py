@@ -70,10 +70,10 @@ def steer(p: Any, joints: Sequence[Any], seen: Sight) -> Steered:
     answers = p.jacobian == "generalized"
     away, turned = _behind(seen.wanted, seen.arm.stance(answers=answers))
     arm = seen.arm if p.loop == "closed" else seen.asked
-    there = arm.stance(answers=answers)
-    behind, aside = _behind(seen.wanted, there)
-    v = sub(add(seen.wanted.v, scale(p.gain, behind)), there.v)
-    w = sub(add(seen.wanted.w, scale(p.gain, aside)), there.w)
+    stance = arm.stance(answers=answers)
+    behind, aside = _behind(seen.wanted, stance)
+    v = sub(add(seen.wanted.v, scale(p.gain, behind)), stance.v)
+    w = sub(add(seen.wanted.w, scale(p.gain, aside)), stance.w)
     task = _chosen(rows, v, w, p.length)
 
     units = [p.length if slides else 1.0 for slides in seen.slides]  # for a joint's share in |u|
@@ -105,9 +105,9 @@ def steer(p: Any, joints: Sequence[Any], seen: Sight) -> Steered:
     )
 
 
-def _behind(wanted: Stance, there: Stance) -> tuple[Vector, Vector]:
+def _behind(wanted: Stance, stance: Stance) -> tuple[Vector, Vector]:
     """The error of a frame against its path: displacement, m, and turn (axis times angle), rad, world axes."""
-    return sub(wanted.p, there.p), rotation_vector(product(wanted.R, transposed(there.R)))
+    return sub(wanted.p, stance.p), rotation_vector(product(wanted.R, transposed(stance.R)))
 
 
 def _chosen(rows: Sequence[int], linear: Vector, angular: Vector, length: Real) -> list[Real]:

@@ -30,10 +30,10 @@ class EntryPoint:
     def load(self) -> Any:
         """Import the object; raises whatever its module raises."""
         module, _, path = self.value.partition(":")
-        found: Any = import_module(module.strip())
+        loaded: Any = import_module(module.strip())
         for attribute in filter(None, path.strip().split(".")):
-            found = getattr(found, attribute)
-        return found
+            loaded = getattr(loaded, attribute)
+        return loaded
 
 
 def offered(group: str) -> list[EntryPoint]:
@@ -54,8 +54,8 @@ def offered(group: str) -> list[EntryPoint]:
                 text = file.read()
         except OSError:  # most packages offer nothing and have no such file
             continue
-        found = [EntryPoint(*pair, package) for pair in _in_table(text, group)]
-        (own if package == PACKAGE else others).extend(found)
+        points = [EntryPoint(*pair, package) for pair in _in_table(text, group)]
+        (own if package == PACKAGE else others).extend(points)
     return own + sorted(others, key=lambda point: (point.package, point.name))
 
 

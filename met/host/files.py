@@ -36,15 +36,15 @@ class _Raw(FileIO):
     reading raises OSError."""
 
     def readinto(self, buffer: Any) -> int:
-        return self._given(super().readinto(buffer))
+        return self._ready(super().readinto(buffer))
 
     def readall(self) -> bytes:
-        return self._given(super().readall())
+        return self._ready(super().readall())
 
-    def _given(self, found: Any) -> Any:
-        if found is None:
+    def _ready(self, value: Any) -> Any:
+        if value is None:
             raise BlockingIOError(errno.EAGAIN, "it has nothing to give, and no end")
-        return found
+        return value
 
 
 def real_path(path: str) -> str:

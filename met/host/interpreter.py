@@ -34,7 +34,7 @@ def packages() -> dict[str, str]:
     script may have found it in another way; it is left out where Python finds it anyway, and where it would hide the
     standard library.
     """
-    named = [os.path.abspath(each) for each in os.environ.get("PYTHONPATH", "").split(os.pathsep) if each]
+    named = [os.path.abspath(folder) for folder in os.environ.get("PYTHONPATH", "").split(os.pathsep) if folder]
     home = str(Path(__file__).resolve().parents[2])
     ours = [] if home in map(os.path.realpath, [*site.getsitepackages(), site.getusersitepackages()]) else [home]
     return {"PYTHONPATH": os.pathsep.join(dict.fromkeys([*ours, *named])), "PYTHONSAFEPATH": "1"}
@@ -43,10 +43,10 @@ def packages() -> dict[str, str]:
 def looked_in() -> list[str]:
     """The folders of `sys.path` without the one that Python puts first: the script's, or the working folder, whose
     modules do not count as installed packages."""
-    found = list(dict.fromkeys(sys.path))
+    folders = list(dict.fromkeys(sys.path))
     if not sys.flags.safe_path:
         main = getattr(sys.modules["__main__"], "__file__", None)
         own = [os.getcwd(), *([] if main is None else [os.path.dirname(os.path.realpath(main))])]
         if sys.path[:1] and os.path.realpath(sys.path[0]) in map(os.path.realpath, own):
-            found = list(dict.fromkeys(sys.path[1:]))
-    return [each for each in found if each]
+            folders = list(dict.fromkeys(sys.path[1:]))
+    return [folder for folder in folders if folder]

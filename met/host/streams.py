@@ -95,6 +95,6 @@ def _over(raw: StandardStream, stream: Any) -> io.TextIOWrapper:
 
 def _open_closed() -> None:
     """Open those of the files 0, 1 and 2 that the shell has closed, so that no file of ours gets their numbers."""
-    while (made := os.open(os.devnull, os.O_RDWR)) <= 2:
-        os.set_inheritable(made, True)
-    os.close(made)
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        os.set_inheritable(descriptor, True)
+    os.close(descriptor)

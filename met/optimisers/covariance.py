@@ -62,10 +62,10 @@ class CovarianceAdaptation:
         self._path_rate = (4 + mass / n) / (n + 4 + 2 * mass / n)
         self._step_rate = (mass + 2) / (n + mass + 5)
         self._damping = 1 + 2 * max(0.0, math.sqrt((mass - 1) / (n + 1)) - 1) + self._step_rate
-        one = 2 / ((n + 1.3) * (n + 1.3) + mass)
-        mu = min(1 - one, 2 * (mass - 2 + 1 / mass) / ((n + 2) * (n + 2) + mass))
-        most = min(1 + one / mu, 1 + 2 * negative_mass / (mass + 2), (1 - one - mu) / (n * mu))
-        self._one_rate, self._mu_rate = one, mu
+        one_rate = 2 / ((n + 1.3) * (n + 1.3) + mass)
+        mu = min(1 - one_rate, 2 * (mass - 2 + 1 / mass) / ((n + 2) * (n + 2) + mass))
+        most = min(1 + one_rate / mu, 1 + 2 * negative_mass / (mass + 2), (1 - one_rate - mu) / (n * mu))
+        self._one_rate, self._mu_rate = one_rate, mu
         self._gains, self._losses = positive / total(positive), -negative / total(negative) * most
         self._usual_length = math.sqrt(n) * (1 - 1 / (4 * n) + 1 / (21 * n * n))
 
@@ -124,13 +124,13 @@ class CovarianceAdaptation:
         return steady
 
     def _learn(self, gains: np.ndarray, losses: np.ndarray, moves: np.ndarray, steady: bool) -> None:
-        n, one, mu = len(self._mean), self._one_rate, self._mu_rate
+        n, one_rate, mu = len(self._mean), self._one_rate, self._mu_rate
         squares = added((self._drawn * self._drawn).T)
         scaled = gains + losses * n / np.maximum(squares, 1e-300)
-        lost = 0.0 if steady else one * self._path_rate * (2 - self._path_rate)
+        lost = 0.0 if steady else one_rate * self._path_rate * (2 - self._path_rate)
         self._covariance = (
-            (1 + lost - one - mu * total(gains + losses)) * self._covariance
-            + one * self._path[:, None] * self._path[None, :]
+            (1 + lost - one_rate - mu * total(gains + losses)) * self._covariance
+            + one_rate * self._path[:, None] * self._path[None, :]
             + mu * added(scaled[:, None, None] * moves[:, :, None] * moves[:, None, :])
         )
         factor = lower_factor(self._covariance)

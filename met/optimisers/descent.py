@@ -93,12 +93,12 @@ class SlopeDescent:
         none = np.empty((0, len(self.point)))
         while self._left > 0 and self._radius >= FINEST:
             self._left -= 1
-            found = step(self._model, self._curvature, np.maximum(-self.point, -self._radius),
+            solution = step(self._model, self._curvature, np.maximum(-self.point, -self._radius),
                          np.minimum(1.0 - self.point, self._radius))  # fmt: skip
-            if found is None:
+            if solution is None:
                 self._radius *= POOR
                 continue
-            self._move, self._multipliers = found
+            self._move, self._multipliers = solution
             bent = 0.5 * total(self._move * added((self._curvature * self._move[None, :]).T))
             self._promise = self._model.value - self._model.after(self._move) - bent
             if not self._promise > CONVERGED * abs(self._model.value):
@@ -116,10 +116,10 @@ class SlopeDescent:
         if model is None or not worth < self.worth:
             self._radius = POOR * length
             return
-        kept = (self._model.value - model.value) / self._promise
-        if kept < POOR:
+        ratio = (self._model.value - model.value) / self._promise
+        if ratio < POOR:
             self._radius = 0.5 * length
-        elif kept > GOOD and length > 0.9 * self._radius:
+        elif ratio > GOOD and length > 0.9 * self._radius:
             self._radius = min(2.0 * self._radius, LONGEST)
         self.point, self.worth, self._model = np.clip(self.point + self._move, 0.0, 1.0), worth, model
 
@@ -148,13 +148,13 @@ def step(
     whole[:n, :n] = curvature / size
     slope = np.zeros(unknowns)
     slope[n] = 1.0
-    found = least_within(whole, slope, np.concatenate([piece_rows, hinge_rows, ends]), limits)
-    if found is None:
+    solution = least_within(whole, slope, np.concatenate([piece_rows, hinge_rows, ends]), limits)
+    if solution is None:
         return None
     multipliers = np.zeros(pieces + len(model.hinges))
-    multipliers[:pieces] = found[1][:pieces]
-    multipliers[pieces + near] = found[1][pieces : pieces + len(near)] * size
-    move = np.where(found[0][:n] - low < ON, low, np.where(high - found[0][:n] < ON, high, found[0][:n]))
+    multipliers[:pieces] = solution[1][:pieces]
+    multipliers[pieces + near] = solution[1][pieces : pieces + len(near)] * size
+    move = np.where(solution[0][:n] - low < ON, low, np.where(high - solution[0][:n] < ON, high, solution[0][:n]))
     return move, multipliers
 
 

@@ -27,32 +27,32 @@ class BoxDivision:
         self._of_size: dict[int, list[int]] = {}
         """The boxes by the number of times they were cut."""
         self._cut_along = np.zeros(dimension, np.int64)
-        self._asked: list[tuple[np.ndarray, np.ndarray]] = []
+        self._batch: list[tuple[np.ndarray, np.ndarray]] = []
 
     def ask(self, count: int) -> np.ndarray:
         """Centres of new boxes, [centre, dimension]: at most `count`, two for each box that is cut."""
-        self._asked = []
+        self._batch = []
         if not self._centres:
-            self._asked = [(np.full(self._dimension, 0.5), np.zeros(self._dimension, np.int64))][:count]
+            self._batch = [(np.full(self._dimension, 0.5), np.zeros(self._dimension, np.int64))][:count]
         cutting = bool(self._centres)
-        while cutting and len(self._asked) + 2 <= count:
+        while cutting and len(self._batch) + 2 <= count:
             cutting = self._cut_round(count)
-        return np.array([centre for centre, _ in self._asked]).reshape(-1, self._dimension)
+        return np.array([centre for centre, _ in self._batch]).reshape(-1, self._dimension)
 
     def _cut_round(self, count: int) -> bool:
         """Cut, for each size, the best boxes, as many as the square root of their number; False where there is nothing
         to cut."""
-        before = len(self._asked)
+        before = len(self._batch)
         for size in sorted(self._of_size):
             if size >= FINEST * self._dimension:
                 continue
             boxes = self._of_size[size]
             boxes.sort(key=lambda box: (self._values[box], box))
-            number = min(math.isqrt(max(len(boxes) - 1, 0)) + 1, (count - len(self._asked)) // 2, len(boxes))
+            number = min(math.isqrt(max(len(boxes) - 1, 0)) + 1, (count - len(self._batch)) // 2, len(boxes))
             best, self._of_size[size] = boxes[:number], boxes[number:]
             for box in best:
                 self._cut(box)
-        return len(self._asked) > before
+        return len(self._batch) > before
 
     def _cut(self, box: int) -> None:
         cuts = self._cuts[box].copy()
@@ -64,13 +64,13 @@ class BoxDivision:
         for side in (-third, third):
             centre = self._centres[box].copy()
             centre[along] += side
-            self._asked.append((centre, cuts))
+            self._batch.append((centre, cuts))
         self._cuts[box] = cuts
         self._of_size.setdefault(int(cuts.sum()), []).append(box)
 
     def tell(self, values: np.ndarray) -> None:
         """Take the values of the centres that were asked last, [centre]."""
-        for (centre, cuts), value in zip(self._asked, values, strict=True):
+        for (centre, cuts), value in zip(self._batch, values, strict=True):
             self._of_size.setdefault(int(cuts.sum()), []).append(len(self._centres))
             self._centres.append(centre)
             self._cuts.append(cuts)

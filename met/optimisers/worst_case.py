@@ -97,10 +97,10 @@ class WorstCaseSearch:
                 self._evolution = DifferentialEvolution(self._draws, trials, of_trials)
         else:
             self._evolution.tell(of_trials)
-        for found, its in ((boxes, of_boxes), (polished, of_polished)):
+        for points, its in ((boxes, of_boxes), (polished, of_polished)):
             if len(its) and len(its) < len(values):
                 least = int(np.argmin(its))
-                self._evolution.add(found[least], float(its[least]))
+                self._evolution.add(points[least], float(its[least]))
         self._choose_polishing(self._evolution)
 
     def _choose_polishing(self, evolution: DifferentialEvolution) -> None:
@@ -125,9 +125,9 @@ class WorstCaseSearch:
                 return
 
 
-def distance(one: np.ndarray, other: np.ndarray) -> float:
+def distance(point: np.ndarray, other: np.ndarray) -> float:
     """The largest difference of a coordinate."""
-    return float(np.abs(one - other).max())
+    return float(np.abs(point - other).max())
 
 
 def generation(at_most: int) -> int:

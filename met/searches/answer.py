@@ -107,11 +107,11 @@ def answer(
         worst = np.full(len(first), -np.inf)
         np.maximum.at(worst, of_case, worth)
         order = np.lexsort((first, worst, -tried))
-        judged = [each for each in search.judged if each.case < len(table)]
-        kept = next((each for each in judged if search.advises(each)), None)
-        stability = kept or next(iter(judged), None)
+        judged = [candidate for candidate in search.judged if candidate.case < len(table)]
+        advised = next((candidate for candidate in judged if search.advises(candidate)), None)
+        stability = advised or next(iter(judged), None)
         best = order[0] if stability is None else of_case[stability.case]
-        left = judged[0] if kept is not None and kept is not judged[0] else None
+        left = judged[0] if advised is not None and advised is not judged[0] else None
         cases = np.flatnonzero(of_case == best)
         if left is not None:
             of_left = np.flatnonzero(of_case == of_case[left.case])
@@ -177,15 +177,17 @@ def _nearest_miss(
     bad = np.flatnonzero(~(done & met.all(axis=0)))
     if not len(bad):
         return None
-    found, distance = nearest(search, table, case, bad)
-    missed = [each.text for each, row in zip(requirements, met, strict=True) if not row[found]]
-    return NearestMiss(found, missed[0] if done[found] else "", distance)
+    nearest_case, distance = nearest(search, table, case, bad)
+    missed = [requirement.text for requirement, row in zip(requirements, met, strict=True) if not row[nearest_case]]
+    return NearestMiss(nearest_case, missed[0] if done[nearest_case] else "", distance)
 
 
 def nearest(search: Search, table: np.ndarray, case: int, among: np.ndarray) -> tuple[int, float]:
     """The first case, among these places of a table, whose candidate is nearest to that of a case; and its distance, as
     a share of the range of the parameter that is farthest."""
-    shares = np.stack([shares_of_range(each, table[:, at]) for at, each in enumerate(search.parameters)])
+    shares = np.stack(
+        [shares_of_range(parameter, table[:, column]) for column, parameter in enumerate(search.parameters)]
+    )
     distances = np.abs(shares[:, among] - shares[:, [case]]).max(axis=0)
     first = int(np.argmin(distances))
     return int(among[first]), float(distances[first])
@@ -212,12 +214,12 @@ def _room(limit: MetricLimit, values: np.ndarray) -> float:
 
 
 def _ends(search: Search, case: np.ndarray) -> list[tuple[str, str]]:
-    found = []
-    for each, value in zip(search.parameters, case, strict=False):
-        share = float(shares_of_range(each, value))
+    ends = []
+    for parameter, value in zip(search.parameters, case, strict=False):
+        share = float(shares_of_range(parameter, value))
         if not NEAR < share < 1.0 - NEAR:
-            found.append((each.path, "lower" if share < 0.5 else "upper"))
-    return found
+            ends.append((parameter.path, "lower" if share < 0.5 else "upper"))
+    return ends
 
 
 NEAR = 0.005

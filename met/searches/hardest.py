@@ -16,7 +16,7 @@ class HardestCase:
         self._search = search
         self._optimiser = optimisers.hardest(len(search.parameters), search.seed, search.at_most)
         self._known: dict[bytes, float] = {}
-        self._asked: list[bytes] = []
+        self._batch: list[bytes] = []
         self._new: list[bytes] = []
 
     def ask(self) -> np.ndarray:
@@ -26,12 +26,12 @@ class HardestCase:
             cases = self._search.values(self._optimiser.ask())
             if not len(cases):
                 break
-            self._asked = [case.tobytes() for case in cases]
-            first = {key: place for place, key in reversed(list(enumerate(self._asked)))}
+            self._batch = [case.tobytes() for case in cases]
+            first = {key: place for place, key in reversed(list(enumerate(self._batch)))}
             places = sorted(place for key, place in first.items() if key not in self._known)
             if len(places) > left:
                 break
-            self._new = [self._asked[place] for place in places]
+            self._new = [self._batch[place] for place in places]
             if places:
                 return cases[places]
             self._pass_on()
@@ -43,4 +43,4 @@ class HardestCase:
         self._pass_on()
 
     def _pass_on(self) -> None:
-        self._optimiser.tell(np.array([self._known[key] for key in self._asked]))
+        self._optimiser.tell(np.array([self._known[key] for key in self._batch]))

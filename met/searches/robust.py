@@ -84,7 +84,9 @@ class RobustTuning:
                     self.beginnings.append(self._search.budget - self._left)
                     self._begins_afresh = False
                 self._left -= len(self._wanted)
-                return np.array([[*np.frombuffer(each), *self._plants[plant]] for each, plant in self._wanted])
+                return np.array(
+                    [[*np.frombuffer(candidate), *self._plants[plant]] for candidate, plant in self._wanted]
+                )
             if not self._confirmed:
                 self._go_on()
         return np.empty((0, len(self._search.parameters) + len(self._plants[0])))
@@ -98,7 +100,11 @@ class RobustTuning:
     def _begin_afresh(self) -> None:
         """Begin again after steps along slopes, from the middle of the cube, or, if that was idle, from opposite to the
         best point; if that was idle too, the tuning is over."""
-        worths = {each: max(known.values()) for each, known in self._known.items() if len(known) == len(self._plants)}
+        worths = {
+            candidate: max(known.values())
+            for candidate, known in self._known.items()
+            if len(known) == len(self._plants)
+        }
         least, before = min(worths.values(), default=math.inf), self._best_before
         better = before is None or (least < before and not hardly_better(least, before))
         self._best_before, self._fruitless = least, 0 if better else self._fruitless + 1
@@ -107,9 +113,9 @@ class RobustTuning:
         if not stepped or not worths or self._fruitless == IDLE or room < SHORTEST:
             self._confirmed = True
             return
-        best = min(worths, key=lambda each: worths[each])
+        best = min(worths, key=lambda candidate: worths[candidate])
         known = self._known[best]
-        self._active = [max(known, key=lambda each: known[each])]
+        self._active = [max(known, key=lambda number: known[number])]
         self._since_beginning, self._borne, self._idle = {}, None, 0
         self._begins_afresh = True
         self._begin_turn(1.0 - self._points[best] if self._fruitless else None)
@@ -183,23 +189,23 @@ class RobustTuning:
 
     @property
     def _active_plants(self) -> list[tuple[float, ...]]:
-        return [self._plants[each] for each in self._active]
+        return [self._plants[number] for number in self._active]
 
     def _unknown(self, candidates: list[Candidate], plants: list[int] | range) -> list[tuple[Candidate, int]]:
         once = dict.fromkeys(candidates)
-        return [(each, plant) for each in once for plant in plants if plant not in self._known[each]]
+        return [(candidate, plant) for candidate in once for plant in plants if plant not in self._known[candidate]]
 
     def _go_on(self) -> None:
         """Pass on the known worths of a generation; or judge the best of a turn, which was tried against all plants."""
         if not self._confirming:
             if self.steps is not None and self.steps.going:
-                asked = self._batch[0]
-                self.steps.tell(np.frombuffer(asked), self._active_plants, self._worst(asked))
+                candidate = self._batch[0]
+                self.steps.tell(np.frombuffer(candidate), self._active_plants, self._worst(candidate))
             else:
-                self._tuner.tell(np.array([self._worst(each) for each in self._batch]))
+                self._tuner.tell(np.array([self._worst(candidate) for candidate in self._batch]))
             return
         best = self._best()
-        plant = max(range(len(self._plants)), key=lambda each: self._known[best][each])
+        plant = max(range(len(self._plants)), key=lambda number: self._known[best][number])
         if self._known[best][plant] > self._worst(best):
             self._active.append(plant)
             if self.steps is not None and self.steps.settled:
@@ -219,7 +225,7 @@ class RobustTuning:
     def _best(self) -> Candidate:
         """The candidate with the best worth against the active plants, among those tried against all of them and asked
         for since the beginning."""
-        tried = [each for each in self._since_beginning if self._known[each].keys() >= set(self._active)]
+        tried = [candidate for candidate in self._since_beginning if self._known[candidate].keys() >= set(self._active)]
         return min(tried, key=self._worst)
 
     def _worst(self, candidate: Candidate) -> float:
@@ -234,13 +240,13 @@ def around(middle: np.ndarray | None, points: np.ndarray) -> np.ndarray:
     """
     if middle is None or not len(points):
         return points
-    at = np.clip(middle, INSIDE, 1.0 - INSIDE)
-    return np.where(points < 0.5, 2.0 * at * points, at + (1.0 - at) * (2.0 * points - 1.0))
+    centre = np.clip(middle, INSIDE, 1.0 - INSIDE)
+    return np.where(points < 0.5, 2.0 * centre * points, centre + (1.0 - centre) * (2.0 * points - 1.0))
 
 
 def hardly_better(now: float, before: float) -> bool:
     """True if the goal of a candidate that meets all requirements, by its worth (`served`), has hardly improved."""
     if not (abs(now) < MET and abs(before) < MET):
         return False
-    one, other = (worth / (1.0 - abs(worth)) for worth in (now, before))
-    return abs(one - other) <= GAIN * abs(other)
+    new, other = (worth / (1.0 - abs(worth)) for worth in (now, before))
+    return abs(new - other) <= GAIN * abs(other)

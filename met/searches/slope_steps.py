@@ -66,12 +66,12 @@ class SlopeSteps:
 
     def _local(self, candidate: np.ndarray, plants: Sequence[tuple[float, ...]]) -> tuple[float, LocalModel | None]:
         """The worth of a candidate, by its metrics between samples, and a local model of the function to minimise."""
-        found = self._source.slopes(np.array([[*candidate, *plant] for plant in plants]))
-        if isinstance(found, CaseSlopes):
-            model = local_model(self._search, self._source.requirements, found, candidate)
+        slopes = self._source.slopes(np.array([[*candidate, *plant] for plant in plants]))
+        if isinstance(slopes, CaseSlopes):
+            model = local_model(self._search, self._source.requirements, slopes, candidate)
             if isinstance(model, LocalModel):
-                return worth_of(self._search, self._source.requirements, found), model
+                return worth_of(self._search, self._source.requirements, slopes), model
             self.why_not = model
         else:
-            self.why_not = found
+            self.why_not = slopes
         return math.inf, None

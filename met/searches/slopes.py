@@ -51,48 +51,50 @@ class SlopeSource(Protocol):
         """The slopes of these cases, [case, coordinate], SI; or the reason why there are none."""
 
 
-def worth_of(search: Search, requirements: Sequence[MetricLimit], found: CaseSlopes) -> float:
+def worth_of(search: Search, requirements: Sequence[MetricLimit], case_slopes: CaseSlopes) -> float:
     """The worth of the worst of these cases, by what its metrics are between samples."""
-    goal = found.values[search.metric]
+    goal = case_slopes.values[search.metric]
     return float(
-        served(goal, search.largest, found.done, requirements, found.values, search.margin).max(initial=-math.inf)
+        served(goal, search.largest, case_slopes.done, requirements, case_slopes.values, search.margin).max(
+            initial=-math.inf
+        )
     )
 
 
 def local_model(
-    search: Search, requirements: Sequence[MetricLimit], found: CaseSlopes, candidate: np.ndarray
+    search: Search, requirements: Sequence[MetricLimit], case_slopes: CaseSlopes, candidate: np.ndarray
 ) -> LocalModel | str:
     """A local model, over the unit cube, of the function to minimise near a candidate; or the reason why there is none.
 
-    candidate  values of its parameters, SI;  found: of its cases
+    candidate  values of its parameters, SI;  case_slopes: of its cases
     """
-    if not found.done.all():
+    if not case_slopes.done.all():
         return "a case fails"
-    per_share = np.array([_per_share(each.low, each.high, each.logarithmic, value)
-                          for each, value in zip(search.parameters, candidate, strict=True)])  # fmt: skip
+    per_share = np.array([_per_share(parameter.low, parameter.high, parameter.logarithmic, value)
+                          for parameter, value in zip(search.parameters, candidate, strict=True)])  # fmt: skip
     sign = -1.0 if search.largest else 1.0
-    goal = sign * found.values[search.metric]
-    goal_slopes = sign * found.slopes[search.metric] * per_share
+    goal = sign * case_slopes.values[search.metric]
+    goal_slopes = sign * case_slopes.slopes[search.metric] * per_share
     count, dimension = goal_slopes.shape
-    misses = worth_of(search, requirements, found) >= 1.0
+    misses = worth_of(search, requirements, case_slopes) >= 1.0
     if not np.isfinite(goal).all():
         return f"`{search.metric}` has no value"
     if misses:
         goal, goal_slopes = np.zeros(count), np.zeros((count, dimension))
     elif not np.isfinite(goal_slopes).all():
-        return found.why_not.get(search.metric, f"`{search.metric}` has no slope")
+        return case_slopes.why_not.get(search.metric, f"`{search.metric}` has no slope")
     hinges, slopes, weights = [np.zeros(0)], [np.zeros((0, dimension))], [np.zeros(0)]
     for requirement in requirements:
-        values = found.values[requirement.metric]
+        values = case_slopes.values[requirement.metric]
         if not np.isfinite(values).all():
             return f"`{requirement.metric}` has no value"
         falls = -1.0 if requirement.comparison.startswith("<") else 1.0
         size = abs(requirement.limit) or 1.0
-        out = -falls * found.slopes[requirement.metric] * per_share / size
+        out = -falls * case_slopes.slopes[requirement.metric] * per_share / size
         beyond = -falls * (values - requirement.limit) / size
         far = beyond < -max(2.0 * search.margin, 10.0 * WITHIN)
         if not np.isfinite(out).all(axis=1)[~far].all():
-            return found.why_not.get(requirement.metric, f"`{requirement.metric}` has no slope")
+            return case_slopes.why_not.get(requirement.metric, f"`{requirement.metric}` has no slope")
         out = np.where(np.isfinite(out), out, 0.0)
         keep = WITHIN + (0.5 * search.margin if misses else 0.0)
         hinges.append(beyond + keep)
@@ -102,8 +104,10 @@ def local_model(
             hinges.append(1.0 + beyond / search.margin)
             slopes.append(out / search.margin)
             weights.append(np.abs(goal) * search.margin)
-    of = np.tile(np.arange(count), len(hinges) - 1)
-    return LocalModel(goal, goal_slopes, np.concatenate(hinges), np.concatenate(slopes), of, np.concatenate(weights))
+    pieces = np.tile(np.arange(count), len(hinges) - 1)
+    return LocalModel(
+        goal, goal_slopes, np.concatenate(hinges), np.concatenate(slopes), pieces, np.concatenate(weights)
+    )
 
 
 def _per_share(low: float, high: float, logarithmic: bool, value: float) -> float:

@@ -32,8 +32,8 @@ def slopes(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
 
 def fastest(p: Any) -> Real:
     """The size of the filter's poles, 1/s."""
-    found: Real = 2.0 * math.pi * p.cutoff
-    return found
+    rate: Real = 2.0 * math.pi * p.cutoff
+    return rate
 
 
 def swing(p: Any) -> tuple[Real, Real]:

@@ -18,8 +18,8 @@ def follow(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
 
 
 def fastest(p: Any) -> Real:
-    found: Real = 2.0 * math.pi * p.cutoff
-    return found
+    rate: Real = 2.0 * math.pi * p.cutoff
+    return rate
 
 
 def begin(p: Any, value: Real) -> Mapping[str, Real]:

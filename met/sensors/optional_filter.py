@@ -42,5 +42,5 @@ def settled(p: Any, value: Real) -> Mapping[str, Real]:
 
 def behind(p: Any, states: Any, sensed: Sensed) -> Real:
     """The filter's output at a tick; without a filter, its input."""
-    found: Real = sensed.value if p.filter == "none" else states.filtered
-    return found
+    output: Real = sensed.value if p.filter == "none" else states.filtered
+    return output

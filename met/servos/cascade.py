@@ -73,9 +73,9 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
         "amplifier": p.ki_current * _within(error, wanted, p.v_max),
     }
     tau_m = p.kt * states.current
-    shown = {"voltage": voltage, "motor_torque": tau_m}
+    signals = {"voltage": voltage, "motor_torque": tau_m}
     if elastic:
-        moved = geared(p, states, joint, tau_m, p.kt * p.i_max, shown)
+        moved = geared(p, states, joint, tau_m, p.kt * p.i_max, signals)
         return replace(moved, slopes={**electric, **moved.slopes})
     drag = friction(p, w, states)
     return Drive(
@@ -84,7 +84,7 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
         rotor=p.ratio * p.ratio * p.j_m,
         spin=p.ratio * p.j_m,
         slopes={**electric, **drag.bending},
-        signals=shown,
+        signals=signals,
         state_out_of_range=drag.state_out_of_range,
     )
 
@@ -138,10 +138,10 @@ def fastest_law(p: Any) -> Real:
 def swings(p: Any, kind: str) -> Mapping[str, tuple[Real, Real]]:
     """Oscillations of the current loop, and of the motor on its gear, damped only by the rate loop's gain: the current
     is the one commanded."""
-    found = {"current loop": (p.ki_current / p.inductance, (p.resistance + p.k_current) / p.inductance)}
+    oscillations = {"current loop": (p.ki_current / p.inductance, (p.resistance + p.k_current) / p.inductance)}
     if p.gear == "elastic":
-        found["gear"] = compliant_gearbox.swing(p, 0.0 if kind == "torque" else p.kt * p.kp)
-    return found
+        oscillations["gear"] = compliant_gearbox.swing(p, 0.0 if kind == "torque" else p.kt * p.kp)
+    return oscillations
 
 
 def full(p: Any) -> Mapping[str, Real]:

@@ -45,8 +45,10 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
     return geared(p, states, joint, tau_m, p.tau_max, {"motor_torque": tau_m})
 
 
-def geared(p: Any, states: Any, joint: JointMotion, tau_m: Real, strongest: Real, shown: Mapping[str, Real]) -> Drive:
-    """The drive of a motor behind the gear, with this torque, N m, and at most the strongest; shown: its own
+def geared(
+    p: Any, states: Any, joint: JointMotion, tau_m: Real, strongest: Real, own_signals: Mapping[str, Real]
+) -> Drive:
+    """The drive of a motor behind the gear, with this torque, N m, and at most the strongest; own_signals: its own
     signals."""
     w = states.motor_rate
     rate = w / p.ratio - joint.qd
@@ -59,7 +61,7 @@ def geared(p: Any, states: Any, joint: JointMotion, tau_m: Real, strongest: Real
         slopes={"deflection": rate, "motor_rate": (tau_m - at_motor - drag.torque) / p.j_m, **drag.bending},
         friction={"motor_rate": drag.level / p.j_m},
         rotors={"motor_rate": p.j_m},
-        signals={**shown, "gear_torque": joint.coupled * T},
+        signals={**own_signals, "gear_torque": joint.coupled * T},
         kinetic=0.5 * p.j_m * (w * w),
         potential=gear.energy(p, states.deflection),
         state_out_of_range=drag.state_out_of_range,

@@ -80,9 +80,9 @@ class Furthest:
                 self._cut()
 
     def _cut(self) -> None:
-        kept = np.concatenate(self._parts)
-        kept = np.partition(kept, len(kept) - self._most)[-self._most :].copy()
-        self._parts, self._held, self._above = [kept], len(kept), float(kept[0])
+        values = np.concatenate(self._parts)
+        values = np.partition(values, len(values) - self._most)[-self._most :].copy()
+        self._parts, self._held, self._above = [values], len(values), float(values[0])
 
     @property
     def least(self) -> float:

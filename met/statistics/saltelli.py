@@ -60,12 +60,12 @@ def saltelli_shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares 
     first = _less_each(b[:, None] * (mixed - a[:, None]), part) / pairs / variance
     total = 0.5 * _less_each((mixed - a[:, None]) ** 2, part) / pairs / variance
     drawn = np.concatenate([y[:, 0], y[:, -1]]) * size + output.mean()
-    found = []
+    of_inputs = []
     for place, values in enumerate(inputs):
         points = values.reshape(-1, width)
         own = np.concatenate([points[:, 0], points[:, -1]])
         low, high, ends_by = means_of_ends(own, drawn)
-        found.append(
+        of_inputs.append(
             InputShare(
                 first=float(np.clip(first[0, place], 0.0, 1.0)),
                 first_by=interval(first[:, place]),
@@ -78,7 +78,7 @@ def saltelli_shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares 
                 ends_by=ends_by,
             )
         )
-    return Shares(tuple(found), None)
+    return Shares(tuple(of_inputs), None)
 
 
 def _less_each(values: np.ndarray, part: np.ndarray) -> np.ndarray:

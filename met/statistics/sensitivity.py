@@ -140,29 +140,29 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
         pairs, spread = _Variance(left, part[some]), _Variance(y[some], part[some]).spread
         counts = [_count(cell) for cell in coarse]
         is_cut = [
-            count == size and len(np.unique(each[some])) > size for count, each in zip(counts, inputs, strict=True)
+            count == size and len(np.unique(column[some])) > size for count, column in zip(counts, inputs, strict=True)
         ]
-        total = [each.copy() for each in first]
+        total = [column.copy() for column in first]
         explained = np.sum(first, axis=0)
         for i, j in combinations(range(len(inputs)), 2):
             sums = pairs.sums(coarse[i] * counts[j] + coarse[j], counts[i] * counts[j])
             fine, wide = (
-                pairs.between(*each, fitted=a + b - 2) / spread
-                for each, a, b in (
+                pairs.between(*both, fitted=a + b - 2) / spread
+                for both, a, b in (
                     (sums, counts[i], counts[j]),
                     _halved(sums, counts[i], counts[j], is_cut[i], is_cut[j]),
                 )
             )
             # the variance hidden within cells falls with the square of their width
             together = fine + (fine - wide) / 3.0
-            for each in (i, j):
-                total[each] += together
-                cut[each] += abs(fine[0] - wide[0]) / 3.0
+            for place in (i, j):
+                total[place] += together
+                cut[place] += abs(fine[0] - wide[0]) / 3.0
             explained = explained + together
         unexplained = 1.0 - explained
         rest = float(np.clip(unexplained[0], 0.0, 1.0))
     ranks = _ranks(output)
-    found = []
+    of_inputs = []
     for number, values in enumerate(inputs):
         least, low, high = None, 0.0, 1.0
         if total is not None and unexplained is not None:
@@ -171,7 +171,7 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
             high = min(1.0, max(least, float(most[0])) + interval(most) + cut[number] + hidden[number])
             low = min(high, max(0.0, float(total[number][0]) - interval(total[number]) - cut[number]))
         low_end, high_end, ends_by = means_of_ends(values, output)
-        found.append(
+        of_inputs.append(
             InputShare(
                 first=_share(first[number]),
                 first_by=min(1.0, interval(first[number]) + hidden[number]),
@@ -184,7 +184,7 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
                 ends_by=ends_by,
             )
         )
-    return Shares(tuple(found), rest)
+    return Shares(tuple(of_inputs), rest)
 
 
 DEPENDENT = 1e-3
@@ -209,7 +209,7 @@ def dependent(inputs: Sequence[np.ndarray]) -> list[tuple[int, int, float]]:
     level = 0.5 * DEPENDENT / pairs
     ranks = [_ranks(values[some]) for values in inputs]
     coarse = [cells(values[some], max(4, min(8, int((count / 12) ** 0.5)))).astype(np.int64) for values in inputs]
-    found = []
+    dependent_pairs = []
     for i, j in combinations(range(len(inputs)), 2):
         size = _correlation(ranks[i], ranks[j])
         is_correlated = abs(size) > max(SLIGHT, -ndtri(0.5 * level) / np.sqrt(max(1, count - 1)))
@@ -219,8 +219,8 @@ def dependent(inputs: Sequence[np.ndarray]) -> list[tuple[int, int, float]]:
         excess = float(((both - expected) ** 2 / np.maximum(expected, 1e-300)).sum())
         is_uneven = excess > SLIGHT**2 * count and chdtrc(max(1, (a - 1) * (b - 1)), excess) < level
         if is_correlated or is_uneven:
-            found.append((i, j, size))
-    return found
+            dependent_pairs.append((i, j, size))
+    return dependent_pairs
 
 
 def _additive(
@@ -300,9 +300,11 @@ def _halved(
     """Sums of a by b cells, merged into cells twice as wide along the inputs that were cut, and the new numbers of
     cells."""
     at_a, at_b = np.arange(0, a, 2 if cut_a else 1), np.arange(0, b, 2 if cut_b else 1)
-    n, found = (np.add.reduceat(np.add.reduceat(each.reshape(a, b, -1), at_a, axis=0), at_b, axis=1) for each in sums)
+    n, totals = (
+        np.add.reduceat(np.add.reduceat(array.reshape(a, b, -1), at_a, axis=0), at_b, axis=1) for array in sums
+    )
     cells = len(at_a) * len(at_b)
-    return (n.reshape(cells, -1), found.reshape(cells, -1)), len(at_a), len(at_b)
+    return (n.reshape(cells, -1), totals.reshape(cells, -1)), len(at_a), len(at_b)
 
 
 def _sums(key: np.ndarray, count: int, weights: np.ndarray | None = None) -> np.ndarray:
@@ -324,14 +326,14 @@ def _means(cell: np.ndarray, y: np.ndarray, cells: int = 0) -> np.ndarray:
     return np.asarray(np.bincount(cell, y, minlength=cells) / np.maximum(1, count))
 
 
-def _share(found: np.ndarray) -> float:
-    return float(np.clip(found[0], 0.0, 1.0))
+def _share(estimates: np.ndarray) -> float:
+    return float(np.clip(estimates[0], 0.0, 1.0))
 
 
-def interval(found: np.ndarray) -> float:
-    """Half the width of the jackknife's 95 % interval. found: from all cases, then without each part."""
-    each = found[1:]
-    return float(QUANTILE * np.sqrt((GROUPS - 1) / GROUPS * ((each - each.mean()) ** 2).sum()))
+def interval(estimates: np.ndarray) -> float:
+    """Half the width of the jackknife's 95 % interval. estimates: from all cases, then without each part."""
+    without_part = estimates[1:]
+    return float(QUANTILE * np.sqrt((GROUPS - 1) / GROUPS * ((without_part - without_part.mean()) ** 2).sum()))
 
 
 def means_of_ends(values: np.ndarray, output: np.ndarray) -> tuple[float, float, float]:

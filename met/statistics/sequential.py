@@ -50,8 +50,8 @@ def _mixture(cases: np.ndarray, counted: np.ndarray, allowed: float) -> np.ndarr
     with np.errstate(divide="ignore"):
         average = betaln(counted + a, cases - counted + b) + np.log(betainc(counted + a, cases - counted + b, allowed))
         prior = betaln(a, b) + math.log(betainc(a, b, allowed))
-    found: np.ndarray = average - prior - counted * math.log(allowed) - (cases - counted) * math.log1p(-allowed)
-    return found
+    log_ratio: np.ndarray = average - prior - counted * math.log(allowed) - (cases - counted) * math.log1p(-allowed)
+    return log_ratio
 
 
 SMALLEST = 2.0**-50
@@ -98,8 +98,8 @@ def _first(misses: np.ndarray, at_most: int, holds: Callable[[np.ndarray, np.nda
     low, high = misses.copy(), np.full(len(misses), at_most + 1)
     while (low < high).any():
         middle = (low + high) // 2
-        found = holds(middle, misses) | (middle > at_most)
-        low, high = np.where(found, low, np.minimum(middle + 1, high)), np.where(found, middle, high)
+        holding = holds(middle, misses) | (middle > at_most)
+        low, high = np.where(holding, low, np.minimum(middle + 1, high)), np.where(holding, middle, high)
     return high
 
 
@@ -119,11 +119,11 @@ def decided(missed: np.ndarray, share: float, confidence: float) -> tuple[int, V
 
     missed  for each case, in the order in which they were drawn, whether it missed the requirement
     """
-    found = limits(share, confidence, len(missed)).verdicts(np.arange(1, len(missed) + 1), np.cumsum(missed))
-    if not found.any():
+    verdicts = limits(share, confidence, len(missed)).verdicts(np.arange(1, len(missed) + 1), np.cumsum(missed))
+    if not verdicts.any():
         return len(missed), "not shown"
-    first = int((found != 0).argmax())
-    return first + 1, "demonstrated" if found[first] > 0 else "refuted"
+    first = int((verdicts != 0).argmax())
+    return first + 1, "demonstrated" if verdicts[first] > 0 else "refuted"
 
 
 def cases_needed(share: float, confidence: float, missed: int = 0) -> int:

@@ -125,12 +125,12 @@ class BedModel:
 def check(model: BedModel) -> tuple[str, str] | None:
     """The first fault of a declaration: words that go on after the model's name, and the remedy. None: it is sound."""
     for needed in PARAMETERS:
-        found = [parameter for parameter in model.parameters if parameter.name == needed.name]
-        if not found:
+        parameters = [parameter for parameter in model.parameters if parameter.name == needed.name]
+        if not parameters:
             return _missing("parameter", needed)
-        if any(parameter.unit != needed.unit or parameter.shape != needed.shape for parameter in found):
-            return _other_unit(needed, found[0])
-        if needed.at_most is not None and not all(_within(parameter, needed.at_most) for parameter in found):
+        if any(parameter.unit != needed.unit or parameter.shape != needed.shape for parameter in parameters):
+            return _other_unit(needed, parameters[0])
+        if needed.at_most is not None and not all(_within(parameter, needed.at_most) for parameter in parameters):
             message = f"lets `{needed.name}` be other than a whole number from 0 to {needed.at_most:g}"
             return message, f"declare it with `at_least=0.0, at_most={needed.at_most}, whole=True`"
     for needed_memory in (*MEMORY, *(TORQUE,) * (model.drive == "rate")):
@@ -148,10 +148,10 @@ def _missing(kind: str, needed: Parameter | Memory, whose: str = "") -> tuple[st
     return message, f"`{needed.name}`, {needed.unit}: {needed.doc}"
 
 
-def _other_unit(needed: Parameter | Memory, found: Parameter | Memory) -> tuple[str, str]:
-    if found.unit == needed.unit:
+def _other_unit(needed: Parameter | Memory, declared: Parameter | Memory) -> tuple[str, str]:
+    if declared.unit == needed.unit:
         return f"declares `{needed.name}`, which is no number", f"`{needed.name}`, {needed.unit}: {needed.doc}"
-    message = f"declares `{needed.name}` in {found.unit}, and every bed model has it in {needed.unit}"
+    message = f"declares `{needed.name}` in {declared.unit}, and every bed model has it in {needed.unit}"
     return message, f"`{needed.name}`, {needed.unit}: {needed.doc}"
 
 

@@ -37,24 +37,29 @@ def over(f_cut: Real, time: Real) -> Filter:
     return Filter(sigma, time, rows)
 
 
-def _about(of: Filter, x: State, before: State, after: State) -> State:
+def _about(lowpass: Filter, x: State, before: State, after: State) -> State:
     """The state at the end: free motion about a course that begins at `before` and ends at `after`."""
     y, z = x[0] - before[0], x[1] - before[1]
-    (yy, yz), (zy, zz) = of.free
+    (yy, yz), (zy, zz) = lowpass.free
     return after[0] + (yy * y + yz * z), after[1] + (zy * y + zz * z)
 
 
-def along_line(of: Filter, x: State, begin: Real, end: Real) -> State:
+def along_line(lowpass: Filter, x: State, begin: Real, end: Real) -> State:
     """The state at the end, where the rate goes from `begin` to `end` in a straight line, rad/s."""
-    slope = (end - begin) / of.time
-    lag = slope / of.sigma
-    return _about(of, x, (begin - lag, slope), (end - lag, slope))
+    slope = (end - begin) / lowpass.time
+    lag = slope / lowpass.sigma
+    return _about(lowpass, x, (begin - lag, slope), (end - lag, slope))
 
 
-def along_decay(of: Filter, x: State, begin: Real, final: Real, decay: Real) -> State:
+def along_decay(lowpass: Filter, x: State, begin: Real, final: Real, decay: Real) -> State:
     """The state at the end, where the rate goes from `begin` towards `final` (rad/s) with the rate constant `decay`
     (1/s)."""
-    gain = 2.0 * of.sigma * of.sigma / (decay * decay - 2.0 * of.sigma * decay + 2.0 * of.sigma * of.sigma)
+    gain = (
+        2.0
+        * lowpass.sigma
+        * lowpass.sigma
+        / (decay * decay - 2.0 * lowpass.sigma * decay + 2.0 * lowpass.sigma * lowpass.sigma)
+    )
     away = gain * (begin - final)
-    left = away * exp(-decay * of.time)
-    return _about(of, x, (final + away, -decay * away), (final + left, -decay * left))
+    left = away * exp(-decay * lowpass.time)
+    return _about(lowpass, x, (final + away, -decay * away), (final + left, -decay * left))

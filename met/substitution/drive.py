@@ -80,13 +80,13 @@ def at_least(value: Real, least: Real) -> Real:
     return where(value > least, value, least)
 
 
-def mean_torque(motor: Motor, begins: Real, found: Balanced | None, mean: float) -> Real:
+def mean_torque(motor: Motor, begins: Real, balanced: Balanced | None, mean: float) -> Real:
     """Mean torque of the joint's own motor over the coming tick, N m, within its limit.
 
     begins  its torque as the tick begins, N m
     found   the joint's motion in the tick, None where no balance says it;  mean: half of the tick, s
     """
-    if found is None:
+    if balanced is None:
         return begins
-    gained = motor.ratio * found.qdd * mean
+    gained = motor.ratio * balanced.qdd * mean
     return clip(begins - motor.kt * motor.kt / motor.resistance * gained, -motor.tau_max, motor.tau_max)

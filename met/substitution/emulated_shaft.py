@@ -51,7 +51,7 @@ def turned(
     """
     count = math.ceil(time / SUBSTEP - 1e-9)
     h = time / count
-    of = butterworth.over(p.f_cut, h)
+    lowpass = butterworth.over(p.f_cut, h)
     load = p.kt_load * current
     noise = p.tachometer * draw("tachometer")
     w, angle, x = held.shaft_rate, held.shaft_angle, (held.filtered, held.filtered_slope)
@@ -63,7 +63,7 @@ def turned(
         )
         smooth = driving(w) + load - p.f_v * w + uneven
         after = shaft.slid(w, smooth, p.f_c, inertia=p.inertia, decay=decay, time=h)
-        x = butterworth.along_line(of, x, w + noise, after + noise)
+        x = butterworth.along_line(lowpass, x, w + noise, after + noise)
         angle = angle + 0.5 * h * (w + after)
         w = after
     return {"shaft_rate": w, "shaft_angle": angle, "filtered": x[0], "filtered_slope": x[1]}

@@ -26,11 +26,11 @@ def give(
         share = 1.0 - exp(-2.0 * math.pi * own.low_pass * joint.period)
         shaft.append(memory.acceleration + share * (new - memory.acceleration))
     qdd = [a / joint.motor.ratio for a, joint in zip(shaft, inputs, strict=True)]
-    given = []
+    outputs = []
     for a, joint_a, joint, taken in zip(shaft, qdd, inputs, load(qdd), strict=True):
         torque = -taken / joint.motor.ratio + (joint.inertia - joint.motor.inertia) * a
-        given.append((LawOutput(torque, joint_a), {"acceleration": a}))
-    return given
+        outputs.append((LawOutput(torque, joint_a), {"acceleration": a}))
+    return outputs
 
 
 LAW = Law(

@@ -31,12 +31,12 @@ class DiscreteModel:
 def model(*, inertia: Real, damping: Real, f_cut: Real, period: Real) -> DiscreteModel:
     """The modelled bed: shaft inertia (kg m^2), Kt^2/R + F_v (N m s/rad, above 0), filter (Hz), tick (s)."""
     decay = damping / inertia
-    of = butterworth.over(f_cut, period)
+    lowpass = butterworth.over(f_cut, period)
     fading = exp(-decay * period)
 
     def after(w: Real, y: Real, z: Real, d: Real, u: Real) -> Four:
         final = (d + u) / damping
-        y, z = butterworth.along_decay(of, (y, z), w, final, decay)
+        y, z = butterworth.along_decay(lowpass, (y, z), w, final, decay)
         return final + (w - final) * fading, y, z, d
 
     columns = [after(*(1.0 if i == j else 0.0 for i in range(5))) for j in range(5)]
@@ -44,9 +44,11 @@ def model(*, inertia: Real, damping: Real, f_cut: Real, period: Real) -> Discret
     return DiscreteModel((rows[0], rows[1], rows[2], rows[3]), columns[4])
 
 
-def predicted(of: DiscreteModel, x: Four, u: Real) -> Four:
+def predicted(discrete: DiscreteModel, x: Four, u: Real) -> Four:
     """x at the next tick, with the torque u (N m) held until then."""
-    rows = [sum((a * b for a, b in zip(row, x, strict=True)), b * u) for row, b in zip(of.A, of.B, strict=True)]
+    rows = [
+        sum((a * b for a, b in zip(row, x, strict=True)), b * u) for row, b in zip(discrete.A, discrete.B, strict=True)
+    ]
     return rows[0], rows[1], rows[2], rows[3]
 
 
@@ -77,15 +79,15 @@ def gain_of(P: Square, noise: Noise) -> Four:
     return P[0][1] / total, P[1][1] / total, P[2][1] / total, P[3][1] / total
 
 
-def next_covariance(of: DiscreteModel, P: Square, noise: Noise) -> Square:
+def next_covariance(discrete: DiscreteModel, P: Square, noise: Noise) -> Square:
     """The covariance of x before the next reading, from that before this one: one turn of Riccati's recursion."""
     gain = gain_of(P, noise)
     read = [[P[i][j] - gain[i] * P[1][j] for j in range(4)] for i in range(4)]
-    half = [[sum((of.A[i][k] * read[k][j] for k in range(4)), 0.0) for j in range(4)] for i in range(4)]
+    half = [[sum((discrete.A[i][k] * read[k][j] for k in range(4)), 0.0) for j in range(4)] for i in range(4)]
     rows = [[0.0] * 4 for _ in range(4)]  # type: list[list[Real]]
     for i in range(4):
         for j in range(i + 1):
-            entry = sum((half[i][k] * of.A[j][k] for k in range(4)), of.B[i] * of.B[j] * noise.torque)
+            entry = sum((half[i][k] * discrete.A[j][k] for k in range(4)), discrete.B[i] * discrete.B[j] * noise.torque)
             rows[i][j] = rows[j][i] = entry + (noise.drift if i == j == 3 else 0.0)
     a, b, c, d = (tuple(row) for row in rows)
     return a, b, c, d  # type: ignore[return-value]

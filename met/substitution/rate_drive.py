@@ -41,13 +41,13 @@ def advance(p: Any, held: Any, wire: Wire, time: float, draw: Draw) -> Mapping[s
         return tau
 
     decay = damping(p.kt, p.resistance, p.f_v) / p.inertia
-    found = emulated_shaft.turned(p, held, wire.current, time, draw, driving, decay)
-    return {**found, "integral": integral, "motor_torque": tau}
+    memory = emulated_shaft.turned(p, held, wire.current, time, draw, driving, decay)
+    return {**memory, "integral": integral, "motor_torque": tau}
 
 
 def taken(p: Any, wire: Wire) -> tuple[Wire, Truth]:
-    told, current = converted(wire.drive, p.converter_rate), converted(wire.current, p.converter_current)
-    return Wire(told, clip(current, -p.i_max, p.i_max)), absolute(current) > p.i_max
+    rate, current = converted(wire.drive, p.converter_rate), converted(wire.current, p.converter_current)
+    return Wire(rate, clip(current, -p.i_max, p.i_max)), absolute(current) > p.i_max
 
 
 BED = BedModel(

@@ -18,10 +18,10 @@ from met.trace import Real
 
 def balanced(inputs: LawInput) -> LawOutput:
     """The load torque by which the shaft takes its part in the balance, and the joint's part."""
-    found = inputs.balance
-    assert found is not None
-    torque = (inputs.inertia + inputs.extra) * (inputs.motor.ratio * found.qdd) - (found.net - found.friction)
-    return LawOutput(torque, found.qdd)
+    balance = inputs.balance
+    assert balance is not None
+    torque = (inputs.inertia + inputs.extra) * (inputs.motor.ratio * balance.qdd) - (balance.net - balance.friction)
+    return LawOutput(torque, balance.qdd)
 
 
 def give(

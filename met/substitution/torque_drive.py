@@ -39,13 +39,13 @@ def advance(p: Any, held: Any, wire: Wire, time: float, draw: Draw) -> Mapping[s
         return goal + away * ((1.0 - left) / times)  # the mean of the substep
 
     decay = at_least(p.f_v / p.inertia, LEAST / h)
-    found = emulated_shaft.turned(p, held, wire.current, time, draw, driving, decay)
-    return {**found, "motor_torque": tau}
+    memory = emulated_shaft.turned(p, held, wire.current, time, draw, driving, decay)
+    return {**memory, "motor_torque": tau}
 
 
 def taken(p: Any, wire: Wire) -> tuple[Wire, Truth]:
-    told, current = converted(wire.drive, p.converter_torque), converted(wire.current, p.converter_current)
-    held = Wire(clip(told, -p.tau_max, p.tau_max), clip(current, -p.i_max, p.i_max))
+    tau, current = converted(wire.drive, p.converter_torque), converted(wire.current, p.converter_current)
+    held = Wire(clip(tau, -p.tau_max, p.tau_max), clip(current, -p.i_max, p.i_max))
     return held, absolute(current) > p.i_max
 
 

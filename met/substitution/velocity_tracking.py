@@ -22,12 +22,12 @@ from met.trace import Real
 def give(
     p: Sequence[Any], held: Sequence[Any], inputs: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
 ) -> Sequence[tuple[LawOutput, Mapping[str, Real]]]:
-    given: list[tuple[LawOutput, Mapping[str, Real]]] = []
+    outputs: list[tuple[LawOutput, Mapping[str, Real]]] = []
     for own, joint in zip(p, inputs, strict=True):
         pull = own.gain * joint.inertia / joint.period * (joint.w_ref - joint.w)
         shared = balanced(joint)
-        given.append((LawOutput(shared.torque + pull, shared.qdd), {}))
-    return given
+        outputs.append((LawOutput(shared.torque + pull, shared.qdd), {}))
+    return outputs
 
 
 LAW = Law(
