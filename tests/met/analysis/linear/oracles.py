@@ -146,17 +146,17 @@ def _significand(x: Any) -> Any:
     return value * (1.0 + 1j * (complex(x).imag / complex(x).real))
 
 
-def _sum(x: Any) -> Any:
-    """The sum, whole where a constant so large is in it that it rounds to whole numbers."""
-    return x.real if abs(x) >= 2.0**51 else x
+def _sum(a: Any, b: Any) -> Any:
+    """The sum, whole where one of the two is a constant so large that it rounds the other to whole numbers."""
+    return (a + b).real if min(abs(a), abs(b)) < 2.0**51 <= max(abs(a), abs(b)) else a + b
 
 
 COMPLEX: Mapping[str, Callable[..., Any]] = {
-    "add": lambda a, b: _sum(a + b),
-    "sub": lambda a, b: _sum(a - b),
+    "add": _sum,
+    "sub": lambda a, b: _sum(a, -b),
     "mul": lambda a, b: a * b,
     "div": _divide,
-    "fma": lambda a, b, c: _sum(a * b + c),
+    "fma": lambda a, b, c: _sum(a * b, c),
     "abs": lambda x: _abs(complex(x)),
     "sqrt": lambda x: cmath.sqrt(complex(x)),
     "flip": _flip,
