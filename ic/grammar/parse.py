@@ -48,7 +48,7 @@ from met.units import Measure
 
 NO_UNITS: Mapping[str, Measure] = MappingProxyType({})
 COMPARE = ("require", "exclude")
-DEFINED_IN_PARTS = ("arm", "link", "joint", "servo", "run", "substitute")  # by a block in a block
+DEFINED_IN_PARTS = ("arm", "link", "joint", "loop", "servo", "run", "substitute")  # by a block in a block
 PARAM = "param"
 LETS = ("let", PARAM)
 _OVER_CASES = "write `require METRIC < LIMIT in 99 % of cases with 90 % confidence;`"

@@ -7,7 +7,7 @@ sweeps are made of these declarations. A new key needs an `Entry`, and the code 
 from __future__ import annotations
 
 from ic.language.anywhere import ANYWHERE
-from ic.language.bodies import ARM, BOOM, JOINT, LINK, PAYLOAD
+from ic.language.bodies import ARM, BOOM, JOINT, LINK, LOOP, PAYLOAD
 from ic.language.declaration import BlockDeclaration, Entry
 from ic.language.runs import (
     ENVIRONMENT,
@@ -29,7 +29,7 @@ from ic.language.top_level import TOP_LEVEL
 BLOCKS = {
     block.name: block
     for block in (
-        ARM, LINK, BOOM, JOINT, SERVO, RUN, RATES, INITIAL, ENVIRONMENT, PAYLOAD, SUBSTITUTE, SCALE, METRIC,
+        ARM, LINK, BOOM, JOINT, LOOP, SERVO, RUN, RATES, INITIAL, ENVIRONMENT, PAYLOAD, SUBSTITUTE, SCALE, METRIC,
         LINEAR, TOLERANCES, SWEEP, SEARCH, TUNE,
     )
 }  # fmt: skip
@@ -44,7 +44,7 @@ OF_A_RUN = ("sweep", "search", "tune")
 EXPERIMENTS = ("run", *OF_A_RUN)
 """The definitions that have cases to run; they share one space of names."""
 
-NAMED = ("JOINT", "SERVO")
+NAMED = ("JOINT", "LOOP", "SERVO")
 """Placeholders at the start of a declared path, which stand for a name of the deck's."""
 
 HEADS = tuple(

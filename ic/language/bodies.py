@@ -152,6 +152,38 @@ JOINT = BlockDeclaration(
     ),
 )  # fmt: skip
 
+LEADER = Parameter(name="leader", shape="word", doc="the joint of the loop that leads the others")
+PIN_AT = Parameter(name="at", unit="m", shape="vector", default=ZEROS, doc="the pin in the frame of `link`")
+TO_AT = Parameter(name="to_at", unit="m", shape="vector", default=ZEROS, doc="the pin in the frame of `to`")
+BRANCH = Parameter(
+    name="branch",
+    shape="word",
+    words=("left", "right"),
+    doc="which of the two ways to close the loop",
+)
+
+LOOP = BlockDeclaration(
+    name="loop",
+    written="loop NAME { ... }",
+    within="arm",
+    doc="A pin that holds a point of one link on a point of another, and closes three joints that move in one plane: a "
+    "ram, or a linkage of four bars. One of them leads, the others follow it.",
+    entries=(
+        Entry(name="leader", written="leader = JOINT;", parameter=LEADER,
+              doc="the joint that leads: the one that slides, if one does"),
+        Entry(name="link", written="link = LINK;", doc="a link that the pin holds"),
+        Entry(name="at", written="at = [0.8, 0, 0] m;", parameter=PIN_AT, varies="number", path="LOOP.at",
+              default="`[0, 0, 0] m`", doc="where the pin is, in the frame of `link`"),
+        Entry(name="to", written="to = LINK;", doc="the other link that it holds, or `base`"),
+        Entry(name="to_at", written="to_at = [1.2, 0, -0.1] m;", parameter=TO_AT, varies="number", path="LOOP.to_at",
+              default="`[0, 0, 0] m`", doc="where the pin is, in the frame of `to`"),
+        Entry(name="branch", written="branch = left;", parameter=BRANCH, path="LOOP.branch",
+              doc="which of the two ways to close it: round the loop from the leader, in the direction from the pin "
+                  "through `link`, the other corners turn `left` or `right`, seen with the axis of the first of them "
+                  "towards you"),
+    ),
+)  # fmt: skip
+
 PAYLOAD_AT = Parameter(
     name="at", unit="m", shape="vector", default=ZEROS, doc="origin of the payload's frame, in the link's frame"
 )
@@ -269,6 +301,12 @@ ARM = BlockDeclaration(
             form="named",
             written="joint NAME revolute { ... }",
             doc="a connection of two links: `revolute`, `prismatic` or `fixed` (`met doc joint`)",
+        ),
+        Entry(
+            name="loop",
+            form="named",
+            written="loop NAME { ... }",
+            doc="a pin that closes three joints to a ram or a linkage of four bars (`met doc loop`)",
         ),
     ),
 )

@@ -9,7 +9,7 @@ from ic.text.lexer import NAME, STRING, Token
 from met.frozen import frozen
 
 VALUES = ("let", "param")
-NAMING = (*VALUES, "arm", "link", "joint", "servo", "run", "sweep", "search", "tune", "unit", "as")
+NAMING = (*VALUES, "arm", "link", "joint", "loop", "servo", "run", "sweep", "search", "tune", "unit", "as")
 """Words before a name that the deck defines, which no condition can see."""
 
 MOST_IN_BRACES = 8  # tokens of one index

@@ -20,6 +20,7 @@ from met.dynamics.spatial import ZERO, Vector
 from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import Experiment, Joint
+from met.plan.loops import in_loops
 from met.program.build import Builder
 from met.program.system import Actuator, System
 from met.program.values import parameters
@@ -80,7 +81,8 @@ class _Along:
             for rates in (self.qd, self.qdd)
         )
         self.q, self.qd, self.qdd = list(moving.q), list(moving.qd), list(turning.qd)  # type: ignore[arg-type]
-        self.ratios = self.system.ratios(tape.read)
+        self.qdd = [a + b for a, b in zip(self.qdd, self.system.bends(tape.read, moving), strict=True)]
+        self.ratios = self.system.ratios(tape.read, moving.q)
 
     @property
     def names(self) -> list[str]:
@@ -182,13 +184,15 @@ class _Along:
 
     def _base(self) -> Iterator[Assumption]:
         """The largest force and moment that a joint exerts on a base that is held."""
-        wrenches = reactions(self.tree, self.moving)
+        wrenches, looped = reactions(self.tree, self.moving), in_loops(self.system.structure.joints)
         for part, unit, meaning in ((1, "N", "the largest force on it"), (0, "N*m", "the largest moment on it")):
             sizes = {
                 self.names[i]: float(np.max(np.sqrt(sum(np.square(x) for x in wrenches[i][part]))))
                 for i, joint in enumerate(self.tree.joints)
-                if joint.parent < 0
+                if joint.parent < 0 and self.names[i] not in looped
             }
+            if not sizes:
+                return  # how the joints of a loop share its load is not known
             joint = max(sizes, key=sizes.__getitem__)
             yield Assumption("base", "held", sizes[joint], unit, joint, meaning)
 

@@ -125,26 +125,30 @@ def _posed(
         if placed
         else poses[:1]
     )
+    q = q[np.isfinite(q).all(axis=1)]  # a loop closes in some poses alone
     tree = system.tree(tape.read).each(lambda _, value: float(value))
     columns, qd, base = _unit_velocities(tree, q)
     motions = link_motions(tree, columns, qd, base_velocity=base)
     lumped = [link.name for link in system.structure.links if link.lumped]
     turns = {link: _stacked(motions[link].w, (len(q), _size(tree))) for link in lumped}
     matrices = mass_matrices(tree, q, *(list(map(float, inertias)) for inertias in (solved.rotor, solved.spin)))
-    free = _independent(system.ratios(tape.read), _size(tree))
-    return q, free.T @ matrices @ free, {link: free.T @ turn for link, turn in turns.items()}
+    free = _independent(system.ratios(tape.read, q.T), _size(tree), len(q))
+    back = free.transpose(0, 2, 1)
+    return q, back @ matrices @ free, {link: back @ turn for link, turn in turns.items()}
 
 
-def _independent(ratios: Ratios, size: int) -> np.ndarray:
-    """The velocities of a free base and of all joints, [velocity, independent one], for unit velocities of the base and
-    of the joints that follow none. size: number of all"""
-    rows = np.eye(size)
+def _independent(ratios: Ratios, size: int, poses: int) -> np.ndarray:
+    """The velocities of a free base and of all joints, [pose, velocity, independent one], for unit velocities of the
+    base and of the joints that follow none. size: number of all"""
+    rows = np.tile(np.eye(size), (poses, 1, 1))
     before = size - len(ratios)
     for i, row in enumerate(ratios):
         if row:
-            rows[before + i] = 0.0
-            rows[before + i, [before + j for j in row]] = [float(ratio) for ratio in row.values()]
-    return rows[:, [j for j in range(size) if j < before or not ratios[j - before] or j - before in ratios[j - before]]]
+            rows[:, before + i] = 0.0
+            for j, ratio in row.items():
+                rows[:, before + i, before + j] = ratio
+    leads = [j for j in range(size) if j < before or not ratios[j - before] or j - before in ratios[j - before]]
+    return rows[:, :, leads]
 
 
 def _spread(joints: int) -> np.ndarray:

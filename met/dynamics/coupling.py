@@ -2,9 +2,10 @@
 
     q_i = sum_j G_ij u_j + c_i        u: positions of the joints that lead; G_jj = 1 for these
 
-The recursion is affine in the accelerations u'' of the joints that lead. One pass with all coupled joints held at
-u'' = 0 gives the torques tau0 that they take, and one more pass for each leader, at rest and without loads, the torques
-T_j that u''_j = 1 takes besides. With Q the torques given at the joints
+Where a loop gives q_i as a function of u_j, G_ij is its derivative, and q_i'' has a share (dG_ij/du_j) u_j'^2 of its
+own. The recursion is affine in the accelerations u'' of the joints that lead. One pass with all coupled joints held at
+their own shares gives the torques tau0 that they take, and one more pass for each leader, at rest and without loads,
+the torques T_j that u''_j = 1 takes besides. With Q the torques given at the joints
 
     G' T u'' = G' (Q - tau0)
 
@@ -23,7 +24,7 @@ from met.dynamics.linearised import tell
 from met.dynamics.recursion import SINGULAR, FreeRotor, Solved, solve
 from met.dynamics.spatial import ZERO, Real, Vector, add, choose, is_zero, scale
 from met.dynamics.tree import Tree
-from met.trace import both
+from met.trace import both, is_nan
 from met.trace.primitives import divide
 from met.trace.scalar import Scalar
 
@@ -32,9 +33,11 @@ Ratios = tuple[Mapping[int, Real], ...]
 of a joint that is not coupled {}."""
 
 
-def solve_coupled(tree: Tree, ratios: Ratios, **given: Any) -> Solved:
+def solve_coupled(tree: Tree, ratios: Ratios, bends: Sequence[Real] = (), **given: Any) -> Solved:
     """The arm's motion at one instant, as `recursion.solve`, of which it takes the arguments `q`, `qd`, `tau`, `qdd`,
     `mode`, `rotor` and so on, with coupled joints.
+
+    bends  by joint, its own share of its acceleration, not a number where its loop is flat; none: they have none
 
     The mode of a leader is that of all that it leads; modes and accelerations given for followers are not read. Of a
     leader, `tau` and `tau_load` are those at its coordinate: what it and its followers take together, less the torques
@@ -46,7 +49,8 @@ def solve_coupled(tree: Tree, ratios: Ratios, **given: Any) -> Solved:
     members = [i for i, row in enumerate(ratios) if row]
     tau, rotor, modes = given["tau"], given["rotor"], given["mode"]
     held = tuple(False if row else mode for row, mode in zip(ratios, modes, strict=True))
-    rest = tuple(0.0 if row else x for row, x in zip(ratios, given["qdd"], strict=True))
+    own = tuple(bends) or (0.0,) * n
+    rest = tuple(bend if row else x for row, bend, x in zip(ratios, own, given["qdd"], strict=True))
     first = _told(tree, {**given, "mode": held, "qdd": rest})
     passes = [
         _told(tree, _at_rest(given, n) | {"mode": held, "qdd": tuple(row.get(j, 0.0) for row in ratios)})
@@ -73,14 +77,16 @@ def solve_coupled(tree: Tree, ratios: Ratios, **given: Any) -> Solved:
         return total
 
     qdd = tuple(
-        sum((row[j] * u for j, u in zip(leaders, moved, strict=True) if j in row), 0.0) if row else x
-        for row, x in zip(ratios, whole(lambda each: each.qdd), strict=True)
+        sum((row[j] * u for j, u in zip(leaders, moved, strict=True) if j in row), bend) if row else x
+        for row, bend, x in zip(ratios, own, whole(lambda each: each.qdd), strict=True)
     )
     needed, torques, loads = whole(lambda each: each.tau), list(tau), list(whole(lambda each: each.tau_load))
     singular = list(first.singular)
     for i, row in enumerate(ratios):
         if not row:
             torques[i] = needed[i]
+        if not is_zero(own[i]):
+            singular[i] = is_nan(own[i])
     for j, pivot in zip(leaders, pivots, strict=True):
         followers = sum((ratios[i][j] * tau[i] for i in members if j in ratios[i] and i != j), 0.0)
         torques[j] = choose(modes[j], tau[j], at_leader(needed, j) - followers)

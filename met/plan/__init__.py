@@ -14,8 +14,9 @@ Parameters are named by paths, the ones a deck uses inside a run:
     <joint>.axis.x|y|z                     unit vector in the joint frame
     <joint>.pivot.x|y|z                    m, joint frame: a point of a revolute joint's axis; not there: the origin
     <joint>.q_min|q_max|qd_max|tau_max     rad, rad/s, N m (m, m/s, N): limits of the joint, those that it has
-    <joint>.ratio  <joint>.offset          of a joint that follows another: q = ratio times the other's + offset
-    <joint>.ratio.<other>                  of one that follows several, to each of them
+    <joint>.ratio|offset                   of a joint that follows another: q = ratio times the other's + offset;
+                                           .ratio.<other> of one that follows several, to each of them
+    <loop>.at|to_at.x|y|z                  m: the pin of a loop, in the frames of its two links
     <joint>.servo.<parameter>              as the servo declares
     <joint>.servo.command.<parameter>      as the command declares
     <joint>.servo.sensor.<of>.<parameter>  as the sensor declares through which the servo's law sees a quantity
@@ -64,6 +65,7 @@ from met.plan.judged import (
     Tolerance,
 )
 from met.plan.linear_uses import LinearUse
+from met.plan.loops import Loop
 from met.plan.run_keys import RunKey, run_key
 from met.plan.searches import Search
 from met.trace.graph import Formulas
@@ -132,6 +134,7 @@ class Joint:
 
     limits   those of `q_min`, `q_max`, `qd_max` and `tau_max` that the joint has
     follows  the joints whose positions give its own
+    loop     by which it follows one joint, and not in proportion
     """
 
     name: str
@@ -141,12 +144,13 @@ class Joint:
     place: Place | None = keyed("never", default=None)
     limits: tuple[str, ...] = keyed("where set", default=())
     follows: tuple[str, ...] = keyed("where set", default=())
+    loop: Loop | None = keyed("where set", default=None)
 
     @property
     def ratio_paths(self) -> dict[str, str]:
-        """By each joint that it follows, the path of the parameter that is its ratio to that joint."""
-        several = len(self.follows) > 1
-        return {name: f"{self.name}.ratio.{name}" if several else f"{self.name}.ratio" for name in self.follows}
+        """By each joint that it follows, the path of the parameter that is its ratio to that joint; none of a loop."""
+        head, names = f"{self.name}.ratio", () if self.loop is not None else self.follows
+        return {name: f"{head}.{name}" if len(names) > 1 else head for name in names}
 
 
 @frozen

@@ -23,7 +23,8 @@ Derived channels, computed from the state only where a record or a metric asks f
     <joint>.tau_load .J_eff .b      what the arm takes, tau_load = J_eff qdd + b, all other joints in their modes
     <joint>.mode                    1 in torque mode, 0 in acceleration mode
     <joint>.limit_margin            room to the nearest of the joint's limits, a share; limits.margin: the least of all
-    <joint>.reaction.moment|force   what the link takes from its parent: about its frame's origin, in its axes
+    <joint>.reaction.moment|force   what the link takes from its parent: about its frame's origin, in its axes; not of a
+                                    joint in a loop
     links.<link>.position, .orientation, .velocity, .rate       of the link's frame, in world axes
     links.<boom>.deflection, .bend  of the tip of a link that bends, against its root
     links.<link>.jacobian.angular|linear.<joint>                rate and velocity for each unit of the joint's rate
@@ -51,6 +52,7 @@ from functools import lru_cache
 from met import models, units
 from met.frozen import frozen
 from met.plan import Joint, Recorded, Structure
+from met.plan.loops import in_loops
 from met.plan.uses import quantities, sensor_parts, servo_parts
 from met.unit_parser import parse_unit
 
@@ -252,13 +254,14 @@ def _channels(structure: Structure, names: list[str], *, all_owners: bool) -> di
 
     mentions = [*names, *(path for expression in structure.expressions for path in expression.channels)]
     joints = {name.partition(".")[0] for name in mentions}
+    looped = in_loops(structure.joints)
     for joint in structure.moving:
         if not all_owners and joint.name not in joints:
             continue
         for name, unit, doc in MOTION:
             add(f"{joint.name}.{name}", joint_unit(unit, joint), doc, dynamics, joint.name, JOINT_AXIS)
         for name, unit, doc, components, frame in (*OF_JOINT, *([LIMIT_MARGIN] if joint.limits else [])):
-            if joint.follows and name in ("J_eff", "b"):
+            if (joint.follows and name in ("J_eff", "b")) or (joint.name in looped and name.startswith("reaction.")):
                 continue
             derive(f"{joint.name}.{name}", joint_unit(unit, joint), doc, components, frame, joint.name)
         use = servos.get(joint.name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator
 
 from met import models
@@ -9,6 +10,7 @@ from met.diagnostic import Place, nearest
 from met.parameter import Parameter, is_present, under
 from met.plan import COMPONENTS, Course, Experiment, Joint, Origin, Quantity, Structure
 from met.plan.channel import JOINT_LIMITS, channels, joint_unit, ratio_unit, watched_unit
+from met.plan.loops import of_joints
 from met.plan.uses import quantities, sensor_parts, servo_parts
 from met.substitution import bed_scale
 
@@ -130,6 +132,8 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
             yield f"{joint.name}.offset", joint_unit("joint", joint), None, None
         yield f"initial.{joint.name}.q", joint_unit("joint", joint), None, None
         yield f"initial.{joint.name}.qd", joint_unit("joint/s", joint), None, None
+    for name, point, axis in itertools.product(of_joints(structure.joints), ("at", "to_at"), "xyz"):
+        yield f"{name}.{point}.{axis}", "m", None, None
     yield from _of_base(structure)
     for use in structure.servos:
         joint = kinds[use.joint]

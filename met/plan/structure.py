@@ -14,6 +14,7 @@ from met.plan import guides as guides
 from met.plan.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.plan.codec import Damaged
 from met.plan.following import follows_itself
+from met.plan.loops import ring
 from met.plan.uses import quantities
 from met.trace.nodes import TRUTHS
 
@@ -92,6 +93,12 @@ def _check_followers(structure: Structure, where: str) -> None:
         if joint.follows and (not right or follows_itself(joint.name, joints)):
             message = "it should follow moving joints, each once, of which none follows it"
             raise Damaged(f"{where}[{index}].follows", message)
+    for index, joint in enumerate(structure.joints):
+        if joint.loop is None:
+            continue
+        looped = {member.name for member, _ in ring(joint.loop, structure.joints)}
+        if len(looped) != 3 or not {joint.name, *joint.follows} <= looped or joint.follows != (joint.loop.leader,):
+            raise Damaged(f"{where}[{index}].loop", "it should close three moving joints, and one of them leads")
     servos = {use.joint: models.find("servo", use.model, use.place) for use in structure.servos}
     for index, joint in enumerate(structure.joints):
         if joint.follows and joint.name in servos and not servos[joint.name].is_passive:

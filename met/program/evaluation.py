@@ -96,7 +96,7 @@ def derivative(
         loads = _environment(system, tree, read, y, base, time, begin)
         wrenches, on_payloads = split_wrenches(system, read, loads.wrenches)
 
-    prescribed_qdd, ratios = prescribed_qdd or {}, system.ratios(read)
+    prescribed_qdd, ratios = prescribed_qdd or {}, system.ratios(read, y.q)
     given_qdd: list[Real] = []
     mode: list[Truth] = []
     dry: list[Real] = []
@@ -145,7 +145,7 @@ def derivative(
             "velocity_products": system.structure.velocity_products,
         }
         if any(ratios):
-            solved = solve_coupled(tree, ratios, **given)
+            solved = solve_coupled(tree, ratios, system.bends(read, y), **given)
         else:
             solved = solve(tree, **given)
             tell(tree, given, solved)
@@ -368,7 +368,7 @@ def followers_level(
 ) -> Real:
     """The dry friction of joints that follow one joint, as that one feels it, N m (N). on_joints: that of brakes, by
     joint."""
-    ratios = system.ratios(read)
+    ratios = system.ratios(read, y.q)
     total: Real = 0.0
     for i in followers:
         level, actuator = on_joints.get(system.joints[i].name, 0.0), system.actuators[i]

@@ -127,7 +127,7 @@ class Grapple:
         on_beds = {actuator.index for actuator, _, _ in system.mounted}
         body = free_base(system)
         turning = None if body is None else rotors.of(system, drives, y, (0.0,) * len(system.states), {}, on_beds)
-        ratios, tree = system.ratios(tape.read), payloads.tree_with_payloads(system, tape.read)
+        ratios, tree = system.ratios(tape.read, y.q), payloads.tree_with_payloads(system, tape.read)
         solver = partial(solve_coupled, tree, ratios) if any(ratios) else partial(solve, tree)
         solved = solver(
             q=y.q[:n],

@@ -177,7 +177,7 @@ class Observed:
     def _jacobian(self, link: str) -> Sequence[tuple[Vector, Vector]]:
         if link not in self._jacobians:
             columns = jacobian(self.tree, self.q, link, base=self.base.pose)
-            self._jacobians[link] = at_leaders(self.system.ratios(self.read), columns)
+            self._jacobians[link] = at_leaders(self.system.ratios(self.read, self.q), columns)
         return self._jacobians[link]
 
     @cached_property

@@ -6,7 +6,7 @@ from the case's memory where a sweep varies it (`PARAMETER` cells, computed once
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -36,6 +36,7 @@ from met.plan import (
     Structure,
 )
 from met.plan.channel import Channel, channels
+from met.plan.closing import Led, close, corners_of
 from met.plan.defaults import of_environment, timing_defaults
 from met.plan.uses import sensor_parts, servo_parts
 from met.program.courses import recorded
@@ -150,43 +151,75 @@ class System:
         """The joints that follow others."""
         return tuple(joint for joint in self.joints if joint.follows)
 
-    def ratios(self, read: ReadCell) -> Ratios:
-        """The ratios of the joints to those that lead them; followers of followers to the first that lead."""
-        numbers = {joint.name: i for i, joint in enumerate(self.joints)}
+    @cached_property
+    def numbers(self) -> dict[str, int]:
+        """The joints' numbers, by name."""
+        return {joint.name: i for i, joint in enumerate(self.joints)}
 
-        def row(joint: Joint) -> dict[int, Real]:
-            if not joint.follows:
-                return {numbers[joint.name]: 1.0}
+    def led(self, joint: Joint, read: ReadCell, q: Sequence[Real]) -> Led:
+        """A joint that follows by a loop, at positions q of all joints, of which it reads that of the loop's leader."""
+        loop = joint.loop
+        assert loop is not None
+        number = lambda path: self.value(path, read) if path in self._parameters else 0.0  # noqa: E731  # a pivot
+        corners = corners_of(loop, self.structure.joints, number)
+        return close(corners, q[self.numbers[loop.leader]], left=loop.branch == "left")[0][joint.name]
+
+    def _ratios(self, joint: Joint, read: ReadCell, q: Sequence[Real]) -> dict[int, Real]:
+        """The ratios of a joint to those that it follows itself, by their numbers."""
+        if joint.loop is not None:
+            return {self.numbers[joint.loop.leader]: self.led(joint, read, q).ratio}
+        return {self.numbers[name]: self.value(path, read) for name, path in joint.ratio_paths.items()}
+
+    def ratios(self, read: ReadCell, q: Sequence[Real]) -> Ratios:
+        """The ratios of the joints at positions q to those that lead them; followers of followers to the first that
+        lead."""
+
+        def row(i: int) -> dict[int, Real]:
+            if not self.joints[i].follows:
+                return {i: 1.0}
             found: dict[int, Real] = {}
-            for name, path in joint.ratio_paths.items():
-                for leader, ratio in row(self.joints[numbers[name]]).items():
-                    found[leader] = found.get(leader, 0.0) + self.value(path, read) * ratio
+            for other, ratio in self._ratios(self.joints[i], read, q).items():
+                for leader, of_other in row(other).items():
+                    found[leader] = found.get(leader, 0.0) + ratio * of_other
             return found
 
-        rows = {numbers[joint.name]: row(joint) for joint in self.followers}
+        rows = {i: row(i) for i in map(self.joints.index, self.followers)}
         leaders = {leader for each in rows.values() for leader in each}
-        return tuple(rows.get(i, {i: 1.0} if i in leaders else {}) for i in numbers.values())
+        return tuple(rows.get(i, {i: 1.0} if i in leaders else {}) for i in range(len(self.joints)))
+
+    def bends(self, read: ReadCell, y: Motion) -> tuple[Real, ...]:
+        """The accelerations of joints that follow while those that lead have none, as loops have it, rad/s^2."""
+
+        def bend(i: int) -> Real:
+            joint = self.joints[i]
+            own: Real = 0.0
+            if joint.loop is not None:
+                rate = y.qd[self.numbers[joint.loop.leader]]
+                own = self.led(joint, read, y.q).bend * rate * rate
+            return sum((ratio * bend(other) for other, ratio in self._ratios(joint, read, y.q).items()), own)
+
+        return tuple(map(bend, range(len(self.joints))))
 
     def followed(self, read: ReadCell, y: Motion) -> Motion:
         """The motion with positions and rates of followers as those of their leaders give them."""
         if not self.followers:
             return y
         q, qd = list(y.q), list(y.qd)
-        numbers = {joint.name: i for i, joint in enumerate(self.joints)}
 
-        def place(joint: Joint) -> int:
-            i = numbers[joint.name]
-            if joint.follows:
-                ratios = [
-                    (place(self.joints[numbers[name]]), self.value(path, read))
-                    for name, path in joint.ratio_paths.items()
-                ]
+        def place(i: int) -> int:
+            joint = self.joints[i]
+            if joint.loop is not None:
+                leader = place(self.numbers[joint.loop.leader])
+                led = self.led(joint, read, q)
+                q[i], qd[i] = led.q + self.value(f"{joint.name}.offset", read), led.ratio * qd[leader]
+            elif joint.follows:
+                ratios = [(place(other), ratio) for other, ratio in self._ratios(joint, read, q).items()]
                 q[i] = sum((ratio * q[j] for j, ratio in ratios), self.value(f"{joint.name}.offset", read))
                 qd[i] = sum((ratio * qd[j] for j, ratio in ratios), 0.0)
             return i
 
         for joint in self.followers:
-            place(joint)
+            place(self.numbers[joint.name])
         return Motion(tuple(q), tuple(qd), y.x)
 
     @cached_property

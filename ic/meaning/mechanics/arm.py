@@ -19,6 +19,7 @@ from ic.meaning.mechanics.booms import KEYS, check_names, resolve_boom
 from ic.meaning.mechanics.dh import use_dh
 from ic.meaning.mechanics.following import check_followers, use_follows
 from ic.meaning.mechanics.foreign import how_to_close, refuse_foreign_joint
+from ic.meaning.mechanics.loops import close_loops, resolve_loop
 from ic.meaning.mechanics.matter import use_matter
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.addresses import in_arm
@@ -32,6 +33,7 @@ from met.diagnostic import Label, Place, did_you_mean, leave_out, meant, write
 from met.frozen import frozen
 from met.plan import BASE, Joint, Link
 from met.plan.chains import springs
+from met.plan.loops import Loop
 from met.trace import Scalar, sqrt
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -74,8 +76,8 @@ class ResolvedArm:
         return tuple(joint for joint in self.moving if not joint.follows and joint.name not in self.springs)
 
 
-Part = tuple[Link | Joint, ...]
-"""A link or a joint of the deck; of a boom its pieces and joints."""
+Part = tuple[Link | Joint | Loop, ...]
+"""A link, a joint or a loop of the deck; of a boom its pieces and joints."""
 
 
 @frozen
@@ -203,6 +205,8 @@ def _resolved(
         there = scope if alone is None else Scope(scope.definitions, scope.complaints)
         if item.kind == "link":
             made = resolve_link(there, item, homes)
+        elif item.kind == "loop":
+            made = _loop(there, item, homes, ends)
         else:
             joint = _joint(there, item, homes, block, ends)
             made = () if joint is None else (joint,)
@@ -232,10 +236,14 @@ def _resolved(
             help="write `link NAME { ... }` and a joint to hold it",
         )
     check_tree(scope, definition.name, links, joints, complete=complete)
+    loops = [each for item in block.of_kind("loop") for each in part(item) if isinstance(each, Loop)]
+    if complete:
+        joints = close_loops(scope, joints, loops)
     check_followers(scope, joints)
     free_of_errors = not scope.complaints.errors
     names = {item.name for kind in ARM.named for item in block.of_kind(kind)}
-    failed = frozenset(names - {link.name for link in links} - {joint.name for joint in joints})
+    resolved: tuple[Link | Joint | Loop, ...] = (*links, *joints, *loops)
+    failed = frozenset(names - {each.name for each in resolved})
     return ResolvedArm(definition.name, tuple(links), tuple(joints), failed, free_of_errors)
 
 
@@ -330,15 +338,7 @@ def _joint(
         kind = meant(kind, JOINT_KINDS) if kind else None
         if kind is None or (kind != "fixed" and item.body.get("axis") is None and item.body.get("dh") is None):
             return None
-    roof = scope.definitions.roofs.get(item.name)
-    if item.name in (*HEADS, BASE) or roof is not None:
-        scope.complaints.error(
-            "D166",
-            f"`{item.name}` begins paths of its own, so no joint may be called so",
-            item.place,
-            also=[Label(roof.use.roof.place, "a roof")] if roof is not None else [],
-            help="give the joint another name" if roof is None else "give the roof another name, or the joint",
-        )
+    if _begins_paths(scope, item):
         return None
     body = item.body
     check_keys(scope, body, JOINT.keys, owner, NOT_OF_A_JOINT)
@@ -355,6 +355,35 @@ def _joint(
     if parent is None or child is None or follows is None:
         return None
     return Joint(item.name, kind, parent, child, item.place, limits, follows)  # type: ignore[arg-type]
+
+
+def _loop(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str, None]) -> Part:
+    owner = Owner(f"loop `{item.name}`", item.place, item.name, homes=homes)
+    if item.body is None or item.value is not None or item.detail:
+        helps = f"write `loop {item.name} {{ leader = JOINT;  link = ...;  to = ...;  branch = left; }}`"
+        scope.complaints.error("D213", f"{owner.label} needs a block, and no word before it", item.place, help=helps)
+        return ()
+    if _begins_paths(scope, item):
+        return ()
+    link, to = (_end(scope, owner, key, item.body.get(key), {BASE: None, **links}) for key in ("link", "to"))
+    return resolve_loop(scope, owner, item.body, link, to)
+
+
+def _begins_paths(scope: Scope, item: Item) -> bool:
+    """Return True, with an error, if paths of a run begin with the name of this joint or loop."""
+    roof = scope.definitions.roofs.get(item.name)
+    if item.name not in (*HEADS, BASE) and roof is None:
+        return False
+    scope.complaints.error(
+        "D166",
+        f"`{item.name}` begins paths of its own, so no {item.kind} may be called so",
+        item.place,
+        also=[Label(roof.use.roof.place, "a roof")] if roof is not None else [],
+        help=f"give the {item.kind} another name"
+        if roof is None
+        else f"give the roof another name, or the {item.kind}",
+    )
+    return True
 
 
 def _limits(scope: Scope, owner: Owner, body: MergedBlock) -> tuple[str, ...]:

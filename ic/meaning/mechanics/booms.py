@@ -28,6 +28,7 @@ from met.diagnostic import leave_out
 from met.frozen import frozen
 from met.plan import Joint, Link, Structure
 from met.plan.chains import chains
+from met.plan.loops import Loop
 from met.trace import Real, minimum, sqrt
 
 GAUSS = ((1.0 - 1.0 / math.sqrt(3.0)) / 2.0, (1.0 + 1.0 / math.sqrt(3.0)) / 2.0)
@@ -227,7 +228,7 @@ class _Boom:
         self.scope.keep_derived(path, value, unit, self.item, f"of boom `{self.link.name}`")
 
 
-def check_names(scope: Scope, item: Item, parts: Sequence[Link | Joint], arm: MergedBlock) -> None:
+def check_names(scope: Scope, item: Item, parts: Sequence[Link | Joint | Loop], arm: MergedBlock) -> None:
     """Report what the arm calls as a boom's piece or spring is called. item: the boom; parts: its own"""
     own = {part.name for part in parts} - {item.name}
     for other in arm.items.values():

@@ -8,6 +8,7 @@ from dataclasses import replace
 from ic.grammar.syntax import List, Name
 from ic.language.bodies import OFFSET, RATIO
 from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.mechanics.loops import begin_in_loop
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import value_place
 from ic.meaning.parameters.owner import Owner, Settled
@@ -119,6 +120,9 @@ def begin_followers(scope: Scope, joints: Sequence[Joint]) -> None:
             return  # in a circle: already reported
         for joint in ready:
             waiting.remove(joint)
+            if joint.loop is not None:
+                begin_in_loop(scope, joint, joints)
+                continue
             for name, unit in (("q", "joint"), ("qd", "joint/s")):
                 ratios = [scope.parameters.get(path) for path in joint.ratio_paths.values()]
                 leads = [scope.parameters.get(f"initial.{leader}.{name}") for leader in joint.follows]

@@ -15,6 +15,7 @@ from met import models
 from met.diagnostic import Help, Label, Place, did_you_mean, nearest, write
 from met.plan import Recorded, Structure
 from met.plan.channel import FAMILIES, Channel, carries, recordable
+from met.plan.loops import in_loops
 
 COMPUTED = (Binary, Call, Unary, WithUnit)
 """Expressions that could be a signal."""
@@ -163,6 +164,12 @@ def _why_none(words: list[str], structure: Structure) -> str:
         return (
             f"joint `{words[0]}` is fixed: its two links move as one body, and nothing is computed between them; "
             "what they take shows in the reaction of the moving joint that carries them"
+        )
+    looped = in_loops(structure.joints)
+    if words[0] in looped and words[1:2] == ["reaction"]:
+        return (
+            f"how the joints of loop `{looped[words[0]].name}` share its load is not computed; a joint that carries "
+            "the whole loop has a reaction"
         )
     if len(words) > 1 and words[-2] == "servo":
         return _under_a_word(words, structure)

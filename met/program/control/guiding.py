@@ -108,7 +108,7 @@ class _ArmAt:
         self._own = [names.index(joint) for joint in use.joints]
         point = tuple(system.value(f"guides.{use.name}.point.{axis}", read) for axis in "xyz")
         link = system.value(f"guides.{use.name}.link", read)
-        self._ratios = system.ratios(read)
+        self._ratios = system.ratios(read, self._q)
         self._moves = at_leaders(self._ratios, jacobian(tree, self._q, link, point, stands.pose))
         at_rest = [0.0] * n
         frame = base.motions(tree, self._q, at_rest, BaseMotion(stands.pose))[link]

@@ -16,6 +16,7 @@ from met.trace.recording import Recording
 from tests.ic.small_decks import experiment
 from tests.met.backends.marked import NAMES
 from tests.met.program.test_followers import GROUPS
+from tests.met.program.test_loops import LINKED
 
 DECK = Path(ic.__file__).parent / "decks" / "two_link.ic"
 
@@ -45,8 +46,11 @@ def test_all_have_the_bits_of_the_default(name: str, run: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-def test_joints_that_follow_others_have_the_bits_of_the_default(name: str, tmp_path: Path) -> None:
-    made = experiment(tmp_path, GROUPS, select=["ratios"])
+@pytest.mark.parametrize(("text", "sweep"), [(GROUPS, "ratios"), (LINKED, "places")], ids=["ratios", "loops"])
+def test_joints_that_follow_others_have_the_bits_of_the_default(
+    text: str, sweep: str, name: str, tmp_path: Path
+) -> None:
+    made = experiment(tmp_path, text, select=[sweep])
     recording, given = prepare(made).recording, inputs(made, np.arange(3))
     rows, outputs = backends.load(recording).run(given, 60)
     other_rows, other_outputs = backends.load(recording, name=name).run(given, 60)

@@ -21,6 +21,7 @@ from tests.ic.small_decks import experiment
 from tests.met.backends import whole_runs
 from tests.met.backends.whole_runs import WholeRun, differing, whole_run
 from tests.met.program.test_followers import GROUPS
+from tests.met.program.test_loops import LINKED
 from tests.met.small_models import EVERY, smallest
 
 MACHINE = pytest.mark.parametrize("machine", [pytest.param(False, id="own fma"), pytest.param(None, id="found out")])
@@ -125,8 +126,11 @@ def test_arms_of_2_7_and_30_joints_that_reverse_have_the_native_bits(
 
 @pytest.mark.node
 @MACHINE
-def test_joints_that_follow_others_have_the_native_bits(machine: bool | None, tmp_path: Path) -> None:
-    count, wrong = counted(whole_run("groups", experiment(tmp_path, GROUPS, select=["ratios"]), cases=3), machine)
+@pytest.mark.parametrize(("text", "sweep"), [(GROUPS, "ratios"), (LINKED, "places")], ids=["ratios", "loops"])
+def test_joints_that_follow_others_have_the_native_bits(
+    text: str, sweep: str, machine: bool | None, tmp_path: Path
+) -> None:
+    count, wrong = counted(whole_run(sweep, experiment(tmp_path, text, select=[sweep]), cases=3), machine)
     assert wrong == 0 and count > 1_000
 
 

@@ -26,6 +26,7 @@ from tests.met.analysis.linear.oracles import (
     shipped_experiment,
 )
 from tests.met.program.test_followers import GROUPS
+from tests.met.program.test_loops import LINKED
 from tests.met.small_models import EVERY, smallest
 
 
@@ -61,14 +62,15 @@ PAD = (
     "text",
     [
         GROUPS,
+        LINKED,
         LATCHED.replace("MODEL", LATCH),
         LATCHED.replace("MODEL", PAD),
     ],
-    ids=["groups", "a latch", "a contact"],
+    ids=["groups", "loops", "a latch", "a contact"],
 )  # fmt: skip
 def test_it_is_that_of_joints_that_follow_others_of_latches_and_of_contacts(text: str, tmp_path: Path) -> None:
     """By complex steps, about states that are scattered around the run's."""
-    made = experiment(tmp_path, text, select=["lift"] if text is GROUPS else None)
+    made = experiment(tmp_path, text, select={GROUPS: ["lift"], LINKED: ["raise"]}.get(text))
     program, rng = PeriodProgram(made), np.random.default_rng(3)
     for time in (0.05, 0.4):
         start = scattered(program, rng, time=time, size=0.1)
