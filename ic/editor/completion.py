@@ -359,8 +359,8 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
     if where == "servos":
         yield from _named(names, "servo", "roof")
         return
-    kinds = {"parent": "link", "child": "link", "arm": "arm"}
-    if key in kinds and where in ("joint", "run"):
+    kinds = {"parent": "link", "child": "link", "arm": "arm", "leader": "joint", "link": "link", "to": "link"}
+    if key in kinds and where in ("joint", "loop", "run"):
         if kinds[key] == "link":
             yield Offer("base", types.CompletionItemKind.Constant, "the body that the arm stands on")
         yield from _named(names, kinds[key], around=around)

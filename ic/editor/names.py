@@ -28,7 +28,8 @@ UNDER: Mapping[str, str] = MappingProxyType({"links": "link", "initial": "joint"
 """The kinds of names after these first words of paths."""
 
 _OF_KEY: Mapping[str, tuple[str, ...]] = MappingProxyType({
-    "arm": ("arm",), "parent": ("link",), "child": ("link",), "link": ("link",), "of": ("joint", "linear"),
+    "arm": ("arm",), "parent": ("link",), "child": ("link",), "link": ("link",), "leader": ("joint",),
+    "of": ("joint", "linear"),
 })  # fmt: skip
 """The kinds of names in the values of these keys."""
 
