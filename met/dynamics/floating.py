@@ -66,28 +66,28 @@ def factors(M: Symmetric, limits: tuple[float, float]) -> tuple[Factors, Truth]:
     return Factors(tuple(L), tuple(Dinv)), any_of(d[i] <= limits[i // 3] for i in range(6))
 
 
-def accelerated(found: Factors, moment: Vector, force: Vector) -> tuple[Vector, Vector]:
+def accelerated(LDL: Factors, moment: Vector, force: Vector) -> tuple[Vector, Vector]:
     """Angular and linear acceleration under a wrench about the frame's origin."""
     wrench = (*moment, *force)
     x: list[Real] = []
     for i in range(6):
         value = wrench[ORDER[i]]
         for j in range(i):
-            value = value - found.L[i][j] * x[j]
+            value = value - LDL.L[i][j] * x[j]
         x.append(value)
-    x = [value * inverse for value, inverse in zip(x, found.Dinv, strict=True)]
+    x = [value * inverse for value, inverse in zip(x, LDL.Dinv, strict=True)]
     for i in reversed(range(6)):
         for j in range(i + 1, 6):
-            x[i] = x[i] - found.L[j][i] * x[j]
+            x[i] = x[i] - LDL.L[j][i] * x[j]
     return (x[3], x[4], x[5]), (x[0], x[1], x[2])
 
 
-def mobility(found: Factors) -> Symmetric:
+def mobility(LDL: Factors) -> Symmetric:
     """IA_0^-1: the accelerations under unit wrenches, angular over linear."""
     columns = []
     for k in range(6):
         unit = [1.0 if i == k else 0.0 for i in range(6)]
-        angular, linear = accelerated(found, (unit[0], unit[1], unit[2]), (unit[3], unit[4], unit[5]))
+        angular, linear = accelerated(LDL, (unit[0], unit[1], unit[2]), (unit[3], unit[4], unit[5]))
         columns.append((*angular, *linear))
     upper = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
     return Symmetric(

@@ -38,23 +38,23 @@ def base_answers(tree: Tree, q: Sequence[Real], base: Pose = HERE) -> tuple[tupl
     """For each joint, the angular velocity of the base and the velocity of its origin, world axes, for each unit of
     that joint's rate. The tree floats; base: its frame in the world."""
     assert tree.floating is not None
-    there = Pose(base.R, ZERO)  # everything about the base's origin
+    about_origin = Pose(base.R, ZERO)  # everything about the base's origin
     steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
-    poses = joint_poses(tree, steps, there)
+    poses = joint_poses(tree, steps, about_origin)
     carried = [rigid_raise(joint.body, pose) for joint, pose in zip(tree.joints, poses, strict=True)]
-    whole = rigid_raise(tree.floating.body, compose(there, tree.base))
+    whole = rigid_raise(tree.floating.body, compose(about_origin, tree.base))
     for i in reversed(tree.order):
         parent = tree.joints[i].parent
         if parent < 0:
             whole = rigid_sum(whole, carried[i])
         else:
             carried[parent] = rigid_sum(carried[parent], carried[i])
-    found, _ = factors(add_rigid(NOTHING, whole), (0.0, 0.0))
+    LDL, _ = factors(add_rigid(NOTHING, whole), (0.0, 0.0))
     answers = []
     for joint, (R, p), body in zip(tree.joints, poses, carried, strict=True):
         axis = (R[0][2], R[1][2], R[2][2])
         angular, linear = (axis, cross(p, axis)) if joint.kind == "revolute" else (ZERO, axis)
-        w, v = accelerated(found, *_momentum(body, angular, linear))
+        w, v = accelerated(LDL, *_momentum(body, angular, linear))
         answers.append((scale(-1.0, w), scale(-1.0, v)))
     return tuple(answers)
 

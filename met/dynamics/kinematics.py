@@ -154,8 +154,8 @@ def jacobian(
     frame = tree.frames[link]
     columns: list[tuple[Vector, Vector]] = [(ZERO, ZERO)] * len(tree.joints)
     outer = compose(base, tree.base) if frame.joint < 0 else poses[frame.joint]
-    there = compose(outer, frame.pose)
-    target = add(there.p, turn_vector(there.R, point))
+    world_pose = compose(outer, frame.pose)
+    target = add(world_pose.p, turn_vector(world_pose.R, point))
     i = frame.joint
     while i >= 0:
         joint = tree.joints[i]
@@ -169,8 +169,8 @@ def jacobian(
 def fixed_acceleration(w: Vector, acceleration: tuple[Vector, Vector], inner: Pose) -> tuple[Vector, Vector]:
     """The acceleration of a frame fixed, at the given pose, to one that turns at w; in its own axes."""
     wd, a = acceleration
-    there = add(a, add(cross(wd, inner.p), cross(w, cross(w, inner.p))))
-    return turn_vector_back(inner.R, wd), turn_vector_back(inner.R, there)
+    linear = add(a, add(cross(wd, inner.p), cross(w, cross(w, inner.p))))
+    return turn_vector_back(inner.R, wd), turn_vector_back(inner.R, linear)
 
 
 def fixed_motion(motion: tuple[Vector, Vector], inner: Pose) -> tuple[Vector, Vector]:

@@ -101,8 +101,8 @@ class LinearisedDynamics:
             lacking[i] = lacking[i] - entry * q[j]
         for (i, j), entry in self.by_qd.items():
             lacking[i] = lacking[i] - entry * qd[j]
-        given = [choose(solved.mode[i], 0.0, qdd[i]) for i in joints]
-        left = [tau[i] + x for i, x in enumerate(self._less_inertia(lacking, given))]
+        prescribed = [choose(solved.mode[i], 0.0, qdd[i]) for i in joints]
+        left = [tau[i] + x for i, x in enumerate(self._less_inertia(lacking, prescribed))]
         for i in reversed(self.tree.order):
             for inboard in self._inboard(i):
                 left[inboard] = left[inboard] - self.L[i, inboard] * left[i]
@@ -111,10 +111,10 @@ class LinearisedDynamics:
             moved[i] = left[i] * self.Dinv[i]
             for inboard in self._inboard(i):
                 moved[i] = moved[i] - self.L[i, inboard] * moved[inboard]
-        found = [choose(solved.mode[i], moved[i], given[i]) for i in joints]
-        needed = self._less_inertia(lacking, found)
-        felt = [choose(solved.mode[i], tau[i] - solved.rotor[i] * found[i], -needed[i]) for i in joints]
-        return found, felt
+        changes = [choose(solved.mode[i], moved[i], prescribed[i]) for i in joints]
+        needed = self._less_inertia(lacking, changes)
+        felt = [choose(solved.mode[i], tau[i] - solved.rotor[i] * changes[i], -needed[i]) for i in joints]
+        return changes, felt
 
     def _less_inertia(self, torques: Sequence[Real], qdd: Sequence[Real]) -> list[Real]:
         """torques - M qdd."""
@@ -143,10 +143,10 @@ class LinearisedDynamics:
 
 def _inboard(tree: Tree, i: int) -> list[int]:
     """The joints between a joint and the base, the nearest first."""
-    found: list[int] = []
+    inboard: list[int] = []
     while (i := tree.joints[i].parent) >= 0:
-        found.append(i)
-    return found
+        inboard.append(i)
+    return inboard
 
 
 @frozen
@@ -228,15 +228,15 @@ def linearised(tree: Tree, qd: Sequence[Real], solved: Solved) -> LinearisedDyna
         revolute = joint.kind == "revolute"
         mine = _revolute(subtree, psi, more, a) if revolute else _prismatic(subtree, psi, more)
         answers[i][i] = mine
-        for j, each in answers[i].items():
-            (t4, t3, t2) = ((*t[0], *t[1]) for t in (each.t4, each.t3, each.t2))
+        for j, answer in answers[i].items():
+            (t4, t3, t2) = ((*t[0], *t[1]) for t in (answer.t4, answer.t3, answer.t2))
             M[i, j], by_q[i, j], by_qd[i, j] = t4[k], t2[k], t3[k]
             if i == j:
                 continue
             if revolute:
-                coriolis = each.t1[0] * psi[0] + each.t1[1] * psi[1]
+                coriolis = answer.t1[0] * psi[0] + answer.t1[1] * psi[1]
                 by_q[j, i] = coriolis + dot(t4[:3], more) + (t4[3] * a[1] - t4[4] * a[0])
-                by_qd[j, i] = each.t1[2] + 2.0 * (t4[0] * psi[0] + t4[1] * psi[1])
+                by_qd[j, i] = answer.t1[2] + 2.0 * (t4[0] * psi[0] + t4[1] * psi[1])
             else:
                 by_q[j, i] = dot(t4[3:], more)
                 by_qd[j, i] = 2.0 * (t4[3] * psi[0] + t4[4] * psi[1])
@@ -250,7 +250,7 @@ def linearised(tree: Tree, qd: Sequence[Real], solved: Solved) -> LinearisedDyna
         raised = raised.shifted(step.offset, near).turned(Z, step.swing)
         before = whole[parent]
         whole[parent] = raised if before is None else before.with_rigid(raised)
-        answers[parent] |= {j: each.raised(step, far, near) for j, each in answers[i].items()}
+        answers[parent] |= {j: answer.raised(step, far, near) for j, answer in answers[i].items()}
     return LinearisedDynamics(tree, solved, M, by_q, by_qd, *_factor(tree, solved, M))
 
 
@@ -351,54 +351,54 @@ MOVING = ("q", "qd", "tau", "qdd", "wrenches")
 """The arguments of `recursion.solve` by which its derivative is known, by name."""
 
 
-def tell(tree: Tree, given: Mapping[str, Any], solved: Solved) -> None:
+def tell(tree: Tree, arguments: Mapping[str, Any], solved: Solved) -> None:
     """Give the graph in which `recursion.solve` was recorded the derivative of its results (`met.trace.known`).
 
     given  what `solve` was given, by its words, `velocity_products` with them
     """
-    moving = {name: given[name] for name in MOVING}
+    moving = {name: arguments[name] for name in MOVING}
     scalars = _scalars(moving)
     if tree.floating is not None or not scalars:
         return
-    held = _scalars({"tree": tree} | {name: value for name, value in given.items() if name not in MOVING})
+    held = _scalars({"tree": tree} | {name: value for name, value in arguments.items() if name not in MOVING})
     # a result that existed before the arguments belongs to another pass, which knows less, or was given
     last = max(x.ref >> 1 for x in (*scalars, *held))
-    found = (
+    results = (
         *solved.qdd,
         *(x if mode is not True else 0.0 for x, mode in zip(solved.tau_load, solved.mode, strict=True)),
     )
-    places = [place for place, x in enumerate(found) if isinstance(x, Scalar) and x.ref >> 1 > last]
+    places = [place for place, x in enumerate(results) if isinstance(x, Scalar) and x.ref >> 1 > last]
     if not places:
         return
-    if not given["velocity_products"]:
+    if not arguments["velocity_products"]:
         moving["qd"] = (0.0,) * len(tree.joints)
 
     def moves(graph: Nodes) -> Callable[[Tangent], list[int]]:
-        here = _in_graph((tree, moving, solved), graph)
-        of = linearised(here[0], here[1]["qd"], here[2])
+        in_graph = _in_graph((tree, moving, solved), graph)
+        derivative = linearised(in_graph[0], in_graph[1]["qd"], in_graph[2])
 
         def along(tangent: Tangent) -> list[int]:
-            move = {name: _tangents(graph, value, tangent) for name, value in here[1].items()}
-            ends = [x for part in of.along(**move) for x in part]
+            move = {name: _tangents(graph, value, tangent) for name, value in in_graph[1].items()}
+            ends = [x for part in derivative.along(**move) for x in part]
             return [x.ref if isinstance(x, Scalar) else graph.constant(x) for x in (ends[place] for place in places)]
 
         return along
 
-    refs = tuple(x.ref for x in (found[place] for place in places) if isinstance(x, Scalar))
+    refs = tuple(x.ref for x in (results[place] for place in places) if isinstance(x, Scalar))
     scalars[0].graph.known.append(KnownDerivative(refs, tuple(x.ref for x in held), moves))
 
 
 def _scalars(value: Any) -> list[Scalar]:
     """The recorded numbers in nested dataclasses, tuples and dictionaries."""
-    found: dict[int, Scalar] = {}
+    by_ref: dict[int, Scalar] = {}
 
     def see(_: str, x: Any) -> Any:
         if isinstance(x, Scalar):
-            found[x.ref] = x
+            by_ref[x.ref] = x
         return x
 
     each_number("", value, see)
-    return list(found.values())
+    return list(by_ref.values())
 
 
 def _in_graph(value: Any, graph: Nodes) -> Any:
@@ -409,7 +409,7 @@ def _in_graph(value: Any, graph: Nodes) -> Any:
 def _tangents(graph: Nodes, value: Any, tangent: Tangent) -> Any:
     """The tangents of the numbers in nested tuples and dictionaries."""
     if isinstance(value, dict):
-        return {name: _tangents(graph, each, tangent) for name, each in value.items()}
+        return {name: _tangents(graph, part, tangent) for name, part in value.items()}
     if isinstance(value, tuple):
-        return tuple(_tangents(graph, each, tangent) for each in value)
+        return tuple(_tangents(graph, part, tangent) for part in value)
     return Scalar(graph, tangent(value.ref)) if isinstance(value, Scalar) else 0.0

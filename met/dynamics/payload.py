@@ -72,8 +72,8 @@ def free_acceleration(body: Rigid, w: Vector, wrench: Wrench, gravity: Vector) -
     """
     moment, force = wrench
     gyroscopic, centrifugal = rate_wrench(body, w)
-    found, _ = factors(add_rigid(NOTHING, body), (0.0, 0.0))
-    wd, a = accelerated(found, sub(moment, gyroscopic), sub(force, centrifugal))
+    LDL, _ = factors(add_rigid(NOTHING, body), (0.0, 0.0))
+    wd, a = accelerated(LDL, sub(moment, gyroscopic), sub(force, centrifugal))
     return wd, add(a, gravity)
 
 

@@ -280,12 +280,12 @@ def solve(
         own = e[i] - through + rest[i] * before[k]
         after = (*before[:k], own, *before[k + 1 :])
         wd[i], a[i] = after[:3], after[3:]  # type: ignore[assignment]
-        found = choose(modes[i], own - before[k], qdd[i])
+        qdd_i = choose(modes[i], own - before[k], qdd[i])
         needed = (*p[i][0], *p[i][1])[k] + dot(U[i], after)
         if k == 2 and not is_zero(spin[i]):
-            needed = needed - spin[i] * found  # the rotor feels its parent's rotation alone
-        tau_load = choose(modes[i], tau[i] - rotor[i] * found, needed)
-        solved[i] = (found, choose(modes[i], tau[i], tau_load + rotor[i] * found), tau_load)
+            needed = needed - spin[i] * qdd_i  # the rotor feels its parent's rotation alone
+        tau_load = choose(modes[i], tau[i] - rotor[i] * qdd_i, needed)
+        solved[i] = (qdd_i, choose(modes[i], tau[i], tau_load + rotor[i] * qdd_i), tau_load)
 
     D = tuple(x + y for x, y in zip(D0, rotor, strict=True))
     return Solved(
@@ -375,8 +375,8 @@ def _handed_on(M: Symmetric, k: int, U: Six, Dinv: Real, rest: Real, spin: Real)
     def entry(i: int, j: int) -> Real:
         if k in (i, j):
             other = i + j - k
-            kept = rest * column[other]
-            return kept - g[k] * spin if other == 2 and not is_zero(spin) else kept
+            share = rest * column[other]
+            return share - g[k] * spin if other == 2 and not is_zero(spin) else share
         if j < 3:
             old = M.A[AT[i][j]]
         else:

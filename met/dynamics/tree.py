@@ -218,14 +218,14 @@ class _Builder:
             elif ground is not None:
                 ground = rigid_sum(ground, inertia)
         carried = tuple(self.bodies[b].name for b in self.links)
-        made = [replace(joint, body=rigid[i]) for i, joint in enumerate(joints) if joint is not None]
-        made, dynamic = _regrouped(made, self.order, ground)
-        made, whole = _with_reach(made, self.order, ground)
+        with_bodies = [replace(joint, body=rigid[i]) for i, joint in enumerate(joints) if joint is not None]
+        with_bodies, dynamic = _regrouped(with_bodies, self.order, ground)
+        with_bodies, whole = _with_reach(with_bodies, self.order, ground)
         floating = None
         if ground is not None and dynamic is not None and whole is not None:
             mass, xx, yy, zz = (_size(x) for x in (whole.mass, whole.I[0], whole.I[3], whole.I[5]))
             floating = Floating(ground, dynamic, mass, xx + yy + zz)
-        return Tree(tuple(made), self.order, base, frames, carried, floating)
+        return Tree(tuple(with_bodies), self.order, base, frames, carried, floating)
 
     def _own(self, i: int) -> Pose:
         """The recursion's frame of joint i in the frame of the link that it carries."""
@@ -238,24 +238,24 @@ class _Builder:
             return plain
         child = self.first[i]
         next_axis = self.bodies[self.links[child]].axis
-        at = self.at[child]
-        if not all_constant(next_axis, at.R):
+        pose = self.at[child]
+        if not all_constant(next_axis, pose.R):
             return plain
-        there = turn_vector(at.R, _unit(next_axis))
-        normal = cross(axis, there)
+        next_direction = turn_vector(pose.R, _unit(next_axis))
+        normal = cross(axis, next_direction)
         size = _norm(normal)
-        known = all_constant(at.p)
-        far = _norm(at.p) if known else 0.0
+        known = all_constant(pose.p)
+        far = _norm(pose.p) if known else 0.0
         if size < 1e-9:
-            x = sub(at.p, scale(dot(at.p, axis), axis)) if known else ZERO
+            x = sub(pose.p, scale(dot(pose.p, axis), axis)) if known else ZERO
             if _norm(x) <= 1e-9 * far or not known:
                 return plain
             return Pose(_frame_with(x, axis), ZERO)
         foot = 0.0
         if known and size > 0.05:
             # at.p + t there is nearest to s axis: solve for s.
-            c = dot(axis, there)
-            foot = snapped((dot(at.p, axis) - c * dot(at.p, there)) / (size * size) + 0.0, far or 1.0)  # type: ignore
+            c = dot(axis, next_direction)
+            foot = snapped((dot(pose.p, axis) - c * dot(pose.p, next_direction)) / (size * size) + 0.0, far or 1.0)  # type: ignore
             foot = 0.0 if abs(foot) < 1e-14 * far else foot
         return Pose(_frame_with(normal, axis), scale(foot, axis))
 
@@ -324,12 +324,12 @@ def _regrouped(joints: list[Joint], order: Sequence[int], ground: Rigid | None) 
         joint = joints[i]
         m, h, (xx, xy, xz, yy, yz, zz) = gathered[i]
         if joint.kind == "revolute":
-            kept = Rigid(0.0, (h[0], h[1], 0.0), (_less(xx, yy), xy, xz, 0.0, yz, zz))
+            dynamic = Rigid(0.0, (h[0], h[1], 0.0), (_less(xx, yy), xy, xz, 0.0, yz, zz))
             moved = Rigid(m, (0.0, 0.0, h[2]), (yy, 0.0, 0.0, yy, 0.0, 0.0))
         else:
-            kept = Rigid(m, h, (0.0,) * 6)
+            dynamic = Rigid(m, h, (0.0,) * 6)
             moved = Rigid(0.0, ZERO, gathered[i].I)
-        result[i] = replace(joint, dynamic=kept)
+        result[i] = replace(joint, dynamic=dynamic)
         if joint.parent >= 0:
             gathered[joint.parent] = rigid_sum(gathered[joint.parent], rigid_raise(moved, joint.at(0.0).pose()))
         elif ground is not None:
