@@ -75,8 +75,8 @@ def _felt(p: Any, world: World) -> tuple[Matrix, Vector, Vector, Vector]:
     turning = sub(world.rate(p.link), world.rate(p.to))
 
     x, v, w = (turn_vector_back(other, vector) for vector in (apart, moving, turning))
-    force = _minus(_each(p.stiffness, x), _each(p.damping, v))
-    moment = sub(restoring(p.turning, product(transposed(other), own)), _each(p.turning_damping, w))
+    force = _minus(_by_component(p.stiffness, x), _by_component(p.damping, v))
+    moment = sub(restoring(p.turning, product(transposed(other), own)), _by_component(p.turning_damping, w))
     strength = _strength(p, world)
     return other, apart, scale(strength, force), scale(strength, moment)
 
@@ -94,7 +94,7 @@ def _strength(p: Any, world: World) -> Real:
 def restoring(stiffness: Vector, R: Matrix) -> Vector:
     """The moment M of a frame turned by R, without damping, in the axes that it is turned against, N m."""
     phi = rotation_vector(R)
-    felt = _each(stiffness, phi)
+    felt = _by_component(stiffness, phi)
     once = cross(phi, felt)
     twice = scale(_bending(dot(phi, phi)), cross(phi, once))
     return scale(-1.0, add(felt, add(scale(0.5, once), twice)))
@@ -120,7 +120,7 @@ def _bending(square: Real) -> Real:
     return where(small, series, exact)
 
 
-def _each(factors: Vector, vector: Vector) -> Vector:
+def _by_component(factors: Vector, vector: Vector) -> Vector:
     return (factors[0] * vector[0], factors[1] * vector[1], factors[2] * vector[2])
 
 
@@ -180,7 +180,7 @@ ENVIRONMENT = Environment(
         _three("damping", "N*s/m", "force per velocity along each axis"),
         _three("turning", "N*m/rad", "moment per small angle about each axis"),
         _three("turning_damping", "N*m*s/rad", "moment per angular velocity about each axis"),
-        *(replace(each, timing=True) for each in WINDOW),
+        *(replace(parameter, timing=True) for parameter in WINDOW),
         Parameter(
             name="ramp",
             unit="s",

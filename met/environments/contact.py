@@ -33,17 +33,17 @@ bodies meet. It is 4/5 B(2/5, 1/2)."""
 
 
 def loads(p: Any, world: World) -> Loads:
-    found = touch(p, world)
-    press = _press(p, found)
-    force = scale(press, found.normal)
-    sliding = add(found.moving, scale(found.rate, found.normal))
+    touching = touch(p, world)
+    press = _press(p, touching)
+    force = scale(press, touching.normal)
+    sliding = add(touching.moving, scale(touching.rate, touching.normal))
     rub = p.friction * press / sqrt(dot(sliding, sliding) + p.slip * p.slip)
-    return Loads(forces=found.forces(p, sub(force, scale(rub, sliding))))
+    return Loads(forces=touching.forces(p, sub(force, scale(rub, sliding))))
 
 
 def show(p: Any, world: World) -> Mapping[str, Any]:
-    found = touch(p, world)
-    return {"depth": found.depth, "normal": _press(p, found), "force": loads(p, world).forces[0].force}
+    touching = touch(p, world)
+    return {"depth": touching.depth, "normal": _press(p, touching), "force": loads(p, world).forces[0].force}
 
 
 def touch(p: Any, world: World) -> Touch:
@@ -85,15 +85,15 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
     return None
 
 
-def _press(p: Any, found: Touch) -> Real:
+def _press(p: Any, touching: Touch) -> Real:
     """N."""
-    inside = found.depth > 0.0
-    depth = where(inside, found.depth, 0.0)
+    inside = touching.depth > 0.0
+    depth = where(inside, touching.depth, 0.0)
     if p.law == "linear":
         size = p.stiffness * depth
     else:  # the root is not taken at 0, where it has no slope
-        size = 4.0 / 3.0 * p.modulus * depth * sqrt(where(inside, _radius(p) * found.depth, 1.0))
-    return where(inside, size * maximum(0.0, 1.0 + p.dissipation * found.rate), 0.0)
+        size = 4.0 / 3.0 * p.modulus * depth * sqrt(where(inside, _radius(p) * touching.depth, 1.0))
+    return where(inside, size * maximum(0.0, 1.0 + p.dissipation * touching.rate), 0.0)
 
 
 def _radius(p: Any) -> Real:

@@ -17,8 +17,8 @@ from met.parameter import Parameter
 from met.trace import Real, where
 
 
-def replaced_reading(p: Any, time: Real, of: str, value: Real, last: Real) -> Real:
-    if of != p.of:
+def replaced_reading(p: Any, time: Real, quantity: str, value: Real, last: Real) -> Real:
+    if quantity != p.of:
         return value
     return where(open_at(p, time), 0.0 if p.reads == "zero" else last, value)
 

@@ -12,7 +12,7 @@ DIGITS = 40  # far more than a double has, so that the doubles are the nearest o
 @cache
 def gauss(count: int) -> tuple[tuple[float, float], ...]:
     """Points in (-1, 1), rising, and their weights, which sum to 2 (Abramowitz and Stegun 25.4.29)."""
-    found = []
+    points = []
     with localcontext() as context:
         context.prec = DIGITS
         for i in reversed(range(count)):
@@ -21,8 +21,8 @@ def gauss(count: int) -> tuple[tuple[float, float], ...]:
                 value, slope = _legendre(count, x)
                 x -= value / slope
             slope = _legendre(count, x)[1]
-            found.append((float(x), float(2 / ((1 - x * x) * slope * slope))))
-    return tuple(found)
+            points.append((float(x), float(2 / ((1 - x * x) * slope * slope))))
+    return tuple(points)
 
 
 def _legendre(count: int, x: Decimal) -> tuple[Decimal, Decimal]:

@@ -62,10 +62,10 @@ def _around(p: Any, world: World) -> tuple[Matrix, Vector]:
 
 def _acceleration(p: Any, field: Matrix, turning: Vector, position: Vector, velocity: Vector) -> Vector:
     """Acceleration of a part at this position and velocity, world axes, m/s^2; `field`, `turning`: see `_around`."""
-    found = turn_vector(field, position)
+    acceleration = turn_vector(field, position)
     if p.frame == "orbital":
-        found = add(found, scale(-2.0, cross(turning, velocity)))
-    return found
+        acceleration = add(acceleration, scale(-2.0, cross(turning, velocity)))
+    return acceleration
 
 
 def _on_link(p: Any, world: World, link: str, field: Matrix, turning: Vector) -> Force:

@@ -129,13 +129,13 @@ def _cells(p: Any, length: Real, nozzle: Real, away: Real, dense: Real, narrow: 
     far, farther = sqrt(1.0 + z * z), sqrt(1.0 + (z + dz) * (z + dz))
     k = z / far
     dk = dz * (1.0 + far * farther - z * (z + dz)) / (far * farther * (far + farther))
-    found = []
+    cells = []
     for point, weight in gauss(int(p.cells)):
-        at = k + dk * (0.5 + 0.5 * point)
-        rest = 1.0 - at * at
+        node = k + dk * (0.5 + 0.5 * point)
+        rest = 1.0 - node * node
         root = sqrt(rest)
-        found.append((middle + narrow * at / root, 0.5 * weight * dk * narrow / (rest * root)))
-    return found
+        cells.append((middle + narrow * node / root, 0.5 * weight * dk * narrow / (rest * root)))
+    return cells
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:

@@ -31,11 +31,11 @@ NAMES = tuple(f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"
 
 
 def loads(p: Any, world: World) -> Loads:
-    def given(kind: str) -> Vector:
-        x, y, z = (_at(p, getattr(p, f"{kind}_{axis}"), world) for axis in "xyz")
+    def triple(kind: str) -> Vector:
+        x, y, z = (_value_now(p, getattr(p, f"{kind}_{axis}"), world) for axis in "xyz")
         return world.to_world(p.link, (x, y, z)) if p.axes == "link" else (x, y, z)
 
-    return Loads(forces=(Force(p.link, force=given("force"), moment=given("moment"), point=p.point),))
+    return Loads(forces=(Force(p.link, force=triple("force"), moment=triple("moment"), point=p.point),))
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
@@ -49,11 +49,11 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
     first, last = rows.index(True), len(rows) - 1 - rows[::-1].index(True)
     begins = p.begin + p.times[first - 1] if first else -math.inf
     until = p.begin + p.times[last + 1] if last + 1 < len(rows) else math.inf
-    found = never(begins, until, duration)
-    return (("begin", "times"), found[1]) if found is not None else None
+    reason = never(begins, until, duration)
+    return (("begin", "times"), reason[1]) if reason is not None else None
 
 
-def _at(p: Any, values: tuple[float, ...], world: World) -> Real:
+def _value_now(p: Any, values: tuple[float, ...], world: World) -> Real:
     if len(values) < 2:
         return values[0] if values else 0.0
     value = linear(p.times, values, world.time - p.begin)[0]

@@ -29,18 +29,18 @@ def furthest(metric: Metric) -> Metric | None:
     name = metric.extreme or (metric.memory[0].name if metric.margin and metric.unit == "of" else "")
     if metric.furthest is not None or not name:
         return metric.furthest
-    start = next(each.start for each in metric.memory if each.name == name)
+    start = next(memory.start for memory in metric.memory if memory.name == name)
     sign = -1.0 if start == math.inf else 1.0
 
     def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
-        own = {each.name: getattr(held, each.name) for each in metric.memory}
+        own = {memory.name: getattr(held, memory.name) for memory in metric.memory}
         new = dict(metric.update(p, held, x, t, dt))
         alone = metric.update(p, Held(**own | {name: start}), x, t, dt)[name]
-        samples = [getattr(held, each.name) for each in SAMPLES]
+        samples = [getattr(held, sample.name) for sample in SAMPLES]
         reached = samples[1] + beyond(sign * alone, *samples)
         new[name] = sign * maximum(sign * new[name], reached)
         before = (sign * alone, *samples[:3])
-        return new | {each.name: value for each, value in zip(SAMPLES, before, strict=True)}
+        return new | {sample.name: value for sample, value in zip(SAMPLES, before, strict=True)}
 
     return replace(metric, memory=(*metric.memory, *SAMPLES), update=update)
 
@@ -64,11 +64,11 @@ def beyond(last: Real, d: Real, c: Real, b: Real, a: Real) -> Real:
 
     def meeting(up: Real, down: Real, other: Real) -> Real:
         slopes = up + down
-        found = up * (down - other) / where(slopes > 0.0, slopes, 1.0)
-        return where((up > 0.0) & (down > other) & (found < math.inf), found, 0.0)
+        height = up * (down - other) / where(slopes > 0.0, slopes, 1.0)
+        return where((up > 0.0) & (down > other) & (height < math.inf), height, 0.0)
 
-    found = maximum(
+    excess = maximum(
         meeting(minimum(rise, STEEPER * rise_before), fall_after, fall),
         meeting(minimum(fall, STEEPER * fall_after), rise_before, rise),
     )
-    return where((rise >= 0.0) & (fall >= 0.0), found, 0.0)
+    return where((rise >= 0.0) & (fall >= 0.0), excess, 0.0)

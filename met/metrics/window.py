@@ -22,7 +22,7 @@ WITHIN = Parameter(
 )
 WINDOW = (AFTER, WITHIN)
 
-PART = tuple(replace(each, timing=True) for each in WINDOW)
+PART = tuple(replace(parameter, timing=True) for parameter in WINDOW)
 """The window of a metric that watches the whole run unless the deck sets one. Only then is it in plan and program."""
 
 EVERY_JOINT = OverJoints("every", lambda margins: reduce(minimum, margins))
