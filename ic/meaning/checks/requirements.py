@@ -116,7 +116,7 @@ def _remark_window(
     scope: Scope, requirement: Requirement, use: MetricUse, metric: Metric, duration: float, place: Place
 ) -> bool:
     """Return True, with a warning, for a window that begins or ends after the run's end."""
-    windowed = any(each.name == "after" for each in metric.parameters)
+    windowed = any(parameter.name == "after" for parameter in metric.parameters)
     p = constant_values(scope, f"metrics.{use.name}", metric.parameters) if windowed else None
     after, within = getattr(p, "after", 0.0), getattr(p, "within", math.inf)
     if after <= duration and (within == math.inf or after + within <= duration * (1.0 + ROUNDING)):

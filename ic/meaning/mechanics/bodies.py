@@ -69,9 +69,11 @@ def check_body(
 
 def _is_plainly_a_body(inertia: Sequence[Real], mass: Real | None) -> bool:
     """True for numbers that no case varies, without products of inertia: their moments are the written ones."""
-    if not all(isinstance(each, float) and math.isfinite(each) for each in (*inertia, 1.0 if mass is None else mass)):
+    if not all(
+        isinstance(number, float) and math.isfinite(number) for number in (*inertia, 1.0 if mass is None else mass)
+    ):
         return False
-    least, middle, most = sorted(float(each) for each in inertia[:3])
+    least, middle, most = sorted(float(moment) for moment in inertia[:3])
     return mass != 0.0 and not any(inertia[3:]) and least >= 0.0 and most <= least + middle
 
 
@@ -94,15 +96,15 @@ def _not_a_body(values: np.ndarray, kind: str, *, lumped: bool) -> tuple[np.ndar
     bad = ~finite if lumped else ~finite | negative | triangle | weightless
     causes = []
     for row in np.flatnonzero(bad)[:1]:
-        shown = f"principal moments {least[row]:.6g}, {middle[row]:.6g} and {most[row]:.6g} kg*m^2"
+        moments = f"principal moments {least[row]:.6g}, {middle[row]:.6g} and {most[row]:.6g} kg*m^2"
         if not finite[row]:
             causes.append("it is not finite")
         elif weightless[row]:
             causes.append(f"the {kind} has no mass, and so no inertia")
         elif negative[row]:
-            causes.append(f"{shown}; none may be negative")
+            causes.append(f"{moments}; none may be negative")
         else:
-            causes.append(f"{shown}; no body has one above the sum of the others")
+            causes.append(f"{moments}; no body has one above the sum of the others")
     return bad, causes
 
 
@@ -129,9 +131,9 @@ def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint], pa
     heavy: dict[str, bool] = {}  # whether it, or something that it carries, has a mass that no case varies
     for joint in reversed(order):
         mass = masses.get(joint.child)
-        outboard = (heavy[each.child] for each in carried.get(joint.child, ()))
+        outboard = (heavy[outer.child] for outer in carried.get(joint.child, ()))
         own = [mass, *(value for _, value in loads.get(joint.child, ()))]
-        heavy[joint.child] = any([*outboard, *(isinstance(each, float) and each > 0.0 for each in own)])
+        heavy[joint.child] = any([*outboard, *(isinstance(number, float) and number > 0.0 for number in own)])
     above: dict[str, tuple[str, ...]] = {"base": ()}  # the light joints that move, between the base and a link
     for joint in order:
         before = above[joint.child] = above[joint.parent]
@@ -144,9 +146,9 @@ def check_moved(scope: Scope, links: Sequence[Link], joints: Sequence[Joint], pa
         ):
             continue
         above[joint.child] = (*before, f"{joint.name}.moved")
-        names = [joint.child, *(each.child for each in all_led_by(joint, joints))]
+        names = [joint.child, *(follower.child for follower in all_led_by(joint, joints))]
         for name in names:
-            names += [each.child for each in carried.get(name, ())]
+            names += [outer.child for outer in carried.get(name, ())]
         values = [value for name in names if (value := masses.get(name)) is not None]
         values += [value for name in names for _, value in loads.get(name, ())]
         also = [word for name in names for word in passing.get(name, ())]

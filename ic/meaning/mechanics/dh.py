@@ -93,8 +93,8 @@ def use_dh(scope: Scope, owner: Owner, kind: str, item: Item, body: MergedBlock)
     numbers = item.body or MergedBlock()
     check_keys(scope, numbers, [wanted.name for wanted in NUMBERS], inner)
     scope.not_sweepable[owner.join("dh")] = not_sweepable.several(_numbers(owner))
-    found = [scope.number(inner, wanted, numbers.get(wanted.name), record=False) for wanted in NUMBERS]
-    values = [value for value in found if value is not None]
+    entered = [scope.number(inner, wanted, numbers.get(wanted.name), record=False) for wanted in NUMBERS]
+    values = [value for value in entered if value is not None]
     if len(values) < len(NUMBERS):
         return
     frame = CONVENTIONS[convention](*values)

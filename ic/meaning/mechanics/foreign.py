@@ -29,12 +29,12 @@ def refuse_foreign_joint(scope: Scope, item: Item, arm: str, block: MergedBlock)
     arm, block: the name of its arm, and all that this holds
     """
     kind = item.detail[0].text if item.detail else ""
-    there = "in the arm's block, " if scope.definitions.robot_files.hold(item.place) else ""
+    where = "in the arm's block, " if scope.definitions.robot_files.hold(item.place) else ""
     if kind in OTHER_KINDS:
         helps = [f"{OTHER_KINDS[kind]}; put links of `mass = 0 kg` between them"]
-        if there:
-            helps.append(f"{there}`remove {item.name};` makes room for them")
-        on_base = [each for each in block.of_kind("joint") if _link(each, "parent") == BASE]
+        if where:
+            helps.append(f"{where}`remove {item.name};` makes room for them")
+        on_base = [other for other in block.of_kind("joint") if _link(other, "parent") == BASE]
         base = block.get(f"link {BASE}")
         if (
             kind == "floating"
@@ -42,7 +42,7 @@ def refuse_foreign_joint(scope: Scope, item: Item, arm: str, block: MergedBlock)
             and (base is None or scope.definitions.robot_files.hold(base.place))
         ):
             weighs = base or scope.definitions.base_from_file(arm)
-            helps = [_free_base(item, there, f"link {BASE} {{ mass = 0 kg; }}" if weighs else "")]
+            helps = [_free_base(item, where, f"link {BASE} {{ mass = 0 kg; }}" if weighs else "")]
         scope.complaints.error(
             "D212",
             f"joint `{item.name}` is {kind}, and joints are revolute, prismatic or fixed",
@@ -56,23 +56,23 @@ def refuse_foreign_joint(scope: Scope, item: Item, arm: str, block: MergedBlock)
 def how_to_close(scope: Scope, joint: Joint, place: Place) -> list[str]:
     """The helps for a joint that closes a chain: a bushing that leaves free what the joint does."""
     of_file = scope.definitions.robot_files.hold(place)
-    there = f"in the arm's block, `remove {joint.name};`" if of_file else f"leave `{joint.name}` out"
+    removal = f"in the arm's block, `remove {joint.name};`" if of_file else f"leave `{joint.name}` out"
     at, rpy, axis = ([_number(scope, f"{joint.name}.{key}.{part}") for part in XYZ] for key in ("at", "rpy", "axis"))
     along = [k for k in range(3) if axis[k] != 0.0]
     if joint.kind == "fixed":
         along = []
     elif len(along) != 1:  # about no axis of the frame
-        return [f"a stiff `bushing` of the run's `environment` closes a chain (`met doc bushing`): {there}"]
+        return [f"a stiff `bushing` of the run's `environment` closes a chain (`met doc bushing`): {removal}"]
     stiff, turning = ([size * (k not in along or kind == joint.kind) for k in range(3)] for size, kind in BUSHING)
     keys = [("to_at", at, "m"), ("to_rpy", rpy, "rad"), ("stiffness", stiff, "N/m")]
-    keys += [("damping", [each * 1e-3 for each in stiff], "N*s/m"), ("turning", turning, "N*m/rad")]
-    keys += [("turning_damping", [each * 1e-3 for each in turning], "N*m*s/rad")]
+    keys += [("damping", [stiffness * 1e-3 for stiffness in stiff], "N*s/m"), ("turning", turning, "N*m/rad")]
+    keys += [("turning_damping", [stiffness * 1e-3 for stiffness in turning], "N*m*s/rad")]
     to = "" if joint.parent == BASE else f"  to = {joint.parent};"
     numbers = "".join(
         f"  {key} = [{', '.join(map(_spelled, three))}] {unit};" for key, three, unit in keys if any(three)
     )
     bushing = f"{joint.name} = bushing {{ link = {joint.child};{to}{numbers} }}"
-    return [f"a stiff `bushing` closes a chain: {there}", f"then, in the run's `environment`: `{bushing}`"]
+    return [f"a stiff `bushing` closes a chain: {removal}", f"then, in the run's `environment`: `{bushing}`"]
 
 
 def _spelled(value: float) -> str:
@@ -85,18 +85,21 @@ def _number(scope: Scope, path: str) -> float:
     return settled.value if settled is not None and isinstance(settled.value, float) else 0.0
 
 
-def _free_base(item: Item, there: str, weightless: str) -> str:
+def _free_base(item: Item, where: str, weightless: str) -> str:
     """The help for a floating joint that is the only one on the base. weightless: entry of a base without mass"""
     body = item.body or MergedBlock()
     child = _link(item, "child") or "..."
-    frame = [(key, given.value) for key in ("at", "rpy") if (given := body.get(key)) is not None]
-    at = "".join(f"  {key} = {spell(value)};" for key, value in frame if value is not None)
-    entries = [f"remove {item.name};"] if there else []
-    entries += [f"joint {item.name} fixed {{ parent = {BASE};  child = {child};{at} }}", *filter(None, (weightless,))]
-    return f"{there}`{'  '.join(entries)}`, and in the run `base = free;`: base and `{child}` then float as one"
+    frame = [(key, entry.value) for key in ("at", "rpy") if (entry := body.get(key)) is not None]
+    placing = "".join(f"  {key} = {spell(value)};" for key, value in frame if value is not None)
+    entries = [f"remove {item.name};"] if where else []
+    entries += [
+        f"joint {item.name} fixed {{ parent = {BASE};  child = {child};{placing} }}",
+        *filter(None, (weightless,)),
+    ]
+    return f"{where}`{'  '.join(entries)}`, and in the run `base = free;`: base and `{child}` then float as one"
 
 
 def _link(joint: Item, end: str) -> str | None:
     """The link that a joint has as its parent or child, as written."""
-    given = joint.body.get(end) if joint.body is not None else None
-    return given.value.text if given is not None and isinstance(given.value, Name) else None
+    entry = joint.body.get(end) if joint.body is not None else None
+    return entry.value.text if entry is not None and isinstance(entry.value, Name) else None

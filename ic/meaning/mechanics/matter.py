@@ -30,7 +30,7 @@ def use_matter(
     kind    what it is in words: "link" or "payload"
     lumped  whether its numbers are an identified set, of which only finite ones are asked
     """
-    mass = scope.number(owner, _of(MASS, kind), body.get("mass"))
+    mass = scope.number(owner, _of_kind(MASS, kind), body.get("mass"))
     solid = _shape(scope, owner, body.get("shape"))
     _com(scope, owner, kind, body.get("com"), solid)
     inertia = _inertia(scope, owner, kind, body.get("inertia"), solid, mass)
@@ -41,7 +41,7 @@ def use_matter(
     return solid.kind, tuple((name, scope.checks.first(value)) for name, value in solid.numbers)
 
 
-def _of(wanted: Parameter, kind: str) -> Parameter:
+def _of_kind(wanted: Parameter, kind: str) -> Parameter:
     return replace(wanted, doc=wanted.doc.format(kind))
 
 
@@ -70,16 +70,16 @@ def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
     numbers: dict[str, Real] = {}
     along, good = "x", True
     for wanted in kind.parameters:
-        given = body.get(wanted.name)
+        entry = body.get(wanted.name)
         if wanted.shape == "word":
-            word = scope.word(inner, wanted, given)
+            word = scope.word(inner, wanted, entry)
             along, good = word or along, good and word is not None
         elif wanted.shape == "vector":
-            vector = scope.vector(inner, wanted, given, record=False)
+            vector = scope.vector(inner, wanted, entry, record=False)
             good = good and vector is not None
             numbers |= {f"{wanted.name}_{axis}": x for axis, x in zip("xyz", vector or (), strict=False)}
         else:
-            number = scope.number(inner, wanted, given, record=False)
+            number = scope.number(inner, wanted, entry, record=False)
             good = good and number is not None
             if number is not None:
                 numbers[wanted.name] = number
@@ -88,7 +88,7 @@ def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
 
 def _com(scope: Scope, owner: Owner, kind: str, item: Item | None, solid: Solid | None) -> None:
     if item is not None or solid is None:
-        scope.vector(owner, replace(_of(COM, kind), default=(0.0, 0.0, 0.0)), item)
+        scope.vector(owner, replace(_of_kind(COM, kind), default=(0.0, 0.0, 0.0)), item)
         return
     scope.not_sweepable[owner.join("com")] = not_sweepable.several([owner.join(f"com.{axis}") for axis in "xyz"])
     for axis, value in zip("xyz", solid.com, strict=True):
@@ -99,7 +99,7 @@ def _inertia(
     scope: Scope, owner: Owner, kind: str, item: Item | None, solid: Solid | None, mass: Real | None
 ) -> tuple[Real, ...] | None:
     if item is not None:
-        return scope.vector(owner, _of(INERTIA, kind), item, names=MOMENTS, short=3)
+        return scope.vector(owner, _of_kind(INERTIA, kind), item, names=MOMENTS, short=3)
     if solid is None:
         if isinstance(mass, float) and mass == 0.0:
             return tuple(scope.derived(owner, f"inertia.{name}", 0.0, "kg*m^2", "without mass") for name in MOMENTS)
@@ -119,7 +119,7 @@ def _inertia(
         scope.checks.fail(owner.join("inertia"))
         return None
     scope.not_sweepable[owner.join("inertia")] = not_sweepable.several(
-        [owner.join(f"inertia.{each}") for each in MOMENTS]
+        [owner.join(f"inertia.{moment}") for moment in MOMENTS]
     )
     return tuple(
         scope.derived(owner, f"inertia.{name}", value, "kg*m^2", f"uniform {solid.kind} of the {kind}'s mass")

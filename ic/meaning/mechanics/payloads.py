@@ -31,12 +31,12 @@ USAGE = "write `payload NAME { mass = 20 kg;  shape = sphere(radius = 0.2 m);  o
 
 def resolve_payloads(scope: Scope, block: MergedBlock, arm: ResolvedArm) -> tuple[Payload, ...]:
     """The payloads of a run, in the deck's order, their numbers entered as parameters; mistakes are reported."""
-    found: list[Payload] = []
+    payloads: list[Payload] = []
     for item in block.of_kind("payload"):
         with scope.complaints.gather():
             taken = (BASE, WORLD, *(link.name for link in arm.links))
-            found.append(_payload(scope, item, arm, taken))
-    return tuple(found)
+            payloads.append(_payload(scope, item, arm, taken))
+    return tuple(payloads)
 
 
 def check_payloads(scope: Scope, block: MergedBlock, structure: Structure) -> None:
@@ -84,7 +84,7 @@ def _payload(scope: Scope, item: Item, arm: ResolvedArm, taken: Collection[str])
         scope.vector(owner, PAYLOAD_RPY, body.get("rpy"))
     for wanted in FLIGHT if grappled else ():
         scope.vector(owner, wanted, body.get(wanted.name))
-    times = [scope.number(owner, wanted, given) for wanted in EVENTS if (given := body.get(wanted.name)) is not None]
+    times = [scope.number(owner, wanted, entry) for wanted in EVENTS if (entry := body.get(wanted.name)) is not None]
     for wanted in EVENTS:
         if body.get(wanted.name) is None:
             scope.not_sweepable[owner.join(wanted.name)] = NotSweepable(
@@ -134,7 +134,7 @@ def _link(scope: Scope, owner: Owner, item: Item | None, arm: ResolvedArm) -> st
 
 def _check_unused(scope: Scope, item: Item, body: MergedBlock, grappled: bool) -> None:
     """Report entries without meaning for a payload that is held from the start, or that is caught in flight."""
-    for name in ("rpy",) if grappled else tuple(each.name for each in FLIGHT):
+    for name in ("rpy",) if grappled else tuple(parameter.name for parameter in FLIGHT):
         written = body.get(name)
         if written is None:
             continue
@@ -179,19 +179,19 @@ def _check_solid(scope: Scope, owner: Owner, payload: Payload, item: Item) -> No
     """Check that a flying payload has mass, and inertia about every axis."""
     paths = [owner.join("mass"), *(owner.join(f"inertia.{entry}") for entry in INERTIA)]
     settled = [scope.parameters.get(path) for path in paths]
-    if any(each is None or isinstance(each.value, str | tuple) for each in settled):
+    if any(setting is None or isinstance(setting.value, str | tuple) for setting in settled):
         return
     body = item.body or MergedBlock()
-    given = next((part for name in ("inertia", "shape", "mass") if (part := body.get(name)) is not None), item)
+    cause = next((part for name in ("inertia", "shape", "mass") if (part := body.get(name)) is not None), item)
     helps = (
         "what flies has mass, and resists a turn about every axis: a box, a cylinder or a sphere does",
         "or leave `grapple` and `release` out: then it is a part of its link",
     )
     scope.checks.require(
-        tuple(each.value for each in settled if each is not None),  # type: ignore[misc]  # numbers, by the test above
+        tuple(setting.value for setting in settled if setting is not None),  # type: ignore[misc]  # numbers, by the test above
         _not_solid,
         code="D265",
-        place=value_place(given),
+        place=value_place(cause),
         help=helps,
         needs=(*paths, f"{owner.path}.shape"),
         message=f"payload `{payload.name}` is no body that could fly",
@@ -229,11 +229,11 @@ def _remark_time(scope: Scope, payload: Payload, event: str, time: float, struct
             else "let the run last longer, or leave it: then the payload flies by",
         )
         return
-    there = schedule.step * math.ceil(time / schedule.step - INSTANT)
-    if there - time > INSTANT * schedule.step:
+    next_instant = schedule.step * math.ceil(time / schedule.step - INSTANT)
+    if next_instant - time > INSTANT * schedule.step:
         scope.complaints.remark(
             "D267",
-            f"{does} at {there:.9g} s: {time:.9g} s is no instant of the dynamics",
+            f"{does} at {next_instant:.9g} s: {time:.9g} s is no instant of the dynamics",
             place,
             help=f"a step of the dynamics is {schedule.step:g} s; write a multiple of it",
         )

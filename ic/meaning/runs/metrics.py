@@ -27,14 +27,16 @@ def resolve_metrics(
 ) -> tuple[tuple[MetricUse, ...], tuple[SignalExpression, ...]]:
     """The metrics that are computed during the run, and the watched expressions that are not yet channels of the
     run."""
-    made: dict[str, SignalExpression] = {}
+    expressions: dict[str, SignalExpression] = {}
     own = [item for item in block.of_kind("metric") if not is_figure_metric(item)]
-    found = [_metric(scope, item, signals, made) for item in own]
-    scope.complaints.note_lost_names(*(item.name for item, use in zip(own, found, strict=True) if use is None))
-    return tuple(use for use in found if use is not None), tuple(made.values())
+    uses = [_metric(scope, item, signals, expressions) for item in own]
+    scope.complaints.note_lost_names(*(item.name for item, use in zip(own, uses, strict=True) if use is None))
+    return tuple(use for use in uses if use is not None), tuple(expressions.values())
 
 
-def _metric(scope: Scope, item: Item, signals: ChannelTable, made: dict[str, SignalExpression]) -> MetricUse | None:
+def _metric(
+    scope: Scope, item: Item, signals: ChannelTable, expressions: dict[str, SignalExpression]
+) -> MetricUse | None:
     if item.detail:
         scope.complaints.error(
             "D129",
@@ -63,9 +65,9 @@ def _metric(scope: Scope, item: Item, signals: ChannelTable, made: dict[str, Sig
         return None
     body = item.body or MergedBlock()
     owner = Owner(f"metric `{item.name}`", item.place, f"metrics.{item.name}")
-    of = body.get("of")
+    of_item = body.get("of")
     channel = None
-    if of is None:
+    if of_item is None:
         check_keys(scope, body, ["of", *(p.name for p in metric.parameters)], owner)
         scope.complaints.missing(
             item.place,
@@ -74,14 +76,14 @@ def _metric(scope: Scope, item: Item, signals: ChannelTable, made: dict[str, Sig
             f"metric `{item.name}` watches no {'condition' if metric.condition else 'channel'}",
             help=_write(metric),
         )
-    elif of.value is None or of.body is not None:
-        scope.complaints.error("D125", "a channel is needed here", of.upon or of.place, help=_write(metric))
+    elif of_item.value is None or of_item.body is not None:
+        scope.complaints.error("D125", "a channel is needed here", of_item.upon or of_item.place, help=_write(metric))
     else:
-        channel = _watched(scope, of.value, metric, signals, made)
-    if channel is None or of is None:
+        channel = _watched(scope, of_item.value, metric, signals, expressions)
+    if channel is None or of_item is None:
         return None
     scope.keep_in_deck(f"metrics.{item.name}.model", metric.name, item)
-    scope.keep_in_deck(f"metrics.{item.name}.of", channel.path, of)
+    scope.keep_in_deck(f"metrics.{item.name}.of", channel.path, of_item)
     use_model(scope, replace(owner, of=channel.unit), metric.parameters, body, ("of",))
     return MetricUse(item.name, metric.name, channel.path, item.place)
 
@@ -93,22 +95,22 @@ def _write(metric: Metric) -> str:
 
 
 def _watched(
-    scope: Scope, of: Expression, metric: Metric, signals: ChannelTable, made: dict[str, SignalExpression]
+    scope: Scope, watched: Expression, metric: Metric, signals: ChannelTable, expressions: dict[str, SignalExpression]
 ) -> Channel | None:
     """The channel that a metric watches, or that of an expression; None where there is none (reported)."""
-    if isinstance(of, Name) and not metric.condition and of.path[0].text != "*":
-        if of.text in signals.known:
-            return signals.known[of.text]
-        if of.text in signals.lost or of.path[0].text in scope.failed_servos | scope.failed_parts:
+    if isinstance(watched, Name) and not metric.condition and watched.path[0].text != "*":
+        if watched.text in signals.known:
+            return signals.known[watched.text]
+        if watched.text in signals.lost or watched.path[0].text in scope.failed_servos | scope.failed_parts:
             return None
-        if not of_lost(scope, of, signals.structure):
-            message, helps = not_one(of, signals.structure)
-            scope.complaints.error("D125", message, of.place, help=helps)
+        if not of_lost(scope, watched, signals.structure):
+            message, helps = not_one(watched, signals.structure)
+            scope.complaints.error("D125", message, watched.place, help=helps)
         return None
     expression = None
     with scope.complaints.gather():
-        expression = signals.condition(of, metric) if metric.condition else signals.number(of, metric)
+        expression = signals.condition(watched, metric) if metric.condition else signals.number(watched, metric)
     if expression is None:
         return None
-    made[expression.name] = expression
+    expressions[expression.name] = expression
     return Channel(expression.name, expression.unit, expression.text, 1)
