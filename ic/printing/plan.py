@@ -163,8 +163,11 @@ def _arm(experiment: Experiment) -> Iterator[str]:
             command = f": {use.command.kind}, {use.command.model or use.command.guide}" if use.command else ""
             servo = f"{use.definition} ({use.model}){command}"
         if joint.follows:
-            ratios = [f"{values.text(path)} {leader}" for leader, path in joint.ratio_paths.items()]
-            ratios = ratios if joint.loop is None else [f"{joint.loop.leader} by loop {joint.loop.name}"]
+            ratios = (
+                [f"{values.text(path)} {leader}" for leader, path in joint.ratio_paths.items()]
+                if joint.loop is None
+                else [f"{joint.loop.leader} by loop {joint.loop.name}"]
+            )
             servo = f"follows {', '.join(ratios)}" + (f"; {servo}" if use is not None else "")
         position = values.vector(f"{joint.name}.at")
         place = "varies" if position is None else vector(position, "m") if any(position) else ""

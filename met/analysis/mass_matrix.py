@@ -147,8 +147,9 @@ def _independent(ratios: Ratios, size: int, poses: int) -> np.ndarray:
             rows[:, before + i] = 0.0
             for j, ratio in row.items():
                 rows[:, before + i, before + j] = ratio
-    leads = [j for j in range(size) if j < before or not ratios[j - before] or j - before in ratios[j - before]]
-    return rows[:, :, leads]
+    return rows[
+        ..., [j for j in range(size) if j < before or not ratios[j - before] or j - before in ratios[j - before]]
+    ]
 
 
 def _spread(joints: int) -> np.ndarray:

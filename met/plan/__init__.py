@@ -14,8 +14,7 @@ Parameters are named by paths, the ones a deck uses inside a run:
     <joint>.axis.x|y|z                     unit vector in the joint frame
     <joint>.pivot.x|y|z                    m, joint frame: a point of a revolute joint's axis; not there: the origin
     <joint>.q_min|q_max|qd_max|tau_max     rad, rad/s, N m (m, m/s, N): limits of the joint, those that it has
-    <joint>.ratio|offset                   of a joint that follows another: q = ratio times the other's + offset;
-                                           .ratio.<other> of one that follows several, to each of them
+    <joint>.ratio|offset  .ratio.<other>   of a joint that follows one, or several: q = ratio times the other's + offset
     <loop>.at|to_at.x|y|z                  m: the pin of a loop, in the frames of its two links
     <joint>.servo.<parameter>              as the servo declares
     <joint>.servo.command.<parameter>      as the command declares
@@ -36,8 +35,7 @@ Parameters are named by paths, the ones a deck uses inside a run:
     payloads.<name>.at|rpy.x|y|z           its frame in its link's, m, rad (fixed x-y-z): where it is held from the
                                            start; of one that is grappled `at` alone, the point that it should come to
     payloads.<name>.grapple|release        s; each only where it is grappled, released
-    payloads.<name>.position|attitude|velocity|rate.x|y|z   where it flies first, as `initial.base.` has it (attitude:
-                                           rpy); only where it is grappled
+    payloads.<name>.position|attitude|velocity|rate.x|y|z   where it is grappled: how it flies first (attitude: rpy)
 
 A vector parameter of a model is three numbers, `.x .y .z`.
 """
@@ -133,8 +131,7 @@ class Joint:
     """Connects `parent` (a link or the base) to `child`, along or about its axis.
 
     limits   those of `q_min`, `q_max`, `qd_max` and `tau_max` that the joint has
-    follows  the joints whose positions give its own
-    loop     by which it follows one joint, and not in proportion
+    follows  the joints whose positions give its own;  loop: by which it follows one, and not in proportion
     """
 
     name: str

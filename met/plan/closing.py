@@ -41,8 +41,6 @@ if TYPE_CHECKING:
 FLAT = 1e-13
 """Share of the squares of its sides below which the square of a triangle's area is rounding noise."""
 
-Point = tuple[Real, Real]
-
 
 @frozen
 class Corner:
@@ -117,7 +115,7 @@ def close(corners: Sequence[Corner], u: Real, left: bool) -> tuple[dict[str, Led
     first = scale(1.0 / sqrt(dot(way, way)), way)
     second = cross(across, first)
 
-    def flat(point: Vector) -> Point:
+    def flat(point: Vector) -> tuple[Real, Real]:
         return dot(point, first), dot(point, second)
 
     p, r = flat(sub(v.after, a.before)), flat(sub(v.before, b.after))
@@ -142,11 +140,6 @@ def close(corners: Sequence[Corner], u: Real, left: bool) -> tuple[dict[str, Led
     closes = square > FLAT * pp * rr
     size, by_side = sqrt(where(closes, square, math.nan)), 1.0 / where(closes, vv, math.nan)
     area = size if left else -size
-    angles = (
-        heading - turned * u - atan2(area, k_b) + math.pi - _angle(r),
-        _angle(r) - _angle(p) - atan2(area, k_v),
-        _angle(p) - heading - atan2(area, k_a),
-    )
     m, dm = _dot(side, slope), _dot(slope, slope) + _dot(side, curve)
     angle_v = m / area
     angle_v2 = (dm - angle_v * angle_v * k_v) / area
@@ -155,23 +148,26 @@ def close(corners: Sequence[Corner], u: Real, left: bool) -> tuple[dict[str, Led
     angle_b2 = -by_side * (m * (1.0 - 2.0 * k_a * by_side) * angle_v + k_a * angle_v2)
     swing = _cross(side, slope) * by_side
     swing2 = (_cross(side, curve) - 2.0 * m * swing) * by_side
-    rates = (swing - turned - angle_b, -angle_v, -swing - angle_a)
-    bends = (swing2 - angle_b2, -angle_v2, -swing2 - angle_a2)
+    values = (
+        (b, heading - turned * u - atan2(area, k_b) + math.pi - _angle(r), swing - turned - angle_b, swing2 - angle_b2),
+        (v, _angle(r) - _angle(p) - atan2(area, k_v), -angle_v, -angle_v2),
+        (a, _angle(p) - heading - atan2(area, k_a), -swing - angle_a, -swing2 - angle_a2),
+    )
     followers = {}
-    for corner, *values in zip((b, v, a), angles, rates, bends, strict=True):
+    for corner, *numbers in values:
         direction = corner.along * sign(dot(corner.axis, across))
-        followers[corner.name] = Led(*(direction * value for value in values))
+        followers[corner.name] = Led(*(direction * number for number in numbers))
     return followers, (sqrt(vv), sqrt(pp), sqrt(rr))
 
 
-def _angle(a: Point) -> Real:
+def _angle(a: tuple[Real, Real]) -> Real:
     """The angle of a point, rad."""
     return atan2(a[1], a[0])
 
 
-def _dot(a: Point, b: Point) -> Real:
+def _dot(a: tuple[Real, Real], b: tuple[Real, Real]) -> Real:
     return a[0] * b[0] + a[1] * b[1]
 
 
-def _cross(a: Point, b: Point) -> Real:
+def _cross(a: tuple[Real, Real], b: tuple[Real, Real]) -> Real:
     return a[0] * b[1] - a[1] * b[0]

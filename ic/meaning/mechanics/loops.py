@@ -22,6 +22,7 @@ from met.trace import Real, Scalar, absolute, rint
 from met.vectors import cross, dot, scale, sub
 
 SOFTLY = "a `bushing` of the environment closes any chain softly (`met doc bushing`)"
+PLANE = "its revolute joints have parallel axes; a joint that slides, and the pin, stay in a plane across them"
 TOLERANCE = 1e-9
 """Of a direction, or m, by which the joints of a loop may miss its plane: rounding of decimals."""
 
@@ -127,9 +128,8 @@ def _check(scope: Scope, loop: Loop, corners: Sequence[Corner], q: Real, closed:
         reach = f"and the links reach from {abs(p - r):.4g} to {p + r:.4g} m"
         return bad, [f"from {names[3]} to {names[1]} there are {v:.4g} m, {reach}"]
 
-    of_plane = "its revolute joints have parallel axes; a joint that slides, and the pin, stay in a plane across them"
     for values, test, message, helps in (
-        (tuple(off), leaves_plane, "leaves its plane", (of_plane, SOFTLY)),
+        (tuple(off), leaves_plane, "leaves its plane", (PLANE, SOFTLY)),
         (closed, opens, "does not close where its leader begins", (_where_it_closes(loop, corners, q, closed),)),
     ):
         scope.checks.require(
