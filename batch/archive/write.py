@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 @frozen
 class ArchivePart:
-    """One experiment of an archive. rows: of its case table, ascending; kept: places among them of the cases whose
-    histories are in the archive; single: as numbers of four bytes.
+    """One experiment of an archive. rows: of its case table, ascending; history_places: places among them of the cases
+    whose histories are in the archive; single: as numbers of four bytes.
 
     code     key of the program (`met.run.Prepared.code_key`)
     results  keys of what metrics and signals compute beyond the state (`met.run.Prepared.result_keys`)
@@ -48,7 +48,7 @@ class ArchivePart:
 
     experiment: Experiment
     rows: CaseValues
-    kept: np.ndarray
+    history_places: np.ndarray
     single: bool = False
     code: str = ""
     results: Mapping[str, str] = field(default_factory=dict)
@@ -109,9 +109,9 @@ class ArchiveWriter:
         for variable in group.layout.variables:
             if variable.dims[0] == "case":
                 _put(group.node[variable.name], first, last, values[variable.name])
-        recorded = (group.part.kept >= first) & (group.part.kept < last)
+        recorded = (group.part.history_places >= first) & (group.part.history_places < last)
         for name, gathered in group.gathered.items():
-            own = values[name][group.part.kept[recorded] - first]
+            own = values[name][group.part.history_places[recorded] - first]
             gathered[recorded] = own.astype(str) if own.dtype.kind == "S" else own
         self._sink.check()
 
@@ -171,7 +171,7 @@ class ArchiveWriter:
 
     def _group(self, node: Any, part: ArchivePart) -> OpenGroup:
         """Lay out a group: every variable in its order, the signals with all their chunks."""
-        layout = archive_layout.layout(part.experiment, len(part.rows), len(part.kept), part.single)
+        layout = archive_layout.layout(part.experiment, len(part.rows), len(part.history_places), part.single)
         early = {"until_shown": part.until_shown} if part.until_shown else {}
         put_attributes(node, {**layout.attributes, **early, "code_key": part.code})
         datasets = {variable.name: _make(node, layout, variable) for variable in layout.variables}
@@ -184,7 +184,8 @@ class ArchiveWriter:
                 for axis, dim in enumerate(variable.dims):
                     datasets[variable.name].dims[axis].attach_scale(datasets[dim])
         gathered = {
-            variable.source: np.empty(len(part.kept), KINDS[variable.kind]) for variable in layout.role("recorded")
+            variable.source: np.empty(len(part.history_places), KINDS[variable.kind])
+            for variable in layout.role("recorded")
         }
         return OpenGroup(part, layout, node, gathered)
 
@@ -264,7 +265,7 @@ def _write_rest(group: OpenGroup) -> None:
     values: dict[str, Any] = {variable.name: group.gathered[variable.source] for variable in layout.role("recorded")}
     values |= values_of_dimensions(part.experiment)
     values["time"] = times_of(part.experiment)
-    values["recorded_case"] = part.experiment.cases.table[part.rows[part.kept]]
+    values["recorded_case"] = part.experiment.cases.table[part.rows[part.history_places]]
     for variable in layout.variables:
         if variable.role != "signal" and variable.dims[0] != "case":
             group.node[variable.name][...] = values[variable.name]

@@ -62,12 +62,12 @@ model."""
 class DataSheet:
     """The parameters that are assumed before a bed is identified.
 
-    values  SI, by the names of `UNITS`, and `v_max`, V, where the servo has it
-    said    True where `kt_load` is given by the deck or by the user, and is no default
+    values       SI, by the names of `UNITS`, and `v_max`, V, where the servo has it
+    has_kt_load  True where `kt_load` is given by the deck or by the user, and is no default
     """
 
     values: Mapping[str, float]
-    said: bool
+    has_kt_load: bool
 
 
 def sheet_of(experiment: Experiment, joint: str, kt_load: float | None) -> DataSheet:
@@ -116,7 +116,7 @@ def identify_and_tell(
     records = deck.with_suffix(".records")
     _check_output(deck, records)
     _check_sheet(sheet, which.joint)
-    if which.simulated is None and not sheet.said:
+    if which.simulated is None and not sheet.has_kt_load:
         message = f"joint `{which.joint}`: the load motor's constant, by which torques are measured, is nowhere said"
         helps = "`--kt-load '0.072 N*m/A'`, from its data sheet; or `bed = emulated(kt_load = ..., ...)` in the deck"
         raise Problem(error("E424", message, help=helps))
@@ -199,15 +199,15 @@ def widened(parameters: Mapping[str, Estimate], kt_load_error: float) -> dict[st
     95 % interval, as a share"""
     from hw.identify.fit import Estimate
 
-    if parameters["kt_load"].found or not kt_load_error:
+    if parameters["kt_load"].is_fitted or not kt_load_error:
         return dict(parameters)
     out = {}
     for name, estimate in parameters.items():
         half = math.log(estimate.high / estimate.value)
-        if (estimate.found and name in MEASURED_BY) or name == "kt_load":
+        if (estimate.is_fitted and name in MEASURED_BY) or name == "kt_load":
             half = math.hypot(half, math.log1p(kt_load_error))
         out[name] = Estimate(
-            estimate.value, estimate.value * math.exp(-half), estimate.value * math.exp(half), estimate.found
+            estimate.value, estimate.value * math.exp(-half), estimate.value * math.exp(half), estimate.is_fitted
         )
     return out
 
@@ -219,7 +219,7 @@ def table_lines(fit: FitResult, estimates: Mapping[str, Estimate], sheet: DataSh
         estimate, believed = estimates[name], sheet.values[name]
         share = f"{100.0 * math.log(estimate.high / estimate.value):.2g} %"
         off = "given"
-        if estimate.found:
+        if estimate.is_fitted:
             off = f"{math.log(estimate.value / believed) / math.log(estimate.high / estimate.value):+.3g}"
         interval = (
             f"{digits(estimate, estimate.low)} to {digits(estimate, estimate.high)}"
@@ -249,7 +249,7 @@ def table_lines(fit: FitResult, estimates: Mapping[str, Estimate], sheet: DataSh
 
 def reasons(fit: FitResult) -> list[str]:
     """The reasons, in words, why parameters were not found."""
-    missing = [name for name, estimate in fit.parameters.items() if not estimate.found]
+    missing = [name for name, estimate in fit.parameters.items() if not estimate.is_fitted]
     out = []
     if "kt_load" in missing:
         out.append(
@@ -279,7 +279,7 @@ def origin_of(about: About, ended: Mapping[str, Any], estimates: Mapping[str, Es
     """The comment at the head of the deck about the source of its numbers."""
     reference = (
         "drive current as the bed measures it"
-        if estimates["kt_load"].found
+        if estimates["kt_load"].is_fitted
         else (f"the load motor's {digits(estimates['kt_load'], estimates['kt_load'].value)} N m/A, which was given")
     )
     return [
@@ -334,7 +334,7 @@ def included(
             if estimate.high > estimate.low
             else ""
         )
-        if not estimate.found:
+        if not estimate.is_fitted:
             remark = f"given, not found; {remark}".removesuffix("; ")
         assigned = f"{digits(estimate, estimate.value)} {unit};"
         lines.append(f"let {head}_{name:<{wide}} = {assigned:<26} // {remark}")
@@ -389,7 +389,7 @@ def as_data(
                 "value": estimate.value,
                 "low": estimate.low,
                 "high": estimate.high,
-                "found": estimate.found,
+                "found": estimate.is_fitted,
                 "unit": UNITS[name],
                 "data_sheet": sheet.values[name],
             }

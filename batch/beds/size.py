@@ -103,7 +103,7 @@ def as_data(size: BedSize) -> dict[str, Any]:
         "limited": figures.limited,
         "at_largest_torque": figures.at_most,
         **{
-            role: {"figures": _figures(motor.found, size.margin), "curve": _curve(motor)}
+            role: {"figures": _figures(motor.extremes, size.margin), "curve": _curve(motor)}
             for role, motor in (("drive", figures.drive), ("load", figures.load))
         },
         "both": _figures(figures.both, size.margin),
@@ -143,11 +143,11 @@ def _verdict_as_data(verdict: PartVerdict) -> dict[str, Any]:
             {
                 "what": check.what,
                 "unit": check.unit,
-                "asked": check.asked,
+                "asked": check.required,
                 "has": check.has,
                 "share": check.share,
-                "case": check.at.case,
-                **({} if check.at.time is None else {"time": check.at.time}),
+                "case": check.extreme.case,
+                **({} if check.extreme.time is None else {"time": check.extreme.time}),
             }
             for check in verdict.checks
         ],

@@ -40,7 +40,7 @@ def size_lines(size: BedSize, *, named: bool, curves: bool = False) -> Iterator[
     for role, motor in zip(ROLES, (figures.drive, figures.load), strict=True):
         yield ""
         rows = [[f"{role} motor", "at most", f"order, x {size.margin:g}", "where"]]
-        for name, extreme in motor.found.items():
+        for name, extreme in motor.extremes.items():
             least = size.margin * extreme.value
             also = f" = {_digits(RPM * least)} rpm" if name == "rate" else ""
             unit = UNITS[name]
@@ -114,11 +114,11 @@ def _named(size: BedSize, several: bool) -> Iterator[str]:
         rows = [
             [
                 check.what,
-                _with(check.asked, check.unit),
+                _with(check.required, check.unit),
                 "of",
                 _with(check.has, check.unit),
                 f"{100.0 * check.share:.0f} %",
-                _in(check.at, several).removeprefix(", "),
+                _in(check.extreme, several).removeprefix(", "),
             ]
             for check in sorted(verdict.checks, key=lambda check: -check.share)
         ]
@@ -169,7 +169,7 @@ def _share(verdict: PartVerdict) -> float:
 
 def _check(check: PartCheck) -> str:
     """One check in words: `torque, peak: 0.3 of 1.1 N*m, 27 %`."""
-    return f"{check.what}: {_digits(check.asked)} of {_with(check.has, check.unit)}, {100.0 * check.share:.0f} %"
+    return f"{check.what}: {_digits(check.required)} of {_with(check.has, check.unit)}, {100.0 * check.share:.0f} %"
 
 
 def _where(name: str, extreme: Extreme, several: bool) -> str:

@@ -58,7 +58,7 @@ class Largest:
     """The largest values so far, by name, updated block by block."""
 
     def __init__(self) -> None:
-        self.found: dict[str, Extreme] = {}
+        self.extremes: dict[str, Extreme] = {}
 
     def of_cases(self, name: str, values: np.ndarray, work: ShaftWork) -> None:
         """Take the values of cases. values: [case]"""
@@ -79,8 +79,10 @@ class Largest:
         self._keep(name, Extreme(most, int(work.case[row]), *instant))
 
     def _keep(self, name: str, extreme: Extreme) -> None:
-        if name not in self.found or extreme.value > self.found[name].value + ROUNDING * abs(self.found[name].value):
-            self.found[name] = extreme
+        if name not in self.extremes or extreme.value > self.extremes[name].value + ROUNDING * abs(
+            self.extremes[name].value
+        ):
+            self.extremes[name] = extreme
 
 
 def _operating_point(work: ShaftWork, torque: np.ndarray, row: int, k: int) -> tuple[float, float, float]:
@@ -128,9 +130,9 @@ class MotorFigures:
         self._corners = {"driving": np.zeros((0, 2)), "braking": np.zeros((0, 2))}
 
     @property
-    def found(self) -> dict[str, Extreme]:
+    def extremes(self) -> dict[str, Extreme]:
         """The known figures by the names of `UNITS`."""
-        return {name: self.largest.found[name] for name in UNITS if name in self.largest.found}
+        return {name: self.largest.extremes[name] for name in UNITS if name in self.largest.extremes}
 
     def see(
         self, work: ShaftWork, torque: np.ndarray, kt: np.ndarray | None = None, voltage: np.ndarray | None = None
@@ -262,8 +264,8 @@ def gather(blocks: Iterable[ShaftWork], candidates: Sequence[Candidate] = ()) ->
         cases, instants = cases + len(work.case), len(work.time)
         failed, limited = failed + int(work.failed.sum()), limited + int((work.limited > 0).sum())
         at_most += int((np.abs(work.drive) >= work.strongest[:, None]).any(1).sum())
-    figures = rest.found
-    if "arm+" not in figures or "torque_peak" not in drive.found:
+    figures = rest.extremes
+    if "arm+" not in figures or "torque_peak" not in drive.extremes:
         return None
 
     def least_and_most(name: str) -> tuple[Extreme, Extreme]:
@@ -300,18 +302,18 @@ CHECKS = (
 
 @frozen
 class PartCheck:
-    """One figure of a part against the required one, margin included, SI. at: where that occurs"""
+    """One figure of a part against the required one, margin included, SI. extreme: where that occurs"""
 
     what: str
     unit: str
-    asked: float
+    required: float
     has: float
-    at: Extreme
+    extreme: Extreme
 
     @property
     def share(self) -> float:
         """The required share of the part's figure; above 1 it does not fit."""
-        return self.asked / self.has
+        return self.required / self.has
 
 
 @frozen
@@ -338,7 +340,7 @@ class PartVerdict:
 
 def judge_part(candidate: Candidate, margin: float) -> PartVerdict:
     """Compare a part with its required figures times the margin."""
-    figures, part, checks = candidate.figures.found, candidate.part, []
+    figures, part, checks = candidate.figures.extremes, candidate.part, []
     for what, name, own in CHECKS:
         has = part.figure(own)
         if has is not None and name in figures:

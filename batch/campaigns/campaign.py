@@ -52,20 +52,21 @@ class Wires:
 class CampaignPart:
     """The cases of one experiment that are run.
 
-    rows    of its case table, rising
-    kept    places in `rows` of the cases whose histories are kept whatever comes of them
-    later   how many more may be chosen when all are done, at most
-    single  whether histories are kept as numbers of four bytes
-    wires   whether its beds are real ones, and how late these are (met.program.build.build); None: they are emulated
-    stops_early  whether its cases are run only until what is required of them is decided; then `rows` are the most
-    written  the number of cases that have a row in the archive, about; None: all
-    searches  whether what its cases give decides which ones are run next; then `rows` are the first generation
-    keeps_best  whether of a search the history of its answer is kept
+    rows            of its case table, rising
+    history_places  places in `rows` of the cases whose histories are kept whatever comes of them
+    later           how many more may be chosen when all are done, at most
+    single          whether histories are kept as numbers of four bytes
+    wires           whether its beds are real ones, and how late these are (met.program.build.build); None: they are
+                    emulated
+    stops_early     whether its cases are run only until what is required of them is decided; then `rows` are the most
+    written         the number of cases that have a row in the archive, about; None: all
+    searches        whether what its cases give decides which ones are run next; then `rows` are the first generation
+    keeps_best      whether of a search the history of its answer is kept
     """
 
     experiment: Experiment
     rows: CaseValues
-    kept: np.ndarray
+    history_places: np.ndarray
     later: int = 0
     single: bool = False
     wires: Wires | None = None
@@ -94,11 +95,13 @@ class CampaignPart:
     @property
     def recorded(self) -> int:
         """The number of cases whose histories are kept, at most."""
-        return self.most if self.all_recorded else min(self.most, len(self.kept) + self.later + self.keeps_best)
+        return (
+            self.most if self.all_recorded else min(self.most, len(self.history_places) + self.later + self.keeps_best)
+        )
 
     @property
     def all_recorded(self) -> bool:
-        return 0 < len(self.rows) == len(self.kept)
+        return 0 < len(self.rows) == len(self.history_places)
 
     @property
     def bytes(self) -> int:
@@ -135,7 +138,7 @@ class Campaign:
         return sum(part.most for part in self.parts)
 
     @property
-    def asked(self) -> list[str]:
+    def run_names(self) -> list[str]:
         """The runs and sweeps, by the names by which they were asked for, each once."""
         return list(dict.fromkeys(part.experiment.name_in_deck for part in self.parts))
 
@@ -178,18 +181,18 @@ def prepare(
 ) -> Campaign:
     """Determine the cases to run, without writing anything; raises Problem for anything that would stop the run later.
 
-    output       None: `default_output`, in the current folder
-    experiments  names; None: all of the plan's
-    cases        positions in the case table, `7` or `"#7"`, or the beginning of a case_id; None: all
-    histories    what to keep (batch/campaigns/keep.py), one word or several
-    float32      keep histories as numbers of four bytes
-    selected     experiments with rows of their case tables, in place of `experiments` and `cases`
+    output        None: `default_output`, in the current folder
+    experiments   names; None: all of the plan's
+    cases         positions in the case table, `7` or `"#7"`, or the beginning of a case_id; None: all
+    histories     what to keep (batch/campaigns/keep.py), one word or several
+    float32       keep histories as numbers of four bytes
+    selected      experiments with rows of their case tables, in place of `experiments` and `cases`
     history_rows  rows whose histories are kept, by the experiment's name, in place of `histories`
-    wires        where it is run on real beds: then nothing is verified
-    verify       which cases are run again with shorter steps: "none", "some", "all", or "auto": some where it is cheap
-    decided      experiments, by name, whose rows in `selected` are those after which it was decided what is required
-    rows         of which cases the archive has rows: "all", or a "summary" and the rows that it names, "worst:N:METRIC"
-                 and the worst besides (batch/campaigns/keep.py)
+    wires         where it is run on real beds: then nothing is verified
+    verify        which cases are run again with shorter steps: "none", "some", "all", or "auto": some where it is cheap
+    decided       experiments, by name, whose rows in `selected` are those after which it was decided what is required
+    rows          of which cases the archive has rows: "all", or a "summary" and the rows that it names,
+                  "worst:N:METRIC" and the worst besides (batch/campaigns/keep.py)
     """
     if verify not in VERIFY_WORDS:
         raise ValueError(f"verify is one of {', '.join(VERIFY_WORDS)}, and not {verify!r}")
@@ -212,7 +215,9 @@ def prepare(
     if not chosen_rows.all:
         parts = tuple(_summarised(part, chosen_rows) for part in parts)
     if history_rows is not None:
-        parts = tuple(replace(part, kept=places_among(part.rows, history_rows[part.experiment.name])) for part in parts)
+        parts = tuple(
+            replace(part, history_places=places_among(part.rows, history_rows[part.experiment.name])) for part in parts
+        )
     notes: list[str] = []
     whole = sum(part.bytes for part in parts)
     if wanted.default and whole > KEPT_BYTES:
@@ -295,7 +300,7 @@ def _parts(
         part = replace(part, stops_early=experiment.cases.until_shown > 0 and whole)
         if experiment.search is not None and not experiment.search.complete and whole:
             part = replace(part, searches=True, keeps_best=wanted.default and experiment.structure.history_bytes > 0)
-            part = replace(part, kept=part.kept[:0] if wanted.default else part.kept)
+            part = replace(part, history_places=part.history_places[:0] if wanted.default else part.history_places)
         parts.append(part)
     return tuple(parts)
 
@@ -318,7 +323,7 @@ def histories_section(
     part = campaign.parts[values.experiment]
     if values.recorded or not part.experiment.structure.history_bytes:
         return None
-    history_places = part.kept
+    history_places = part.history_places
     if campaign.keep.later:
         history_places = distinct(
             np.concatenate([history_places, kept_by_outcome(campaign.keep, part.experiment, results())])
@@ -342,11 +347,11 @@ def with_known_rows(
     parts, notes = [], []
     for part, section in zip(campaign.parts, sections, strict=True):
         experiment = section.prepared.experiment
-        wanted = section.rows if part.searches and part.all_recorded else part.rows[part.kept]
+        wanted = section.rows if part.searches and part.all_recorded else part.rows[part.history_places]
         if part.keeps_best:
             wanted = np.concatenate([wanted, best[section.number]])
         known_places = np.flatnonzero(np.isin(section.rows, wanted))
-        parts.append(replace(part, experiment=experiment, rows=section.rows, kept=known_places))
+        parts.append(replace(part, experiment=experiment, rows=section.rows, history_places=known_places))
         for _, named in choosing.select_rows([experiment], campaign.keep.cases) if part.stops_early else ():
             for case in experiment.cases.table[named[~np.isin(named, section.rows)]].tolist():
                 notes.append(f"no history of case #{case} is kept: what is required was decided without it")

@@ -59,10 +59,10 @@ class Count:
 class Driver:
     """Drives the sections of a campaign, one after the other. Whoever made the executor closes it.
 
-    counts   what is done, by section
-    told     what is to be told of shards that did not count
-    more     what else is told of how far it is
-    sections of the first pass, whose failures count: those after them run the same cases again
+    counts    what is done, by section
+    messages  what is to be told of shards that did not count
+    more      what else is told of how far it is
+    sections  of the first pass, whose failures count: those after them run the same cases again
     """
 
     folder: Folder
@@ -71,14 +71,14 @@ class Driver:
     max_failures: int | None = None
     sections: int | None = None
     counts: dict[int, Count] = field(default_factory=dict)
-    told: list[str] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
     more: str = ""
-    _at: int | None = None
+    _section_number: int | None = None
 
     def find(self, section: CampaignSection) -> list[tuple[int, int]]:
         """Count the finished cases of a section; returns the missing stretches."""
         sound, messages = self.folder.sound_tasks(section)
-        self.told += messages
+        self.messages += messages
         missing = uncovered(sound, len(section.rows))
         count = self.counts[section.number] = Count(len(section.rows) - sum(last - first for first, last in missing))
         for done in sound.values():
@@ -100,9 +100,9 @@ class Driver:
         if self.progress is not None:
             count = self.counts[section.number]
             self.progress.begin(section.name, cases, count.done, count.failed, self.executor.about)
-        self._at = section.number
+        self._section_number = section.number
         yield
-        self._at, self.more = None, ""
+        self._section_number, self.more = None, ""
         if self.progress is not None:
             self.progress.end()
 
@@ -115,8 +115,8 @@ class Driver:
 
     def tell(self) -> None:
         """Report the progress of the running section."""
-        if self.progress is not None and self._at is not None:
-            count = self.counts[self._at]
+        if self.progress is not None and self._section_number is not None:
+            count = self.counts[self._section_number]
             self.progress.advance(count.done + self.executor.under_way, count.failed, self.more)
 
     def check(self) -> None:

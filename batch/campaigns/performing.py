@@ -151,7 +151,7 @@ class _CampaignWork:
     """A campaign on its way, in its folder.
 
     whole   the campaign with the cases that it has in the end: less those that are dropped (`until_shown`), with those
-            that were searched;  values, kept: its sections, as they were begun and with these cases
+            that were searched;  values, final_sections: its sections, as they were begun and with these cases
     """
 
     def __init__(
@@ -167,7 +167,7 @@ class _CampaignWork:
     ) -> None:
         self.campaign, self.folder, self.key, self.say, self.more = campaign, folder, key, say, more
         self.sections = {section.number: section for section in values}
-        self.values = self.kept = values
+        self.values = self.final_sections = values
         self.whole = campaign
         self.notes: list[str] = []
         self.warned: dict[object, Diagnostic] = {}
@@ -266,7 +266,7 @@ class _CampaignWork:
         """Go on with the final cases: those up to these stops, and those of these searches, by section."""
         if not stops and not searches:
             return
-        self.kept = [
+        self.final_sections = [
             without_dropped(self.folder, value, stops[value.number], 2 * len(self.values) + value.number)
             if value.number in stops
             else searches[value.number].section
@@ -274,12 +274,12 @@ class _CampaignWork:
             else value
             for value in self.values
         ]
-        self.kept = [
+        self.final_sections = [
             now if section.number in stops or section.number in searches else section
-            for section, now in zip(self.kept, instants.with_memories(self.kept), strict=True)
+            for section, now in zip(self.final_sections, instants.with_memories(self.final_sections), strict=True)
         ]
         best = {number: [search.answer.case] for number, search in searches.items()}
-        self.whole, notes = with_known_rows(self.campaign, self.kept, best)
+        self.whole, notes = with_known_rows(self.campaign, self.final_sections, best)
         for note in notes:
             self._note(note)
 
@@ -302,12 +302,12 @@ class _CampaignWork:
             number = 2 * len(self.values) + section.number
             sections.append(merge.with_rows(self.folder, section, summarised.places, number))
             parts.append(replace(part, rows=sections[-1].rows))
-        self.kept, self.whole = sections, replace(self.campaign, parts=tuple(parts))
+        self.final_sections, self.whole = sections, replace(self.campaign, parts=tuple(parts))
 
     def _histories(self, driver: Driver) -> dict[int, CampaignSection]:
         """Run the second pass; its sections by experiment."""
         sections_again = {}
-        for section in self.kept:
+        for section in self.final_sections:
             histories = histories_section(self.whole, section, partial(self._results, section))
             if histories is not None:
                 self.sections[histories.number] = sections_again[section.experiment] = histories
@@ -332,8 +332,8 @@ class _CampaignWork:
         from batch.archive.write import ArchivePart, ArchiveWriter
 
         parts = []
-        for part, values in zip(self.whole.parts, self.kept, strict=True):
-            history_places = part.kept
+        for part, values in zip(self.whole.parts, self.final_sections, strict=True):
+            history_places = part.history_places
             if values.experiment in histories:
                 rows = np.asarray(histories[values.experiment].rows)
                 lost = merge.without_history(self.folder, values, histories[values.experiment])
@@ -358,7 +358,7 @@ class _CampaignWork:
         temporary = temporary_of(self.campaign.output)
         writer = ArchiveWriter(temporary, self.whole.plan, parts)
         try:
-            for number, section in enumerate(self.kept):
+            for number, section in enumerate(self.final_sections):
                 self.reporter.begin(f"{section.name}, merging", len(section.rows), 0, 0, "")
                 outcomes = merge.merge(
                     writer,
@@ -374,7 +374,7 @@ class _CampaignWork:
                 if number in self.summaries:
                     outcomes, whole = self.summaries[number].outcomes, self.values[number]
                     writer.put_summary(number, self.summaries[number].summary)
-                self.counted[section.name] = outcomes.counted(len(parts[number].kept))
+                self.counted[section.name] = outcomes.counted(len(parts[number].history_places))
                 self._verify(writer, number, whole, outcomes)
                 for step_warning in instants.step_warnings(whole, outcomes, self._threads):
                     self.warned.setdefault((step_warning.code, step_warning.at), step_warning)
@@ -440,15 +440,15 @@ class _CampaignWork:
                     6,
                 ),
             }
-            for number, section in enumerate(self.kept)
+            for number, section in enumerate(self.final_sections)
         ]
 
     def _tell_found(self, *, first: bool) -> None:
         driver = self.driver
         assert driver is not None
-        for text in driver.told:
+        for text in driver.messages:
             self._note(text)
-        driver.told.clear()
+        driver.messages.clear()
         done = sum(count.done for count in driver.counts.values())
         if first and done:
             self._note(f"goes on: {self._of_all(done)} are done")

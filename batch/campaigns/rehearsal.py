@@ -44,8 +44,8 @@ FRAME = re.compile(r'^  File "(?P<file>.+)", line (?P<line>\d+) in (?P<name>.+)$
 def rehearse(timeout: float | None, **question: Any) -> None:
     """Have all models of a deck or plan recorded in another process. Raises Problem E217 where that does not end well.
 
-    timeout  s of a case without any progress; None: it may take for ever
-    question as `batch.campaigns.plans.read_plan` takes it
+    timeout   s of a case without any progress; None: it may take for ever
+    question  as `batch.campaigns.plans.read_plan` takes it
     """
     if all(point.package == PACKAGE for group in models.GROUPS.values() for point in offered(group.entry_points)):
         return

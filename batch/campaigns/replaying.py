@@ -25,15 +25,15 @@ MOST_TOLD = 8
 
 @frozen
 class Replay:
-    """The cases of an archive that are run again: its plan, and of each experiment the rows of the case table; `kept`,
-    by name: those whose histories the archive has, where all of it is run again; `decided`: names of the experiments
-    of which these rows are those after which it was decided what is required."""
+    """The cases of an archive that are run again: its plan, and of each experiment the rows of the case table;
+    `history_rows`, by name: those whose histories the archive has, where all of it is run again; `decided`: names of
+    the experiments of which these rows are those after which it was decided what is required."""
 
     archive: Path
     plan: Plan
     selected: tuple[tuple[Experiment, np.ndarray], ...]
     word: str
-    kept: Mapping[str, np.ndarray] | None = None
+    history_rows: Mapping[str, np.ndarray] | None = None
     decided: tuple[str, ...] = ()
 
     @property

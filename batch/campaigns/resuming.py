@@ -269,7 +269,7 @@ def _asked_sum(campaign: Campaign) -> str:
     for part in campaign.parts:
         for piece in blocks(len(part.rows)):
             summed.update(np.asarray(part.rows[piece]).tobytes())
-        summed.update(b"kept" + part.kept.tobytes())
+        summed.update(b"kept" + part.history_places.tobytes())
     return summed.hexdigest()
 
 

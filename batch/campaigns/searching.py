@@ -219,7 +219,7 @@ def _held(
             shards.append((task, driver.folder.read(section, task)))
         except (shard.UnsoundShard, OSError) as reason:
             why = str(reason) if isinstance(reason, shard.UnsoundShard) else f"cannot be read: {reason.strerror}"
-            driver.told.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
+            driver.messages.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
             driver.folder.remove_shard(task)
     end, new_shards = first, list[tuple[Task, shard.Shard]]()
     for task, held_shard in shards:

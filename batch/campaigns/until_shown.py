@@ -83,7 +83,7 @@ class StoppingPoints:
             self._known[task.first : task.last] = True
         self._stops = [self._stop(places) for places in self._places]
 
-    def kept(self) -> np.ndarray:
+    def places_up_to_stops(self) -> np.ndarray:
         """Places in the section of the cases up to each design point's stop, ascending."""
         parts = [places[:stop] for places, stop in zip(self._places, self._stops, strict=True)]
         return np.sort(np.concatenate(parts))
@@ -166,5 +166,5 @@ def run_until_shown(driver: Driver, section: CampaignSection, points: StoppingPo
 
 def without_dropped(folder: Folder, section: CampaignSection, points: StoppingPoints, number: int) -> CampaignSection:
     """The section without dropped cases, with shards of its own under this number. Raises Missing."""
-    places = points.kept()
+    places = points.places_up_to_stops()
     return section if len(places) == len(section.rows) else with_rows(folder, section, places, number)

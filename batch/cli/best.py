@@ -127,7 +127,7 @@ def best(
                 raise Problem(error("E395", message, help="a `tune` chooses values that are"))
             deck = None
             if (diff or write) and searched.ok:
-                deck = chosen_deck(file, searched.values, output, experiment=searched.name, among=searched.of)
+                deck = chosen_deck(file, searched.values, output, experiment=searched.name, among=searched.among)
             tell(form, finite(searched.data), searched.lines, deck, requested=diff or write, write=write)
             return YES if searched.ok else NO
         designs = Designs(pool, over, choose)

@@ -130,15 +130,15 @@ def fit(
         if diff or write:
             if len(chosen) != 1:
                 raise click.UsageError("--identifiable writes the best motion of one sweep: `--motion SWEEP`")
-            name = chosen[0].motion.given.name
+            name = chosen[0].motion.deck_run.name
             changed = fitted_deck(deck, shown.written_motion(chosen[0]), output, experiment=name, **how_read)
-            if logged := {run.given.name for run in question.runs} & {name, *changed.others}:
+            if logged := {run.deck_run.name for run in question.runs} & {name, *changed.others}:
                 message = f"with this motion, `{min(logged)}` is no longer the run of its log"
                 raise Problem(error("E480", message, help=f"give `{name}` servos of its own"))
         data = shown.identifiable_data(question, known, promised)
         tell(form, data, shown.identifiable_lines(question, known, promised), changed, requested=False, write=write)
         return YES if set(known.verdict) == {"known"} else NO
-    bar.begin(f"fit of {question.runs[0].given.name}", 0)
+    bar.begin(f"fit of {question.runs[0].deck_run.name}", 0)
     answer = question.answer(bar.advance)
     bar.end()
     certain = shown.is_certain(question, answer)
@@ -150,7 +150,7 @@ def fit(
         if diff or write:
             values = shown.written_values(question, answer)
             try:
-                changed = fitted_deck(deck, values, output, experiment=question.runs[0].given.name, **how_read)
+                changed = fitted_deck(deck, values, output, experiment=question.runs[0].deck_run.name, **how_read)
             except Problem:
                 tell(form, data, lines, None, requested=False, write=False)  # the numbers are not lost with the deck
                 raise

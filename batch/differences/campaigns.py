@@ -301,7 +301,7 @@ def _metric(
     if out.why:
         return out
     out.deck_scale, out.deck_unit = deck_unit(b.variables[name])
-    out.said = allowed.said({"": name})
+    out.as_written = allowed.as_written({"": name})
     values_a, values_b = a.values(name)[matched.a], b.values(name)[matched.b]
     finite = values_a[np.isfinite(values_a)]
     if len(finite):
@@ -418,7 +418,7 @@ def _signals(
             out.deck_scale, out.deck_unit = deck_unit(b.variables[name])
             joints = tuple(a.joints(a.variables[name]))
             out.by_joint = _by_joint(a, a.variables[name], allowed)
-            out.said = allowed.said({"": name, **dict(zip(joints, joint_parts(name, joints), strict=True))})
+            out.as_written = allowed.as_written({"": name, **dict(zip(joints, joint_parts(name, joints), strict=True))})
             absolute = _absolute(a, a.variables[name], out)
             together = max(1, BLOCK // (len(labels) * max(len(time_a), len(time_b))))
             for first in range(0, len(places), together):

@@ -74,9 +74,11 @@ def _compare_step_errors(a: ArchiveGroup, b: ArchiveGroup, out: ExperimentDiff) 
         verdict, other = before.get(text), now.get(text)
         if verdict is not None and other is not None:
             if verdict.word != other.word:
-                out.notes.append(f"require {text} was {verdict.word} ({verdict.said}), now {other.word} ({other.said})")
+                out.notes.append(
+                    f"require {text} was {verdict.word} ({verdict.reason}), now {other.word} ({other.reason})"
+                )
         elif only := verdict or other:
-            note = f"require {text} is only in {(b if verdict is None else a).path}, {only.word} ({only.said})"
+            note = f"require {text} is only in {(b if verdict is None else a).path}, {only.word} ({only.reason})"
             out.notes.append(note)
             out.required_in_one.append(note)
 

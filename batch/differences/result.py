@@ -32,19 +32,19 @@ class DiffPlace:
 class SignalDiff:
     """One signal, or metric, over all matched cases.
 
-    verdict      of compare.VERDICTS;  why: of what is incomparable
-    by_joint     what is allowed of single joints, in the stead of tolerance.absolute
-    said         the same and tolerance.absolute as they were written: by joint, "" for the whole
-    deck_unit    in which people read it, typeset; shown = SI value / deck_scale
-    compared     cases that both have;  identical, equivalent, different: of these
-    largest      the largest |b - a|, of what is beyond its tolerance where anything is;  place: where they differ most
-    rms          of all finite differences;  span: of the values of a
-    first        s, the earliest time of a difference, in whichever case; first_beyond: by more than is allowed
-    used         the largest share of the tolerance that was needed
-    nan          values that are not-a-number in one archive alone
-    higher       of a metric, cases in which b has the larger value;  lower: the smaller
-    chance       the probability of pairs as one-sided by chance, corrected; not a number where it was not tested
-    by_step      of a metric, the sum of both archives' errors by the step; not a number where neither was verified
+    verdict     of compare.VERDICTS;  why: of what is incomparable
+    by_joint    what is allowed of single joints, in the stead of tolerance.absolute
+    as_written  the same and tolerance.absolute as they were written: by joint, "" for the whole
+    deck_unit   in which people read it, typeset; shown = SI value / deck_scale
+    compared    cases that both have;  identical, equivalent, different: of these
+    largest     the largest |b - a|, of what is beyond its tolerance where anything is;  place: where they differ most
+    rms         of all finite differences;  span: of the values of a
+    first       s, the earliest time of a difference, in whichever case; first_beyond: by more than is allowed
+    used        the largest share of the tolerance that was needed
+    nan         values that are not-a-number in one archive alone
+    higher      of a metric, cases in which b has the larger value;  lower: the smaller
+    chance      the probability of pairs as one-sided by chance, corrected; not a number where it was not tested
+    by_step     of a metric, the sum of both archives' errors by the step; not a number where neither was verified
     """
 
     name: str
@@ -52,7 +52,7 @@ class SignalDiff:
     metric: bool
     tolerance: SignalTolerance
     by_joint: dict[str, float] = field(default_factory=dict)
-    said: dict[str, str] = field(default_factory=dict)
+    as_written: dict[str, str] = field(default_factory=dict)
     deck_unit: str = ""
     deck_scale: float = 1.0
     compared: int = 0

@@ -126,7 +126,7 @@ def _ended(experiment: ExperimentDiff, cut: Shortening) -> Iterator[str]:
     """Cases that end otherwise, in kinds."""
     for ending in words.endings(experiment):
         yield f"  {ending.text}: {ending.cases}"
-        cases = [f"    #{case.case} {case.case_id[:8]}  {words.cause(case)}" for case in ending.each]
+        cases = [f"    #{case.case} {case.case_id[:8]}  {words.cause(case)}" for case in ending.case_endings]
         yield from cut.cut(cases, SHOWN_ENDED, "    ")
 
 

@@ -33,7 +33,7 @@ class SignalTolerance:
     time: float = 0.0
 
     @property
-    def given(self) -> bool:
+    def allows_any(self) -> bool:
         return bool(self.absolute or self.relative or self.time)
 
 
@@ -51,7 +51,7 @@ class Tolerances:
     alone: bool = False
 
     @property
-    def given(self) -> bool:
+    def allow_any(self) -> bool:
         return bool(self.relative or self.time or any(size for size, _ in self.absolute.values()))
 
     def of(self, name: str) -> SignalTolerance:
@@ -75,7 +75,7 @@ class Tolerances:
         }
         return replace(self, absolute=fit)
 
-    def said(self, names: Mapping[str, str]) -> dict[str, str]:
+    def as_written(self, names: Mapping[str, str]) -> dict[str, str]:
         """Tolerances as they were written, under the names that `names` gives them."""
         return {called: self.absolute[name][1] for called, name in names.items() if name in self.absolute}
 

@@ -166,7 +166,7 @@ class Ending:
 
     text: str
     cases: str
-    each: tuple[EndingDiff, ...]
+    case_endings: tuple[EndingDiff, ...]
 
 
 def endings(experiment: ExperimentDiff) -> list[Ending]:
@@ -323,8 +323,8 @@ def step_error_note(experiment: ExperimentDiff) -> str:
 
 def _tolerance(signal: SignalDiff) -> str:
     tolerance = signal.tolerance
-    words = [f"{joint} {text}".lstrip() for joint, text in signal.said.items()]
-    if len(words) > 1 or any(signal.said):
+    words = [f"{joint} {text}".lstrip() for joint, text in signal.as_written.items()]
+    if len(words) > 1 or any(signal.as_written):
         words = [f"({', '.join(words)})"]
     if tolerance.relative:
         words.append(f"rel {tolerance.relative:g}")
@@ -488,7 +488,7 @@ def _of_values(difference: Diff) -> str:
     lost = sum(signal.verdict == INCOMPARABLE for signal in signals)
     if of_values == INCOMPARABLE and lost < len(signals):
         return f"incomparable: {lost} of {len(signals)} signals and metrics; no other is different"
-    has_tolerances = any(experiment.tolerances.given for experiment in difference.experiments)
+    has_tolerances = any(experiment.tolerances.allow_any for experiment in difference.experiments)
     of_size = of_values == EQUIVALENT or any(signal.different for signal in signals)
     if of_values == DIFFERENT and (others := _beyond_any_tolerance(difference)):
         text += f": {'; '.join([*others, *(['values differ'] if of_size else [])])}"

@@ -65,7 +65,7 @@ def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, dec
     """Write the cases' histories and return the number of rows. deck: varied parameters in the deck's units. Raises
     Problem E305."""
     columns, groups = all_columns(cases), list({case.group.name: case.group for case in cases}.values())
-    runs = dict.fromkeys(case.asked for case in cases)
+    runs = dict.fromkeys(case.run_name for case in cases)
     fields = [of_varied(variable, deck=deck) for variable in varied(groups)]
     numbered = len(cases) > 1 or bool(fields)
     heads = [*([("run", "")] if len(runs) > 1 else []), *([("case", "1")] if numbered else [])]
@@ -74,7 +74,7 @@ def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, dec
     with whole(output) as sink:
         sink.write(memoryview(_head(file, runs, heads)))
         for case in cases:
-            begin: list[object] = [case.asked] if len(runs) > 1 else []
+            begin: list[object] = [case.run_name] if len(runs) > 1 else []
             begin += [case.number] if numbered else []
             begin += [value_of(field, case.group, case.position) for field in fields]
             cells = [number_texts(case.time), *_cells(case, columns)]

@@ -26,7 +26,7 @@ def check(campaign: Campaign, target: Path, *, histories: bool) -> None:
     """Refuse, before anything runs, a campaign that could not be exported. histories: True where they were asked for.
     Raises Problem E305, E323, E370-E376."""
     writer = find(str(format_of(target)))
-    recorded = sum(len(part.kept) for part in campaign.parts)
+    recorded = sum(len(part.history_places) for part in campaign.parts)
     writer.check_request(ExportRequest("histories" if histories else None), target)
     takes_histories = "metrics" not in writer.tables or ("histories" in writer.tables and campaign.cases == 1)
     if not recorded and not campaign.keep.later and (takes_histories or histories):
@@ -41,11 +41,11 @@ def check(campaign: Campaign, target: Path, *, histories: bool) -> None:
 
 def export_command(campaign: Campaign, target: Path, *, histories: bool) -> str:
     """The command that makes the export of an archive that is whole."""
-    runs = campaign.asked
+    runs = campaign.run_names
     named = "".join(f" --run {quoted(name)}" for name in runs) if len(runs) > 1 else ""
     return f"met export {quoted(campaign.output)}{named}{' --histories' * histories} -o {quoted(target)}"
 
 
 def export_run(campaign: Campaign, target: Path, *, histories: bool) -> Exported:
     """Export everything that was run. Raises Problem."""
-    return export(campaign.output, target, runs=campaign.asked, table="histories" if histories else None)
+    return export(campaign.output, target, runs=campaign.run_names, table="histories" if histories else None)

@@ -66,17 +66,17 @@ def arms(file: ArchiveFile, cases: Sequence[ExportedCase], *, named: bool) -> li
     for case in cases:
         end = max(case.time, default=0.0)
         if end * SECOND >= LONGEST:
-            message = f"`{case.asked}` ends at {end:g} s: times of an MCAP file are below {LONGEST / SECOND:.3g} s"
+            message = f"`{case.run_name}` ends at {end:g} s: times of an MCAP file are below {LONGEST / SECOND:.3g} s"
             raise Problem(error("E376", message, help="`-o FILE.csv` has times of any length"))
     if len(cases) > OVERLAID and not named:
         helps = (
             f"`--case '#{cases[0].number}' --case '#{cases[1].number}'` shows these over one another",
             f"`met show {quoted(file.path)}` lists the cases, the worst first",
         )
-        raise Problem(too_many(len(cases), cases[0].asked, helps))
+        raise Problem(too_many(len(cases), cases[0].run_name, helps))
     plan = file.plan(as_written=True)
-    one_run = len({case.asked for case in cases}) == 1
-    prefixes = [f"case{case.number}/" if one_run else f"{case.asked}/case{case.number}/" for case in cases]
+    one_run = len({case.run_name for case in cases}) == 1
+    prefixes = [f"case{case.number}/" if one_run else f"{case.run_name}/case{case.number}/" for case in cases]
     return [arm_of(plan, case, prefix if len(cases) > 1 else "") for case, prefix in zip(cases, prefixes, strict=True)]
 
 
@@ -120,7 +120,7 @@ def _about(writer: Writer, file: ArchiveFile, arms: Sequence[PosedArm]) -> None:
         }
         data = {
             "prefix": arm.prefix,
-            "run": case.asked,
+            "run": case.run_name,
             "case": str(case.number),
             **keys,
             **{f"varied.{path}": value for path, value in varied(case).items()},
@@ -249,7 +249,7 @@ def _transforms(arm: PosedArm, base: str, times: Sequence[int], block: slice) ->
 def _log(case: ExportedCase, arm: PosedArm, line: LogLine) -> bytes:
     from foxglove_schemas_protobuf.Log_pb2 import Log
 
-    name = arm.prefix.rstrip("/") or case.asked
+    name = arm.prefix.rstrip("/") or case.run_name
     level = Log.Level.Value(line.level)
     text = Log(timestamp=_stamp(_ns(line.time)), level=level, message=plain(line.text), name=name)
     data: bytes = text.SerializeToString()
@@ -309,14 +309,14 @@ class Mcap(ExportFormat):
         """Refuse a campaign that cannot be shown: positions are not recorded, or it has too many cases. Raises Problem
         E370, E372."""
         _check_positions(campaign, target)
-        recorded = sum(len(part.kept) for part in campaign.parts)
+        recorded = sum(len(part.history_places) for part in campaign.parts)
         if recorded > OVERLAID:
             archive = quoted(target.with_suffix(".h5"))
             helps = (
                 "`--case '#0'` runs one alone, and `--histories '#0'` keeps the signals of one",
                 f"or run all, and choose then: `-o {archive}`, `met export {archive} --case '#0'`",
             )
-            raise Problem(too_many(recorded, ", ".join(campaign.asked), helps))
+            raise Problem(too_many(recorded, ", ".join(campaign.run_names), helps))
 
     def write_histories(
         self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: ExportRequest

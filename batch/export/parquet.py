@@ -42,7 +42,7 @@ def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, dec
     """Write the cases' histories and return the number of rows. deck: varied parameters in the deck's units. Raises
     Problem E305, and E373 where there is no pyarrow."""
     arrow, parquet = pyarrow_here()
-    columns, runs = all_columns(cases), dict.fromkeys(case.asked for case in cases)
+    columns, runs = all_columns(cases), dict.fromkeys(case.run_name for case in cases)
     fields = [of_varied(variable, deck=deck) for variable in varied([case.group for case in _one_each(cases)])]
     schema = _schema(arrow, cases, fields, columns).with_metadata(_about(file, runs))
     with whole(output) as sink:
@@ -133,7 +133,7 @@ def _one_each(cases: Sequence[ExportedCase]) -> list[ExportedCase]:
 def _table(arrow: Any, schema: Any, case: ExportedCase, fields: Sequence[TableColumn]) -> Any:
     """A case as a table; nulls in columns that it does not have."""
     rows = len(case.time)
-    alike: dict[str, Any] = {"run": case.asked, "case": case.number}
+    alike: dict[str, Any] = {"run": case.run_name, "case": case.number}
     alike |= {field.name: value_of(field, case.group, case.position) for field in fields}
     arrays: dict[str, Any] = {"time": case.time}
     signals = {name: case.signal(name) for name in dict.fromkeys(column.variable for column in case.columns)}

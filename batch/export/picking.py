@@ -49,7 +49,7 @@ class ExportedCase:
     columns: tuple[SignalColumn, ...]
 
     @property
-    def asked(self) -> str:
+    def run_name(self) -> str:
         """The run or sweep that it is of."""
         return self.group.sweep or self.group.name
 

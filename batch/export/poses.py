@@ -111,7 +111,7 @@ def positions(case: ExportedCase, joints: Sequence[str], *, free: bool = False) 
     if missing or of_base:
         every = missing and len(missing) == len(joints)
         which = ", ".join([*(["q"] if every else [f"{joint}.q" for joint in missing]), *of_base])
-        message = f"the arm of case #{case.number} of `{case.asked}` cannot be shown: {which} was not recorded"
+        message = f"the arm of case #{case.number} of `{case.run_name}` cannot be shown: {which} was not recorded"
         helps = (
             lacking_help(free=bool(of_base)),
             f"`met export {quoted(case.group.path)} -o FILE.csv` needs no positions",

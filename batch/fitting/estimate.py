@@ -465,7 +465,7 @@ def _memory(residuals: np.ndarray) -> float:
 def _fails(logs: LoggedRuns, start: np.ndarray) -> Problem:
     for run in logs.runs:
         if not np.isfinite(run.computed(start[None, :])).all():
-            message = f"`{run.given.name}` fails with the deck's values: {run.cause(start)}"
+            message = f"`{run.deck_run.name}` fails with the deck's values: {run.cause(start)}"
             helps = "a fit begins where the run goes through: `--set` other values, or a shorter `duration`"
-            return Problem(error("E480", message, run.given.experiment.place, help=helps))
+            return Problem(error("E480", message, run.deck_run.experiment.place, help=helps))
     raise AssertionError

@@ -38,14 +38,14 @@ STRETCHES = 24
 class LoggedRun:
     """A run beside a log of the real arm.
 
-    given    the run;  file: of the log;  log: its signals
-    paths    the parameters that get values; of these the run depends on those of `varied` alone, and the log's times
-             on its delay
-    fixed    values of other parameters of `varied`, SI, by path
-    zero     the time in the file at which the run begins, s
+    deck_run  the run;  file: of the log;  log: its signals
+    paths     the parameters that get values; of these the run depends on those of `varied` alone, and the log's times
+              on its delay
+    fixed     values of other parameters of `varied`, SI, by path
+    zero      the time in the file at which the run begins, s
     """
 
-    given: GivenRun
+    deck_run: GivenRun
     file: str
     log: MeasuredSignals
     paths: tuple[str, ...]
@@ -133,7 +133,7 @@ class LoggedRun:
     @property
     def name(self) -> str:
         """The run and the log, in words."""
-        return f"{self.given.name} and {self.file}"
+        return f"{self.deck_run.name} and {self.file}"
 
     @cached_property
     def used(self) -> tuple[str, ...]:
@@ -143,7 +143,7 @@ class LoggedRun:
     @cached_property
     def columns(self) -> list[dict[str, str]]:
         """The recorded channels, in the order of a history's columns, each with its SI unit."""
-        return described_columns(self.given.experiment)
+        return described_columns(self.deck_run.experiment)
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
@@ -212,7 +212,7 @@ class LoggedRun:
         out = np.full((len(values), len(self.measured)), np.nan)
         own, delays = self.inputs(values), self._delays(values)
         rows = np.flatnonzero(~self.refused(values))
-        many = max(1, MOST_BYTES // max(1, self.given.experiment.structure.history_bytes))
+        many = max(1, MOST_BYTES // max(1, self.deck_run.experiment.structure.history_bytes))
         for first in range(0, len(rows), many):
             some = rows[first : first + many]
             for row, history in zip(some, self._histories(own[some]), strict=True):
@@ -246,7 +246,7 @@ class LoggedRun:
 
     @property
     def _times(self) -> np.ndarray:
-        schedule = self.given.experiment.structure.schedule
+        schedule = self.deck_run.experiment.structure.schedule
         return np.arange(schedule.rows) * schedule.record / schedule.base_hz
 
     def _with(self, own: np.ndarray) -> engine.Prepared:
@@ -259,7 +259,7 @@ class LoggedRun:
     def _histories(self, own: np.ndarray) -> np.ndarray:
         """[case, row, column]; own: values of `used`, [case, path]"""
         result = engine.run(self._with(own), record=True)
-        signals = [recorded.name for recorded in self.given.experiment.structure.record]
+        signals = [recorded.name for recorded in self.deck_run.experiment.structure.record]
         return np.concatenate(
             [result.signals[signal].reshape(len(own), len(result.time), -1) for signal in signals], axis=2
         )

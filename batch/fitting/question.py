@@ -96,7 +96,7 @@ class FitQuestion:
         """The residuals of each log with these values, SI, [path]."""
         comparisons = []
         for run in runs:
-            joints = [joint.name for joint in run.given.experiment.structure.joints]
+            joints = [joint.name for joint in run.deck_run.experiment.structure.joints]
             comparisons.append(compare(run.courses(values), run.columns, joints, run.log))
         return tuple(comparisons)
 

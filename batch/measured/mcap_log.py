@@ -53,13 +53,13 @@ SHOWN = 40
 class MeasuredSignals:
     """A log's signals of a run: by channel the times (s, rising) and the numbers in SI, nan where there is none.
 
-    told    the columns that are shown, with their units; and where times count from
-    unused  columns or topics that are not shown
-    head    where a log that is a text names what it has
+    column_texts  the columns that are shown, with their units; and where times count from
+    unused        columns or topics that are not shown
+    head          where a log that is a text names what it has
     """
 
     signals: dict[str, tuple[np.ndarray, np.ndarray]]
-    told: list[str]
+    column_texts: list[str]
     unused: list[str]
     head: Place | None = None
 
@@ -87,7 +87,7 @@ def mcap_signals(path: str | Path, columns: Sequence[Mapping[str, str]]) -> Meas
     except (McapError, DecodeError, ValueError, TypeError, KeyError, RuntimeError, OverflowError) as reason:
         reason_text = visible(str(reason).split("\n")[0])[:120]
         raise Problem(error("E478", f"`{path}` cannot be read as an MCAP file: {reason_text}")) from None
-    return log.found()
+    return log.measured_signals()
 
 
 class _Log:
@@ -227,7 +227,7 @@ class _Log:
                     number = isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
                     yield f"{name}.{signal}", float(value) if number else math.nan
 
-    def found(self) -> MeasuredSignals:
+    def measured_signals(self) -> MeasuredSignals:
         """All data read, at ascending times."""
         unused = [visible(_short(topic)) for topic in dict.fromkeys(self.topics.values()) if topic not in self.shown]
         first = min((min(times) for times, _ in self.taken.values()), default=0)

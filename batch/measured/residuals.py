@@ -216,12 +216,13 @@ def _whiteness(residual: np.ndarray) -> tuple[float, bool | None]:
 
 @frozen
 class _Feature:
-    """A quantity that a residual may follow. unit: of its size; at: its numbers at instants (s), [instant, number]"""
+    """A quantity that a residual may follow. unit: of its size; values_at: its numbers at instants (s), [instant,
+    number]"""
 
     what: str
     means: str
     unit: str
-    at: Callable[[np.ndarray], np.ndarray]
+    values_at: Callable[[np.ndarray], np.ndarray]
 
 
 def _features(
@@ -276,7 +277,7 @@ def _explained(pair: Pair, features: Sequence[_Feature]) -> tuple[FollowedCause,
     if count < SHORTEST:
         return None
     halves = np.arange(len(residual)) * count // len(residual) % 2
-    numbers = {feature: feature.at(instants) for feature in features}
+    numbers = {feature: feature.values_at(instants) for feature in features}
     left = [feature for feature in features if _varies_enough(feature, numbers[feature], residual)]
     chosen: list[_Feature] = []
     gains: list[tuple[float, tuple[str, ...]]] = []

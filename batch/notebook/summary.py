@@ -58,7 +58,7 @@ def _answered(data: xarray.Dataset) -> list[str]:
         return []
     return [
         f"  {outcome.headline}",
-        *(f"  require {requirement.text}: {requirement.said}" for requirement in outcome.requirements),
+        *(f"  require {requirement.text}: {requirement.outcome_with_value}" for requirement in outcome.requirements),
     ]
 
 

@@ -32,11 +32,11 @@ SIGN_ROOM = 5.0
 
 @frozen
 class CellValues:
-    """The values of the cells, row by row from the lowest. there: True where a case is in the cell; failed: True where
-    one failed."""
+    """The values of the cells, row by row from the lowest. occupied: True where a case is in the cell; failed: True
+    where one failed."""
 
     values: np.ndarray
-    there: np.ndarray
+    occupied: np.ndarray
     failed: np.ndarray
     striped: tuple[tuple[np.ndarray, str], ...]
 
@@ -81,7 +81,7 @@ def draw(ax: Any, drawn: CellValues, x: MapSide, y: MapSide, colours: Any, norm:
     mapped = ax.pcolormesh(*np.meshgrid(x.edges, y.edges), plain, cmap=colours, norm=norm, rasterized=fine, **edges)
     infinite = np.isinf(values)
     failed = drawn.failed & np.isnan(values)
-    lacking = drawn.there & np.isnan(values) & ~failed
+    lacking = drawn.occupied & np.isnan(values) & ~failed
     for which, grey in ((infinite, INFINITE), (failed, FAILED), (lacking, LACKING)):
         _fill(ax, x, y, which, facecolors=grey, edgecolors=grey, linewidth=0.5)
     light = np.ones(len(values), bool)

@@ -193,7 +193,7 @@ def _bar(
     if map_layout.other is not None:
         unit = f"  ({metric.column.unit})" if metric.column.unit else ""
         label = f"{metric.column.label}: {map_layout.other[0]} − {map_layout.other[1]}{unit}"
-    lines = [layout.two_lines(label, 26), *(text for text in reversed(far.said) if text)]
+    lines = [layout.two_lines(label, 26), *(text for text in reversed(far.beyond_texts) if text)]
     bar.set_label("\n".join(lines), fontsize=sheet.small)
     bar.outline.set_visible(False)
     if map_layout.other is None:

@@ -52,7 +52,7 @@ class MapSide:
         return np.asarray((self.edges[1:] + self.edges[:-1]) / 2)
 
     @property
-    def at(self) -> np.ndarray:
+    def level_positions(self) -> np.ndarray:
         """The positions of the levels on the axis."""
         return self.centres if self.scale == "place" else self.levels.values
 
@@ -105,7 +105,7 @@ def write(
     if map_side.scale == "log" and not whole:
         write_log(axis, map_side, inches, sheet, upright=upright)
     elif map_side.scale == "place" or whole:
-        axis.set_ticks(map_side.at[::every], texts[::every])
+        axis.set_ticks(map_side.level_positions[::every], texts[::every])
 
 
 def write_log(axis: Any, map_side: MapSide, inches: float, sheet: PictureSheet, *, upright: bool = False) -> None:

@@ -62,7 +62,7 @@ def log_data(path: str | Path, columns: Sequence[Mapping[str, str]], rows: np.nd
     whole = both >= COVERED * (end - begin) and both >= COVERED * run
     values = [_interpolated(rows, *log.signals[name]) if name in log.signals else None for name in channels]
     part = "" if whole else f"{_spans(begin, end, rows)}: what both have is shown"
-    return {"values": values, "told": log.told, "unused": log.unused, "part": part}
+    return {"values": values, "told": log.column_texts, "unused": log.unused, "part": part}
 
 
 def _spans(begin: float, end: float, rows: np.ndarray) -> str:

@@ -42,14 +42,14 @@ MACRO = "macro "
 class OtherNumbers:
     """A run with the deck's numbers as inputs.
 
-    of        the run's name in the deck
+    run_name  the run's name in the deck
     plan      of the run as the deck has it, by which one sees in which units its signals are thought of
     fixed     what decides the program and is as the archive's group has it, as `integrator = rk4`
     measures  of each input the unit in which the deck writes it
     left_out  numbers of the deck that are no inputs: they have no effect, decide the program, or are too many
     """
 
-    of: str
+    run_name: str
     plan: Plan
     fixed: tuple[str, ...]
     run: VariedRun

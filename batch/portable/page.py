@@ -107,7 +107,8 @@ def _numbers(numbers: OtherNumbers, archived: Experiment) -> dict[str, Any]:
     data["limits"] = limits(numbers.run)
     data["leftOut"] = [visible(path) for path in numbers.left_out]
     words = [
-        f"Any number that the deck writes can be moved here, one at a time; the others are those of `{numbers.of}`"
+        f"Any number that the deck writes can be moved here, one at a time; "
+        f"the others are those of `{numbers.run_name}`"
     ]
     if archived.varies:
         words.append(f", which `{archived.name_in_deck}` varies")
@@ -115,7 +116,7 @@ def _numbers(numbers: OtherNumbers, archived: Experiment) -> dict[str, Any]:
         words.append(f", with {', '.join(numbers.fixed)}")
     words.append(". The run is computed here by another program than the archive's, for numbers are its inputs ")
     words.append(f"({_program(data)}): last digits may differ. What the archive has is behind the switch.")
-    head = {"kicker": "Other numbers than the archive's", "name": numbers.of, "lede": "".join(words)}
+    head = {"kicker": "Other numbers than the archive's", "name": numbers.run_name, "lede": "".join(words)}
     data["head"] = visible_texts(head)
     return data
 

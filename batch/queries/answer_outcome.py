@@ -16,9 +16,11 @@ class AnswerRequirement:
     """A requirement in the cases of an answer. One over a share of cases is asked of each of them.
 
     met, missed, unknown  cases of the answer;  no_value: of the unknown ones, those that reached their end
-    worst  the value that is furthest beyond the limit or nearest to it, as text;  case: its number in the case table
-    outcome  how it came out in words, without the value;  said: with it, and with other cases that miss it
-    elsewhere  a case that a search tried besides its answer misses it
+    worst                 the value that is furthest beyond the limit or nearest to it, as text;  case: its number in
+                          the case table
+    outcome               how it came out in words, without the value;  outcome_with_value: with it, and with other
+                          cases that miss
+    it elsewhere  a case that a search tried besides its answer misses it
     """
 
     text: str
@@ -29,7 +31,7 @@ class AnswerRequirement:
     worst: str
     case: int
     outcome: str
-    said: str
+    outcome_with_value: str
     elsewhere: bool = False
 
     @property
@@ -56,7 +58,7 @@ def answer_outcome(group_answer: SearchAnswer) -> AnswerOutcome:
 
 
 def _required(answer: SearchAnswer, requirement: GroupRequirement) -> AnswerRequirement:
-    group, cases = answer.group, np.array(answer.found.cases)
+    group, cases = answer.group, np.array(answer.best.cases)
     variable, values = group.variables[requirement.metric], group.values(requirement.metric)
     met, numbers = outcomes(group)[:, requirement.place], group.values("case")
     scale, unit = deck_unit(variable)
@@ -97,7 +99,7 @@ def _came_out(answer: SearchAnswer, missed: int, unknown: int) -> str:
 
 def _cases(answer: SearchAnswer, *, every: bool = True) -> str:
     """The cases of a tuning's answer: `all 32 cases of spread`; empty where it is judged against no sweep."""
-    best, sweep = answer.found, answer.search.against
+    best, sweep = answer.best, answer.search.against
     if best.all == 1:
         return ""
     if not best.confirmed:
@@ -122,7 +124,7 @@ def _misses(judged: tuple[AnswerRequirement, ...], *, named: bool) -> str:
 
 
 def _of_tuning(answer: SearchAnswer, judged: tuple[AnswerRequirement, ...]) -> str:
-    best, sweep = answer.found, answer.search.against
+    best, sweep = answer.best, answer.search.against
     if best.failed:
         return f"The answer fails in case #{answer.position}"
     if best.missed:
@@ -149,9 +151,9 @@ def _of_tuning(answer: SearchAnswer, judged: tuple[AnswerRequirement, ...]) -> s
 
 def _of_worst(answer: SearchAnswer, judged: tuple[AnswerRequirement, ...]) -> str:
     worst = f"The worst case found, #{answer.position},"
-    if answer.found.failed:
+    if answer.best.failed:
         return f"{worst} fails"
-    if answer.found.missed:
+    if answer.best.missed:
         return f"{worst} {_misses(judged, named=False)}"
     if (others := [requirement.text for requirement in judged if requirement.elsewhere]) and not answer.ok:
         return f"{worst} {_all(answer)}, but another that was tried misses {', '.join(others)}"

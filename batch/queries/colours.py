@@ -54,7 +54,7 @@ class Reach:
     most: float = np.nan
 
     @property
-    def said(self) -> tuple[str, str]:
+    def beyond_texts(self) -> tuple[str, str]:
         """The values below and above, in words; "" where there are none."""
         return (
             f"{self.below:,} below, down to {number_text(self.least)}" if self.below else "",

@@ -132,7 +132,7 @@ def evidence_for(group: ArchiveGroup, judged_requirements: Sequence[GroupRequire
 
 def _of_answer(answer: SearchAnswer) -> list[EvidenceRow]:
     """The rows of the requirements in the cases of a search's answer, each asked of every one of these."""
-    group, cases = answer.group, np.array(answer.found.cases)
+    group, cases = answer.group, np.array(answer.best.cases)
     met, out = requirements.outcomes(group), []
     for requirement in answer.required:
         judged = _judged(

@@ -193,7 +193,7 @@ def _of_step_error(
         worst=size,
         worst_case=verdict.worst if verdict.worst >= 0 else None,
         margin=None if size is None else limit.limit - size,
-        why="" if verdict.met is not None else verdict.said,
+        why="" if verdict.met is not None else verdict.reason,
         again=_again(group, verdict.worst, archive, several) if verdict.worst >= 0 else "",
     )
 

@@ -55,12 +55,12 @@ class SearchAnswer:
         return None if search is None else SearchAnswer(group, search)
 
     @cached_property
-    def found(self) -> Answer:
+    def best(self) -> Answer:
         """The best of its cases."""
-        return answer(self.search, *self._given)
+        return answer(self.search, *self._judged_cases)
 
     @cached_property
-    def _given(self) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], list[_Required]]:
+    def _judged_cases(self) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], list[_Required]]:
         """Coordinates of the cases, a truth for each that reached its end, their metrics, and the requirements on
         these."""
         group = self.group
@@ -78,7 +78,7 @@ class SearchAnswer:
         the generation, the cases by then, the best of these."""
         ends = np.flatnonzero(np.diff(self.group.values("generation"), append=self.generations)) + 1
         some = np.unique(np.linspace(0, len(ends) - 1, min(len(ends), most)).astype(int))
-        table, done, metrics, required = self._given
+        table, done, metrics, required = self._judged_cases
         return [
             (int(number), int(end), answer(self.search, table[:end], done[:end], cut(metrics, int(end)), required))
             for number, end in zip(some, ends[some], strict=True)
@@ -92,7 +92,7 @@ class SearchAnswer:
     @property
     def position(self) -> int:
         """The position in the case table of the answer's representative case."""
-        return int(self.group.values("case")[self.found.case])
+        return int(self.group.values("case")[self.best.case])
 
     @cached_property
     def required(self) -> list[GroupRequirement]:
@@ -113,14 +113,14 @@ class SearchAnswer:
         """True if a tuning's result meets all requirements; for a search, if it found no case that fails or misses
         one."""
         if self.search.kind == "tune":
-            return self.found.serves and all(confirmation.withstood for confirmation in self.search.confirmation)
+            return self.best.serves and all(confirmation.withstood for confirmation in self.search.confirmation)
         return bool((self.group.values("status") == DONE).all() and (outcomes(self.group) == 1).all())
 
     def values(self, case: int | None = None) -> list[WrittenValue]:
         """The chosen values, for a deck's text or `--set`; those of another case, by its place, where one is given."""
         written = []
         for parameter, variable in zip(self.search.parameters, self.group.role("coordinate"), strict=False):
-            value = float(self.group.at(variable.name, [self.found.case if case is None else case])[0])
+            value = float(self.group.at(variable.name, [self.best.case if case is None else case])[0])
             written.append(
                 WrittenValue(parameter.path, value, str(variable.attributes.get("deck_unit", variable.unit)))
             )
@@ -133,7 +133,7 @@ class SearchAnswer:
 
     def value(self, best: Answer | None = None) -> str:
         """The goal's value in the deck's unit, of the best, or of an earlier best."""
-        return self.goal((best or self.found).value)
+        return self.goal((best or self.best).value)
 
     def goal(self, value: float) -> str:
         """A value of the goal, SI, in the deck's unit."""
@@ -144,7 +144,7 @@ class SearchAnswer:
 
     def lines(self) -> list[str]:
         """The answer in lines, without the commands for further steps."""
-        best, search = self.found, self.search
+        best, search = self.best, self.search
         sureness = self._sureness() if best.stands else []
         out = [*self._tuned(), *self._by_slopes(), *sureness] if search.kind == "tune" else self._worst()
         if best.missed:
@@ -182,12 +182,12 @@ class SearchAnswer:
     def starts(self) -> list[float]:
         """The goal that each start of a tuning came to with all plants, SI, not-a-number where none did; none where the
         archive was made before MET kept its starts."""
-        goal = self._given[2][self.search.metric]
+        goal = self._judged_cases[2][self.search.metric]
         return [float(goal[start.best]) if start.best >= 0 else math.nan for start in self.search.starts]
 
     def _sureness(self) -> list[str]:
         """Lines about how sure it is that a tuning's optimum is the best: the goals that its starts came to."""
-        optimum, reached = self.found, np.array(self.starts)
+        optimum, reached = self.best, np.array(self.starts)
         if not np.isfinite(reached).any():
             return []
         if optimum.left is not None:
@@ -213,7 +213,7 @@ class SearchAnswer:
 
     def _border(self) -> list[str]:
         """The nearest tried candidates that do not meet the requirements, and that have a worse goal, in lines."""
-        miss, out = self.found.miss, []
+        miss, out = self.best.miss, []
         if miss is None:
             out += ["  none of the candidates that were tried misses a requirement"] if self.required else []
         else:
@@ -230,7 +230,7 @@ class SearchAnswer:
     @property
     def _rounding(self) -> float:
         """The difference of goals that is of rounding."""
-        goals = self._given[2][self.search.metric]
+        goals = self._judged_cases[2][self.search.metric]
         return float(ROUNDING * np.abs(goals[np.isfinite(goals)]).max(initial=0.0))
 
     @cached_property
@@ -238,12 +238,12 @@ class SearchAnswer:
         """The case, and the distance as of `nearest`, of the nearest candidate whose goal is worse than the answer's in
         some plant, so that it is in the worst; None where there is none, or where the answer's goal is 0 but for
         rounding."""
-        table, done, metrics, _ = self._given
-        goals, value = metrics[self.search.metric], self.found.value
+        table, done, metrics, _ = self._judged_cases
+        goals, value = metrics[self.search.metric], self.best.value
         loss = value - goals if self.search.largest else goals - value
         worse = np.flatnonzero(done & (loss > SLIGHTLY * abs(value)))
         has_worse = abs(value) > self._rounding and len(worse)
-        return nearest(self.search, table, self.found.case, worse) if has_worse else None
+        return nearest(self.search, table, self.best.case, worse) if has_worse else None
 
     @property
     def _cases(self) -> str:
@@ -253,13 +253,13 @@ class SearchAnswer:
     @property
     def _tried(self) -> str:
         """The number of candidates that were tried, with all plants or with some."""
-        count = len(np.unique(self._given[0][:, : len(self.search.parameters)], axis=0))
+        count = len(np.unique(self._judged_cases[0][:, : len(self.search.parameters)], axis=0))
         return f"{count:,} candidate{'s' * (count != 1)} tried"
 
     @property
     def _cause(self) -> list[str]:
         """The cause of failure of the answer's representative case, in lines."""
-        cause = str(self.group.at("cause", [self.found.case])[0])
+        cause = str(self.group.at("cause", [self.best.case])[0])
         return textwrap.wrap(cause, WIDTH, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
 
     @property
@@ -267,7 +267,7 @@ class SearchAnswer:
         return ", ".join(f"{chosen.path} = {chosen.text}" for chosen in self.values())
 
     def _tuned(self) -> list[str]:
-        best, search = self.found, self.search
+        best, search = self.best, self.search
         none = f"none of the {self._tried} is found to meet all that is required; nearest: {self._chosen}"
         out = [f"use {self._chosen}" if self.ok else f"not advised: {self._chosen}" if best.stands else none]
         if best.failed:
@@ -288,7 +288,7 @@ class SearchAnswer:
 
     def _stability(self) -> list[str]:
         """Lines about the stability of the design, and of a better one that was left for it."""
-        best, search = self.found, self.search
+        best, search = self.best, self.search
         if "search_least_margin" not in self.group.attributes:
             return ["  stability not judged: this archive was made before MET judged it; run it again"]
         out = wrapped(*stability_texts(best.stability, search.least_margin))
@@ -308,7 +308,7 @@ class SearchAnswer:
         return out
 
     def _worst(self) -> list[str]:
-        best, search = self.found, self.search
+        best, search = self.best, self.search
         case, worst = f"case #{self.position} with {self._chosen}", f"the worst of search `{self.group.name}`"
         if best.failed:
             failed = int(np.count_nonzero(self.group.values("status") != DONE))
@@ -322,19 +322,19 @@ class SearchAnswer:
 
     def _settled(self) -> list[str]:
         """Lines about how sure it is that a search's case is the worst: what the second half of its cases brought."""
-        table, done, metrics, required = self._given
+        table, done, metrics, required = self._judged_cases
         half = len(table) // 2
         if not half:
             return []
         before = answer(self.search, table[:half], done[:half], cut(metrics, half), required).value
-        if abs(self.found.value - before) <= NEAR_BEST * abs(self.found.value):
+        if abs(self.best.value - before) <= NEAR_BEST * abs(self.best.value):
             return [f"  the second half of its cases found nothing that is worse by more than {100.0 * NEAR_BEST:g} %"]
         return wrapped(f"not sure that it is the worst: the first half of its cases came to {self.goal(before)}; "
                        "another `seed` or a larger `at_most` may find worse")  # fmt: skip
 
     def as_data(self) -> dict[str, Any]:
         """The answer for programs, SI."""
-        best = self.found
+        best = self.best
         return {
             "kind": self.search.kind,
             "goal": self.search.goal,

@@ -21,8 +21,8 @@ class SearchResult:
     """The answer of a search: as lines, for programs, and whether it is what was asked for.
 
     commands  that follow from it, each with what it is for
-    tunes  whether it is a tuning: then the requirements count in its answer alone;  name: of the search
-    values  what it chose;  of: among what, in words
+    tunes     whether it is a tuning: then the requirements count in its answer alone;  name: of the search
+    values    what it chose;  among: among what, in words
     """
 
     name: str
@@ -32,7 +32,7 @@ class SearchResult:
     ok: bool
     tunes: bool
     values: tuple[WrittenValue, ...]
-    of: str
+    among: str
 
 
 def search_result(archive: ArchiveFile, group: ArchiveGroup) -> SearchResult | None:

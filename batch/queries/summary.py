@@ -194,7 +194,9 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
     answer = None if searched is None else answer_outcome(searched)
     if answer is not None:
         requirements = tuple(
-            AnsweredRequirement(r.text, r.met, r.missed, r.unknown, r.no_value, said=r.said, elsewhere=r.elsewhere)
+            AnsweredRequirement(
+                r.text, r.met, r.missed, r.unknown, r.no_value, said=r.outcome_with_value, elsewhere=r.elsewhere
+            )
             for r in answer.requirements
         )
     elif "met" in group.variables:
@@ -356,7 +358,8 @@ def as_json(summary: Summary) -> dict[str, Any]:
     del plain["answer"]  # `met show` and `met run` print all of it
     warned = [{"code": warning.code, "message": warning.message, "help": warning.help} for warning in summary.warnings]
     limits = [
-        {"text": step_error.text, "met": step_error.met, "said": step_error.said} for step_error in summary.step_errors
+        {"text": step_error.text, "met": step_error.met, "said": step_error.reason}
+        for step_error in summary.step_errors
     ]
     judged = {"verified": figures.as_json(summary.verified), "step_errors": limits, "warnings": warned}
     data: dict[str, Any] = finite({**plain, "metrics": [_named_first(asdict(m)) for m in summary.metrics], **judged})

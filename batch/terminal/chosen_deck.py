@@ -23,14 +23,14 @@ from met.settings import setting_option
 class ChosenDeck:
     """A deck with the chosen values in it, not yet written.
 
-    target   the file it is for;  there: whether that is the deck itself, which is replaced
+    target   the file it is for;  replaces_deck: whether that is the deck itself, which is replaced
     before, after  its text without them, and with them
     run      that has them;  others: runs that change with it
     newline  the ends of its lines
     """
 
     target: Path
-    there: bool
+    replaces_deck: bool
     before: str
     after: str
     run: str
@@ -50,7 +50,7 @@ class ChosenDeck:
     def write(self) -> None:
         """Write the file. Raises Problem E338 where the system refuses; the file is then unchanged."""
         text = self.after.replace("\n", self.newline)
-        if self.there:
+        if self.replaces_deck:
             write(str(self.target), text)
             return
         try:

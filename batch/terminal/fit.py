@@ -116,7 +116,7 @@ def _choice_lines(promise: Promise) -> Iterator[str]:
     if promise.judged < cases:
         judged, others = f"{promise.judged:,} of {judged}", ": the others fail, leave limits or miss requirements"
     yield f"{promise.motion.file} is the best of {judged}{others}"
-    run = promise.motion.given
+    run = promise.motion.deck_run
     words = [f"-D {quoted(define)}" for define in run.defines]
     words += [setting_option(setting) for setting in (*run.settings, *settings)]
     yield f"its motion: {' '.join(['met run', quoted(run.deck.file), run.name, *words])}"
@@ -127,7 +127,7 @@ def fit_lines(question: FitQuestion, answer: FitAnswer) -> Iterator[str]:
     """The fitted numbers, what they are worth, and what is left of the logs, in lines."""
     fit = answer.fit
     logs, numbers = ", ".join(run.file for run in question.runs), f"{len(fit.residuals):,} numbers"
-    yield f"{question.runs[0].given.name}, fitted to {numbers} of {logs}"
+    yield f"{question.runs[0].deck_run.name}, fitted to {numbers} of {logs}"
     yield ""
     rows = [["", "deck", "fitted", "95 %", ""]]
     for place, path in enumerate(question.paths):
@@ -185,7 +185,7 @@ def sweep_lines(question: FitQuestion, answer: FitAnswer, count: int = 200) -> I
         return
     yield "What is known of the arm, as a sweep of the deck:"
     yield ""
-    run = question.runs[0].given.name
+    run = question.runs[0].deck_run.name
     yield f"sweep fitted of {run} {{"
     yield f"    sample lhs({count}) {{"
     for place in free:
@@ -266,7 +266,7 @@ def identifiable_data(question: FitQuestion, known: Known, promised: Sequence[Pr
 def _comparisons(runs: Sequence[Any], pairs: Any) -> list[dict[str, Any]]:
     return [
         {
-            "run": run.given.name,
+            "run": run.deck_run.name,
             "log": run.file,
             "before": dataclasses.asdict(before),
             "after": dataclasses.asdict(after),

@@ -121,7 +121,7 @@ def show_evidence(archive: ArchiveFile, experiments: Sequence[str] = (), *, widt
     for name, groups in by_run(groups_named(archive, tuple(experiments))).items():
         cases = sum(group.run for group in groups)
         answer = SearchAnswer.of(groups[0])
-        of_answer = "" if answer is None else f"its answer, {count(len(answer.found.cases), 'case')} of "
+        of_answer = "" if answer is None else f"its answer, {count(len(answer.best.cases), 'case')} of "
         title = f"{name}: {of_answer}{count(cases, 'case')}"
         out += ["", title, *evidence_table_lines(_evidence(archive, groups), width)]
     return "\n".join(map(line, out)).rstrip() + "\n"
@@ -300,7 +300,7 @@ def verdict(summary: Summary, width: int) -> list[str]:
             outcome += f" (its metric has no value in {r.no_value:,})" if r.no_value else ""
         out.append(f"  require {r.text:<{wide}}  {outcome}")
     for step_error in summary.step_errors:
-        out.append(f"  require {step_error.text:<{wide}}  {step_error.word}: {step_error.said}")
+        out.append(f"  require {step_error.text:<{wide}}  {step_error.word}: {step_error.reason}")
     verdicts = [row for r in summary.requirements for row in r.evidence if row.lower is not None]
     if len(verdicts) > 1:
         tested = len({row.requirement.text for row in verdicts})

@@ -58,7 +58,7 @@ class DeckFiles:
         self._around = {folder: _stamp(folder) for folder in self._all_folders()}
         return time.time()
 
-    def found(self, names: Iterable[str], begun: float) -> bool:
+    def watch_files(self, names: Iterable[str], begun: float) -> bool:
         """Watch the files from which a deck was read since then, by their names in messages. True where a new one has
         changed meanwhile, so that the contents read are uncertain."""
         paths = dict.fromkeys([self._deck, *(path_of(name) for name in names if name != COMMAND_LINE)])

@@ -109,10 +109,10 @@ class _Loop:
             return self._once()
         except Exception as mishap:
             self._is_broken, self._page = True, ""
-            self._board.tell(**self._of(mishap), doing="")
+            self._board.tell(**self._message_about(mishap), doing="")
             return False
 
-    def _of(self, mishap: Exception) -> dict[str, Any]:
+    def _message_about(self, mishap: Exception) -> dict[str, Any]:
         """The message about an error that is not a mistake of the deck: the machine's, or MET's own, which is also
         printed in the terminal. To be called while it is handled."""
         state: dict[str, Any] = {"broken": True, "tried": time.time()}
@@ -127,7 +127,7 @@ class _Loop:
         memo = AnalysisMemo(self._known)
         answer = answers.compiled(self._deck, self._name, self._group, memo)
         self._known = memo.so_far
-        if self._files.found(answer.files, begun):
+        if self._files.watch_files(answer.files, begun):
             return True
         if self._tell is not None and answer.messages:
             self._tell(answer.messages)
@@ -186,7 +186,7 @@ class _Loop:
         except Problem as problem:
             board.tell(page, messages=_words(problem), doing="the cases were not run")
         except Exception as mishap:
-            board.tell(page, **self._of(mishap), doing="the cases were not run")
+            board.tell(page, **self._message_about(mishap), doing="the cases were not run")
         finally:
             self._running.release()
 

@@ -179,7 +179,7 @@ class _Request(BaseHTTPRequestHandler):
         self.rfile = io.BufferedReader(_InTime(self.connection, self.timeout, self.server.begun(self.request)))
 
     def do_GET(self) -> None:
-        what, number = self._asked()
+        what, number = self._requested()
         if what == "":
             text, policy = frame()
             self._send(text.encode(), "text/html; charset=utf-8", policy)
@@ -193,7 +193,7 @@ class _Request(BaseHTTPRequestHandler):
             self._refuse(HTTPStatus.NOT_FOUND)
 
     def do_POST(self) -> None:
-        what, _ = self._asked(posted=True)
+        what, _ = self._requested(posted=True)
         if what is None:
             return
         size = self.headers.get("Content-Length", "")
@@ -207,7 +207,7 @@ class _Request(BaseHTTPRequestHandler):
         else:
             self._refuse(HTTPStatus.BAD_REQUEST)
 
-    def _asked(self, posted: bool = False) -> tuple[str | None, int]:
+    def _requested(self, posted: bool = False) -> tuple[str | None, int]:
         """The requested name after the token, and its number; None where the request was refused."""
         hosts = self.headers.get_all("Host") or []
         if len(hosts) != 1 or hosts[0] not in self.server.hosts:

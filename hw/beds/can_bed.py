@@ -230,7 +230,7 @@ class CanBed(BedDriver):
     # What a bed does
 
     def limit(self, limits: Mapping[str, float]) -> None:
-        about = self._there()
+        about = self._require_about()
         tighter = greeting.tighter(about, limits)
         if self._kind == "rate" and "rate" in limits:  # its command is a rate, too
             most_counts = greeting.counts(limits["rate"], about.scales.voltage)
@@ -242,7 +242,7 @@ class CanBed(BedDriver):
         )
 
     def arm(self) -> BedSample:
-        about = self._there()
+        about = self._require_about()
         for drive in self._drives:
             drive.forget_answers()
         self._ask_both(about)
@@ -263,7 +263,7 @@ class CanBed(BedDriver):
         return self._sample()
 
     def exchange(self, voltage: float, current: float) -> BedSample | None:
-        about, force, scales = self._there(), self._in_force, self._about_scales()
+        about, force, scales = self._require_about(), self._in_force, self._about_scales()
         kind, unit = f"a {self._kind}", DRIVES[self._kind][0]
         volts = greeting.commanded(voltage, scales.voltage, force.voltage)
         amperes = greeting.commanded(current, scales.current, force.current)
@@ -292,7 +292,7 @@ class CanBed(BedDriver):
             drive, load = self._drives
             frames += [*load.checks(), *drive.checks()] if self._asks else []
             frames += load.told(self._kt_load * amperes * scales.current)
-            frames += drive.told(self._told(volts * scales.voltage))
+            frames += drive.told(self._drive_command(volts * scales.voltage))
         answered = self._answers(frames, now)
         if self._state == BedState.ARMED:
             self._watch()
@@ -301,7 +301,7 @@ class CanBed(BedDriver):
         return self._sample(refused=not armed)
 
     def read(self) -> BedSample:
-        about = self._there()
+        about = self._require_about()
         self._silence(about)
         self._ask_both(about)
         self._follow()
@@ -310,13 +310,13 @@ class CanBed(BedDriver):
         return self._sample()
 
     def look(self) -> BedSample | None:
-        about = self._there()
+        about = self._require_about()
         self._silence(about)
         self._talk.drain()
         return self._sample() if self._answers([], self._talk.line.now()) else None
 
     def clear(self) -> BedSample:
-        about = self._there()
+        about = self._require_about()
         self._ask_both(about)
         self._follow()
         hot = Fault.HEAT in self._faults and self._heat > about.limits.heat / 2.0
@@ -339,14 +339,14 @@ class CanBed(BedDriver):
         return (*why, f"{whose} gave {self.returned:.3g} J back to the supply")
 
     def rest(self, time: float) -> BedSample:
-        self._there()
+        self._require_about()
         self.stop()
         self._talk.line.sleep(time)
         self._warm(self._talk.line.now())
         return self.read()
 
     def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> BedSample:
-        self._there()
+        self._require_about()
         raise real_plant()
 
     def stop(self) -> bool:
@@ -489,15 +489,15 @@ class CanBed(BedDriver):
 
     # The state
 
-    def _there(self) -> About:
+    def _require_about(self) -> About:
         if self._about is None:
             raise refusals.not_connected(str(self._bench.bus["channel"]))
         return self._about
 
     def _about_scales(self) -> Scales:
-        return self._there().scales
+        return self._require_about().scales
 
-    def _told(self, sent: float) -> float:
+    def _drive_command(self, sent: float) -> float:
         """The command for the drive under test, N m: the value sent, or the torque of an armature at it, V; for a rate
         drive the rate sent, rad/s, which is within its limit."""
         if self._kind == "rate":
@@ -514,7 +514,7 @@ class CanBed(BedDriver):
     def _warm(self, now: float) -> None:
         """Update the load's heat, A^2 s, from the command so far, and stop where it is too much; sum up the energy that
         the drives returned."""
-        about = self._there()
+        about = self._require_about()
         passed, self._warmed = now - self._warmed, now
         held = self._amperes * about.scales.current
         self._heat = max(0.0, self._heat + (held * held - self._rated * self._rated) * passed)
@@ -545,17 +545,17 @@ class CanBed(BedDriver):
         return round(counts) if abs(counts) < messages.MOST else messages.MOST
 
     def _slow(self) -> bool:
-        return abs(self._rate()) <= greeting.counts(self._there().limits.arming_rate, FINE)
+        return abs(self._rate()) <= greeting.counts(self._require_about().limits.arming_rate, FINE)
 
     def _refused(self, what: str) -> Problem:
-        problem = refusals.refused(self._there(), what, self._sample(refused=True))
+        problem = refusals.refused(self._require_about(), what, self._sample(refused=True))
         if not self._why:
             return problem
         only = problem.diagnostics[0]
         return Problem(replace(only, help=(self._why, *only.help)))
 
     def _sample(self, *, refused: bool = False) -> BedSample:
-        about, side = self._there(), self._sides[0]
+        about, side = self._require_about(), self._sides[0]
         angle = round(side.angle / FINE_ANGLE) * FINE_ANGLE
         tick = max(0, int((side.time - self._epoch) * about.tick_hz))
         return BedSample(self._state, True, self._faults, refused, tick, self._rate() * FINE, angle)

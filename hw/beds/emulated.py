@@ -119,7 +119,7 @@ class EmulatedBed(BedDriver):
         return about
 
     def limit(self, requested: Mapping[str, float]) -> None:
-        about = self._there()
+        about = self._require_about()
         tighter = greeting.tighter(about, requested)
         if self._state != BedState.DISARMED:
             raise refusals.refused(about, "take tighter limits", self._sample(refused=True))
@@ -129,7 +129,7 @@ class EmulatedBed(BedDriver):
         )
 
     def arm(self) -> BedSample:
-        about = self._there()
+        about = self._require_about()
         if self._state != BedState.DISARMED or not self._slow():
             raise refusals.refused(about, "arm", self._sample(refused=True))
         self._hold(0, 0)
@@ -137,7 +137,7 @@ class EmulatedBed(BedDriver):
         return self._sample()
 
     def exchange(self, voltage: float, current: float) -> BedSample | None:
-        about, force, scales = self._there(), self._in_force, self._scales
+        about, force, scales = self._require_about(), self._in_force, self._scales
         volts = greeting.commanded(voltage, scales.voltage, force.voltage)
         amperes = greeting.commanded(current, scales.current, force.current)
         if volts is None or amperes is None:
@@ -160,11 +160,11 @@ class EmulatedBed(BedDriver):
         return self._sample(refused=not armed)
 
     def read(self) -> BedSample:
-        self._there()
+        self._require_about()
         return self._sample()
 
     def clear(self) -> BedSample:
-        about = self._there()
+        about = self._require_about()
         hot = Fault.HEAT in self._faults and self._heat > self._limits.heat / 2.0
         if self._state == BedState.ARMED or (self._state == BedState.STOPPED and (hot or not self._slow())):
             raise refusals.refused(about, "clear", self._sample(refused=True))
@@ -172,14 +172,14 @@ class EmulatedBed(BedDriver):
         return self._sample()
 
     def rest(self, time: float) -> BedSample:
-        self._there()
+        self._require_about()
         self.stop()
         for _ in range(math.ceil(time / self._plant.period - 1e-6)):
             self._advance()
         return self._sample()
 
     def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> BedSample:
-        about = self._there()
+        about = self._require_about()
         if self._state != BedState.DISARMED or not math.isfinite(rate):
             raise refusals.refused(about, "start its plant anew", self._sample(refused=True))
         self._rate = self._counted(self._plant.start(rate, float(seed), float(repeat)))
@@ -195,7 +195,7 @@ class EmulatedBed(BedDriver):
         self.stop()
         self._about = None
 
-    def _there(self) -> About:
+    def _require_about(self) -> About:
         if self._about is None:
             raise refusals.not_connected(self._name)
         return self._about

@@ -59,7 +59,7 @@ class SimulatedBed(WireBed):
         self._process: subprocess.Popen[bytes] | None = None
 
     def open(self) -> BedLine:
-        line = self._here() if self._kind == "firmware" else self._in_an_emulator()
+        line = self._line_to_process() if self._kind == "firmware" else self._in_an_emulator()
         return line if self._writer is None else TranscribedLine(line, self._writer)
 
     def close(self) -> None:
@@ -69,7 +69,7 @@ class SimulatedBed(WireBed):
             self._process.wait()
             self._process = None
 
-    def _here(self) -> BedLine:
+    def _line_to_process(self) -> BedLine:
         ours, theirs = socket.socketpair()
         with theirs:
             number = theirs.fileno()

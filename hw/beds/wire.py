@@ -113,7 +113,7 @@ class WireBed(BedDriver):
         return about
 
     def limit(self, limits: Mapping[str, float]) -> None:
-        about = self._there()
+        about = self._require_about()
         for name, most in greeting.tighter(about, limits).items():
             limits_answer = self._ask(messages.LimitMessage(LIMIT_NAMES.index(name), most), LimitsAnswer)
             if getattr(limits_answer, name) > most:
@@ -122,7 +122,7 @@ class WireBed(BedDriver):
             self._in_force = limits_answer
 
     def arm(self) -> BedSample:
-        about = self._there()
+        about = self._require_about()
         # so that a bed whose answer was lost is asked again before its deadman has it; or says that it has
         waits = _WAITS if self._step else (*(about.deadman / 3,) * 3, _WAITS[-1])
         self.confirmed, self._foreign = False, 0
@@ -135,7 +135,7 @@ class WireBed(BedDriver):
         return sample
 
     def exchange(self, voltage: float, current: float) -> BedSample | None:
-        about = self._there()
+        about = self._require_about()
         volts = self._counts("a voltage", voltage, about.scales.voltage, self._in_force.voltage, "V")
         amperes = self._counts("a current", current, about.scales.current, self._in_force.current, "A")
         command = (
@@ -154,27 +154,27 @@ class WireBed(BedDriver):
         counts = greeting.commanded(value, scale, most)
         if counts is None:
             self.stop()
-            raise refusals.no_command(self._there(), what, value, unit, most * scale)
+            raise refusals.no_command(self._require_about(), what, value, unit, most * scale)
         return counts
 
     def read(self) -> BedSample:
-        self._there()
+        self._require_about()
         return self._sample(self._ask(messages.ReadMessage(), SampleAnswer))
 
     def look(self) -> BedSample | None:
-        self._there()
+        self._require_about()
         answer = self._answer(messages.ReadMessage(), SampleAnswer, self.patience)
         return None if answer is None else self._sample(answer)
 
     def clear(self) -> BedSample:
-        about = self._there()
+        about = self._require_about()
         sample = self._sample(self._ask(messages.ClearMessage(), SampleAnswer))
         if sample.state != BedState.DISARMED:
             raise refusals.refused(about, "clear", sample)
         return sample
 
     def rest(self, time: float) -> BedSample:
-        about = self._there()
+        about = self._require_about()
         self.stop()
         if Capability.LOCK_STEP not in about.capabilities:
             assert self._line is not None
@@ -192,7 +192,7 @@ class WireBed(BedDriver):
         return sample
 
     def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> BedSample:
-        about = self._there()
+        about = self._require_about()
         if Capability.SIMULATED not in about.capabilities:
             raise real_plant()
         for which, value in ((1, float(seed)), (2, float(repeat)), (0, rate)):
@@ -226,7 +226,7 @@ class WireBed(BedDriver):
 
     # Questions and answers
 
-    def _there(self) -> About:
+    def _require_about(self) -> About:
         if self._about is None:
             raise refusals.not_connected(self._name)
         return self._about
@@ -234,7 +234,7 @@ class WireBed(BedDriver):
     def _ask(self, message: HostMessage, kind: type[T], waits: Sequence[float] = _WAITS) -> T:
         answer = self._ask_again(message, kind, waits)
         if answer is None:
-            raise refusals.silent(self._there().name, message.word)
+            raise refusals.silent(self._require_about().name, message.word)
         return answer
 
     def _ask_again(self, message: HostMessage, kind: type[T], waits: Sequence[float]) -> T | None:
@@ -269,7 +269,7 @@ class WireBed(BedDriver):
         return None
 
     def _sample(self, answer: SampleAnswer) -> BedSample:
-        status, scale = answer.status, self._there().scales.rate
+        status, scale = answer.status, self._require_about().scales.rate
         read = dict[str, float]()
         for (name, scale_), counts in zip(self._sensors, answer.others, strict=not self._has_interlock):
             read[name] = (self._unwrapped(counts) if name == "angle" else counts) * scale_

@@ -52,7 +52,7 @@ class Estimate:
     value: float
     low: float
     high: float
-    found: bool
+    is_fitted: bool
 
 
 @frozen

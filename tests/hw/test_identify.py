@@ -141,7 +141,9 @@ def moved(
 
 def outside(found: FitResult, truth: Mapping[str, float]) -> list[str]:
     """Parameters whose interval the truth is not in."""
-    return [name for name, each in found.parameters.items() if each.found and not each.low <= truth[name] <= each.high]
+    return [
+        name for name, each in found.parameters.items() if each.is_fitted and not each.low <= truth[name] <= each.high
+    ]
 
 
 def identified(seed: int, faults: str) -> tuple[FitResult, dict[str, float]]:
@@ -153,7 +155,7 @@ def identified(seed: int, faults: str) -> tuple[FitResult, dict[str, float]]:
 @pytest.mark.parametrize("faults", ["none", "typical"])
 def test_hidden_parameters_are_found_and_sure_to_a_percent_or_so(faults: str) -> None:
     found, truth = identified(3, faults)
-    assert found.settled and [name for name, each in found.parameters.items() if each.found] == TOLD
+    assert found.settled and [name for name, each in found.parameters.items() if each.is_fitted] == TOLD
     assert outside(found, truth) == []
     for name in TOLD:
         each = found.parameters[name]
@@ -200,7 +202,7 @@ def test_drive_current_that_is_measured_gives_the_load_motors_constant_too() -> 
     truth = hidden(4)
     what, its, _ = moved(experiment(truth, "typical"), 4, Measuring)
     found = fitted(what, its, SHEET)
-    assert [name for name, each in found.parameters.items() if each.found] == list(UNITS)
+    assert [name for name, each in found.parameters.items() if each.is_fitted] == list(UNITS)
     assert outside(found, truth) == []
 
 
@@ -209,7 +211,7 @@ def test_friction_and_back_emf_are_not_told_apart_where_the_drive_never_reaches_
     truth = {**SHEET, "kt": 0.065, "f_c": 0.018}
     what, its, _ = moved(experiment(truth, "none"), 1, voltage=4.0)
     found = fitted(what, its, SHEET)
-    assert [name for name, each in found.parameters.items() if not each.found] == ["tau_max", "f_v", "kt_load"]
+    assert [name for name, each in found.parameters.items() if not each.is_fitted] == ["tau_max", "f_v", "kt_load"]
     assert found.parameters["f_v"].value == pytest.approx(SHEET["f_v"], rel=1e-12)
     assert outside(found, truth) == []
 

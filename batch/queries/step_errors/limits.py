@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 class StepErrorVerdict:
     """The verdict of all verified cases on a requirement on an error due to the step; None where it is not known.
 
-    said   the worst of them, or why it is not known
-    limit  that is required
-    cases  verified ones that have a value;  missed: of these
-    worst  position in the case table of the worst, -1 where none is verified;  size: its error, SI or a share of its
-           value; infinite where it is not known
+    reason  the worst of them, or why it is not known
+    limit   that is required
+    cases   verified ones that have a value;  missed: of these
+    worst   position in the case table of the worst, -1 where none is verified;  size: its error, SI or a share of its
+            value; infinite where it is not known
     """
 
     text: str
     met: bool | None
-    said: str
+    reason: str
     limit: StepErrorLimit
     cases: int = 0
     missed: int = 0

@@ -26,12 +26,12 @@ class ComparedArchive:
     """The other (earlier) archive, and the differences from it, in which both archives have the names of the page."""
 
     file: ArchiveFile
-    found: Diff
+    differences: Diff
 
     def of(self, pool: Pool) -> EarlierCases | None:
         """The cases that match those of a pool; None where there is no such run or sweep."""
         groups = {group.name: group for group in self.file.groups}
-        by_name = {experiment.name_b: experiment for experiment in self.found.experiments}
+        by_name = {experiment.name_b: experiment for experiment in self.differences.experiments}
         pairs = [
             (number, groups[by_name[group.name].name_a], by_name[group.name])
             for number, group in enumerate(pool.groups)
@@ -59,14 +59,14 @@ class EarlierCases:
             self.how[mine] = experiment.how
 
     @cached_property
-    def there(self) -> np.ndarray:
+    def in_both(self) -> np.ndarray:
         """[case] whether it is in both."""
         return self.place >= 0
 
     @cached_property
     def ended(self) -> np.ndarray:
         """[case] its outcome before, as its place in `content.ENDED`; -1 where there is none."""
-        return np.where(self.there, self.pool.ended[self.place], -1)
+        return np.where(self.in_both, self.pool.ended[self.place], -1)
 
     @cached_property
     def most(self) -> tuple[int, ...]:
@@ -96,7 +96,7 @@ class EarlierCases:
         if not theirs or {metric.unit for metric in theirs} != {column.unit for column in mine}:
             return None
         before = self.pool.gathered(name) / deck_unit(mine[0])[0]
-        return np.where(self.there, before[self.place], np.nan)
+        return np.where(self.in_both, before[self.place], np.nan)
 
     def history_of(self, number: int, position: int) -> tuple[ArchiveGroup, int] | None:
         """The other archive's group and its position in it, for a case of the pool's structure `number`; None where the

@@ -26,10 +26,10 @@ class OtherOrigin:
 class DeckTextChange:
     """A file of the decks that differs.
 
-    said  how, in words;  lines: a unified difference of its text, without its heads;  left  lines that are not here
+    summary  how, in words;  lines: a unified difference of its text, without its heads;  left  lines that are not here
     """
 
-    said: str
+    summary: str
     lines: tuple[str, ...]
     left: int = 0
 

@@ -93,7 +93,7 @@ def _run_changes(differences: Diff, experiment: ExperimentDiff, several: bool) -
 def verdict(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases | None]]) -> Verdict:
     """The verdict of the comparison, over all cases. pairs: runs and sweeps of the page, with their earlier
     counterparts"""
-    differences = against.found
+    differences = against.differences
     both = [(pool, before) for pool, before in pairs if before is not None]
     headline = words.verdict(differences).removeprefix(differences.verdict).lstrip(",;: ")
     if not any(experiment.cases.count for experiment in differences.experiments):
@@ -112,7 +112,7 @@ def verdict(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases |
 
 
 def _parts(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases | None]]) -> tuple[OutcomeCount, ...]:
-    differences = against.found
+    differences = against.differences
     how = np.concatenate([np.zeros(0, np.int8), *(experiment.how for experiment in differences.experiments)])
     counts = {word: int((how == VERDICTS.index(word)).sum()) for word in (IDENTICAL, EQUIVALENT, DIFFERENT)}
     gone = sum(group.count for group in against.file.groups if group.name in differences.only_a)
@@ -126,11 +126,11 @@ def _figure(both: Sequence[tuple[Pool, EarlierCases]]) -> tuple[int, int, int] |
     """The number of cases that meet all requirements, before and now, and of all common cases; None where there are no
     requirements."""
     judged = [(pool, before) for pool, before in both if pool.requirements and before.pool.requirements]
-    total = sum(int(before.there.sum()) for _, before in judged)
+    total = sum(int(before.in_both.sum()) for _, before in judged)
     if total < 2:
         return None
     was = sum(int(np.isin(before.ended, GOOD).sum()) for _, before in judged)
-    now = sum(int((np.isin(pool.ended, GOOD) & before.there).sum()) for pool, before in judged)
+    now = sum(int((np.isin(pool.ended, GOOD) & before.in_both).sum()) for pool, before in judged)
     return was, now, total
 
 
@@ -142,12 +142,12 @@ def _flows(pool: Pool, before: EarlierCases, *, named: bool) -> list[Requirement
         requirement.now: requirement for _, _, experiment in before.pairs for requirement in experiment.requirements
     }
     for place, text in enumerate(pool.requirements):
-        if text not in pairs or not before.there.any():
+        if text not in pairs or not before.in_both.any():
             continue
         column = before.pool.requirements.index(pairs[text].before)
-        was = before.there & (before.pool.outcomes[before.place, column] == 1)
-        now = before.there & (pool.outcomes[:, place] == 1)
-        met = words.met_by_text(int(was.sum()), int(now.sum()), int(before.there.sum()))
+        was = before.in_both & (before.pool.outcomes[before.place, column] == 1)
+        now = before.in_both & (pool.outcomes[:, place] == 1)
+        met = words.met_by_text(int(was.sum()), int(now.sum()), int(before.in_both.sum()))
         if len(before.pairs) == 1:
             met += words.pairs_text(pairs[text])
         requirement_name = words.requirement_text(pairs[text])
@@ -170,10 +170,10 @@ def _ends(both: Sequence[tuple[Pool, EarlierCases]]) -> RequirementFlow | None:
         now_ended, was_ended = pool.ended < ENDED.index("failed"), before.ended < ENDED.index("failed")
         name = f"{pool.name}: " if len(both) > 1 else ""
         for which, names in ((now_ended & ~was_ended, gained), (was_ended & ~now_ended, lost)):
-            if (which & before.there).any():
-                names.append(f"{name}{ranges(pool.cases[which & before.there].tolist())}")
-        was, now = was + int((was_ended & before.there).sum()), now + int((now_ended & before.there).sum())
-        total += int(before.there.sum())
+            if (which & before.in_both).any():
+                names.append(f"{name}{ranges(pool.cases[which & before.in_both].tolist())}")
+        was, now = was + int((was_ended & before.in_both).sum()), now + int((now_ended & before.in_both).sum())
+        total += int(before.in_both.sum())
     if not gained and not lost:
         return None
     met = f"by {was:,}, now by {now:,} of {total:,}" if was != now else f"by {now:,} of {total:,}, other ones"

@@ -44,7 +44,7 @@ def design_answer(archive: ArchiveFile, pool: Pool) -> DesignAnswer | None:
         why=_sentence(answer.why),
         table=_table(answer.cells(answer.rows()), answer.right),
         stretches=TextTable(heads, ("",) * 3, stretches) if stretches else None,
-        said=_sentence(sentence),
+        purpose=_sentence(sentence),
         command=command,
         notes=tuple(f"{_sentence(note)}." for note in (*answer.stability(), *answer.notes())),
         map=design_map(designs, answer.best),

@@ -47,7 +47,7 @@ class EarlierHistories:
         was_values, changes = {}, {}
         for n, panel in enumerate(self.signal_panels):
             key = panel.name, panel.unit
-            mine, theirs = self._of(False, group).get(key), self._of(True, other).get(key)
+            mine, theirs = self._panels_of(False, group).get(key), self._panels_of(True, other).get(key)
             if theirs is None:
                 continue
             was = _lines(panel, theirs, history(other, theirs, place))
@@ -58,7 +58,7 @@ class EarlierHistories:
         change = History(case, self._clock(time[rows]), changes) if changes else None
         return (History(case, self._clock(was_time), was_values), change) if was_values else (None, None)
 
-    def _of(self, other: bool, group: ArchiveGroup) -> dict[tuple[str, str], Panel]:
+    def _panels_of(self, other: bool, group: ArchiveGroup) -> dict[tuple[str, str], Panel]:
         key = other, group.name
         if key not in self._panels:
             known = [self._in_unit(panel) for panel in panels(group)]

@@ -64,8 +64,8 @@ def gather(
     several = len(by_run(archive.groups)) > 1
     experiments, trouble = _experiments(archive)
     if against is not None and names:
-        against = replace(against, found=of_groups(against.found, groups))
-    name = archive.path.name if against is None else str(against.found.b)
+        against = replace(against, differences=of_groups(against.differences, groups))
+    name = archive.path.name if against is None else str(against.differences.b)
     share = MOST_VALUES // max(1, len(pools_))
     befores = [None if against is None else against.of(pool) for pool in pools_]
     sections = tuple(
@@ -82,7 +82,7 @@ def gather(
                 archive,
                 simulate,
             ),
-            changes=() if against is None else comparison.run_changes(against.found, before),
+            changes=() if against is None else comparison.run_changes(against.differences, before),
         )
         for pool, before in zip(pools_, befores, strict=True)
     )
@@ -98,9 +98,10 @@ def gather(
         sections=sections,
         sources=_sources(archive),
         provenance=_provenance(archive, groups) + (() if against is None else _compared_with(against)),
-        changes=None if against is None else comparison.archive_changes(against.found),
+        changes=None if against is None else comparison.archive_changes(against.differences),
         again=tuple(
-            f"met run {quoted(path)} --all" for path in (name, *(() if against is None else [str(against.found.a)]))
+            f"met run {quoted(path)} --all"
+            for path in (name, *(() if against is None else [str(against.differences.a)]))
         ),
     )
 
@@ -151,7 +152,7 @@ def _section(
     if drawn is not None and computed:
         opens = [] if drawn.opens is None else [drawn.opens]
         first = [
-            *drawn.shown,
+            *drawn.first_cases,
             *opens,
             *(case for notable in (best_cases, worst_cases) if notable is not None for case in notable.cases),
         ]
@@ -298,7 +299,7 @@ def _provenance(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> tuple[F
 
 
 def _compared_with(against: ComparedArchive) -> tuple[Fact, ...]:
-    path, name = against.file.path, str(against.found.a)
+    path, name = against.file.path, str(against.differences.a)
     size = path.stat().st_size
     digest = _digest(path) if size <= MOST_HASHED else "not computed: it is large"
     return Fact("compared with", f"{name} ({size_text(size)})"), Fact(f"SHA-256 of {name}", digest, True)

@@ -30,14 +30,14 @@ def _beyond(pool: Pool, before: EarlierCases, column: CaseColumn) -> np.ndarray:
     """[case] whether a metric differs by more than its structure's tolerances."""
     name = column.key.partition(":")[2]
     now = pool.gathered(name)
-    was = np.where(before.there, before.pool.gathered(name)[before.place], np.nan)
+    was = np.where(before.in_both, before.pool.gathered(name)[before.place], np.nan)
     out = np.zeros(pool.count, bool)
     for number, _, experiment in before.pairs:
         diff = next(
             (signal for signal in experiment.signals if signal.metric and signal.name == name and not signal.why), None
         )
         if diff is not None:
-            in_both = (pool.group_of == number) & before.there
+            in_both = (pool.group_of == number) & before.in_both
             a, b, allowed = was[in_both], now[in_both], diff.tolerance
             with np.errstate(invalid="ignore", over="ignore"):
                 limit = allowed.absolute + allowed.relative * magnitude(a, b)

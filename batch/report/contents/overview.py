@@ -60,7 +60,7 @@ def overview(pool: Pool, before: EarlierCases | None = None) -> Overview | None:
         total=pool.count,
         start=(against[0].key, judged.key, varied[1].key if len(varied) > 1 else ""),
         maps=maps(pool, varied, (*metrics, *changes)),
-        said=note,
+        note=note,
     )
 
 
@@ -79,12 +79,12 @@ def _compared(pool: Pool, before: EarlierCases) -> tuple[CaseColumn, ...]:
     """Columns that compare each case with the other archive: the verdict of `met diff`, and whether it meets the
     requirements."""
     verdicts = (*VERDICTS[:3], "only now")
-    how = np.where(before.there, before.how, len(verdicts) - 1).astype(float)
+    how = np.where(before.in_both, before.how, len(verdicts) - 1).astype(float)
     yes, no = ("meets all", "does not") if pool.requirements else ("reaches its end", "does not")
     words = (f"{yes}, and did not", f"{yes}, as before", f"{no}, as before", f"{no}, and did", "only now")
     was, now = np.isin(before.ended, GOOD), np.isin(pool.ended, GOOD)
     flow = np.where(now, np.where(was, 1, 0), np.where(was, 3, 2))
-    flow = np.where(before.there, flow, len(words) - 1).astype(float)
+    flow = np.where(before.in_both, flow, len(words) - 1).astype(float)
     return (
         CaseColumn("choice:compared", "compared with before", "", "choice", how, verdicts),
         CaseColumn("choice:outcome", "outcome, now and before", "", "choice", flow, words),
@@ -98,7 +98,7 @@ def _noted(pool: Pool, before: EarlierCases | None, changes: tuple[CaseColumn, .
         return np.zeros(0, np.int64)
     was, now = np.isin(before.ended, GOOD), np.isin(pool.ended, GOOD)
     out = [np.flatnonzero(np.isin(pool.cases, before.most))]
-    out += [np.flatnonzero(before.there & other)[:KEPT] for other in (was & ~now, now & ~was)]
+    out += [np.flatnonzero(before.in_both & other)[:KEPT] for other in (was & ~now, now & ~was)]
     out += [_extremes(column) for column in changes]
     return np.concatenate(out)
 

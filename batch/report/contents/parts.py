@@ -60,7 +60,7 @@ class RequirementCounts:
     met: int
     missed: int
     unknown: int
-    of: int
+    cases: int
     furthest: str = ""
     case: int | None = None
     verdict: str = ""
@@ -223,7 +223,7 @@ class EvidenceLine:
     and what runs that again, and its numbers as texts."""
 
     requirement: str
-    at: str
+    condition: str
     ok: bool
     case: int | None
     command: str
@@ -260,7 +260,7 @@ class InfluencePart:
     """
 
     metric: str
-    said: str
+    summary: str
     unit: str
     mean: float
     rows: tuple[InfluenceRow, ...]
@@ -303,21 +303,21 @@ class DesignMap:
 class DesignAnswer:
     """The design to use, as `met best` says it.
 
-    headline, why  which it is, and what it has for it, in lines;  table: it and others
-    stretches      how far each parameter may go
-    said, command  how to run it or confirm it;  map: None where no two parameters with an order are chosen
-    title, about   what the table is called, and what its numbers are
-    heading, link  over all of it, and in the page's menu;  chooses: False where it is the worst case of a search
-    case           number of the design's worst case; None where no design is advised
-    progress       of a search: the cases after each look at it, the best value by then, and the cases of a sweep that
-                   this was tried with; none of what is none
+    headline, why     which it is, and what it has for it, in lines;  table: it and others
+    stretches         how far each parameter may go
+    purpose, command  how to run it or confirm it;  map: None where no two parameters with an order are chosen
+    title, about      what the table is called, and what its numbers are
+    heading, link     over all of it, and in the page's menu;  chooses: False where it is the worst case of a search
+    case              number of the design's worst case; None where no design is advised
+    progress          of a search: the cases after each look at it, the best value by then, and the cases of a sweep
+                      that this was tried with; none of what is none
     """
 
     headline: str
     why: str
     table: TextTable
     stretches: TextTable | None
-    said: str
+    purpose: str
     command: str
     notes: tuple[str, ...]
     map: DesignMap | None
@@ -391,7 +391,7 @@ class Overview:
     total: int
     start: tuple[str, str, str]
     maps: tuple[Map, ...] = ()
-    said: str = ""
+    note: str = ""
 
 
 @frozen
@@ -433,22 +433,24 @@ class History:
 class Signals:
     """Recorded signals of the worst cases, worst first.
 
-    clocks  the times of histories, s
-    shown   cases that are drawn first
-    most    cases that differ most from the other archive, where one is compared with;  worst  the worst of all
-    middle  the case in the middle of the order, to compare the worst with; None where there are few
-    said    what was left out, and how lines were thinned
-    opens   case that the arm begins with: that of the design to use, else the middle one; None: the first of `shown`
-    sources of each structure, by its place in the pool, the channel of each line of each panel; "" where it has none
+    clocks       the times of histories, s
+    first_cases  cases that are drawn first
+    most         cases that differ most from the other archive, where one is compared with;  worst  the worst of all
+    middle       the case in the middle of the order, to compare the worst with; None where there are few
+    notes        what was left out, and how lines were thinned
+    opens        case that the arm begins with: that of the design to use, else the middle one; None: the first of
+                 `first_cases`
+    sources      of each structure, by its place in the pool, the channel of each line of each panel; "" where it has
+                 none
     """
 
     panels: tuple[SignalPanel, ...]
     joints: tuple[str, ...]
     clocks: tuple[np.ndarray, ...]
     histories: tuple[History, ...]
-    shown: tuple[int, ...]
+    first_cases: tuple[int, ...]
     middle: int | None = None
-    said: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     most: tuple[int, ...] = ()
     worst: int | None = None
     opens: int | None = None
@@ -492,7 +494,7 @@ class Stability:
     beds: tuple[BedStability, ...]
     unstable: tuple[str, ...]
     spans: bool = False
-    said: str = ""
+    note: str = ""
 
 
 # The whole

@@ -40,7 +40,7 @@ def search_answer(archive: ArchiveFile, group: ArchiveGroup) -> DesignAnswer | N
         why="\n".join(why),
         table=TextTable(heads, ("",) * len(heads), tuple(rows[n] for n in row_numbers), frozenset({0, 1, 2, 4})),
         stretches=None,
-        said=purpose,
+        purpose=purpose,
         command=command,
         notes=(),
         map=None,

@@ -118,7 +118,7 @@ def _structure(
     columns = {column["channel"]: place for place, column in enumerate(description["columns"])}
     structure = SimulatedStructure(
         code=module.code,
-        told=description,
+        description=description,
         same_code=prepared.code_key == group.attributes.get("code_key"),
         cases=wanted,
         inputs=inputs(experiment, np.asarray(rows, np.int64)),

@@ -62,7 +62,7 @@ def _case_table(pool: Pool, places: np.ndarray, archive: str, only: str, before:
                 marked.add((number, column_number + 2))
                 text = f"{text} {MISSES}"
             cells.append(text)
-        was = ENDED[before.ended[place]] if before is not None and before.there[place] else page_number(np.nan)
+        was = ENDED[before.ended[place]] if before is not None and before.in_both[place] else page_number(np.nan)
         rows.append((*cells, *([was] if before is not None else []), ENDED[pool.ended[place]]))
     ends = ("before", "now") if before is not None else ("came out",)
     table = TextTable(
@@ -117,7 +117,7 @@ def structures(pool: Pool, before: EarlierCases | None = None) -> TextTable | No
         chosen = [cell_text(column, int(places[0])) if len(places) else "" for column in choices]
         counts = [_good(pool.ended[places])]
         if before is not None:
-            both = places[before.there[places]]
+            both = places[before.in_both[places]]
             counts.append(_good(before.ended[both]) if len(both) else page_number(np.nan))
         medians = (median_text(column.values[places], infinite="∞", none=page_number(np.nan)) for column in metrics)
         rows.append((*chosen, f"{len(places):,}", *counts, *medians))

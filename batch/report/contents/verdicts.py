@@ -110,7 +110,7 @@ def _of_answer(pool: Pool, answer: SearchAnswer, experiments: Mapping[str, Exper
             )
             for requirement in requirements
         ),
-        failing=() if tunes and not answer.found.failed else _failing(pool),
+        failing=() if tunes and not answer.best.failed else _failing(pool),
         notes=(*_notes(pool), *map(_of_step_error, errors)),
         warnings=_report_warnings(pool, experiments),
         word=words[0] if summary.ok else words[1],
@@ -130,7 +130,7 @@ def _report_warnings(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple
 
 
 def _of_step_error(step_error: StepErrorVerdict) -> str:
-    return f"{step_error.text}: {step_error.word}, {step_error.said}."
+    return f"{step_error.text}: {step_error.word}, {step_error.reason}."
 
 
 def _headline(pool: Pool, good: int) -> str:

@@ -299,8 +299,8 @@ def _demand(
         far = [requirement.furthest, " ", case_link(requirement.case)]
     return [
         name,
-        el("td", f"{requirement.met:,} of {requirement.of:,}", cls="right"),
-        el("td", share(requirement.met, requirement.of), cls="right strong"),
+        el("td", f"{requirement.met:,} of {requirement.cases:,}", cls="right"),
+        el("td", share(requirement.met, requirement.cases), cls="right strong"),
         _share_verdict(requirement) if shares else None,
         el(
             "td",

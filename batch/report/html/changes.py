@@ -68,11 +68,11 @@ MARKS = {"+": "new", "-": "gone", "@": "at"}
 def _deck(deck_change: DeckTextChange) -> Html:
     """The differences of a file's text: each differing line with its mark, its context, and the line numbers."""
     if not deck_change.lines:
-        return el("p", deck_change.said)
+        return el("p", deck_change.summary)
     rows = [el("li", el("code", line), cls=MARKS.get(line[:1])) for line in deck_change.lines]
     left = el("p", f"and {deck_change.left:,} more lines", cls="under") if deck_change.left else None
     text = [el("ol", lines(rows), cls="textdiff"), left]
-    return el("details", el("summary", deck_change.said), text, open=len(rows) <= SHOWN_DIFF, cls="deck")
+    return el("details", el("summary", deck_change.summary), text, open=len(rows) <= SHOWN_DIFF, cls="deck")
 
 
 def _noted(notes: Sequence[str]) -> Html | None:
@@ -120,9 +120,9 @@ def _ended(ending: Ending) -> Html:
     """Cases with another ending, and the causes."""
     rows = [
         el("li", case_link(case.case), " ", el("code", case.case_id[:8]), "  ", el("span", cause(case)))
-        for case in ending.each[:MOST_ENDED]
+        for case in ending.case_endings[:MOST_ENDED]
     ]
-    more = len(ending.each) - MOST_ENDED
+    more = len(ending.case_endings) - MOST_ENDED
     left = el("li", f"and {more:,} more") if more > 0 else None
     head = el("p", el("strong", ending.text, ":"), " ", el("span", ending.cases, cls="cases"), cls="ends")
     return el("div", head, el("ul", rows, left), cls="failing ended")

@@ -23,7 +23,7 @@ def designs(answer: DesignAnswer) -> Html:
     first, *others = [el("p", line, cls="said") for line in answer.why.split("\n")]
     words: list[Child] = [el("p", answer.headline, cls="pick"), first]
     if answer.command:
-        words += [el("p", answer.said, cls="said"), el("p", command(answer.command), cls="command")]
+        words += [el("p", answer.purpose, cls="said"), el("p", command(answer.command), cls="command")]
     words += [*others, *(el("p", note, cls="note") for note in answer.notes)]
     words += [table(answer.stretches, "How far each may go")] if answer.stretches is not None else []
     head = el("div", el("div", words), _map(answer.map) if answer.map is not None else None, cls="answered")

@@ -170,8 +170,8 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
     if section.designs is not None:
         out.append(_designs(number, section.designs, head))
     if section.signals is not None:
-        run_again = section.simulation.said if section.simulation is not None else ()
-        notes = [el("p", note, cls="said") for note in (*section.signals.said, *run_again)]
+        run_again = section.simulation.notes if section.simulation is not None else ()
+        notes = [el("p", note, cls="said") for note in (*section.signals.notes, *run_again)]
         arm = el("div", cls="arm", data_plot="arm") if section.simulation is not None else None
         plots = el("div", cls="signals plot", data_plot="signals")
         drawn = [part("signals", _signals_name(section), arm, plots, notes)]
@@ -192,7 +192,7 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
                 "Cases at a glance",
                 table,
                 el("div", cls="points plot", data_plot="points"),
-                el("p", section.overview.said, cls="said") if section.overview.said else None,
+                el("p", section.overview.note, cls="said") if section.overview.note else None,
                 el("div", cls="card", data_plot="card"),
                 el("div", cls="map plot", data_plot="map") if section.overview.maps else None,
             )
@@ -215,7 +215,7 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
                 tables.beds(stability),
                 [el("p", note, cls="note") for note in stability.unstable],
                 el("div", cls="stability plot", data_plot="stability"),
-                el("p", stability.said, cls="said") if stability.said else None,
+                el("p", stability.note, cls="said") if stability.note else None,
             )
         )
     out.append(

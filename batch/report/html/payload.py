@@ -88,7 +88,9 @@ def modules_script(sections: Sequence[ReportSection]) -> str:
         structure for section in sections if section.simulation for structure in section.simulation.structures
     ]
     all_ = [version for structure in structures for version in (structure, structure.before) if version is not None]
-    modules = {version.told["kernel"]["module"]: base64.b64encode(version.code).decode("ascii") for version in all_}
+    modules = {
+        version.description["kernel"]["module"]: base64.b64encode(version.code).decode("ascii") for version in all_
+    }
     return f"MET.modules = {json.dumps(modules)};"
 
 
@@ -200,7 +202,7 @@ def _signals(signals: Signals) -> dict[str, Any]:
             }
             for history in signals.histories
         ],
-        "shown": list(signals.shown),
+        "shown": list(signals.first_cases),
         "most": list(signals.most),
         "worst": signals.worst if signals.most else None,
         "middle": signals.middle,
@@ -221,7 +223,7 @@ def _simulation(page_simulation: PageSimulation) -> dict[str, Any]:
 
 
 def _structure(structure: SimulatedStructure) -> dict[str, Any]:
-    description, kernel = structure.told, structure.told["kernel"]
+    description, kernel = structure.description, structure.description["kernel"]
     metrics = {metric["name"]: metric["output"] for metric in description["metrics"]}
     return {
         "module": kernel["module"],

@@ -90,7 +90,10 @@ def evidence(part: EvidencePart) -> Html:
     rows = []
     for row in part.rows:
         texts = row.texts
-        name = [el("code", breaking(row.requirement)), el("span", row.at, cls="under") if row.at else None]
+        name = [
+            el("code", breaking(row.requirement)),
+            el("span", row.condition, cls="under") if row.condition else None,
+        ]
         again = el("span", command(row.command), cls="under command") if row.command else None
         worst = texts.worst if row.case is None else [texts.worst, " ", case_link(row.case)]
         numbers = [
@@ -116,7 +119,7 @@ def evidence(part: EvidencePart) -> Html:
 
 def influence(part: InfluencePart) -> Html:
     """The parameters that explain a metric, with a tornado; notes."""
-    head = [el("code", part.metric), ": ", part.said] if part.metric else part.said
+    head = [el("code", part.metric), ": ", part.summary] if part.metric else part.summary
     if not part.rows:
         return el("p", head, cls="said")
     together = any(row.together for row in part.rows)

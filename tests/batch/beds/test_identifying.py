@@ -135,9 +135,9 @@ def test_a_scaled_bed_is_identified_as_it_is_and_its_deck_has_both_sizes(
 def test_the_servo_is_the_data_sheet_and_what_is_asked_goes_before_the_deck() -> None:
     sheet = sheet_of(wired(), "shoulder", None)
     assert (sheet.values["kt"], sheet.values["inertia"], sheet.values["v_max"]) == (0.061, 6.38e-5, 20.0)
-    assert sheet.values["kt_load"] == 0.072 and not sheet.said
+    assert sheet.values["kt_load"] == 0.072 and not sheet.has_kt_load
     asked = sheet_of(wired(), "shoulder", 0.08)
-    assert asked.values["kt_load"] == 0.08 and asked.said
+    assert asked.values["kt_load"] == 0.08 and asked.has_kt_load
 
 
 @pytest.mark.parametrize(

@@ -176,19 +176,19 @@ def test_of_a_case_that_failed_counts_what_it_had_until_then(pushed: ShaftWork) 
     found = gather([replace(pushed, **whole, **of_cases, **cases)])
     assert found is not None
     assert (found.failed, found.cases) == (2, 2)
-    assert found.drive.found["rate"].value == pytest.approx(W / 2.0, rel=3e-5)
-    assert found.drive.found["rate"].case == 7
-    assert found.drive.found["torque_rms"].value == pytest.approx(0.04, rel=1e-5)
-    assert found.drive.found["power_mean"].value == pytest.approx(0.04 * W / 4.0, rel=3e-5)
+    assert found.drive.extremes["rate"].value == pytest.approx(W / 2.0, rel=3e-5)
+    assert found.drive.extremes["rate"].case == 7
+    assert found.drive.extremes["torque_rms"].value == pytest.approx(0.04, rel=1e-5)
+    assert found.drive.extremes["power_mean"].value == pytest.approx(0.04 * W / 4.0, rel=3e-5)
     energy = 0.5 * 0.3 * (W / 2.0 / 50.0) ** 2
-    assert found.load.found["returned_energy"].value == pytest.approx(energy, rel=3e-5)
+    assert found.load.extremes["returned_energy"].value == pytest.approx(energy, rel=3e-5)
     assert gather([replace(pushed, **none, failed=np.array([True]))]) is None
 
 
 def test_a_winding_that_warms_fast_is_held_against_the_hottest_of_a_case(pushed: ShaftWork) -> None:
     torque = np.where(pushed.time < 0.5, 0.4, 0.0)[None, :]
     found = judged(replace(pushed, drive=torque), "drive", thermal_time=0.1)
-    asked = {each.what: each.asked for each in found.checks}
+    asked = {each.what: each.required for each in found.checks}
     assert asked["torque, continuous"] == pytest.approx(1.5 * 0.4 / 2.0, rel=1e-3)
     assert asked["torque, as it heats"] == pytest.approx(1.5 * 0.4 * math.sqrt(1.0 - math.exp(-5.0)), rel=1e-6)
 
@@ -198,7 +198,7 @@ def test_the_rotors_of_both_parts_are_on_the_shaft(pushed: ShaftWork) -> None:
     for beside, rotors in ((None, 1e-4 + 2e-4), (5e-4, 5e-4 + 2e-4)):
         found = judged(pushed, "load", beside=beside, inertia=2e-4)
         [check] = [each for each in found.checks if each.what == "torque, peak"]
-        assert check.asked == pytest.approx(1.5 * abs(rotors - 1e-4 - 0.3 / 2500.0) * 50.0 * 2.0 / 0.55, rel=3e-5)
+        assert check.required == pytest.approx(1.5 * abs(rotors - 1e-4 - 0.3 / 2500.0) * 50.0 * 2.0 / 0.55, rel=3e-5)
 
 
 @pytest.mark.release

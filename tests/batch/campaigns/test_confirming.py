@@ -66,12 +66,12 @@ def test_its_design_is_run_with_the_draws_of_another_seed_within_its_cases(tmp_p
         stiffness = one["environment.held.stiffness"][:]
         assert len(stiffness) <= 100 and np.array_equal(stiffness, other["environment.held.stiffness"][:])
         assert "search_confirmation" not in other.attrs
-    best = float(stiffness[answer.found.case])
+    best = float(stiffness[answer.best.case])
     settings = [f"environment.held.stiffness={best!r} N/m", f"seed={answer.search.drawn_with + 1}"]
     alone = batch.run(compiled("fresh", set=settings), output=tmp_path / "c.h5", threads=1).path
     with h5py.File(alone) as data:
         assert found == Confirmation("fresh", 30, 0, 0, float(data["off"][:].max())) and found.withstood
-    assert found.worst > answer.found.value and answer.ok
+    assert found.worst > answer.best.value and answer.ok
     worst = answer.goal(found.worst)
     assert f"confirmed by all 30 cases of fresh, which did not choose it: off is {worst} in the worst" in words
 
@@ -89,7 +89,7 @@ def test_one_that_misses_a_requirement_in_them_is_not_what_was_asked_for(
     assert cli.main(["run", str(tmp_path / "d.ic"), "still", "-o", str(out), "-q", "--no-picture"]) == cli.NO
     answer, words, headline = answered(out)
     [found] = answer.search.confirmation
-    assert answer.found.serves and not answer.ok and 0 < found.missed < 30 and not found.failed
+    assert answer.best.serves and not answer.ok and 0 < found.missed < 30 and not found.failed
     assert f"not confirmed: of 30 cases of fresh, which did not choose it, {found.missed} missed a requirement" in words
     assert headline.endswith(f"in all 4 cases of loads, but not in {found.missed} of 30 of fresh")
     capsys.readouterr()
@@ -101,7 +101,7 @@ def test_one_that_misses_a_requirement_in_them_is_not_what_was_asked_for(
 @pytest.mark.slow
 def test_no_design_that_misses_a_requirement_is_confirmed(tmp_path: Path) -> None:
     answer, words, _ = answered(batch.run(compiled("still", limit=1e-6), output=tmp_path / "a.h5", threads=1).path)
-    assert not answer.found.stands and answer.search.confirmation == () and "confirmed" not in words
+    assert not answer.best.stands and answer.search.confirmation == () and "confirmed" not in words
 
 
 @pytest.mark.slow

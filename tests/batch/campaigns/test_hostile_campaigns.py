@@ -416,7 +416,7 @@ def test_a_position_counts_where_it_is_run(here: Path) -> None:
     both = plans.plan(plans.gains(6), plans.gains(7, "more"))
     selected = [(both.experiments[0], np.array([5])), (both.experiments[1], np.array([2]))]
     first, second = prepare(both, output="a.h5", selected=selected, histories="#2").parts
-    assert first.kept.tolist() == [] and second.kept.tolist() == [0]
+    assert first.history_places.tolist() == [] and second.history_places.tolist() == [0]
 
 
 @pytest.mark.slow

@@ -101,7 +101,7 @@ def answers(path: Path) -> dict[str, Said]:
             each = SearchAnswer.of(group)
             assert each is not None
             [chosen] = each.values()
-            found[group.name] = Said(each.found, each.position, chosen.text)
+            found[group.name] = Said(each.best, each.position, chosen.text)
     return found
 
 
@@ -337,7 +337,7 @@ def test_the_history_of_the_answer_alone_is_kept(place: Path) -> None:
         for group in file.groups:
             answer = SearchAnswer.of(group)
             assert answer is not None
-            assert group.recorded_positions.tolist() == [answer.found.case]
+            assert group.recorded_positions.tolist() == [answer.best.case]
 
 
 @pytest.mark.slow

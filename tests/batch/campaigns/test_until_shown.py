@@ -192,7 +192,7 @@ def test_a_case_that_was_lost_misses_every_requirement(plan: Plan, here: Path) -
             (folder.shards / tasks.Task(0, 0, 20).name).unlink()
         points = until_shown.StoppingPoints(section)
         points.read(folder)
-        stops.append(points.kept())
+        stops.append(points.places_up_to_stops())
         assert points.decided == 1
     assert len(stops[0]) > len(stops[1]), "20 lost cases refute what 53 would demonstrate"
 

@@ -134,7 +134,7 @@ def test_what_a_deck_reads_must_be_as_it_was(tmp_path: Path, capsys: pytest.Capt
 @pytest.mark.slow
 def test_of_a_sweep_they_are_those_of_its_run(folder: Path) -> None:
     found = numbers_of(folder, "cranes.h5", "cranes")
-    assert found.of == "it" and found.fixed == () and found.run.experiment.cases.count == 1
+    assert found.run_name == "it" and found.fixed == () and found.run.experiment.cases.count == 1
     cart = next(each for each in found.run.experiment.cases.coordinates if each.path == "links.cart.mass")
     assert float(cart.values[0]) == 1.2
     data = data_in(folder / "cranes.view.html")
@@ -166,7 +166,7 @@ def test_an_archive_of_vary_or_set_has_them_too(folder: Path, tmp_path: Path) ->
     with ArchiveFile(tmp_path / "a.h5") as file:
         found = deck_of(file, file.plan().experiments[0], deck)
     at = {each.path: float(each.values[0]) for each in found.run.experiment.cases.coordinates}
-    assert found.of == "it" and at["links.cart.mass"] == 1.2
+    assert found.run_name == "it" and at["links.cart.mass"] == 1.2
     assert found.left_out == ("initial.turn.q",)  # which follows what was set
     assert float(found.plan.experiments[0].parameters["initial.turn.q"].value) == -parse_unit("deg").to_si(19.0)  # type: ignore[arg-type]
 

@@ -68,26 +68,28 @@ def group_of(file: ArchiveFile, name: str) -> tuple[ArchiveGroup, SearchAnswer, 
 def test_a_tuning_is_judged_in_the_cases_of_its_sweep(archive: Path) -> None:
     with ArchiveFile(archive) as file:
         group, answer, outcome = group_of(file, "still")
-        cases, far = list(answer.found.cases), group.values("far")
+        cases, far = list(answer.best.cases), group.values("far")
         assert outcome.ok and outcome.headline == "The answer meets all requirements in all 5 cases of loads"
         [first, second] = outcome.requirements
         worst = cases[int(np.argmin(far[cases]))]
         assert (first.text, first.met, first.missed, first.case) == ("far > -0.05 m", 5, 0, group.values("case")[worst])
-        assert first.said.startswith("met in all 5 cases of loads; worst ") and second.text == "top < 1 m/s"
+        assert (
+            first.outcome_with_value.startswith("met in all 5 cases of loads; worst ") and second.text == "top < 1 m/s"
+        )
 
 
 @pytest.mark.slow
 def test_a_tuning_says_which_requirement_it_misses_and_in_which_case(archive: Path) -> None:
     with ArchiveFile(archive) as file:
         group, answer, outcome = group_of(file, "poor")
-        missed = [case for case in answer.found.cases if not group.values("far")[case] > -0.05]
+        missed = [case for case in answer.best.cases if not group.values("far")[case] > -0.05]
         assert missed and not outcome.ok and not summary_of(group).ok
         worst = min(missed, key=lambda case: group.values("far")[case])
         where = f"case #{worst}" if len(missed) == 1 else f"{len(missed)} cases"
         assert outcome.headline == f"The answer misses far > -0.05 m in {where} of loads"
         [first, _] = outcome.requirements
-        assert first.said.startswith(f"missed in {len(missed)} of 5 cases of loads; worst ")
-        assert first.said.endswith(f", case #{worst}")
+        assert first.outcome_with_value.startswith(f"missed in {len(missed)} of 5 cases of loads; worst ")
+        assert first.outcome_with_value.endswith(f", case #{worst}")
 
 
 @pytest.mark.slow
@@ -95,7 +97,7 @@ def test_a_tuning_without_a_sweep_is_judged_in_its_case(archive: Path) -> None:
     with ArchiveFile(archive) as file:
         _, answer, outcome = group_of(file, "alone")
         assert outcome.headline == "The answer meets all requirements"
-        assert re.fullmatch(rf"met; worst .* m, case #{answer.position}", outcome.requirements[0].said)
+        assert re.fullmatch(rf"met; worst .* m, case #{answer.position}", outcome.requirements[0].outcome_with_value)
 
 
 @pytest.mark.slow
@@ -104,7 +106,10 @@ def test_a_search_is_judged_in_the_worst_case_that_it_found(archive: Path) -> No
         _, answer, outcome = group_of(file, "back")
         assert not outcome.ok
         assert outcome.headline == f"The worst case found, #{answer.position}, misses far > -0.05 m"
-        assert outcome.requirements[0].said == f"missed in the worst case found: -0.1 m, case #{answer.position}"
+        assert (
+            outcome.requirements[0].outcome_with_value
+            == f"missed in the worst case found: -0.1 m, case #{answer.position}"
+        )
         _, answer, outcome = group_of(file, "calm")
         assert outcome.ok and outcome.headline == f"The worst case found, #{answer.position}, meets all requirements"
 
@@ -120,8 +125,8 @@ def test_a_search_says_what_another_case_misses(archive: Path) -> None:
             f"The worst case found, #{answer.position}, meets all requirements, "
             "but another that was tried misses far > -0.05 m"
         )
-        assert outcome.requirements[0].said.endswith(f", case #{least}")
-        assert "; but missed in another: " in outcome.requirements[0].said
+        assert outcome.requirements[0].outcome_with_value.endswith(f", case #{least}")
+        assert "; but missed in another: " in outcome.requirements[0].outcome_with_value
         assert outcome.requirements[0].elsewhere and not outcome.requirements[1].elsewhere
 
 
@@ -133,11 +138,11 @@ def test_a_requirement_over_a_share_is_asked_of_each_case_and_stands_once(archiv
         summary = summary_of(group)
         assert [each.text for each in summary.requirements] == ["far > -0.05 m", "top < 1 m/s"]
         assert not any(each.evidence for each in summary.requirements) and not evidence(group)
-        assert {each.met + each.missed for each in summary.requirements} == {len(answer.found.cases)}
+        assert {each.met + each.missed for each in summary.requirements} == {len(answer.best.cases)}
         rows = requirement_evidence([group], "a.h5")
         assert [row.requirement for row in rows] == ["far > -0.05 m", "top < 1 m/s"]
         for row in rows:
-            assert row.cases == len(answer.found.cases) and row.share is None and row.confidence is None
+            assert row.cases == len(answer.best.cases) and row.share is None and row.confidence is None
             assert row.at_least is None and row.at_most is None and row.at == "" and not row.test
 
 

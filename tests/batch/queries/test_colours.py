@@ -76,8 +76,8 @@ def test_a_limit_that_is_near_is_within_the_colours() -> None:
 
 
 def test_what_lies_beyond_is_told() -> None:
-    assert of(np.append(BULK, [-1e7, 1e9, 2e9])).said == ("1 below, down to -1e+07", "2 above, up to 2e+09")
-    assert of(BULK).said == ("", "")
+    assert of(np.append(BULK, [-1e7, 1e9, 2e9])).beyond_texts == ("1 below, down to -1e+07", "2 above, up to 2e+09")
+    assert of(BULK).beyond_texts == ("", "")
 
 
 def test_where_there_is_no_number_there_are_no_colours() -> None:

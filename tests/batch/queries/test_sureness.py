@@ -54,7 +54,7 @@ def test_a_tuning_says_how_many_of_its_starts_came_to_its_answer(said: Said) -> 
     answer, words = said()
     first, second, third = answer.search.starts
     near, again, none = answer.starts
-    assert near == answer.found.value and near < again < 1.02 * near and math.isnan(none)
+    assert near == answer.best.value and near < again < 1.02 * near and math.isnan(none)
     assert "2 of its 3 starts came to within 2 % of one another" in words
     assert first.first == 0 and third.best == -1
     _, words = said(search_starts=json.dumps([{"first": 0, "best": first.best}]))
@@ -81,9 +81,9 @@ def test_a_tuning_names_the_nearest_of_its_candidates_that_is_worse_by_one_perce
         answer = SearchAnswer.of(group)
         assert answer is not None
         goals, stiffness = group.values("off").tolist(), group.values("environment.held.stiffness").tolist()
-        best, found = stiffness[answer.found.case], answer.as_data()["nearest_worse"]
+        best, found = stiffness[answer.best.case], answer.as_data()["nearest_worse"]
         away = [abs(each - best) / (9.0 - 2.0) for each in stiffness]
-        place = min((n for n, goal in enumerate(goals) if goal > 1.01 * answer.found.value), key=lambda n: away[n])
+        place = min((n for n, goal in enumerate(goals) if goal > 1.01 * answer.best.value), key=lambda n: away[n])
         assert found == {"case": place, "distance": pytest.approx(away[place], rel=1e-12)} and 0.0 < away[place] < 0.05
         words = " ".join(" ".join(answer.lines()).split())
     far = f"{100.0 * away[place]:.2g} % of a range away, case #{place} with environment.held.stiffness = "
@@ -97,7 +97,7 @@ def test_no_candidate_is_a_percent_worse_than_a_goal_of_nothing(tuned: Path, tmp
         data["off"][:] = np.where(data["off"][:] < 0.05, 0.0, data["off"][:])
     with ArchiveFile(tmp_path / "zero.h5") as file:
         answer = SearchAnswer.of(file.groups[0])
-        assert answer is not None and answer.found.stands and answer.found.value == 0.0
+        assert answer is not None and answer.best.stands and answer.best.value == 0.0
         assert answer.as_data()["nearest_worse"] is None and "worse by" not in " ".join(answer.lines())
 
 

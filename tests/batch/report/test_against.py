@@ -209,7 +209,7 @@ class TestThePage:
         found = gathered(Path("a.h5"), Path("b.h5"))
         assert found.changes is not None
         [changed] = found.changes.decks
-        assert changed.said.endswith("bench.ic: 1 line new, 1 gone") and changed.left == 0
+        assert changed.summary.endswith("bench.ic: 1 line new, 1 gone") and changed.left == 0
         source = page(found)
         assert '<li class="gone"><code>-run brief like nominal { duration = 4 s; }</code></li>' in source
         assert '<li class="new"><code>+run brief like nominal { duration = 4.04 s; }</code></li>' in source
@@ -363,7 +363,7 @@ class TestTheSignals:
     @pytest.mark.release
     def test_that_changed_most_come_first_and_then_the_worst(self, planted: tuple[Path, Path]) -> None:
         found = gathered(*planted).sections[0].signals
-        assert found is not None and found.most[:1] == (MIXED.index(12),) == found.shown
+        assert found is not None and found.most[:1] == (MIXED.index(12),) == found.first_cases
         assert found.worst == MIXED.index(12) and found.middle is None
         assert len(found.histories) == len(MIXED)
 

@@ -46,7 +46,7 @@ class TestTheVerdict:
         assert (verdict.ok, verdict.headline) == (False, "0 of 20 cases meet every requirement")
         assert verdict.parts == (OutcomeCount("missed", 20),)
         first, second = verdict.demands
-        assert (first.text, first.met, first.missed, first.of) == ("settle < 10 s", 19, 1, 20)
+        assert (first.text, first.met, first.missed, first.cases) == ("settle < 10 s", 19, 1, 20)
         assert (first.furthest, first.case) == ("∞ s", 0)
         assert (second.text, second.met, second.missed, second.furthest) == ("volts < 5 V", 0, 20, "6.849 V")
 
@@ -189,7 +189,7 @@ class TestThePoints:
     @pytest.mark.slow
     def test_are_all_cases_of_few(self, sweep: Path) -> None:
         found = gathered(sweep).sections[0].overview
-        assert found is not None and found.cases.tolist() == list(range(20)) and found.said == ""
+        assert found is not None and found.cases.tolist() == list(range(20)) and found.note == ""
         assert found.start == ("parameter:gearbox.kp", "metric:volts", "parameter:links.lower.mass")
         [settle] = [column for column in found.columns if column.label == "settle"]
         assert [(limit.text, limit.value, limit.sense) for limit in settle.limits] == [("settle < 10 s", 10.0, "<")]
@@ -204,7 +204,7 @@ class TestThePoints:
             [pool] = pools(file.groups)
             found = overview.overview(pool)
         assert found is not None and len(found.cases) <= 300
-        assert f"{len(found.cases)} of 3,000 cases are drawn." in found.said
+        assert f"{len(found.cases)} of 3,000 cases are drawn." in found.note
         drawn = set(found.cases.tolist())
         assert 777 in drawn and set(pool.worst_first[:200].tolist()) <= drawn
         for column in pool.metrics():
@@ -309,8 +309,8 @@ class TestSignals:
     @pytest.mark.slow
     def test_are_of_the_worst_cases_and_of_the_middle_one(self, sweep: Path) -> None:
         found = gathered(sweep).sections[0].signals
-        assert found is not None and len(found.histories) == 20 and found.said == ()
-        assert found.histories[0].case == 0 and found.shown == (0, found.histories[1].case, found.middle)
+        assert found is not None and len(found.histories) == 20 and found.notes == ()
+        assert found.histories[0].case == 0 and found.first_cases == (0, found.histories[1].case, found.middle)
         assert [(panel.name, [line.label for line in panel.lines]) for panel in found.panels] == [
             ("q", ["shoulder", "elbow"]),
             ("qd", ["shoulder", "elbow"]),
@@ -327,7 +327,7 @@ class TestSignals:
             found = histories.signals(pool, values=6 * 7 * 51)
         assert found is not None and len(found.histories) == 6
         assert found.middle in {each.case for each in found.histories}
-        assert found.said == ("Signals of the worst of 20 recorded cases are in this page, 6 of them.",)
+        assert found.notes == ("Signals of the worst of 20 recorded cases are in this page, 6 of them.",)
 
     @pytest.mark.slow
     def test_that_are_long_are_thinned_and_that_is_said(self, here: Path, engine: None) -> None:
@@ -340,7 +340,7 @@ class TestSignals:
         thinned = found.histories[[each.case for each in found.histories].index(0)].values[2]
         assert len(found.clocks[0]) == len(thinned) <= histories.MOST_POINTS
         assert (thinned.min(), thinned.max()) == (whole.min(), whole.max())
-        assert found.said == (
+        assert found.notes == (
             "Lines have the smallest and the largest value of every 11 rows, 4,000 points at most: no peak is lost, "
             "and its time is true to that stretch.",
         )
@@ -496,7 +496,7 @@ class TestStability:
         monkeypatch.setattr(stability, "MOST_LOOPS", 1)
         found = gathered(bench).sections[0].stability
         assert found is not None and found.cases.tolist() == [0, 2, 4]
-        assert found.said == "Computed for 3 of 6 cases, spread over all."
+        assert found.note == "Computed for 3 of 6 cases, spread over all."
 
     @pytest.mark.slow
     def test_is_not_there_without_a_bed(self, sweep: Path) -> None:

@@ -73,4 +73,4 @@ def test_the_bars_of_a_tornado_go_from_the_mean_to_both_ends(tmp_path: Path) -> 
 def test_where_nothing_can_be_told_there_is_no_table(tmp_path: Path, sweep: str, count: int, said: list[str]) -> None:
     with ArchiveFile(made(tmp_path, sweep, count or 1)) as file:
         parts = influences(pools(file.groups)[0])
-    assert [part.said for part in parts] == said and not any(part.rows for part in parts)
+    assert [part.summary for part in parts] == said and not any(part.rows for part in parts)

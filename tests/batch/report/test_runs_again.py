@@ -73,7 +73,7 @@ class TestWhatIsInIt:
     @pytest.mark.release
     def test_is_each_case_as_it_was_run_and_what_came_of_it(self, sent: Path) -> None:
         found = gathered(sent / "ways.h5").sections[0].simulation
-        assert found is not None and found.said == ()
+        assert found is not None and found.notes == ()
         with ArchiveFile(sent / "ways.h5") as file:
             experiments = file.plan().experiments
             for each, group, experiment in zip(found.structures, file.groups, experiments, strict=True):
@@ -91,7 +91,7 @@ class TestWhatIsInIt:
         assert section.signals is not None and section.simulation is not None
         assert section.signals.histories == () and section.signals.panels[0].unit == "deg"
         for each in section.simulation.structures:
-            channels = [column["channel"] for column in each.told["columns"]]
+            channels = [column["channel"] for column in each.description["columns"]]
             lines = [[channels[n] for n in columns] for columns in each.panels]
             assert lines[:3] == [[f"{joint}.{name}" for joint in ("shoulder", "elbow")] for name in ("q", "qd", "tau")]
 
@@ -101,8 +101,8 @@ class TestWhatIsInIt:
         monkeypatch.setattr(simulation, "MOST_EXACT", 3 * 8 * 2)  # an input and a metric each
         section = gathered(sent / "many.h5").sections[0]
         assert section.simulation is not None and section.signals is not None
-        assert section.simulation.structures[0].cases.tolist() == list(section.signals.shown)
-        assert section.simulation.said == ("3 of 8 cases can be run again in this page.",)
+        assert section.simulation.structures[0].cases.tolist() == list(section.signals.first_cases)
+        assert section.simulation.notes == ("3 of 8 cases can be run again in this page.",)
 
     @pytest.mark.slow
     def test_begins_with_the_design_to_use_or_with_the_middle_case(self, sent: Path, compared: Path) -> None:
@@ -110,7 +110,7 @@ class TestWhatIsInIt:
         assert many.designs is not None and many.signals is not None and many.simulation is not None
         with ArchiveFile(sent / "many.h5") as file:
             met = file.groups[0].values("met")[many.designs.case, 0]
-        assert many.signals.opens == many.designs.case != many.signals.shown[0] and met == 1
+        assert many.signals.opens == many.designs.case != many.signals.first_cases[0] and met == 1
         assert many.signals.opens in many.simulation.structures[0].cases
         assert ways.designs is None and ways.signals is not None and ways.signals.opens == ways.signals.middle
         with ArchiveFile(compared / "b.h5") as file, ArchiveFile(compared / "a.h5") as other:
@@ -379,18 +379,18 @@ class TestInTheBrowser:
         assert section.simulation is not None
         one, other = section.simulation.structures
         told = {
-            **one.told,
-            "metrics": [{**each, "name": HOSTILE} for each in one.told["metrics"]],
-            "inputs": [{**each, "name": HOSTILE} for each in one.told["inputs"]],
+            **one.description,
+            "metrics": [{**each, "name": HOSTILE} for each in one.description["metrics"]],
+            "inputs": [{**each, "name": HOSTILE} for each in one.description["inputs"]],
         }
         assert one.arm.scene is not None
         bodies = tuple(replace(each, name=HOSTILE) for each in one.arm.scene.bodies)
         metrics = tuple((HOSTILE, values + 1.0) for _, values in one.metrics)
         one = replace(
-            one, told=told, metrics=metrics, arm=replace(one.arm, scene=replace(one.arm.scene, bodies=bodies))
+            one, description=told, metrics=metrics, arm=replace(one.arm, scene=replace(one.arm.scene, bodies=bodies))
         )
         other = replace(other, arm=replace(other.arm, scene=None, lacking=(HOSTILE,)))
-        again = replace(section.simulation, structures=(one, other), said=(HOSTILE,))
+        again = replace(section.simulation, structures=(one, other), notes=(HOSTILE,))
         wild = replace(hostile(replace(section, simulation=None)), simulation=again)
         (tmp_path / "wild.html").write_text(html_page(replace(hostile(found), sections=(wild,))), encoding="utf-8")
         shown = opened(chromium, tmp_path / "wild.html")

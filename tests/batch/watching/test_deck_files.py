@@ -23,7 +23,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> DeckFiles:
     found = DeckFiles(Path("deck.ic"))
     begun = found.begin()
     os.utime("part.ic", (1.0, 1.0))
-    assert not found.found(("deck.ic", "part.ic", "<two_link.ic>", COMMAND_LINE), begun)
+    assert not found.watch_files(("deck.ic", "part.ic", "<two_link.ic>", COMMAND_LINE), begun)
     return found
 
 
@@ -71,11 +71,11 @@ def test_a_file_that_is_looked_for_is_noticed_where_it_may_come(files: DeckFiles
 def test_what_changes_while_a_deck_is_read_is_read_again(files: DeckFiles) -> None:
     begun = files.begin()
     Path("deck.ic").write_text("let a = 4;\n")
-    assert not files.found(("deck.ic",), begun) and files.changed()
+    assert not files.watch_files(("deck.ic",), begun) and files.changed()
     begun = files.begin()
     time.sleep(0.05)  # clocks of files have ticks
     Path("new_part.ic").write_text("let c = 1;\n")
-    assert files.found(("deck.ic", "new_part.ic"), begun)
+    assert files.watch_files(("deck.ic", "new_part.ic"), begun)
     assert files.paths == (Path("deck.ic"), Path("new_part.ic"))
 
 
@@ -107,7 +107,7 @@ def test_a_file_that_is_looked_for_in_another_folder_is_noticed_there(
         Path(folder).mkdir(parents=True)
     Path("deck.ic").write_text('#include "parts/a.ic"\n#include <servos/b.ic>\n#include "not/yet/c.ic"\n"\0/d"\n')
     files = DeckFiles(Path("deck.ic"))
-    assert not files.found(("deck.ic",), files.begin())
+    assert not files.watch_files(("deck.ic",), files.begin())
     assert not files.changed(around=True)
     for name in ("parts/a.ic", "shared/servos/b.ic", "shared/e.ic", "not/yet/c.ic"):
         Path(name).parent.mkdir(parents=True, exist_ok=True)

@@ -162,7 +162,7 @@ def run(
             frames = commands(dialect, way, chance.choice((1, 2)))
             serial = dialect == "odrive_ascii"
             interfere(line, frames, begins, begins + LONGEST + 0.5, seed, heard=heard and not serial)
-        share = min(1.0, bed._there().limits.rate / 110.0)
+        share = min(1.0, bed._require_about().limits.rate / 110.0)
         amplitude, hz = share * chance.uniform(2.0, 6.0) * (10.0 if told == "rate" else 1.0), chance.uniform(1.0, 4.0)
         due = line.now()
         for _ in range(round((LONGEST if way else HONEST) / period)):
@@ -184,7 +184,7 @@ def _noticed(bed: CanBed, line: PlayedLine, begins: float) -> Outcome:
 def _armed_again(bed: CanBed, line: PlayedLine, begins: float) -> Outcome:
     try:
         bed.rest(0.2)
-        while bed.read().state == BedState.DISARMED and abs(bed.read().rate) > bed._there().limits.arming_rate:
+        while bed.read().state == BedState.DISARMED and abs(bed.read().rate) > bed._require_about().limits.arming_rate:
             bed.rest(0.5)
         bed.arm()
     except Problem as problem:

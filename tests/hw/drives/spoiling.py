@@ -164,7 +164,7 @@ def campaign(
     bed.connect()
     bed.patience = 2.0 * period  # as of a run
     truth = _Truth(played)
-    share = min(1.0, bed._there().limits.rate / SWUNG)
+    share = min(1.0, bed._require_about().limits.rate / SWUNG)
     chance = random.Random(f"{spoiler.kind} drives")
     while tally.exchanges < exchanges:
         spoiler.on = False
@@ -177,10 +177,10 @@ def campaign(
             bed.connect()
         if bed.read().state != BedState.DISARMED:
             bed.rest(0.2)
-            while abs(bed.read().rate) > bed._there().limits.arming_rate:
+            while abs(bed.read().rate) > bed._require_about().limits.arming_rate:
                 bed.rest(0.5)
             bed.clear()
-        while abs(bed.read().rate) > bed._there().limits.arming_rate:
+        while abs(bed.read().rate) > bed._require_about().limits.arming_rate:
             bed.rest(0.5)
         bed.arm()
         spoiler.on = True
