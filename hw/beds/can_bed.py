@@ -189,11 +189,11 @@ class CanBed(BedDriver):
 
     def _exchanged(self) -> list[CanFrame]:
         """Frames like those of an exchange, both ways."""
-        questions = [() if drive.answers_commands else drive.asked() for drive in self._drives]
+        questions = [() if drive.answers_commands else drive.query() for drive in self._drives]
         return [
             frame
             for drive, asks in zip(self._drives, questions, strict=True)
-            for frame in (*drive.told(0.0), *asks, *drive.answers())
+            for frame in (*drive.command(0.0), *asks, *drive.answers())
         ]
 
     def line_time(self, about: About) -> float:
@@ -291,8 +291,8 @@ class CanBed(BedDriver):
             self._hold(volts, amperes, now)
             drive, load = self._drives
             frames += [*load.checks(), *drive.checks()] if self._asks else []
-            frames += load.told(self._kt_load * amperes * scales.current)
-            frames += drive.told(self._drive_command(volts * scales.voltage))
+            frames += load.command(self._kt_load * amperes * scales.current)
+            frames += drive.command(self._drive_command(volts * scales.voltage))
         answered = self._answers(frames, now)
         if self._state == BedState.ARMED:
             self._watch()
@@ -389,7 +389,7 @@ class CanBed(BedDriver):
             drive.reading = None
         some_even, all_even = not all(owed), not any(owed)
         drives = [d for d in self._drives if some_even and not (commands and d.answers_commands)]
-        talk.send([*commands, *dict.fromkeys(frame for d in drives for frame in d.asked())])  # one SYNC is to both
+        talk.send([*commands, *dict.fromkeys(frame for d in drives for frame in d.query())])  # one SYNC is to both
         if not some_even:
             self._settle(min(self.patience, self.period))
             return False
@@ -434,7 +434,7 @@ class CanBed(BedDriver):
         """Ask both drives again and again until both have answered, and agree. Raises Problem E402 where one does not
         answer, E406 where they do not agree."""
         talk = self._talk
-        asks = tuple(dict.fromkeys(frame for drive in self._drives for frame in drive.asked()))
+        asks = tuple(dict.fromkeys(frame for drive in self._drives for frame in drive.query()))
         for _ in range(ASKS):
             talk.pump(talk.line.now() + QUIET)
             self._settle(OWED)

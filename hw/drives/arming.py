@@ -25,7 +25,7 @@ def begin_driving(talk: Talk) -> None:
             _give_up(talk)
             raise Problem(error("E406", message, help="is it calibrated? its maker's tool says what it lacks"))
         for drive in talk.drives:
-            talk.send(drive.told(0.0))
+            talk.send(drive.command(0.0))
 
 
 def prove_watchdogs(talk: Talk, deadman: float) -> tuple[float | None, ...]:
@@ -45,7 +45,7 @@ def prove_watchdogs(talk: Talk, deadman: float) -> tuple[float | None, ...]:
     quiet = 1.5 * deadman + 0.02
     if not talk.pump(began + quiet, all_stopped):
         late = [drive for drive in talk.drives if drive.node not in ended]
-        asks = [frame for drive in late for frame in drive.asked()]
+        asks = [frame for drive in late for frame in drive.query()]
         talk.ask(asks, lambda: all(drive.stated > began + quiet for drive in late))
     for drive in talk.drives:
         if drive.state == DriveState.DRIVING:
@@ -83,7 +83,7 @@ def forget(talk: Talk) -> bool:
         for drive in talk.drives:
             if drive.state != DriveState.IDLE:
                 talk.send(drive.cleared())
-                talk.send(drive.asked())
+                talk.send(drive.query())
         if talk.pump(talk.line.now() + TO_IDLE, lambda: all(d.state == DriveState.IDLE for d in talk.drives)):
             return True
     return False
@@ -96,7 +96,7 @@ def switch_off(talk: Talk, *, halt: bool = False) -> bool:
     for _ in range(5):
         for drive in reversed(talk.drives):
             talk.send(drive.halted() if halt else drive.idle())
-            talk.send(drive.asked())
+            talk.send(drive.query())
         if talk.pump(
             talk.line.now() + TO_IDLE / 5,
             lambda: all(d.state != DriveState.DRIVING and d.stated > now for d in talk.drives),

@@ -139,7 +139,7 @@ class Cia402Drive(CanDrive):
         self._set_up(talk)
         talk.send(self.idle())
         self.reading = None
-        if not talk.ask(self.asked(), lambda: self.reading is not None and self.state != DriveState.DRIVING):
+        if not talk.ask(self.query(), lambda: self.reading is not None and self.state != DriveState.DRIVING):
             raise talk.silent(self, "SYNC")
         self._prepare_checks(talk)
         product, revision = int(self._read(talk, PRODUCT, "<I")), int(self._read(talk, REVISION, "<I"))
@@ -260,9 +260,9 @@ class Cia402Drive(CanDrive):
 
     def armed(self) -> Sequence[CanFrame]:
         self._wanted = True
-        return self.told(0.0)
+        return self.command(0.0)
 
-    def told(self, value: float) -> Sequence[CanFrame]:
+    def command(self, value: float) -> Sequence[CanFrame]:
         """The next step towards operation, or torque or rate once it is there. The drive's come last: they end with the
         heartbeat that feeds both watchdogs, and the SYNC at which both answer."""
         command_counts = 0
@@ -271,9 +271,9 @@ class Cia402Drive(CanDrive):
             command_counts = math.trunc(counts + math.copysign(1e-6, counts))  # rounding must not lose a step
         self._checks.tell(command_counts)
         frames = (self._pdo(self._control if self._wanted else OFF, command_counts),)
-        return frames if self.entry.role == "load" else (*frames, CanFrame(HEARTBEAT + HOST, b"\x05"), *self.asked())
+        return frames if self.entry.role == "load" else (*frames, CanFrame(HEARTBEAT + HOST, b"\x05"), *self.query())
 
-    def asked(self) -> Sequence[CanFrame]:
+    def query(self) -> Sequence[CanFrame]:
         return (CanFrame(SYNC),)
 
     def is_asked_by(self, frame: CanFrame) -> bool:

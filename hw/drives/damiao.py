@@ -87,7 +87,7 @@ class DamiaoDrive(CanDrive):
         self.steps = 2.0 * self._angle_max / STEPS_16, 2.0 * self._rate_max / STEPS_12
         watchdog = self._read(talk, TIMEOUT) * TIMEOUT_UNIT
         self.reading = None
-        if not talk.ask(self.asked(), lambda: self.reading is not None):
+        if not talk.ask(self.query(), lambda: self.reading is not None):
             raise talk.silent(self, "what its angle is")
         return DriveFacts(
             f"{version}.{sub}",
@@ -139,13 +139,13 @@ class DamiaoDrive(CanDrive):
 
     def armed(self) -> Sequence[CanFrame]:
         """Send no torque before it is enabled, nor after: no document says whether a drive that is off takes one."""
-        return (*self.told(0.0), self._frame(ENABLE), *self.told(0.0))
+        return (*self.command(0.0), self._frame(ENABLE), *self.command(0.0))
 
-    def told(self, value: float) -> Sequence[CanFrame]:
+    def command(self, value: float) -> Sequence[CanFrame]:
         torque = count_of(self.own(value), self._torque_max, STEPS_12)
         return (self._frame(packed(STEPS_16 // 2, STEPS_12 // 2, 0, 0, torque)),)
 
-    def asked(self) -> Sequence[CanFrame]:
+    def query(self) -> Sequence[CanFrame]:
         return (CanFrame(REGISTERS, struct.pack("<HBBI", self.node, REFRESH, 0, 0)),)
 
     def is_asked_by(self, frame: CanFrame) -> bool:
@@ -162,7 +162,7 @@ class DamiaoDrive(CanDrive):
 
     def idle(self) -> Sequence[CanFrame]:
         """Send no torque while the drive still takes it, so that none is left when it is enabled."""
-        return (*self.told(0.0), self._frame(DISABLE))
+        return (*self.command(0.0), self._frame(DISABLE))
 
     def halted(self) -> Sequence[CanFrame]:
         return self.idle()

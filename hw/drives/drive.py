@@ -7,8 +7,8 @@ shaft. It disarms itself where it hears nothing for the time of its watchdog.
     drive.greet(talk)        who is there: dialect, firmware, limits; it is idle afterwards
     drive.renew(talk)        set again what its greeting set, before each arming
     drive.armed()            frames that arm it with nothing commanded, to be sent until its state says so
-    drive.told(value)        frames of a command
-    drive.asked()            frames that ask for its angle, rate and state
+    drive.command(value)     frames of a command
+    drive.query()            frames that ask for its angle, rate and state
     drive.take(frame)        what it answers, or says by itself
     drive.is_command(frame)  whether a frame that came commands it: then there is another master
     drive.checks()           frames that ask what another master would have changed
@@ -159,11 +159,11 @@ class CanDrive(ABC):
         """Frames that let it drive, with nothing commanded."""
 
     @abstractmethod
-    def told(self, value: float) -> Sequence[CanFrame]:
+    def command(self, value: float) -> Sequence[CanFrame]:
         """Frames of a command, N m; or rad/s for a drive that takes rates."""
 
     @abstractmethod
-    def asked(self) -> Sequence[CanFrame]:
+    def query(self) -> Sequence[CanFrame]:
         """Frames that ask for angle, rate and state."""
 
     @abstractmethod

@@ -165,7 +165,7 @@ class MoteusDrive(CanDrive):
             raise self.other(f"its register map is of version {registers}", helps)
         self.reading = None
         talk.send(self.idle())
-        if not talk.ask(self.asked(), lambda: self.reading is not None and self.state != DriveState.DRIVING):
+        if not talk.ask(self.query(), lambda: self.reading is not None and self.state != DriveState.DRIVING):
             raise talk.silent(self, "what its angle is")
         firmware = ".".join(str(version >> shift & 0xFF) for shift in (16, 8, 0))
         braking = self.entry.role == "drive"
@@ -177,15 +177,15 @@ class MoteusDrive(CanDrive):
         return CanFrame(ASKS_ANSWER | self.node, padded(data), extended=True, fd=True)
 
     def armed(self) -> Sequence[CanFrame]:
-        return (self._frame(written(INT8, MODE, STOPPED)), *self.told(0.0))
+        return (self._frame(written(INT8, MODE, STOPPED)), *self.command(0.0))
 
-    def told(self, value: float) -> Sequence[CanFrame]:
+    def command(self, value: float) -> Sequence[CanFrame]:
         torque = (self.own(value), 0.0, 0.0, self._most)  # and no part of its gains
         data = written(INT8, MODE, DRIVING) + written(FLOAT, TARGET, math.nan) + written(FLOAT, TORQUE, *torque)
         data += written(FLOAT, VALID_FOR, self._watchdog) + written(FLOAT, INTEGRAL_SCALE, 0.0)
         return (self._frame(data + _STATE),)
 
-    def asked(self) -> Sequence[CanFrame]:
+    def query(self) -> Sequence[CanFrame]:
         return (self._frame(_STATE),)
 
     def is_asked_by(self, frame: CanFrame) -> bool:

@@ -160,17 +160,17 @@ class OdriveDrive(OdriveAxis):
     def armed(self) -> Sequence[CanFrame]:
         return (
             self._frame(MODES, struct.pack("<II", self._mode, PASSTHROUGH)),
-            *self.told(0.0),
+            *self.command(0.0),
             self._frame(SET_STATE, struct.pack("<I", CLOSED_LOOP)),
         )
 
-    def told(self, value: float) -> Sequence[CanFrame]:
+    def command(self, value: float) -> Sequence[CanFrame]:
         self._checks.tell(self.own(value) / TURN if self.rates else self.own(value))
         if self.rates:  # with no torque besides that of its loop
             return (self._frame(RATE, struct.pack("<ff", self.own(value) / TURN, 0.0)),)
         return (self._frame(TORQUE, struct.pack("<f", self.own(value))),)
 
-    def asked(self) -> Sequence[CanFrame]:
+    def query(self) -> Sequence[CanFrame]:
         return (self._request(ESTIMATES),)
 
     def is_asked_by(self, frame: CanFrame) -> bool:
@@ -193,10 +193,10 @@ class OdriveDrive(OdriveAxis):
         return (self._frame(READ_OR_WRITE, struct.pack("<BHB", 0, number, 0)),)
 
     def idle(self) -> Sequence[CanFrame]:
-        return (*self.told(0.0), self._frame(SET_STATE, struct.pack("<I", IDLE)))
+        return (*self.command(0.0), self._frame(SET_STATE, struct.pack("<I", IDLE)))
 
     def halted(self) -> Sequence[CanFrame]:
-        return (self._frame(ESTOP), *self.told(0.0))  # otherwise it would resume its command when armed again
+        return (self._frame(ESTOP), *self.command(0.0))  # otherwise it would resume its command when armed again
 
     def cleared(self) -> Sequence[CanFrame]:
         return (self._frame(CLEAR, b"\0"), *self.idle())

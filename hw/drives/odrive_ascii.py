@@ -91,7 +91,7 @@ class OdriveAsciiDrive(OdriveAxis):
         facts = self._described(talk, *words)
         self._property(talk, VOLTAGE)
         seen = talk.line.now()
-        if not talk.ask(self.asked(), lambda: self.stated > seen and self.state != DriveState.DRIVING):
+        if not talk.ask(self.query(), lambda: self.stated > seen and self.state != DriveState.DRIVING):
             raise self._silent(talk, f"`r {STATE}`")
         angle_step, rate_step = self.steps
         return replace(facts, angle_count=angle_step, rate_count=rate_step)
@@ -156,10 +156,10 @@ class OdriveAsciiDrive(OdriveAxis):
             ),
             self._command(0.0),
             self._text(f"w {REQUESTED} {CLOSED_LOOP}"),
-            *self.asked(),
+            *self.query(),
         )
 
-    def told(self, value: float) -> Sequence[CanFrame]:
+    def command(self, value: float) -> Sequence[CanFrame]:
         self._turn += 1
         asks: tuple[str, ...] = (STATE,)
         if self._turn % 2 == 0 and self._checks.doubtful:  # while the command before is still in force
@@ -172,7 +172,7 @@ class OdriveAsciiDrive(OdriveAxis):
             asks = (self._checks.next(),)
         return (self._command(value), self._text("f 0"), *(self._text(f"r {path}") for path in asks))
 
-    def asked(self) -> Sequence[CanFrame]:
+    def query(self) -> Sequence[CanFrame]:
         return (self._text("f 0"), *(self._text(f"r {path}") for path in (STATE, ACTIVE, REASON)))
 
     def is_asked_by(self, frame: CanFrame) -> bool:

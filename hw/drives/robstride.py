@@ -177,7 +177,7 @@ class RobstrideDrive(CanDrive):
         off = most = math.inf
         for _ in range(ASKS):
             angle, self.reading = self.own(self._read(talk, ANGLE)), None
-            if not talk.ask(self.asked(), lambda: self.reading is not None):
+            if not talk.ask(self.query(), lambda: self.reading is not None):
                 raise talk.silent(self, "what its angle is")
             assert self.reading is not None
             off = abs(math.remainder(self.reading.angle - angle, 2.0 * ANGLE_MAX))
@@ -230,14 +230,14 @@ class RobstrideDrive(CanDrive):
         """Send no torque before it is enabled, nor after: no manual says whether a drive that is off takes one."""
         self._wanted, self._ran = True, False
         settings = self._writes(TIMEOUT, self._timeout), self._writes(RUN_MODE, OPERATION_MODE)
-        return (*settings, *self.told(0.0), self._frame(ENABLE), *self.told(0.0))
+        return (*settings, *self.command(0.0), self._frame(ENABLE), *self.command(0.0))
 
-    def told(self, value: float) -> Sequence[CanFrame]:
+    def command(self, value: float) -> Sequence[CanFrame]:
         torque = count_of(self.own(value), self._torque_max, STEPS_16)
         nothing = struct.pack(">HHHH", STEPS_16 // 2, STEPS_16 // 2, 0, 0)
         return (self._frame(TELL, nothing, torque),)
 
-    def asked(self) -> Sequence[CanFrame]:
+    def query(self) -> Sequence[CanFrame]:
         return (self._writes(TIMEOUT, self._timeout), self._asks(SUPPLY))
 
     def is_asked_by(self, frame: CanFrame) -> bool:
@@ -250,7 +250,7 @@ class RobstrideDrive(CanDrive):
     def idle(self) -> Sequence[CanFrame]:
         """Send no torque while the drive still takes it, so that none is left when it is enabled."""
         self._wanted = self._ran = False
-        return (*self.told(0.0), self._frame(STOP))
+        return (*self.command(0.0), self._frame(STOP))
 
     def halted(self) -> Sequence[CanFrame]:
         return self.idle()

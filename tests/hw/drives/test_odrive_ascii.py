@@ -304,7 +304,7 @@ def test_what_its_watchdog_did_is_told_by_its_own_words(tmp_path: Path) -> None:
         bed._talk.line.sleep(0.03)
         assert played.off
         drive = bed._drives[0]
-        bed._talk.ask(drive.asked(), lambda: drive.starved)
+        bed._talk.ask(drive.query(), lambda: drive.starved)
         assert drive.errors == "watchdog expired"
         assert bed.read().faults == Fault.DEADMAN
 

@@ -31,7 +31,7 @@ def test_a_frame_that_commands_a_drive_is_known_and_one_that_asks_is_none(
     for frame in commands(dialect, way, 1):
         assert [each.is_command(frame) for each in drives] == [True, False]
     if dialect not in ("cia402", "robstride"):  # whose questions are a SYNC, and the setting of a watchdog
-        asked = [frame for each in drives for frame in each.asked()]
+        asked = [frame for each in drives for frame in each.query()]
         assert not any(each.is_command(frame) for each in drives for frame in asked)
 
 

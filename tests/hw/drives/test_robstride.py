@@ -48,10 +48,10 @@ def test_a_torque_is_in_the_identifier_and_an_answer_in_16_bits() -> None:
     """Worked by hand from the manual of an RS00: 14 N m, 33 rad/s and 4 pi rad are 65535, their opposites 0."""
     drive = one(1)
     drive._rate_max, drive._torque_max = drive._ranges()
-    (most,), (least,) = drive.told(99.0), drive.told(-99.0)
+    (most,), (least,) = drive.command(99.0), drive.command(-99.0)
     assert (most.id, least.id) == (0x01FFFF01, 0x01000001)
     assert most.data.hex() == "7fff7fff00000000" and most.extended
-    (half,) = drive.told(7.0)
+    (half,) = drive.command(7.0)
     assert half.id == 0x01BFFF01  # 0.75 of 65535, towards 0
     assert drive.take(CanFrame(0x028001FD, bytes.fromhex("ffff0000ffff0131"), extended=True, time=2.0))
     assert drive.reading is not None
