@@ -35,7 +35,7 @@ class Sink:
         self._path = path
         self._file = _locked(path)
         os.ftruncate(self._file, 0)
-        self._at = 0
+        self._position = 0
         self._size = 0
         self.failure: OSError | None = None
 
@@ -45,11 +45,11 @@ class Sink:
             raise self.failure
 
     def tell(self) -> int:
-        return self._at
+        return self._position
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._size}[whence]
-        return self._at
+        self._position = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._position, os.SEEK_END: self._size}[whence]
+        return self._position
 
     def readinto(self, buffer: memoryview) -> int:
         """Read into a buffer; bytes beyond the end, and all after a failure, are zeros."""
@@ -57,16 +57,16 @@ class Sink:
         got = 0
         if self.failure is None:
             try:
-                got = os.preadv(self._file, [view], self._at)
+                got = os.preadv(self._file, [view], self._position)
             except OSError as reason:
                 self.failure = reason
         view[got:] = bytes(len(view) - got)
-        self._at += len(view)
+        self._position += len(view)
         return len(view)
 
     def read(self, size: int = -1) -> bytes:
         """Read bytes, as `readinto` does; h5py takes an object with this method for a file."""
-        buffer = bytearray(self._size - self._at if size < 0 else size)
+        buffer = bytearray(self._size - self._position if size < 0 else size)
         self.readinto(memoryview(buffer))
         return bytes(buffer)
 
@@ -75,17 +75,17 @@ class Sink:
         left = view
         while len(left) and self.failure is None:
             try:
-                wrote = os.pwrite(self._file, left, self._at + len(view) - len(left))
+                wrote = os.pwrite(self._file, left, self._position + len(view) - len(left))
             except OSError as reason:
                 self.failure = reason
                 break
             left = left[wrote:]
-        self._at += len(view)
-        self._size = max(self._size, self._at)
+        self._position += len(view)
+        self._size = max(self._size, self._position)
         return len(view)
 
     def truncate(self, size: int | None = None) -> int:
-        size = self._at if size is None else size
+        size = self._position if size is None else size
         if self.failure is None:
             try:
                 os.ftruncate(self._file, size)

@@ -43,7 +43,7 @@ class Reporter:
         self._path = folder.path / (f"status.{name}.json" if name else "status.json")
         self._progress = progress
         self._next = 0.0
-        self._told: dict[str, Any] = {
+        self._record: dict[str, Any] = {
             "state": "starting",
             "pid": os.getpid(),
             "host": socket.gethostname(),
@@ -61,7 +61,7 @@ class Reporter:
     def begin(self, name: str, cases: int, done: int, failed: int, workers: str) -> None:
         """A section starts, or is taken up again."""
         self._name = name
-        self._told |= {
+        self._record |= {
             "state": "running",
             "section": name,
             "section_cases": cases,
@@ -76,7 +76,7 @@ class Reporter:
 
     def advance(self, done: int, failed: int, more: str = "") -> None:
         self._take(done, failed)
-        self._told["more"] = more
+        self._record["more"] = more
         if time.monotonic() > self._next:
             self._write()
         if self._progress is not None:
@@ -88,17 +88,17 @@ class Reporter:
 
     def state(self, state: str) -> None:
         """Write a state: running, merging, interrupted, stopped, or done."""
-        self._told["state"] = state
+        self._record["state"] = state
         self._write()
 
     def _take(self, done: int, failed: int) -> None:
-        self._told |= {"section_done": done, "failed": failed}
+        self._record |= {"section_done": done, "failed": failed}
 
     def _write(self) -> None:
         self._next = time.monotonic() + WRITE_SECONDS
-        self._told["updated"] = time.time()
+        self._record["updated"] = time.time()
         try:
-            write_json(self._path, self._told)
+            write_json(self._path, self._record)
         except OSError:  # the writer of results reports a full disk
             pass
 

@@ -103,7 +103,7 @@ class _Log:
         self.topics: dict[int, str] = {}
         self.readings: dict[int, Reading | None] = {}
         self.channels: dict[int, Any] = {}
-        self.shown: set[str] = set()
+        self.shown_topics: set[str] = set()
         self.taken: dict[str, tuple[list[int], list[float]]] = {}
         self.count = 0
         self.prefixes: set[str] = set()
@@ -148,7 +148,7 @@ class _Log:
             times, values = self.taken.setdefault(channel, ([], []))
             times.append(message.log_time)
             values.append(value if math.isfinite(value) else math.nan)
-            self.shown.add(self.topics[number])
+            self.shown_topics.add(self.topics[number])
             self.count += 1
             if self.count > MOST_NUMBERS:
                 raise self.problem(f"has more than {MOST_NUMBERS:,} numbers that are shown", "thin it out")
@@ -229,7 +229,9 @@ class _Log:
 
     def measured_signals(self) -> MeasuredSignals:
         """All data read, at ascending times."""
-        unused = [visible(_short(topic)) for topic in dict.fromkeys(self.topics.values()) if topic not in self.shown]
+        unused = [
+            visible(_short(topic)) for topic in dict.fromkeys(self.topics.values()) if topic not in self.shown_topics
+        ]
         first = min((min(times) for times, _ in self.taken.values()), default=0)
         begin = first if first / SECOND >= CLOCK else 0
         signals = {}

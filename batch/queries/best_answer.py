@@ -86,7 +86,7 @@ class BestAnswer:
             if column.limits and column.label not in {goal.text for goal in (*goals, *front)}
             for goal in [designs.goal(f"{column.label}:{'smallest' if column.limits[0].sense == '<' else 'largest'}")]
         ]
-        self.shown = tuple({goal.text: goal for goal in (*self.goals, *self.front, *required)}.values())
+        self.shown_goals = tuple({goal.text: goal for goal in (*self.goals, *self.front, *required)}.values())
         """Goals with a column of their own."""
 
     @property
@@ -116,7 +116,7 @@ class BestAnswer:
         labels = {int(self.order[0]): first}
         if (better := self.left) is not None:
             labels = {int(self.order[0]): "keeps the margin", better: first}
-        for goal in self.shown:
+        for goal in self.shown_goals:
             if all(goal is not shown_goal for shown_goal in self.goals):
                 labels.setdefault(int(designs.order([goal])[0]), _least(goal))
         for number, design in enumerate(self.order[1 : 1 + RUNNERS_UP].tolist(), start=2):
@@ -282,7 +282,7 @@ class BestAnswer:
             cells.append([column.label, column.unit, *_values(column, designs.first[numbers])])
         if designs.steps is not None:
             cells.append(["border", "cells", *(str(designs.steps[number]) for number in numbers)])
-        for goal in self.shown:
+        for goal in self.shown_goals:
             unit, scale = self._unit(goal)
             values = self._worst(goal)[numbers] / scale
             cells.append([goal.text, unit, *("-" if math.isnan(value) else number_text(value) for value in values)])
@@ -397,7 +397,7 @@ class BestAnswer:
             "stability": stability_data(self.judged.get(row.design)),
             "worst": {
                 goal.text: float(designs.worst(goal.values, largest=not goal.largest)[row.design])
-                for goal in self.shown
+                for goal in self.shown_goals
             },
         }
 

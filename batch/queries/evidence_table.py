@@ -212,7 +212,7 @@ def _again(group: ArchiveGroup, case: int, archive: str, several: bool) -> str:
 class EvidenceTexts:
     """A row's numbers as texts, with their units; `NONE` where there is none.
 
-    missed  `3 of 600`;  of_all: `at least 98.71 %`;  asked: `99 % with 90 %`;  needed: more cases
+    missed  `3 of 600`;  of_all: `at least 98.71 %`;  demand: `99 % with 90 %`;  needed: more cases
     bound   of the percentile, on the side of the limit, `2.9 s`;  limit: `< 3 s`
     """
 
@@ -220,7 +220,7 @@ class EvidenceTexts:
     missed: str
     share_met: str
     of_all: str
-    asked: str
+    demand: str
     bound: str
     needed: str
     limit: str
@@ -250,7 +250,7 @@ def texts_of(row: RequirementEvidence, number: Callable[[float], str] = number_t
         missed=f"{row.missed:,} of {row.cases:,}",
         share_met=NONE if row.share_met is None else percent_below(row.share_met).replace(".00 %", " %"),
         of_all=of_all,
-        asked=demand,
+        demand=demand,
         bound=quantity(row.percentile_bound),
         needed=f"{row.more_cases:,}" if row.more_cases else NONE,
         limit=f"{row.comparison} {quantity(row.limit)}",

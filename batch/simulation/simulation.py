@@ -65,7 +65,7 @@ class Simulation:
     ) -> None:
         if (path is None) == (text is None):
             raise TypeError("a deck is given by its path or by its text")
-        self._given = given_run(
+        self._deck_run = given_run(
             text_or_none(path, "path", PATHS) or "",
             text_or_none(run, "run"),
             text=text_or_none(text, "text"),
@@ -79,12 +79,12 @@ class Simulation:
         self._units: dict[str, str | None] = {}
 
     def __repr__(self) -> str:
-        return f"Simulation of `{self._given.name}` in {self._given.deck.file}"
+        return f"Simulation of `{self._deck_run.name}` in {self._deck_run.deck.file}"
 
     @property
     def experiment(self) -> Experiment:
         """The run as the deck has it: its parameters, in SI, with where each was written."""
-        return self._given.experiment
+        return self._deck_run.experiment
 
     def run(
         self,
@@ -176,7 +176,7 @@ class Simulation:
         key = tuple(table), tuple(kinds.items()), seen, repeat > 0
         if key not in self._stepped:
             first = {path: (float(column[0]), self._units[path] or "1") for path, column in table.items()}
-            self._stepped[key] = program(self._given, first, kinds=kinds, record=seen, repeated=repeat > 0)
+            self._stepped[key] = program(self._deck_run, first, kinds=kinds, record=seen, repeated=repeat > 0)
         stepped_program = self._stepped[key]
         zeros = {path: np.zeros(1) for path in stepped_program.paths}
         stepped_program.varied.check({**table, **zeros}, 1)
@@ -190,10 +190,10 @@ class Simulation:
             raise Problem(error("E431", message, help='by path: `{"gearbox.kp": 0.02}`'))
         for path, value in values.items():
             if path not in self._units:
-                self._units[path] = self._given.unit(path)
+                self._units[path] = self._deck_run.unit(path)
             unit = self._units[path]
             if unit is None:  # then this reports the mistake in the path
-                self._given.vary({path: (value if isinstance(value, str) and value.isidentifier() else 0.0, "1")})
+                self._deck_run.vary({path: (value if isinstance(value, str) and value.isidentifier() else 0.0, "1")})
             elif unit == "":
                 raise _no_number(path, value)
             in_si[path] = values_in_si(value, path, unit or "1")
@@ -204,9 +204,9 @@ class Simulation:
         key = tuple(first), repeated
         if key not in self._programs:
             values = {path: (value, self._units[path] or "1") for path, value in first.items()}
-            varied = self._given.vary(values, repeat=2 if repeated else 1)
+            varied = self._deck_run.vary(values, repeat=2 if repeated else 1)
             prepared = engine.prepare(varied.experiment)
-            self._programs[key] = SimulationProgram(varied, prepared, DatasetMaker(self._given.deck.file, prepared))
+            self._programs[key] = SimulationProgram(varied, prepared, DatasetMaker(self._deck_run.deck.file, prepared))
         return self._programs[key]
 
     def _signals(self, histories: bool | str | Sequence[str], cases: int) -> tuple[str, ...]:
@@ -223,7 +223,7 @@ class Simulation:
                     known_words("the run records", known),
                     "the deck's `record` says what",
                 ]
-                raise Problem(error("E432", f"`{self._given.name}` records no `{name}`", help=helps))
+                raise Problem(error("E432", f"`{self._deck_run.name}` records no `{name}`", help=helps))
         needed = self.experiment.structure.history_bytes * cases
         if names and needed > memory():
             message = f"histories of {cases:,} cases take {size_text(needed)} of memory"

@@ -118,7 +118,7 @@ class SteppedRun:
         ]
         self._block = block = self._prepared.kernel.block(np.array([input_values]).reshape(1, -1))
         names, cells = self._prepared.program.inputs, self._prepared.recording.cells
-        self._given = [block.inputs[names.index(path)] for path in program.paths]
+        self._command_inputs = [block.inputs[names.index(path)] for path in program.paths]
         self._held = [block.state[cells.index(PARAMETER + path)] for path in program.paths if PARAMETER + path in cells]
         outputs = self._prepared.program.outputs
         alarms = [name for name in (FAILURE[0], plausible.FAILED_TICK, UNHELD) if name in outputs]
@@ -140,7 +140,7 @@ class SteppedRun:
         if self.done:
             raise self._over()
         values = self._checked(commands)
-        for value, held_inputs in zip(values, self._given, strict=True):
+        for value, held_inputs in zip(values, self._command_inputs, strict=True):
             held_inputs[:] = value
         for value, held in zip(values, self._held, strict=True):
             held[:] = value
@@ -194,7 +194,7 @@ class SteppedRun:
             listed = [listed]
         numbers = [real(command) for command in listed]
         values = [value for value in numbers if value is not None]
-        if units is not None or not len(numbers) == len(values) == len(self._given):
+        if units is not None or not len(numbers) == len(values) == len(self._command_inputs):
             message = (
                 f"commands are a finite number for each of {', '.join(self.joints)}, and not {short_repr(commands)}"
             )

@@ -10,7 +10,7 @@ from batch.queries.evidence_table import EvidenceTexts, RequirementEvidence, not
 from ic.printing.columns import columns
 
 OF_CASES = (("verdict", "verdict"), ("missed", "missed"), ("met", "share_met"), ("of all", "of_all"),
-            ("asked", "asked"), ("percentile", "bound"), ("needed", "needed"))  # fmt: skip
+            ("asked", "demand"), ("percentile", "bound"), ("needed", "needed"))  # fmt: skip
 OF_VALUES = (("limit", "limit"), ("worst", "worst"), ("margin", "margin"), ("in sigmas", "sigmas"),
              ("± step", "step_error"))  # fmt: skip
 """Columns of the two halves of the table, which would be too wide as one: head, and field of `EvidenceTexts`."""

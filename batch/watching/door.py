@@ -35,7 +35,7 @@ class Door:
 
     def __init__(self, listening: socket, token: str, admit: Callable[[socket, Any, bytes], None]) -> None:
         self._listening, self._admit = listening, admit
-        self._shown = f"/{token}/".encode()
+        self._path_start = f"/{token}/".encode()
         self._outside: dict[socket, tuple[Any, float, bytearray]] = {}  # address, time of coming, what came
         self._waiting = selectors.DefaultSelector()
 
@@ -77,7 +77,7 @@ class Door:
     def _listen_to(self, connection: socket) -> None:
         address, _, request = self._outside[connection]
         try:
-            more = connection.recv(LONGEST_METHOD + 1 + len(self._shown) - len(request))
+            more = connection.recv(LONGEST_METHOD + 1 + len(self._path_start) - len(request))
         except BlockingIOError:
             return
         except OSError:
@@ -86,8 +86,8 @@ class Door:
         method, blank, path = request.partition(b" ")
         if not more or len(method) > LONGEST_METHOD or b"\n" in request:
             self._turn_away(connection, STRANGE if more else b"")
-        elif blank and len(path) >= len(self._shown):
-            if hmac.compare_digest(path[: len(self._shown)], self._shown):
+        elif blank and len(path) >= len(self._path_start):
+            if hmac.compare_digest(path[: len(self._path_start)], self._path_start):
                 self._forget(connection)
                 self._admit(connection, address, bytes(request))
             else:

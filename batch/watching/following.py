@@ -78,7 +78,7 @@ class _Loop:
         self._files = DeckFiles(deck.file, deck.include_dirs)
         self._known: dict[bytes, Any] = {}
         self._page = ""
-        self._shown: Prepared | None = None
+        self._prepared: Prepared | None = None
         self._is_broken = False
         self._cases: threading.Thread | None = None
         self._stop = threading.Event()
@@ -156,11 +156,11 @@ class _Loop:
             "run": experiment.name_in_deck, "group": experiment.name, "broken": False, "saved": begun, "tried": begun,
         }  # fmt: skip
         text = answers.page(answer, prepared)
-        if text == self._page and self._shown is not None and prepared.work_key == self._shown.work_key:
+        if text == self._page and self._prepared is not None and prepared.work_key == self._prepared.work_key:
             self._board.tell(**state, doing="")
             return
         self.give_up(0.0)
-        self._page, self._shown, self._stop = text, prepared, threading.Event()
+        self._page, self._prepared, self._stop = text, prepared, threading.Event()
         page = self._board.show("page", text, **state, numbers=0, doing="compiling for this machine")
         self._cases = threading.Thread(target=self._run_cases, args=(prepared, page, self._stop), daemon=True)
         self._cases.start()

@@ -50,7 +50,7 @@ class _ReplayedLine:
     """The line of a transcript: its clock is at the time of the last message sent or received."""
 
     def __init__(self, transcript: Transcript, name: str) -> None:
-        self._records, self._name, self._at = transcript.records, name, 0
+        self._records, self._name, self._position = transcript.records, name, 0
         self._decoder = Decoder()
         self._scales: Scales | None = None
         self._tick = -1
@@ -60,13 +60,13 @@ class _ReplayedLine:
             raise self._other("a line is opened")
 
     def now(self) -> float:
-        return self._records[self._at - 1].time if self._at else 0.0
+        return self._records[self._position - 1].time if self._position else 0.0
 
     def send(self, frame: bytes) -> None:
-        position = self._at
+        position = self._position
         record = self._next(SENT)
         if record is None or record.data != frame:
-            self._at = position
+            self._position = position
             raise self._other(f"{self._words(frame)} is asked")
 
     def receive(self, until: float) -> bytes:
@@ -77,7 +77,7 @@ class _ReplayedLine:
         if (lost := self._next(LOST)) is not None:
             helps = "so it was when the transcript was made"
             raise Problem(error("E401", lost.data.decode("utf-8", "replace"), help=helps))
-        if self._at == len(self._records):
+        if self._position == len(self._records):
             raise self._other("an answer is waited for")
         return b""  # then it did not come in time
 
@@ -88,10 +88,10 @@ class _ReplayedLine:
         """Do nothing: no line is held."""
 
     def _next(self, kind: int) -> TranscriptRecord | None:
-        if self._at == len(self._records) or self._records[self._at].kind != kind:
+        if self._position == len(self._records) or self._records[self._position].kind != kind:
             return None
-        self._at += 1
-        return self._records[self._at - 1]
+        self._position += 1
+        return self._records[self._position - 1]
 
     def _note(self, data: bytes) -> None:
         for payload in self._decoder.feed(data):
@@ -105,10 +105,10 @@ class _ReplayedLine:
         """The error for a question that was not asked then: E407, or E401 where the transcript ends, as that of a
         lost line does."""
         after = f"after tick {self._tick} of the bed" if self._tick >= 0 else "at the beginning"
-        if self._at == len(self._records):
+        if self._position == len(self._records):
             helps = "it was broken off there, or another deck or case made it"
             return Problem(error("E401", f"{self._name} ends {after}, where {question}", help=helps))
-        record = self._records[self._at]
+        record = self._records[self._position]
         then = self._words(record.data) if record.kind == SENT else _KINDS.get(record.kind, "something else")
         helps = "a transcript is replayed by what made it: the same deck, case and version of MET"
         return Problem(error("E407", f"{self._name}: {after} {question}; then it was {then}", help=helps))

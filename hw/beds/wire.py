@@ -69,7 +69,7 @@ class WireBed(BedDriver):
         self._has_interlock = False
         self._step = 0
         """Ticks that a bed in lock-step advances by at an exchange; 0 for one with a time of its own."""
-        self._asked = self._foreign = 0
+        self._question_count = self._foreign = 0
         """Questions since it was greeted, `_OURS` at most, and answers to another's since it was armed."""
         self._angle: tuple[int, int] | None = None
         """The encoder's last count as it came, and without the jumps where it wraps around."""
@@ -81,7 +81,7 @@ class WireBed(BedDriver):
     def connect(self) -> About:
         self.close()
         self._line, self._decoder, self._angle = self.open(), Decoder(), None
-        self._asked = 0
+        self._question_count = 0
         try:
             self._about = self._greet()
         except BaseException:
@@ -249,7 +249,7 @@ class WireBed(BedDriver):
         line = self._line
         assert line is not None
         self._number = number = (self._number + 1) % messages.NUMBERS
-        self._asked = min(self._asked + 1, _OURS)
+        self._question_count = min(self._question_count + 1, _OURS)
         line.send(messages.frame_of(message, number))
         until, nonsense = line.now() + wait, 0
         while nonsense < _NONSENSE:
@@ -260,7 +260,9 @@ class WireBed(BedDriver):
             for payload in self._decoder.feed(data):
                 numbered = messages.bed_answer(payload, len(self._sensors) + self._has_interlock)
                 if numbered is None or numbered[0] != number:
-                    self._foreign += numbered is not None and (number - numbered[0]) % messages.NUMBERS >= self._asked
+                    self._foreign += (
+                        numbered is not None and (number - numbered[0]) % messages.NUMBERS >= self._question_count
+                    )
                     continue
                 if isinstance(numbered[1], kind):
                     return numbered[1]

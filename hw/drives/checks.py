@@ -33,14 +33,14 @@ SELDOM = "a few commands that last less than a period, and those that arm what i
 class SetpointChecks:
     """Chooses what a drive is asked of its own setpoint and settings, and judges whether the answer is this master's.
 
-    apart     the largest difference of two values that are the same, besides `SAME`
-    asked     what was asked for last, where it is not answered; "" where it is
+    apart          the largest difference of two values that are the same, besides `SAME`
+    open_question  what was asked for last, where it is not answered; "" where it is
     """
 
     def __init__(self, apart: float = SAME) -> None:
         self._apart = apart
-        self._told = deque[float](maxlen=TOLD)
-        self.asked: str = ""
+        self._commanded = deque[float](maxlen=TOLD)
+        self.open_question: str = ""
         self.begin(())
 
     def begin(self, commands: Sequence[str], settings: Mapping[str, float] | None = None) -> None:
@@ -50,7 +50,7 @@ class SetpointChecks:
         self._count = self._doubts = 0
         self._odd: dict[str, float] = {}
         self._doubted: str = ""
-        self.asked = ""
+        self.open_question = ""
 
     @property
     def doubtful(self) -> bool:
@@ -59,7 +59,7 @@ class SetpointChecks:
 
     def tell(self, value: float) -> None:
         """Remember a command, as the drive says it."""
-        self._told.append(value)
+        self._commanded.append(value)
 
     def next(self) -> str:
         """Choose the setpoint or setting to ask for now; "" where there is nothing to ask for."""
@@ -68,18 +68,18 @@ class SetpointChecks:
         settings = tuple(self._settings)
         round_, turn = divmod(self._count, OFTEN * len(self._commands) + 1)
         if self._doubts:
-            self.asked = self._doubted
+            self.open_question = self._doubted
         elif settings and not turn:
-            self.asked = settings[round_ % len(settings)]
+            self.open_question = settings[round_ % len(settings)]
         else:
-            self.asked = self._commands[turn % len(self._commands)] if self._commands else ""
-        return self.asked
+            self.open_question = self._commands[turn % len(self._commands)] if self._commands else ""
+        return self.open_question
 
     def answered(self, value: float, time: float) -> str:
         """Take the answer to the last question, at a time of the line's clock, s. Returns what was changed by another
         master, in words; "" where that is not sure."""
-        what, self.asked = self.asked, ""
-        right = (self._settings.get(what, 0.0),) if what not in self._commands[:1] else self._told
+        what, self.open_question = self.open_question, ""
+        right = (self._settings.get(what, 0.0),) if what not in self._commands[:1] else self._commanded
         if any(abs(value - expected) <= self._apart + SAME * abs(expected) for expected in right):
             return ""
         again = time - self._odd.get(what, -math.inf) <= AGAIN

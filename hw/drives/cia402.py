@@ -335,9 +335,9 @@ class Cia402Drive(CanDrive):
 
     def _check(self, data: bytes, time: float) -> None:
         """Take the answer to what it was told, where it was asked."""
-        if not self._checks.asked:
+        if not self._checks.open_question:
             return
-        which, layout = self._objects[self._checks.asked]
+        which, layout = self._objects[self._checks.open_question]
         upload = data[0] & 0xE3 == 0x43 and 4 - (data[0] >> 2 & 3) >= struct.calcsize(layout)
         if not upload or data[1:4] != struct.pack("<HB", *which):
             return

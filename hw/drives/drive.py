@@ -140,7 +140,7 @@ class CanDrive(ABC):
         self.owed = deque[float](maxlen=256)
         self.steps = 0.0, 0.0
         self.disturbed = ""
-        self._said: dict[Hashable, float] = {}
+        self._said_since: dict[Hashable, float] = {}
         """Time of each pair of angle and rate, as in answers, when it was last sent, s."""
         self._turned = -math.inf
         """Time of the last answer in which the shaft turns, s."""
@@ -208,7 +208,7 @@ class CanDrive(ABC):
 
     def forget_answers(self) -> None:
         """Forget its answers so far, so that a new one is not taken for a repeated one, outside of a run."""
-        self._said.clear()
+        self._said_since.clear()
         self._turned = -math.inf
 
     def has_said(self, fields: Hashable, rate: float, time: float) -> bool:
@@ -217,15 +217,15 @@ class CanDrive(ABC):
         came between. rate: rad/s;  time: of the frame, s"""
         angle_step, rate_step = self.steps
         turns = max(0.0, abs(rate) - rate_step)
-        before = self._said.pop(fields, None)
+        before = self._said_since.pop(fields, None)
         if before is not None and time - before > SINCE:
             before = None
         old = before is not None and (turns * abs(time - before) > angle_step or before < self._turned)
-        self._said[fields] = before if before is not None and old else time
+        self._said_since[fields] = before if before is not None and old else time
         if turns > TURNS and not old:
             self._turned = time
-        if len(self._said) > REMEMBERED:
-            del self._said[next(iter(self._said))]
+        if len(self._said_since) > REMEMBERED:
+            del self._said_since[next(iter(self._said_since))]
         return old
 
     @property

@@ -70,7 +70,7 @@ class FdcanusbLine:
         self.refused = 0
         self._sent = deque[float]()
         """Times of commands without an answer yet, s."""
-        self._asked = self._taken = 0.0
+        self._sent_at = self._taken_at = 0.0
         """Times of the last answered command, and of its answer, s."""
         try:
             self._open({name: settings[key] for key, name in SPEEDS.items() if key in settings})
@@ -121,7 +121,7 @@ class FdcanusbLine:
         if text == b"OK" or text.startswith(b"ERR"):
             self._forget(time)
             if self._sent:
-                self._asked, self._taken = self._sent.popleft(), time
+                self._sent_at, self._taken_at = self._sent.popleft(), time
         if text.startswith(b"ERR"):
             if b"not in BusOn" in text:
                 message = f"the fdcanusb on {self._name} is off its bus: it was switched on anew, or the bus has errors"
@@ -137,9 +137,9 @@ class FdcanusbLine:
 
     def _came(self, time: float) -> float:
         """The arrival time of a frame whose line was read at a time, s."""
-        if self._taken - self._asked > LATE:
-            return self._asked - LATE
-        return min(time, self._taken + TURN)
+        if self._taken_at - self._sent_at > LATE:
+            return self._sent_at - LATE
+        return min(time, self._taken_at + TURN)
 
     def _open(self, speeds: Mapping[str, int]) -> None:
         """Set the bus's speeds and enter it. Raises Problem E400 where the device is not an fdcanusb."""

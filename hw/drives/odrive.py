@@ -211,7 +211,7 @@ class OdriveDrive(OdriveAxis):
         if command == ANSWERED and 4 <= len(data) <= 8:
             number = struct.unpack_from("<xH", data)[0]
             self._answered[number] = data[4:]
-            number_asked, layout = self._numbers.get(self._checks.asked, (-1, ""))
+            number_asked, layout = self._numbers.get(self._checks.open_question, (-1, ""))
             if number == number_asked and len(data) >= 4 + struct.calcsize(layout):
                 self._check(float(struct.unpack_from(layout, data, 4)[0]), frame.time)
             return True

@@ -208,7 +208,7 @@ class OdriveAsciiDrive(OdriveAxis):
             self._judge(path, value, frame.time)
         elif path in (VOLTAGE, CURRENT) and math.isfinite(value):
             self._supplied(path, value)
-        elif path == self._checks.asked:
+        elif path == self._checks.open_question:
             self._check(value, frame.time)
         return True
 

@@ -102,12 +102,13 @@ def on_lines(frames: Iterable[CanFrame], baud: int | None) -> float:
 
 
 class _Questions:
-    """The questions to a drive. waiting: to be sent, in order;  sent: that which is not answered yet;  at: when, s"""
+    """The questions to a drive. waiting: to be sent, in order;  sent: that which is not answered yet;  sent_at: when,
+    s"""
 
     def __init__(self) -> None:
         self.waiting = deque[bytes]()
         self.sent: bytes | None = None
-        self.at = 0.0
+        self.sent_at = 0.0
         self.lost: set[bytes] = set()
         """Kinds of questions whose answers are late or lost, and may still come."""
         self.silent_at = 0.0
@@ -207,7 +208,7 @@ class OdriveLines:
             if frame is None:  # no unread input: an overdue answer is late because of the drive
                 now = self.now()
                 for drive in self._drives.values():
-                    if drive.sent is not None and now > drive.at + self._owed:
+                    if drive.sent is not None and now > drive.sent_at + self._owed:
                         drive.give_up(now)
                 due = min(self._ask(node, now) for node in self._drives)
                 frame = self._wires.receive(min(until, due))
@@ -226,9 +227,9 @@ class OdriveLines:
                 return drive.silent_at if drive.waiting else math.inf
             drive.lost.clear()
         if drive.sent is None and (text := drive.next()) is not None:
-            drive.sent, drive.at = text, now
+            drive.sent, drive.sent_at = text, now
             self._wires.send(CanFrame(node, summed(text)))
-        return drive.at + self._owed + 1e-6 if drive.waiting else math.inf
+        return drive.sent_at + self._owed + 1e-6 if drive.waiting else math.inf
 
     def _take(self, frame: CanFrame) -> None:
         """Cut the input into lines, and take the answers to questions."""
@@ -245,7 +246,7 @@ class OdriveLines:
                 drive.heard = line.strip()[:LONGEST_LINE] or drive.heard
                 continue
             assert drive.sent is not None
-            sent_at, now = drive.at, max(frame.time, drive.at)
+            sent_at, now = drive.sent_at, max(frame.time, drive.sent_at)
             took, text = now - sent_at, drive.sent + b"\n" + answer
             drive.sent = None
             drive.lost.clear()

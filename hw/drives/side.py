@@ -31,7 +31,7 @@ class Side:
         self.angle = self.rate = self.time = self.time_unsure = 0.0
         self.zero_unsure = 0.0
         """Uncertainty of the angle because the shaft turned at its zero, rad."""
-        self._told = 0.0
+        self._angle_read = 0.0
         """The angle as it was told last, rad."""
 
     @property
@@ -49,7 +49,7 @@ class Side:
 
     def begin(self, reading: DriveReading, time: float) -> None:
         """Count the angle from its present value, by an answer, at a time of the line's clock, s."""
-        self._told, self.angle, self.rate, self.time = (
+        self._angle_read, self.angle, self.rate, self.time = (
             reading.angle,
             -reading.rate * (time - reading.time),
             reading.rate,
@@ -60,7 +60,7 @@ class Side:
 
     def angle_of(self, reading: DriveReading) -> float:
         """The angle that an answer means, rad, without jumps."""
-        turned = reading.angle - self._told
+        turned = reading.angle - self._angle_read
         if self.facts.angle_range:
             turned = math.remainder(turned, self.facts.angle_range)
         return self.angle + turned
@@ -69,7 +69,7 @@ class Side:
         """Take over the contents of an answer."""
         self.angle, self.rate, self.time = self.angle_of(reading), reading.rate, reading.time
         self.time_unsure = reading.time_unsure
-        self._told = reading.angle
+        self._angle_read = reading.angle
 
     def unsure(self, reading: DriveReading) -> tuple[float, float]:
         """The angle (rad) and rate (rad/s) by which the dialect's steps alone let it be off."""

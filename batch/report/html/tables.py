@@ -103,7 +103,7 @@ def evidence(part: EvidencePart) -> Html:
                 cls="good" if row.ok else "bad",
             ),
             cell(texts.missed, f"{texts.share_met} met"),
-            cell(texts.of_all, f"asked: {texts.asked}"),
+            cell(texts.of_all, f"asked: {texts.demand}"),
             cell(texts.bound),
             cell(worst, f"limit {texts.limit}"),
             cell(texts.margin, f"{texts.sigmas} sigmas" if texts.sigmas[-1:].isdigit() else ""),
