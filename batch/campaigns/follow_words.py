@@ -37,10 +37,10 @@ def not_followed(
     does = "is not followed" if worst.kind == "path" else "does not follow its command"
     at_limit = f", and `{worst.limit}` was reached for most of that time" if worst.limit else ""
     case = f" in case #{int(experiment.cases.table[worst.case])}" if experiment.cases.count > 1 else ""
-    message = f"{what} `{worst.of}` {does}{case}: it is {_off(experiment, worst)}{at_limit}"
+    message = f"{what} `{worst.subject}` {does}{case}: it is {_off(experiment, worst)}{at_limit}"
     helps = [_remedy(experiment, worst)]
     if others:
-        helps.append(f"the same of {', '.join(f'`{other.of}`' for other in others)}")
+        helps.append(f"the same of {', '.join(f'`{other.subject}`' for other in others)}")
     helps.append(f"root mean square from {worst.since:.4g} s to {worst.until:.4g} s, and it does not fall")
     return [Diagnostic("D348", message, None if place is None else Label(place), (), tuple(helps), "warning")]
 
@@ -48,14 +48,14 @@ def not_followed(
 def _off(experiment: Experiment, unfollowed_: Unfollowed) -> str:
     """The error in words: `1.047 rad off, of 1.047 rad that it is told to move`."""
     straight = unfollowed_.kind == "path" or any(
-        joint.name == unfollowed_.of and joint.kind == "prismatic" for joint in experiment.structure.joints
+        joint.name == unfollowed_.subject and joint.kind == "prismatic" for joint in experiment.structure.joints
     )
     unit = ("m" if straight else "rad") + ("/s" if unfollowed_.kind == "rate" else "")
     off = f"{number_text(unfollowed_.off)} {unit} off"
-    if not unfollowed_.asked:
+    if not unfollowed_.commanded:
         return f"{off}, and is told to stay"
     does = {"position": "it is told to move", "rate": "it is told", "path": "it leads"}[unfollowed_.kind]
-    return f"{off}, of {number_text(unfollowed_.asked)} {unit} that {does}"
+    return f"{off}, of {number_text(unfollowed_.commanded)} {unit} that {does}"
 
 
 def _remedy(experiment: Experiment, unfollowed_: Unfollowed) -> str:
@@ -65,7 +65,7 @@ def _remedy(experiment: Experiment, unfollowed_: Unfollowed) -> str:
     structure, beside = experiment.structure, []
     for use in structure.environment:
         about = experiment.parameters.get(f"environment.{use.name}.joint")
-        if about is not None and about.value == unfollowed_.of:
+        if about is not None and about.value == unfollowed_.subject:
             beside.append(f"`{use.name}`")
     other = f", or take away what holds it: {', '.join(beside)}" if beside else ""
     if unfollowed_.limit:
@@ -76,12 +76,12 @@ def _remedy(experiment: Experiment, unfollowed_: Unfollowed) -> str:
 def _place(experiment: Experiment, unfollowed_: Unfollowed) -> Place | None:
     """The place where the command, or the guide, is written."""
     if unfollowed_.kind == "path":
-        return next(use.place for use in experiment.structure.guides if use.name == unfollowed_.of)
+        return next(use.place for use in experiment.structure.guides if use.name == unfollowed_.subject)
     commands = (
         parameter
         for path, parameter in experiment.parameters.items()
-        if path.startswith(f"{unfollowed_.of}.servo.command.")
+        if path.startswith(f"{unfollowed_.subject}.servo.command.")
     )
     places = [command.origin.place for command in commands if command.origin.place is not None]
-    servos = [use.place for use in experiment.structure.servos if use.joint == unfollowed_.of]
+    servos = [use.place for use in experiment.structure.servos if use.joint == unfollowed_.subject]
     return (places or servos)[0]

@@ -147,7 +147,7 @@ def _passed(section: CampaignSection, memories: Memories, cases: Sequence[int]) 
 def _warning(experiment: Experiment, lasting: passed.Lasting) -> Diagnostic:
     """A warning about a lasting finding, in words."""
     hz = experiment.structure.schedule.base_hz
-    where = from_instants(experiment, lasting.case, float(lasting.at.tick[0]) / hz, lasting.until)
+    where = from_instants(experiment, lasting.case, float(lasting.passed.tick[0]) / hz, lasting.until)
     if not isinstance(lasting.fault, StepFault):
         return loop_warning(experiment, lasting.fault, experiment.place, f"as it stands {where}")
     better = passed.remedy_of(experiment, lasting)

@@ -322,20 +322,20 @@ class KnownStructures:
     def __init__(self, opened: Container[str]) -> None:
         """opened: the addresses of the decks that are open now; nothing is kept of others."""
         self._opened = opened
-        self._of: dict[str, dict[str, DeckText]] = {}
+        self._by_deck: dict[str, dict[str, DeckText]] = {}
 
     def of(self, deck: str, texts: Mapping[str, str]) -> dict[str, DeckText]:
         """The structures of all texts of a deck at an address, by the texts' names."""
-        known = {structure.source.name: structure for other in self._of.values() for structure in other.values()}
-        known.update(self._of.get(deck, {}))
+        known = {structure.source.name: structure for other in self._by_deck.values() for structure in other.values()}
+        known.update(self._by_deck.get(deck, {}))
         structures = {}
         for name, text in texts.items():
             last = known.get(name)
             structures[name] = last if last is not None and last.source.text == text else DeckText(name, text)
         if deck in self._opened:
-            self._of[deck] = structures
+            self._by_deck[deck] = structures
         return structures
 
     def forget(self, deck: str) -> None:
         """Release the structures of a deck that an editor has closed."""
-        self._of.pop(deck, None)
+        self._by_deck.pop(deck, None)

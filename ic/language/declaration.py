@@ -86,20 +86,20 @@ class BlockDeclaration:
                 return entry
         raise KeyError(name)
 
-    def _of(self, form: str) -> Iterator[str]:
+    def _names(self, form: str) -> Iterator[str]:
         return (entry.name for entry in self.entries if entry.form == form)
 
     @property
     def keys(self) -> tuple[str, ...]:
         """The names of its keys, in order."""
-        return tuple(self._of("key"))
+        return tuple(self._names("key"))
 
     @property
     def named(self) -> tuple[str, ...]:
         """The words of its entries with names of the deck's, in order."""
-        return tuple(self._of("named"))
+        return tuple(self._names("named"))
 
     @property
     def statements(self) -> tuple[str, ...]:
         """The words of its statements, in order."""
-        return tuple(self._of("statement"))
+        return tuple(self._names("statement"))

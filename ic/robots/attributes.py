@@ -125,7 +125,7 @@ ELEMENTS: Mapping[str, ElementKind] = {
 }
 
 
-def shown(text: str) -> str:
+def printable(text: str) -> str:
     return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
 
 
@@ -182,7 +182,7 @@ def _filled_in(element: Element, attribute: str) -> str:
     text = element.attributes[attribute]
     if "${" in text or "$(" in text:
         place = element.place_of(attribute)
-        raise Problem(error("D203", f"`{shown(text.strip())}` is to be filled in", place, help=XACRO))
+        raise Problem(error("D203", f"`{printable(text.strip())}` is to be filled in", place, help=XACRO))
     return text
 
 
@@ -220,10 +220,10 @@ def _number(text: str, attribute: str, place: Place, known: Attribute, *, count:
     if "," in text and all(_NUMBER.fullmatch(part) for part in text.split(",") if part):
         remedy = "spaces part the numbers, not commas"
         if count == known.count and _NUMBER.fullmatch(text.replace(",", ".")) and not text.endswith(","):
-            remedy = f"the decimal sign is a point: `{shown(text.replace(',', '.'))}`"
+            remedy = f"the decimal sign is a point: `{printable(text.replace(',', '.'))}`"
     elif known.no_limit is not None:
         remedy = f"{remedy}; `{known.no_limit:g}` stands for no limit"
-    raise Problem(error("D206", f"`{shown(text)}` is not a number", place, help=remedy))
+    raise Problem(error("D206", f"`{printable(text)}` is not a number", place, help=remedy))
 
 
 def _other_attribute(element: Element, name: str, text: str, dropped: dict[str, list[Element]]) -> None:
@@ -243,7 +243,7 @@ def _other_attribute(element: Element, name: str, text: str, dropped: dict[str, 
     raise Problem(
         error(
             "D208",
-            f"`<{element.tag}>` has no attribute `{shown(name)}`",
+            f"`<{element.tag}>` has no attribute `{printable(name)}`",
             element.name_place(name),
             help=[
                 *([f"did you mean `{meant}`?"] if meant else did_you_mean(name, kind.attributes)),
@@ -260,7 +260,7 @@ def _other_element(element: Element, child: Element, dropped: dict[str, list[Ele
     if child.tag in kind.attributes:
         helps = [f"`{child.tag}` is an attribute: `{kind.usage}`"]
     if helps:
-        what = f"`<{element.tag}>` has no element `<{shown(child.tag)}>`"
+        what = f"`<{element.tag}>` has no element `<{printable(child.tag)}>`"
         raise Problem(error("D208", what, child.place, help=helps))
     dropped.setdefault(child.tag, []).append(child)
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Setting
-from ic.robots.attributes import shown
+from ic.robots.attributes import printable
 from ic.robots.doubts import in_other_units, incomplete
 from ic.robots.entries import LIMITS, ArmEntries, RobotEntry, spelled
 from ic.robots.following import hold_position
@@ -68,10 +68,10 @@ def remarks(body: ArmEntries) -> Iterator[str]:
     yield from (remark.text for remark in in_other_units(body.robot))
     yield from incomplete(body.robot)
     if body.no_body:
-        yield f"the inertia of `{shown(body.robot.root.name.text)}`, the base, is not in the deck: {body.no_body}"
+        yield f"the inertia of `{printable(body.robot.root.name.text)}`, the base, is not in the deck: {body.no_body}"
     for joint in body.robot.joints:
         if joint.beyond:
-            yield f"joint `{shown(joint.name.text)}` is held at {spelled(joint.held)}, beyond {joint.beyond}"
+            yield f"joint `{printable(joint.name.text)}` is held at {spelled(joint.held)}, beyond {joint.beyond}"
 
 
 def _block(part: RobotEntry, notes: list[str]) -> Iterator[str]:
@@ -111,7 +111,7 @@ def _rows(settings: list[tuple[str, str]]) -> list[list[tuple[str, str]]]:
 
 def _link_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> list[str]:
     notes = _called(part, "link", changed)
-    inertial = getattr(part.of, "inertial", None)
+    inertial = getattr(part.source, "inertial", None)
     if isinstance(inertial, Inertial) and inertial.rpy is not None and inertial.is_turned:
         notes.append(f"inertia turned from axes at rpy {' '.join(map(spelled, inertial.rpy.values))}")
     return notes
@@ -119,7 +119,7 @@ def _link_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> lis
 
 def _joint_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> list[str]:
     notes = _called(part, "joint", changed)
-    joint = part.of
+    joint = part.source
     assert isinstance(joint, Joint)
     if joint.type.text == "continuous":
         notes.append("continuous")
@@ -136,12 +136,12 @@ def _following(joint: Joint, mimic: Mimic) -> str:
     shown_law = ", ".join(f"{name} {spelled(value)}" for name, (value, default) in law.items() if value != default)
     in_deck = f"here it is held at {spelled(joint.held)}" if joint.type.text == "fixed" else "here it moves by itself"
     in_deck += f", beyond {joint.beyond}" if joint.beyond else ""
-    return f"follows `{shown(mimic.joint.text)}` in the file{f' ({shown_law})' if shown_law else ''}; {in_deck}"
+    return f"follows `{printable(mimic.joint.text)}` in the file{f' ({shown_law})' if shown_law else ''}; {in_deck}"
 
 
 def _called(part: RobotEntry, kind: str, changed: Mapping[tuple[str, str], str]) -> list[str]:
     name = changed.get((kind, part.entry.words[1].text))
-    return [] if name is None else [f"`{shown(name)}` in the file"]
+    return [] if name is None else [f"`{printable(name)}` in the file"]
 
 
 # Runs to begin with
@@ -149,9 +149,9 @@ def _called(part: RobotEntry, kind: str, changed: Mapping[tuple[str, str], str])
 
 def _runs(body: ArmEntries, arm: str) -> Iterator[str]:
     joints = {
-        part.entry.words[1].text: part.of
+        part.entry.words[1].text: part.source
         for part in body.joints
-        if isinstance(part.of, Joint) and part.of.type.text in MOVING
+        if isinstance(part.source, Joint) and part.source.type.text in MOVING
     }
     if not joints:
         return

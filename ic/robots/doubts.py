@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from ic.robots.attributes import shown
+from ic.robots.attributes import printable
 from ic.robots.entries import spelled
 from ic.robots.robot import Numbers, Robot
 from ic.robots.urdf import MOMENTS
@@ -24,9 +24,9 @@ def in_other_units(robot: Robot) -> Iterator[Label]:
     """
     for link in robot.links:
         if link.inertial is not None:
-            yield from _turned(link.inertial.rpy, f"the inertia of link `{shown(link.name.text)}`")
+            yield from _turned(link.inertial.rpy, f"the inertia of link `{printable(link.name.text)}`")
     for joint in robot.joints:
-        name = f"joint `{shown(joint.name.text)}`"
+        name = f"joint `{printable(joint.name.text)}`"
         if not joint.held:  # which is in the `rpy` of a follower that is fixed
             yield from _turned(joint.rpy, name)
         for end in ("lower", "upper") if joint.type.text == "revolute" else ():
@@ -66,7 +66,7 @@ def incomplete(robot: Robot) -> Iterator[str]:
         if link.inertial is not None:
             moments = link.inertial.moments
             missing = [
-                f"`{moment}`" for moment, place in zip(MOMENTS, moments.each, strict=True) if place == moments.place
+                f"`{moment}`" for moment, place in zip(MOMENTS, moments.places, strict=True) if place == moments.place
             ]
             if missing:
-                yield f"the inertia of link `{shown(link.name.text)}` has no {', '.join(missing)}: taken as 0"
+                yield f"the inertia of link `{printable(link.name.text)}` has no {', '.join(missing)}: taken as 0"

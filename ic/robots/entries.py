@@ -48,7 +48,7 @@ NOISE = 1e-15  # of sines and cosines of right angles, whose size is 1: cos(pi/2
 class RobotEntry:
     """A link or joint of the robot as an entry."""
 
-    of: Link | Joint
+    source: Link | Joint
     entry: Group
 
 
@@ -117,7 +117,7 @@ def moments(inertial: Inertial) -> Numbers:
     numbers = inertial.moments
     if inertial.rpy is not None and inertial.is_turned:
         numbers = Numbers(_turned(numbers.values, inertial.rpy.values), numbers.place)  # each of them made of all
-    return numbers if any(numbers.values[3:]) else Numbers(numbers.values[:3], numbers.place, numbers.each[:3])
+    return numbers if any(numbers.values[3:]) else Numbers(numbers.values[:3], numbers.place, numbers.places[:3])
 
 
 def _turned(values: tuple[float, ...], rpy: tuple[float, ...]) -> tuple[float, ...]:
@@ -219,7 +219,7 @@ def _setting(key: str, value: Expression, place: Place) -> Setting:
 
 def _vector(key: str, numbers: Numbers, unit: str) -> Setting:
     place = numbers.place
-    places = numbers.each or (place,) * len(numbers.values)
+    places = numbers.places or (place,) * len(numbers.values)
     items = tuple(_bare(value, spot) for value, spot in zip(numbers.values, places, strict=True))
     return _setting(key, WithUnit(List(items, place), _unit(unit, place), place), place)
 

@@ -27,11 +27,12 @@ class Written:
 
 @frozen
 class Numbers:
-    """Numbers of an attribute, or of several of one element, with their place; each: its own place"""
+    """Numbers of an attribute, or of several of one element, with their place; places: of each number,
+    where it has its own"""
 
     values: tuple[float, ...]
     place: Place
-    each: tuple[Place, ...] = ()
+    places: tuple[Place, ...] = ()
 
     @property
     def nothing(self) -> bool:

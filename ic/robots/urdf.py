@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from ic.robots.attributes import XACRO, Found, read_element, shown
+from ic.robots.attributes import XACRO, Found, printable, read_element
 from ic.robots.robot import Inertial, Joint, Link, Mimic, Numbers, Robot
 from ic.robots.xml import Element, parse
 from ic.text.complaints import Complaints, known_words
@@ -26,14 +26,14 @@ def read(name: str, text: str) -> Robot:
     root = parse(name, text)
     for element in _within(root):
         if element.tag.startswith("xacro:"):
-            raise Problem(error("D203", f"`<{shown(element.tag)}>` is not URDF", element.place, help=XACRO))
+            raise Problem(error("D203", f"`<{printable(element.tag)}>` is not URDF", element.place, help=XACRO))
     if root.tag != "robot":
         kind = _FORMATS.get(root.tag)
         what = f": this is {kind}" if kind else ""
         raise Problem(
             error(
                 "D203",
-                f"`<{shown(root.tag)}>` is not URDF{what}",
+                f"`<{printable(root.tag)}>` is not URDF{what}",
                 root.place,
                 help='a URDF file is `<robot name="..."> ... </robot>`',
             )
@@ -138,7 +138,7 @@ def _check_names(named: Sequence[Link] | Sequence[Joint], kind: str, complaints:
         if element.name.text in first:
             complaints.error(
                 "D204",
-                f"{kind} `{shown(element.name.text)}` is there twice",
+                f"{kind} `{printable(element.name.text)}` is there twice",
                 Label(element.name.place, "again"),
                 also=[Label(first[element.name.text], "first")],
                 help="give one of the two another name",
@@ -154,10 +154,10 @@ def _check_ends(links: Sequence[Link], joints: Sequence[Joint], complaints: Comp
             if end.text not in names:
                 complaints.error(
                     "D207",
-                    f"no link `{shown(end.text)}` in this file",
+                    f"no link `{printable(end.text)}` in this file",
                     end.place,
-                    also=[Label(joint.name.place, f"joint `{shown(joint.name.text)}`")],
-                    help=[*did_you_mean(end.text, names), known_words("links", map(shown, sorted(names)))],
+                    also=[Label(joint.name.place, f"joint `{printable(joint.name.text)}`")],
+                    help=[*did_you_mean(end.text, names), known_words("links", map(printable, sorted(names)))],
                 )
 
 
@@ -172,10 +172,10 @@ def _check_mimics(joints: Sequence[Joint], complaints: Complaints) -> None:
         if leader.text not in followed:
             complaints.error(
                 "D207",
-                f"no joint `{shown(leader.text)}` in this file",
+                f"no joint `{printable(leader.text)}` in this file",
                 leader.place,
-                also=[Label(joint.name.place, f"joint `{shown(joint.name.text)}`")],
-                help=[*did_you_mean(leader.text, followed), known_words("joints", map(shown, sorted(followed)))],
+                also=[Label(joint.name.place, f"joint `{printable(joint.name.text)}`")],
+                help=[*did_you_mean(leader.text, followed), known_words("joints", map(printable, sorted(followed)))],
             )
         name = joint.name.text
         mimic: Mimic | None = joint.mimic
@@ -187,7 +187,7 @@ def _check_mimics(joints: Sequence[Joint], complaints: Complaints) -> None:
             in_circles.update(chain)
             complaints.error(
                 "D213",
-                f"joint `{shown(name)}` follows itself: {' -> '.join(map(shown, [*chain, name]))}",
+                f"joint `{printable(name)}` follows itself: {' -> '.join(map(printable, [*chain, name]))}",
                 leader.place,
                 help="remove the `<mimic>` of one of these joints in the file: it then moves by itself; no deck and no "
                 "`--mimic` can change it",
@@ -203,7 +203,7 @@ def _root(element: Element, links: Sequence[Link], joints: Sequence[Joint]) -> L
         what = "has no joints: it is one body" if links else "is empty: it has no links"
         raise Problem(error("D209", f"this robot {what}", element.place, help="an arm has a joint at least"))
     if not roots:
-        also = [Label(joint.name.place, f"joint `{shown(joint.name.text)}`") for joint in joints[1:MOST_NAMED]]
+        also = [Label(joint.name.place, f"joint `{printable(joint.name.text)}`") for joint in joints[1:MOST_NAMED]]
         raise Problem(
             error(
                 "D209",
@@ -218,8 +218,8 @@ def _root(element: Element, links: Sequence[Link], joints: Sequence[Joint]) -> L
             error(
                 "D209",
                 f"{len(roots)} links of this robot hang on no other, and an arm has one base",
-                Label(roots[0].name.place, shown(roots[0].name.text)),
-                also=[Label(root.name.place, shown(root.name.text)) for root in roots[1:MOST_NAMED]],
+                Label(roots[0].name.place, printable(roots[0].name.text)),
+                also=[Label(root.name.place, printable(root.name.text)) for root in roots[1:MOST_NAMED]],
                 help='join them by a `<joint type="fixed">`, or take one of the robots out of the file',
             )
         )

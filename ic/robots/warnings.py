@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from ic.robots.attributes import shown
+from ic.robots.attributes import printable
 from ic.robots.doubts import in_other_units
 from ic.robots.entries import ArmEntries
 from ic.robots.robot import MOVING, Joint
@@ -40,7 +40,7 @@ def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
     changed = body.names.changed
     if changed:
         also = tuple(
-            Label(change.written.place, f"{change.kind} `{shown(change.written.text)}` is `{change.name}`")
+            Label(change.written.place, f"{change.kind} `{printable(change.written.text)}` is `{change.name}`")
             for change in changed[:MOST_NAMED]
         )
         more = f", and {len(changed) - MOST_NAMED} more" if len(changed) > MOST_NAMED else ""
@@ -65,7 +65,7 @@ def _left_out(body: ArmEntries) -> Iterator[Label]:
         )
     if robot.dropped:
         kinds = sorted(robot.dropped.items(), key=lambda kind: (-len(kind[1]), kind[0]))
-        counts = [f"{len(elements)} `{shown(what)}`" for what, elements in kinds[:MOST_NAMED]]
+        counts = [f"{len(elements)} `{printable(what)}`" for what, elements in kinds[:MOST_NAMED]]
         more = f" and {len(kinds) - MOST_NAMED} kinds more" if len(kinds) > MOST_NAMED else ""
         yield Label(kinds[0][1][0].place, f"not read: {', '.join(counts)}{more}")
 

@@ -89,7 +89,7 @@ def parse(name: str, text: str) -> Element:
     root: list[Element] = []
     count = 0
 
-    def here(length: int = 1) -> Place:
+    def place_here(length: int = 1) -> Place:
         return source.place(parser.CurrentByteIndex, parser.CurrentByteIndex + length)
 
     def start(tag: str, attributes: dict[str, str]) -> None:
@@ -100,13 +100,15 @@ def parse(name: str, text: str) -> Element:
                 error(
                     "D202",
                     f"a URDF file has at most {MOST_ELEMENTS} elements",
-                    here(),
+                    place_here(),
                     help="a robot has some hundred: is this the right file?",
                 )
             )
         if len(open_) >= XML_DEPTH:
             raise Problem(
-                error("D202", f"elements go deeper than {XML_DEPTH}", here(), help="those of URDF go some six deep")
+                error(
+                    "D202", f"elements go deeper than {XML_DEPTH}", place_here(), help="those of URDF go some six deep"
+                )
             )
         element = Element(tag, attributes, source, parser.CurrentByteIndex)
         (open_[-1].children if open_ else root).append(element)

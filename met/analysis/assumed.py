@@ -70,7 +70,7 @@ class _Along:
             follow(tape, program.tick)
             self.derivative = builder.step.observed(tape).derivative
         self.system, self.parameters, self.read = builder.system, experiment.parameters, tape.read
-        self.tree = self.system.tree(tape.read).each(lambda _, value: float(value))
+        self.tree = self.system.tree(tape.read).map_numbers(lambda _, value: float(value))
         self.t = np.linspace(0.0, experiment.structure.schedule.duration, INSTANTS)
         motions = [
             self._course(actuator, joint) for actuator, joint in zip(self.system.actuators, self.names, strict=True)

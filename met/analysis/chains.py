@@ -29,7 +29,7 @@ def chains(experiment: Experiment) -> tuple[Experiment, ...]:
     structure = experiment.structure
     if len(structure.moving) < MANY_JOINTS or not _are_apart(structure):
         return ()
-    by_branch = tuple(_of(experiment, joints) for joints in _branches(structure))
+    by_branch = tuple(_reduced(experiment, joints) for joints in _branches(structure))
     divisors = {use.divisor for use in structure.servos}  # with others a frame of computers would be shorter
     if len(by_branch) < 2 or any({use.divisor for use in chain.structure.servos} != divisors for chain in by_branch):
         return ()
@@ -104,7 +104,7 @@ def _branches(structure: Structure) -> Iterator[frozenset[str]]:
             yield frozenset(reached)
 
 
-def _of(experiment: Experiment, joints: frozenset[str]) -> Experiment:
+def _reduced(experiment: Experiment, joints: frozenset[str]) -> Experiment:
     structure = experiment.structure
     every = {joint.name for joint in structure.joints}
     links = {joint.child for joint in structure.joints if joint.name in joints} | {BASE}

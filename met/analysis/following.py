@@ -42,17 +42,17 @@ FALLS = 0.25
 class Unfollowed:
     """A joint or guided point that is not where it is commanded to be, or not as fast, as a case ends.
 
-    of     name of the joint, or of the guide;  kind: `position` or `rate` of a joint, `path` of a guide
+    subject  name of the joint, or of the guide;  kind: `position` or `rate` of a joint, `path` of a guide
     off    root of the mean square of the distance from the setpoint, from `since` to `until`, s
-    asked  what was commanded over the run, 0: to stay: rad, m, rad/s or m/s, as `off`
+    commanded  what was commanded over the run, 0: to stay: rad, m, rad/s or m/s, as `off`
     weight of the distance, by what is told at all;  case: row of the case table
     limit  path of the limit of its servo that it was at for most of that time; "": none
     """
 
-    of: str
+    subject: str
     kind: str
     off: float
-    asked: float
+    commanded: float
     weight: float
     since: float
     until: float
@@ -107,7 +107,7 @@ def unfollowed(
             findings += _not_followed(use.name, "path", whole, times, way, off)
     worst: dict[tuple[str, bool], Unfollowed] = {}
     for finding in sorted(findings, key=lambda finding: (-finding.weight, finding.case)):
-        worst.setdefault((finding.of, finding.kind == "path"), finding)
+        worst.setdefault((finding.subject, finding.kind == "path"), finding)
     return list(worst.values())
 
 

@@ -126,7 +126,7 @@ def _posed(
         else poses[:1]
     )
     q = q[np.isfinite(q).all(axis=1)]  # a loop closes in some poses alone
-    tree = system.tree(tape.read).each(lambda _, value: float(value))
+    tree = system.tree(tape.read).map_numbers(lambda _, value: float(value))
     columns, qd, base = _unit_velocities(tree, q)
     motions = link_motions(tree, columns, qd, base_velocity=base)
     lumped = [link.name for link in system.structure.links if link.lumped]

@@ -64,14 +64,14 @@ class Lasting:
 
     fault   the worst of it: of the step, or of a servo's loop
     case    row of the case table;  since, until: s from the start of the run
-    at      the worst one's instant, alone
+    passed  the worst one's instant, alone
     """
 
     fault: StepFault | Unstable
     case: int
     since: float
     until: float
-    at: Passed
+    passed: Passed
 
 
 def instants(experiment: Experiment) -> int:
@@ -155,7 +155,7 @@ class _Seen:
 
     def growing(self, quiet: np.ndarray) -> list[_Candidate]:
         """Modes that the step makes grow by e and more, where no law holds them."""
-        by_lane = self._of(lambda mode, lane: mode.grown(self.h, 1) > 0.0 and not quiet[lane])
+        by_lane = self._passing(lambda mode, lane: mode.grown(self.h, 1) > 0.0 and not quiet[lane])
         candidates = []
         for owner, first, last in _lasting_ones(by_lane, self.stretches):
             of_each = [max(by_lane[lane][owner], key=lambda mode: mode.growth) for lane in range(first, last + 1)]
@@ -169,7 +169,7 @@ class _Seen:
     def missed(self, held: frozenset[str]) -> list[_Candidate]:
         """The mode that swings and is damped, or not, unlike in truth over the whole time, judged at its best
         instant."""
-        by_lane = self._of(lambda mode, _: abs(mode.root.imag) > abs(mode.root.real))
+        by_lane = self._passing(lambda mode, _: abs(mode.root.imag) > abs(mode.root.real))
         candidates = []
         for owner, first, last in _lasting_ones(by_lane, self.stretches):
             steps = round((self.times[last] - self.times[first]) / self.h)
@@ -187,7 +187,7 @@ class _Seen:
 
     def fast(self) -> list[_Candidate]:
         """Modes for which the step is long."""
-        by_lane = self._of(lambda mode, _: abs(mode.root) * self.h > FAST * (1.0 + 1e-6))
+        by_lane = self._passing(lambda mode, _: abs(mode.root) * self.h > FAST * (1.0 + 1e-6))
         candidates = []
         for owner, first, last in _lasting_ones(by_lane, self.stretches):
             every = [mode for lane in range(first, last + 1) for mode in by_lane[lane][owner]]
@@ -198,7 +198,7 @@ class _Seen:
                 candidates.append(_Candidate(figure, fault, worst.lane, first, last))
         return candidates
 
-    def _of(self, telling: Callable[[Mode, int], bool]) -> list[dict[Owner, list[Mode]]]:
+    def _passing(self, telling: Callable[[Mode, int], bool]) -> list[dict[Owner, list[Mode]]]:
         """The modes of each lane and owner that pass a test."""
         return [
             {owner: those for owner, owned in of_lane.items() if (those := [m for m in owned if telling(m, lane)])}
@@ -252,9 +252,9 @@ def _pairs(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def remedy_of(experiment: Experiment, finding: Lasting) -> Remedy:
     """The remedy for a mode that lasts, as it is at its worst instant."""
     assert isinstance(finding.fault, StepFault)
-    step_map = as_run(Linearizer(experiment, finding.at.case.tolist(), finding.at.memory).map())
+    step_map = as_run(Linearizer(experiment, finding.passed.case.tolist(), finding.passed.memory).map())
     fault = replace(finding.fault, mode=replace(finding.fault.mode, lane=0))
-    return remedy(experiment, step_map, fault, finding.at.memory)
+    return remedy(experiment, step_map, fault, finding.passed.memory)
 
 
 def as_run(step_map: StepMap) -> StepMap:

@@ -11,7 +11,7 @@ turns bodies into `Joint`s once, so that the work repeated at every instant is a
    2002, ch. 9). Motion and torques are the same; reactions are taken from the bodies' own inertia.
 
 A number that is not a plain Python float (a traced one, or numpy's) varies by case: no choice depends on it, and it is
-only used in arithmetic. `Tree.each` keeps such numbers in a case's memory, so that they are computed once.
+only used in arithmetic. `Tree.map_numbers` keeps such numbers in a case's memory, so that they are computed once.
 
 Link frames of the deck are found again in `Tree.frames`.
 """
@@ -125,9 +125,9 @@ class Tree:
         free  the base moves freely, with the matter of the links that are fixed to it. Its own link is one: a body
               fixed to the base where the base is
         """
-        return _Builder(bodies, moving).tree(free=free).each(lambda _, value: value)
+        return _Builder(bodies, moving).tree(free=free).map_numbers(lambda _, value: value)
 
-    def each(self, function: Callable[[str, Real], Real]) -> Tree:
+    def map_numbers(self, function: Callable[[str, Real], Real]) -> Tree:
         """The tree with function(name, value) for every number that a case may vary.
 
         A phase that runs once writes them to the case's memory; later phases, building the same tree from the same

@@ -98,7 +98,7 @@ def key(*parts: str) -> str:
     return digest.hexdigest()
 
 
-def kept(name: str, make: Callable[[], bytes]) -> tuple[bytes, bool]:
+def cached(name: str, make: Callable[[], bytes]) -> tuple[bytes, bool]:
     """The object of that name, made and kept where it was missing; and whether it was there."""
     place = within(name[:2])
     if place is None:

@@ -45,14 +45,14 @@ class LocalModel:
     """A function of the unit cube at a point: the largest of the pieces, each with the hinges on it.
 
     pieces  [piece];  piece_slopes: [piece, dimension]
-    hinges  [hinge];  hinge_slopes: [hinge, dimension];  of: [hinge], the number of its piece;  weights: [hinge]
+    hinges  [hinge];  hinge_slopes: [hinge, dimension];  piece_of: [hinge], the number of its piece;  weights: [hinge]
     """
 
     pieces: np.ndarray
     piece_slopes: np.ndarray
     hinges: np.ndarray
     hinge_slopes: np.ndarray
-    of: np.ndarray
+    piece_of: np.ndarray
     weights: np.ndarray
 
     @property
@@ -65,7 +65,7 @@ class LocalModel:
         values = self.pieces + added((self.piece_slopes * move).T)
         if len(self.hinges):
             np.add.at(
-                values, self.of, self.weights * np.maximum(0.0, self.hinges + added((self.hinge_slopes * move).T))
+                values, self.piece_of, self.weights * np.maximum(0.0, self.hinges + added((self.hinge_slopes * move).T))
             )
         return float(values.max())
 
@@ -136,7 +136,7 @@ def step(
     unknowns = n + 1 + len(near)
     piece_rows = np.zeros((pieces, unknowns))
     piece_rows[:, :n], piece_rows[:, n] = model.piece_slopes / size, -1.0
-    piece_rows[model.of[near], n + 1 + np.arange(len(near))] = model.weights[near] / size
+    piece_rows[model.piece_of[near], n + 1 + np.arange(len(near))] = model.weights[near] / size
     hinge_rows = np.zeros((len(near), unknowns))
     hinge_rows[:, :n] = model.hinge_slopes[near]
     hinge_rows[:, n + 1 :] = -np.eye(len(near))

@@ -369,7 +369,7 @@ class System:
         """The arm for the dynamics: built once where no case varies it, else kept in the case's memory."""
         if self._fixed_tree is not None:
             return self._fixed_tree
-        return self._tree(read).each(lambda name, _: read(TREE + name))
+        return self._tree(read).map_numbers(lambda name, _: read(TREE + name))
 
     def keep_tree(self, read: ReadCell, write: Callable[[str, Real], None]) -> None:
         """Compute the parts of the tree that vary with the case, and keep them for `tree`."""
@@ -379,7 +379,7 @@ class System:
             return value
 
         if self._fixed_tree is None:
-            self._tree(read).each(keep)
+            self._tree(read).map_numbers(keep)
 
     @cached_property
     def _fixed_tree(self) -> Tree | None:

@@ -201,9 +201,9 @@ class _LlvmEmitter:
                 first = op(f"insertelement {V} poison, double %{kind}, i64 0")
                 value = op(f"shufflevector {V} {first}, {V} poison, <{L} x i32> zeroinitializer")
             elif kind in TRUTHS:
-                value = op(f"fcmp une {V} {load('scratch', piece.kept[i])}, zeroinitializer")
+                value = op(f"fcmp une {V} {load('scratch', piece.saved[i])}, zeroinitializer")
             else:
-                value = load("scratch", piece.kept[i])
+                value = load("scratch", piece.saved[i])
             have[i] = value
             return value
 

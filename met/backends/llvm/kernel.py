@@ -72,7 +72,7 @@ def from_recording(
         _refuse_or_warn(machine)
     lanes, text = written(recording, machine, lanes, inline=inline)
     name = cache.key(numbered(text), llvm.versions(), machine.cpu, machine.features, str(level))
-    code, hit = cache.kept(name, lambda: llvm.assemble(text, machine, level=level))
+    code, hit = cache.cached(name, lambda: llvm.assemble(text, machine, level=level))
     return LlvmKernel(recording, lanes, machine, llvm.Loaded(code, machine), hit)
 
 

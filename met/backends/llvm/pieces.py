@@ -28,7 +28,7 @@ class Piece:
     """Consecutive operations of a section.
 
     body     (number in the section, node's position), in order
-    kept     node's position -> scratch slot, of values that earlier pieces kept
+    saved    node's position -> scratch slot, of values that earlier pieces kept
     keep     the same, of values that later pieces will ask for
     stores   number in the section -> what is stored once that operation is done: (kind, where, reference)
     tail     what is stored at the piece's end, all values taken before the first store
@@ -36,7 +36,7 @@ class Piece:
     """
 
     body: list[tuple[int, int]]
-    kept: dict[int, int] = field(default_factory=dict)
+    saved: dict[int, int] = field(default_factory=dict)
     keep: dict[int, int] = field(default_factory=dict)
     stores: dict[int, list[tuple[str, Any, int]]] = field(default_factory=dict)
     tail: list[tuple[str, Any, int]] = field(default_factory=list)
@@ -108,7 +108,7 @@ def check(section: CodeSection, pieces: list[Piece]) -> None:
 
         def taken(ref: int, piece: Piece = piece, computed: set[int] = computed, number: int = number) -> None:
             i = ref >> 1
-            if nodes[i][0] not in LEAVES and i not in computed and held.get(piece.kept.get(i, -1)) != i:
+            if nodes[i][0] not in LEAVES and i not in computed and held.get(piece.saved.get(i, -1)) != i:
                 raise ValueError(f"{section.name}: piece {number} takes node {i}, which it does not have")
 
         for n, i in piece.body:
@@ -166,7 +166,7 @@ def _assign_scratch(pieces: list[Piece], body: list[int], piece_of: list[int], l
                 piece.keep[i] = slot
                 ending.setdefault(until, []).append(slot)
                 for later in pieces[p + 1 : until + 1]:
-                    later.kept[i] = slot
+                    later.saved[i] = slot
         free.extend(sorted(ending.pop(p, ()), reverse=True))
     for piece in pieces:
         piece.slots = slots

@@ -128,14 +128,14 @@ declare void @llvm.trap()"""
 def compiled(recording: Recording, *, quick: bool = False) -> WasmModule:
     """The module of a program, from the cache where it is there. quick: compiled in half the time, a fifth slower, with
     the same bits."""
-    return _linked(recording, *cache.kept(*_object(recording, quick)))
+    return _linked(recording, *cache.cached(*_object(recording, quick)))
 
 
 def begun(recording: Recording, *, quick: bool = False) -> Callable[[], WasmModule]:
     """Start to compile in a thread; the returned function waits for `compiled`'s result. LLVM does not hold Python's
     lock."""
     with_one = ThreadPoolExecutor(1)
-    future = with_one.submit(cache.kept, *_object(recording, quick))
+    future = with_one.submit(cache.cached, *_object(recording, quick))
     with_one.shutdown(wait=False)
     return lambda: _linked(recording, *future.result())
 

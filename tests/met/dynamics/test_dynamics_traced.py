@@ -162,7 +162,7 @@ def test_an_arm_of_constants_stays_one(seed: int) -> None:
         found.append(name)
         return value
 
-    Tree.build(random_tree(seed).bodies).each(note)
+    Tree.build(random_tree(seed).bodies).map_numbers(note)
     assert found == [], f"seed {seed}"
 
 
@@ -177,9 +177,9 @@ def test_a_trees_own_numbers_can_be_kept_in_a_cases_memory() -> None:
         kept[name] = value
         return value
 
-    assert tree.each(keep) == tree
+    assert tree.map_numbers(keep) == tree
     values = dict(zip(kept, record.replayed(list(kept.values())), strict=True))
-    again = tree.each(lambda name, _: np.float64(values[name]))
+    again = tree.map_numbers(lambda name, _: np.float64(values[name]))
     close(everything(again, arm, arm.mode), everything(Tree.build(arm.bodies), arm, arm.mode), 7, 1e-10)
 
 

@@ -338,7 +338,7 @@ def test_a_base_whose_every_number_is_a_cases_moves_the_same() -> None:
             return value
 
         traced = Tree.build(varied, free=True)
-        assert traced.each(keep) == traced
+        assert traced.map_numbers(keep) == traced
         assert any(name.startswith("tree.floating.") for name in kept)
         worst.see(
             relative(whole(passed(arm, traced, base, arm.mode)), whole(passed(arm, tree, base, arm.mode))),
