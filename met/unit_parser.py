@@ -64,6 +64,7 @@ class _UnitReader:
         return result
 
     def factor(self) -> Measure:
+        """One factor of a unit, a name or brackets, with its exponent. Raises ValueError."""
         piece = self.take()
         if piece == "(":
             result = self.product()

@@ -152,6 +152,7 @@ def _cells(scope: Scope, path: str) -> Settled | None:
 
 
 def _explanation(experiment: Experiment, scope: Scope, path: str, settled: Settled) -> Explanation:
+    """A settled parameter with its origin; of one that varies, the values of its cases in short."""
     value = settled.value
     varies = isinstance(value, Scalar)
     if isinstance(value, Scalar):

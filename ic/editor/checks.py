@@ -273,6 +273,7 @@ class DeckChecks:
             self._keep(deck, request, texts, alone)
 
     def _take(self, deck: OpenText, request: CheckRequest, texts: dict[str, OpenText], answer: object) -> None:
+        """Take one answer of a deck's check: a crash, answers to keep, an index, or messages to show."""
         if isinstance(answer, Crash):
             self._log(
                 f"this is a defect of MET, not of what you gave it; please report it together with the deck, "

@@ -132,6 +132,7 @@ def _before(text: DeckText, offset: int, names: NamesInTexts) -> tuple[list[Toke
 def _of_entry(
     words: list[Token], around: TextEntry | None, names: NamesInTexts, index: DeckIndex, offset: int
 ) -> Iterator[Offer]:
+    """The words that may follow those of an entry, all before the cursor; without words, those that begin one."""
     if not words:
         yield from _beginnings(around, names)
         return

@@ -30,6 +30,7 @@ def about(text: DeckText, token: Token, names: NamesInTexts, index: DeckIndex, f
 
 
 def _of_key(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Iterator[str]:
+    """The paragraph about a word that begins an entry: its declaration in the block, or in the model."""
     if entry is None or entry.head is None or token.offset != entry.head.offset:
         return
     around = entry.within

@@ -134,6 +134,7 @@ def renamed(rename_request: RenameRequest) -> Renamed:
 
 
 def _renamed(rename_request: RenameRequest) -> Renamed:
+    """The edits of every deck that shares the name, each proved by its plan. Raises NotRenamed."""
     first = _Deck(rename_request.decks[0])
     text = next((candidate for candidate in first.names.texts if candidate.source.name == rename_request.file), None)
     token = text.token_at(rename_request.offset) if text is not None else None

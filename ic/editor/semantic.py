@@ -101,6 +101,7 @@ def _parameter_or_index(text: DeckText, token: Token, loops: list[TextEntry]) ->
 def _meaning(
     text: DeckText, token: Token, entry: TextEntry | None, names: NamesInTexts, before: Token | None, behind: str
 ) -> tuple[str, int] | None:
+    """The kind and the modifiers of a name at its place in an entry; None where it means nothing."""
     for definition in names.meant(token, entry)[:1]:
         defines = definition.token.offset == token.offset and definition.file == text.source.name
         library = OF_LIBRARY if definition.file.startswith("<") else 0

@@ -78,6 +78,7 @@ class Expressions(Quantities):
         return Range(first, last, self.expression(), dots.place)
 
     def expression(self, least: int = 1) -> Expression:
+        """An expression whose operators bind at least as tightly as `least`."""
         first = self.token
         left = self.prefix(least)
         while True:
@@ -135,6 +136,7 @@ class Expressions(Quantities):
         return self.following.text in (";", ",", ")", "]", "}", ".")
 
     def operand(self) -> Expression:
+        """A number, name, call, string, list, or an expression in brackets, with the unit after it."""
         token = self.token
         if token.kind == NAME and token.text in self.indices:
             token = self.tokens[self.position] = self.stand_in(token)
@@ -179,6 +181,7 @@ class Expressions(Quantities):
     # names, calls, lists
 
     def string(self) -> String:
+        """A string without its quotes, its escapes replaced."""
         token = self.advance()
         if len(token.text) > LONGEST_STRING:
             self.fail("D020", f"a string has at most {LONGEST_STRING} characters", token)
@@ -206,6 +209,7 @@ class Expressions(Quantities):
         return parts
 
     def name_or_call(self) -> Expression:
+        """A name, alone or with arguments, a block, an index or a unit after it."""
         self.not_a_lone_unit()
         parts = self.path()
         words = tuple([Word(t.text, t.place) for t in parts])
@@ -278,6 +282,7 @@ class Expressions(Quantities):
             )
 
     def call(self, name: Name, first: Token) -> Expression:
+        """The arguments in the brackets after a name; those with names stand last."""
         self.enter()
         outer = self.begin_items()
         positional: list[Expression] = []

@@ -148,6 +148,7 @@ def _called(part: RobotEntry, kind: str, changed: Mapping[tuple[str, str], str])
 
 
 def _runs(body: ArmEntries, arm: str) -> Iterator[str]:
+    """The lines of the servos and of the runs `hold` and `fall`; none for an arm that does not move."""
     joints = {
         part.entry.words[1].text: part.source
         for part in body.joints
@@ -189,6 +190,7 @@ def _runs(body: ArmEntries, arm: str) -> Iterator[str]:
 def _fall(
     joints: Mapping[str, Joint], rubbing: Mapping[str, Joint], slides: Collection[str], free: Callable[[str], str]
 ) -> Iterator[str]:
+    """The lines of a run in which the joints let go, with the file's damping and friction."""
     yield ""
     yield "// The joints let go, with the damping and friction of the file."
     for name in joints:

@@ -152,6 +152,7 @@ def _kind(joint: Joint) -> str:
 
 
 def _joint(joint: Joint, names: DeckNames, kinds: Mapping[str, str]) -> Group:
+    """The entry of a joint: its ends, frame, axis, limits, and what it follows."""
     kind = _kind(joint)
     settings = [_end("parent", joint.parent, names), _end("child", joint.child, names)]
     if joint.at is not None and not joint.at.nothing:

@@ -106,6 +106,7 @@ def _origin(element: Found) -> tuple[Numbers | None, Numbers | None]:
 
 
 def _joint(element: Found) -> Joint:
+    """The joint of an element; of what it does not have, None or nothing."""
     position, rpy = _origin(element)
     axis, limit, dynamics = (element.inside.get(tag) for tag in ("axis", "limit", "dynamics"))
     friction = {} if dynamics is None else {name: numbers.values[0] for name, numbers in dynamics.numbers.items()}

@@ -198,6 +198,7 @@ class _SweepReader:
                     self.seed = whole_number(definitions, entry.value, "a seed", least=0)
 
     def enter(self, entry: object) -> None:
+        """Read one entry of a sweep. Raises Problem for one that a sweep does not have."""
         words = [word.text for word in getattr(entry, "words", ())]
         match entry:
             case Setting() if words in (["vary"], ["vary", "macro"]):
@@ -239,6 +240,7 @@ class _SweepReader:
     # Axes
 
     def zip(self, group: Group) -> None:
+        """Read a `zip`, whose columns vary together as one axis. Raises Problem D126, D136."""
         columns: list[Column] = []
         before = self.complaints.error_count
         for entry in group.body:
@@ -292,6 +294,7 @@ class _SweepReader:
         self.axes.append(SweepAxis(tuple(columns)))
 
     def sample(self, statement: Statement) -> None:
+        """Read a `sample`, whose drawn columns are one axis; the same seed draws the same numbers."""
         sample = read_sample(
             self.definitions, self.complaints, statement, self.paths, self.run_seed if self.seed is None else self.seed
         )
@@ -353,6 +356,7 @@ class _SweepReader:
         return self.numbers(path, entry, names)
 
     def numbers(self, path: str, entry: Setting, names: Names) -> VariedPath:
+        """The column of a path that varies over a list of numbers. Raises Problem D126."""
         listed = names.evaluate(entry.value)
         check_constant(path, entry, names, self.paths)
         if isinstance(listed, Value):

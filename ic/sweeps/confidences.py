@@ -58,6 +58,7 @@ def check_confidences(complaints: Complaints, sweep: Sweep, experiment: Experime
 def _check_draws(
     complaints: Complaints, sweep: Sweep, experiment: Experiment, requirement: Requirement, drawn: Sequence[SweepAxis]
 ) -> None:
+    """Report samples whose cases are not drawn independently, as a confidence needs."""
     for axis in drawn:
         if axis.design != "random":
             complaints.error(

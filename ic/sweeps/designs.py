@@ -276,6 +276,7 @@ def _count(value: Value, most: int) -> int:
 
 
 def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> DrawnParameter:
+    """One line of a `sample`: the parameter with its distribution. Raises Problem D225."""
     path = ".".join(word.text for word in entry.path)
     unit, call = None, entry.value
     if isinstance(call, WithUnit):
@@ -321,6 +322,7 @@ def in_unit(expression: Expression, unit: Unit | None) -> Expression:
 
 
 def _check_arguments(name: str, arguments: tuple[float, ...], values: list[Any]) -> None:
+    """Raise Problem D225 where a distribution cannot have these arguments."""
     if name in ("normal", "truncated") and not arguments[1] > 0.0:
         raise Problem(
             error(

@@ -85,6 +85,7 @@ class Effects:
                 self._report_one(complaints, path, entry, where, idle)
 
     def _report_one(self, complaints: Complaints, path: str, entry: Setting, where: str, idle: bool) -> None:
+        """Report a setting of this path where it has no effect, or cannot be set."""
         scope = next(
             (candidate for candidate in self.scopes if path in candidate.known or path in candidate.not_sweepable),
             self.scopes[0],
@@ -130,6 +131,7 @@ class Effects:
         )
 
     def _report_unknown(self, complaints: Complaints, scope: Scope, path: str, entry: Setting, where: str) -> None:
+        """Report a setting of a path that no run has, with what may have been meant."""
         first, *words = scope.definitions.split(path)
         rest = ".".join(words)
         joints = list(

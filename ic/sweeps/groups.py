@@ -133,6 +133,7 @@ class _Sweep:
         self.own = Effects(Settings())  # of what its run sets itself
 
     def groups(self) -> list[ScopedExperiment]:
+        """The experiments of the sweep, one for each structure; none where it has a mistake, which is reported."""
         before = self.complaints.error_count
         read = self._read(self.definitions, self.definition)
         sweep = read.sweep

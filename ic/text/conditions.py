@@ -205,6 +205,7 @@ class _Condition:
         return _wrapped((yes if holds else no).number, yes.plain or no.plain)
 
     def binary(self, least: int, live: bool) -> _Value:
+        """The value of operators that bind at least as tightly as `least`. live: False where C does not evaluate it"""
         left = self.unary(live)
         while True:
             operator = self.text()
@@ -222,6 +223,7 @@ class _Condition:
                 left = self.computed(token, left, self.binary(level + 1, live), live)
 
     def computed(self, operator: Token, left: _Value, right: _Value, live: bool) -> _Value:
+        """The value of an operator on two numbers of 64 bits, as in C. Raises Refused."""
         text, plain = operator.text, left.plain or right.plain
         if text in ("<<", ">>"):
             if not live:
@@ -270,6 +272,7 @@ class _Condition:
         return value
 
     def operand(self, token: Token, live: bool) -> _Value:
+        """The value of a number, a name or a character; of other tokens Refused is raised."""
         self.no_stray(token)
         if token.kind == WHOLE:
             return self.number(token)
@@ -295,6 +298,7 @@ class _Condition:
         self.not_understood(f"expected a value, found `{token.text[:LONGEST_NUMBER]}`", token)
 
     def number(self, token: Token) -> _Value:
+        """The value of one of C's whole numbers, with its suffix. Raises Refused."""
         self.position += 1
         text = token.text
         matched = _NUMBER.fullmatch(text)
@@ -323,6 +327,7 @@ class _Condition:
         return _Value(value, plain)
 
     def character(self, token: Token) -> _Value:
+        """The code of a character between quotes, with the sign of `char`. Raises Refused."""
         self.position += 1
         inner = token.text[1:-1]
         escape = _ESCAPE.fullmatch(inner)

@@ -87,6 +87,7 @@ def checked_definition(tokens: list[Token], is_macro: Callable[[str], bool], fin
 
 
 def _checked_parameters(name: Token, written: list[Token], findings: Findings) -> bool:
+    """True for parameters of a macro that are names, each once; other ones are reported."""
     seen: set[str] = set()
     for i, token in enumerate(written):
         last = i == len(written) - 1

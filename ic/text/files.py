@@ -222,6 +222,7 @@ def _printable(names: Iterable[str], ending: str) -> list[str]:
 
 
 def _read_bytes(file: FoundFile, kind: str, most: int) -> bytes:
+    """The content of a file of at most so many bytes. Raises Problem D001 where it cannot be read."""
     try:
         file.name.encode()
     except UnicodeEncodeError:

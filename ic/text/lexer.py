@@ -230,6 +230,7 @@ def _where_written(line: list[Token], source: Text) -> list[Token]:
 
 
 def _lines_of(source: Text, text: str) -> Iterator[list[Token]]:
+    """The tokens of each line, white space included. source: the text that their offsets are of"""
     line: list[Token] = []
     add = line.append
     for match in _TOKEN.finditer(text):

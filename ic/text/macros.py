@@ -59,6 +59,7 @@ class Macros(Pcpp):
         self.t_COMMENT = (self.t_COMMENT1,)
 
     def define(self, tokens: Any) -> None:
+        """Enter a `#define`; a macro that is refused, or defined again differently, is reported."""
         if isinstance(tokens, str):  # pcpp's own macros, and the clock: a deck must mean the same tomorrow
             return
         body = definitions.checked_definition(tokens, self.macros.__contains__, self.findings)
@@ -175,6 +176,7 @@ class Macros(Pcpp):
             out.append(following)
 
     def _predefined(self, token: Token) -> Token:
+        """What a predefined macro is replaced by at this use; those of the clock are refused."""
         outermost = token.expansions[-1].use if token.expansions else token.place
         replacement = token.__copy__()
         if token.text == "__LINE__":

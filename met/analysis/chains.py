@@ -105,6 +105,7 @@ def _branches(structure: Structure) -> Iterator[frozenset[str]]:
 
 
 def _reduced(experiment: Experiment, joints: frozenset[str]) -> Experiment:
+    """The experiment with these joints and the links that they carry alone, without metrics and records."""
     structure = experiment.structure
     every = {joint.name for joint in structure.joints}
     links = {joint.child for joint in structure.joints if joint.name in joints} | {BASE}

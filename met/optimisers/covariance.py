@@ -124,6 +124,7 @@ class CovarianceAdaptation:
         return steady
 
     def _learn(self, gains: np.ndarray, losses: np.ndarray, moves: np.ndarray, steady: bool) -> None:
+        """Update the covariance from the moves of a generation, with the weights of better and worse ones."""
         n, one_rate, mu = len(self._mean), self._one_rate, self._mu_rate
         squares = added((self._drawn * self._drawn).T)
         scaled = gains + losses * n / np.maximum(squares, 1e-300)

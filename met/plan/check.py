@@ -107,6 +107,7 @@ def _group_name(experiment: Experiment, where: str, before: Collection[str]) -> 
 
 
 def _check_requirements(experiment: Experiment, where: str) -> None:
+    """Check that requirements are of metrics of the run, with sensible limits, shares and confidences."""
     metrics = {use.name for use in experiment.metrics}
     by_text: dict[str, Requirement] = {}
     for index, requirement in enumerate(experiment.requirements):
@@ -161,6 +162,7 @@ def _check_allowances(experiment: Experiment, where: str) -> None:
 
 
 def _check_cases(experiment: Experiment, where: str) -> None:
+    """Check the case table: its count, seed, numberings, and each coordinate."""
     cases = experiment.cases
     many = cases.coordinates or cases.repeats is not None
     plan_structure.check_whole(cases.count, 1, 2**63 - 1 if many else 1, f"{where}.count")
@@ -220,6 +222,7 @@ def _check_coordinate(experiment: Experiment, coordinate: Coordinate, where: str
 
 
 def _check_formulas(experiment: Experiment, where: str) -> None:
+    """Check that formulas are of the coordinates, and that parameters name existing ones."""
     formulas = experiment.formulas
     paths = {coordinate.path for coordinate in experiment.cases.coordinates}
     for index, name in enumerate(formulas.inputs):
@@ -313,6 +316,7 @@ def _check_pivots(experiment: Experiment, where: str) -> set[str]:
 
 
 def _check_quantity(quantity: Quantity, unit: str, parameter: Parameter | None, where: str) -> None:
+    """Check a parameter's unit, shape and bounds, as its model declares them."""
     is_word = parameter is not None and parameter.shape == "word"  # a word has no unit, however it is written
     if not is_word and quantity.unit != unit and not _same_unit(quantity.unit, unit):
         raise Damaged(f"{where}.unit", f"it should be {unit}")
@@ -456,6 +460,7 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
 def _check_varied(
     experiment: Experiment, tests: list[tuple[str, list[Any], Callable[[np.ndarray], np.ndarray], str]], where: str
 ) -> None:
+    """Check tests of parameters that vary, over all cases, a piece of the table at a time."""
     cases, formulas = experiment.cases, experiment.formulas
     wanted = sorted({v.output for _, values, _, _ in tests for v in values if isinstance(v, Formula)})
     some = Formulas(formulas.inputs, formulas.nodes, tuple(formulas.outputs[output] for output in wanted))

@@ -124,6 +124,7 @@ def decode(hint: Any, data: Any, where: str = "", fetch: Fetch | None = None) ->
 
 
 def _decode_fields(cls: Any, data: Any, where: str, fetch: Fetch | None) -> Any:
+    """A dataclass from an object's fields. Raises Damaged for an unknown or missing one."""
     _expect(isinstance(data, dict), where, "an object")
     known = fields(cls)
     for key in data:

@@ -62,6 +62,7 @@ class Builder:
         self.limits = LimitPhases(system, self.step)
 
     def program(self) -> Program:
+        """The program of the experiment: what is done at the start, at each tick and at the end."""
         instant = self.schedule.dynamics
         columns = [channel for recorded in self.system.structure.record for channel in recorded.channels]
         held, at_rows = derived(self.system)
@@ -325,6 +326,7 @@ class Builder:
         return p, NamedValues(owner, held)
 
     def _metrics(self, divisor: int) -> Body:
+        """The body of the phase that updates the metrics of channels with this divisor."""
         period = divisor / self.schedule.base_hz
 
         def body(tape: Tape) -> None:

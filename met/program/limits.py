@@ -82,6 +82,7 @@ class LimitPhases:
         cells.keep(tape, is_new, cell_names.EXTREME_AT(name), last)
 
     def _reached(self, tape: Tape, use: LimitUse, time: Real) -> Truth:
+        """True where a limit is reached at this time, s."""
         system = self.system
         if use.bound:
             return self._excess(tape, use) > 0.0

@@ -82,6 +82,7 @@ class Observed:
         return quaternion((self.motions if kind == "links" else self.seen)[own].pose.R)
 
     def _of_joint(self, joint: str, parts: list[str]) -> Real:
+        """A derived number of a joint, by the words of its channel after the name. Raises KeyError."""
         if parts == ["limit_margin"]:
             return self._margin(joint)
         i, solved = self.joints.index(joint), self.derivative.solved

@@ -118,6 +118,7 @@ class _Writer:
         return self.sections[number]
 
     def _write(self, section: CodeSection, number: int) -> None:
+        """Write what a section computes of the needed cells, outputs and columns, numbered afresh."""
         order = live(section.nodes, slice_roots(section, self.needed, self.outputs, self.columns))
         place = {i: 2 * n for n, i in enumerate(order)}
         self._put("section", number)

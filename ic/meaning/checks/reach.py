@@ -122,6 +122,7 @@ def _is_pushed(structure: Structure, payload: Payload, parameters: Mapping[str, 
 
 
 def _observe(scope: Scope, payload: Payload, looked_at: GrappleNumbers, duration: float, place: Place) -> None:
+    """Warn, once the cases are known, where a link grapples a payload that it cannot reach."""
     head = f"payloads.{payload.name}"
     settled = [scope.parameters.get(path) for path in looked_at.paths]
     values: list[Real] = [number.value for number in settled if number is not None]  # type: ignore[misc]  # they are numbers

@@ -149,6 +149,7 @@ def _observe_filter(
 
 
 def _all_sampled(structure: Structure) -> Iterator[SampledContent]:
+    """The contents of all courses of time and models of the environment, each with the interval at which it is seen."""
     schedule = structure.schedule
 
     def course(
@@ -187,6 +188,7 @@ def _all_sampled(structure: Structure) -> Iterator[SampledContent]:
 
 
 def _observe(scope: Scope, sampled: SampledContent, schedule: Schedule) -> None:
+    """Check a content's instants and pulses once the cases are known."""
     settled = {
         parameter.name: scope.parameters.get(f"{sampled.path}.{parameter.name}") for parameter in sampled.declared
     }
@@ -236,6 +238,7 @@ def _remark_late(
 
 
 def _remark(scope: Scope, sampled: SampledContent, contents: list[Content], schedule: Schedule, place: Place) -> None:
+    """Warn about contents that last beyond the run, swing too fast for their interval, or whose pulses are lost."""
     duration, base = schedule.duration, schedule.base_hz
     first = min(contents, key=lambda content: content.begins)
     if duration <= first.begins < math.inf:

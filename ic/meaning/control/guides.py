@@ -166,6 +166,7 @@ def check_period(scope: Scope, guide: Guiding, rate: Rate) -> None:
 
 
 def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration: float | None) -> Guiding | None:
+    """The guide of an entry; None where it has a mistake, which is reported."""
     if item.detail or item.value is None:
         place = item.detail[0].place if item.detail else item.place
         message = f"guide `{item.name}` has no model"

@@ -68,6 +68,7 @@ def resolve_link_sensors(
 
 
 def _sensor(scope: Scope, item: Item, arm: ResolvedArm, payloads: tuple[Payload, ...]) -> Sensing | None:
+    """The sensor of an entry; None where it has a mistake, which is reported."""
     if item.detail or item.value is None:
         place = item.detail[0].place if item.detail else item.place
         message = (

@@ -151,6 +151,7 @@ def _note_kinds(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> None:
 
 
 def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
+    """The servo of a joint with this joint's values; None where it has a mistake, which is reported."""
     if item.name in arm.failed and not item.kind:
         return None
     kind = moving_kind(scope, item, arm, "so no servo can move it")
@@ -431,6 +432,7 @@ def fixed_rate(
 
 
 def use_command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Place) -> Command | None:
+    """The command of a servo, entered in the scope; None where it takes none, or has a mistake (reported)."""
     known = ", ".join(f"{kind}(...)" for kind in servo.commands)
     if item is None:
         if servo.commands:

@@ -112,6 +112,7 @@ def _columns(
 
 
 def _column_name(owner: Owner, item: Item | None, joint: str) -> str:
+    """The name of a joint's column in a file: the written one, else the joint's. Raises Problem D076."""
     if item is None:
         return joint
     refuse_block(item)

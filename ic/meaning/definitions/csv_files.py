@@ -282,6 +282,7 @@ def _lines_with_cells(text: str) -> Iterator[tuple[int, str]]:
 
 
 def _columns(file: str, line: int, row: str, declared: Collection[str]) -> Iterator[CsvColumn]:
+    """The columns that the first line names, with their units. Raises Problem D191 and others."""
     if all(_NUMBER.fullmatch(_stripped(cell)[0]) for cell in _cells(row)):
         raise Problem(
             error(

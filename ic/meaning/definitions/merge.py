@@ -117,6 +117,7 @@ class _Merger:
         self.written: dict[str, Place] = {}
 
     def enter(self, entry: Entry) -> None:
+        """Enter one entry of a block over what the block has already. Raises Problem."""
         if isinstance(entry, Let):
             raise Problem(
                 error(
@@ -215,6 +216,7 @@ class _Merger:
     def _item(
         self, entry: Setting | Group, kind: str, name: str, detail: tuple[Word, ...], earlier: Item | None
     ) -> Item:
+        """The item of an entry: its value, or its block merged with that of the earlier entry of the name."""
         if isinstance(entry, Setting):
             value, body = open_call(entry.value, self.home[0] if self.home else None, self.complaints)
             if earlier is None:
@@ -283,6 +285,7 @@ class _Merger:
         self.items[earlier.key] = replace(earlier, appended=(*earlier.appended, entry.value))
 
     def _remove(self, entry: Statement) -> None:
+        """Carry out a `remove`: of an item or a requirement of the base, or later of what a use adds."""
         if not isinstance(entry.value, Name) or len(entry.words) > 1:
             meant = entry.value.text if isinstance(entry.value, Name) else "NAME"
             raise Problem(
@@ -430,6 +433,7 @@ def _taken_over(item: Item, homes: tuple[str, ...]) -> Item:
 
 
 def defined_twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnostic:
+    """The error that a name is defined twice, with the remedy for a file, loop or macro that does it."""
     what = f"{kind} `{name}`" if kind else f"`{name}`"
     named = kind not in ("", WITH, REQUIREMENT)
     helps: list[str] = [leave_out("remove one of the two"), *(["or give one of the two another name"] if named else [])]

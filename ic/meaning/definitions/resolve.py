@@ -314,6 +314,7 @@ class Definitions:
         return tuple(reversed(names))
 
     def _enter(self, entry: Entry) -> None:
+        """Enter one entry of the deck: a `let`, a definition or a sum of sweeps. Raises Problem D044 for others."""
         if isinstance(entry, Let):
             earlier = self.lets.get(entry.name.text)
             if earlier is not None and earlier.is_param and entry.is_param and _includes(earlier, entry):
@@ -342,6 +343,7 @@ class Definitions:
             )
 
     def _define(self, group: Group) -> None:
+        """Enter a definition of a block: its kind, its name, and what it is like or of. Raises Problem."""
         words = list(group.words)
         if (
             len(words) > 2

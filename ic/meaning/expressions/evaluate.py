@@ -124,6 +124,7 @@ def evaluate_number(expression: Expression, lookup: Lookup) -> Value:
 
 
 def _leaf(expression: Expression, lookup: Lookup) -> Value | ValueList:
+    """The value of an expression that is no operator, call or number with a unit."""
     match expression:
         case Number():
             return _number(expression)
@@ -179,6 +180,7 @@ def _of_pi(decimal: str) -> bool:
 
 
 def _with_unit(expression: WithUnit, lookup: Lookup) -> Value | ValueList:
+    """The value of an expression, all of whose bare numbers have the unit after it."""
     inner = _written_unit(expression.inner)
     if inner is not None:
         raise Problem(
@@ -249,6 +251,7 @@ def _binary(node: Binary, left: Value | ValueList, lookup: Lookup) -> Value | Va
 
 
 def _of_numbers(node: Binary, left: Value, right: Value) -> Value:
+    """The value of an operator on two numbers. Raises Problem D063 where their dimensions do not fit."""
     operator = node.operator
     place = spanned(left.place, right.place)
     bare = left.bare and right.bare
@@ -296,6 +299,7 @@ def _made_alike(node: Binary, left: Value, right: Value) -> Help:
 
 
 def _power(node: Binary, base: Value, exponent: Value) -> Value:
+    """The value of a power. Raises Problem D068 where the exponent has a dimension, or gives none."""
     power = exponent.number
     if exponent.dimension != PURE:
         raise Problem(
@@ -359,6 +363,7 @@ def _items(written: List, lookup: Lookup) -> Iterable[Value | ValueList]:
 
 
 def _call(call: Call, lookup: Lookup) -> Value | ValueList:
+    """The value of a function's call. Raises Problem D069 for an unknown function."""
     name = call.name.text
     if is_row_table(call):
         message = f"`{CSV}(...)` is a table of values, and no value"

@@ -221,6 +221,7 @@ class Names:
         return []
 
     def _expression(self, name: Name) -> Expression:
+        """The expression that a name stands for: of a `let`, or of a servo's entry. Raises Problem D065."""
         first, *rest = (word.text for word in name.path)
         if not rest and first in self.definitions.lets:
             return self.definitions.lets[first].value

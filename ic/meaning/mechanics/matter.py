@@ -46,6 +46,7 @@ def _of_kind(wanted: Parameter, kind: str) -> Parameter:
 
 
 def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
+    """The shape of a link or payload with its sizes, m; None where there is none, or a mistake, which is reported."""
     if item is None:
         return None
     name = word_of(item.value)
@@ -98,6 +99,7 @@ def _com(scope: Scope, owner: Owner, kind: str, item: Item | None, solid: Solid 
 def _inertia(
     scope: Scope, owner: Owner, kind: str, item: Item | None, solid: Solid | None, mass: Real | None
 ) -> tuple[Real, ...] | None:
+    """The moments xx, yy, zz, xy, xz, yz, kg m^2: as written, or of the shape; None where there are none (reported)."""
     if item is not None:
         return scope.vector(owner, _of_kind(INERTIA, kind), item, names=MOMENTS, short=3)
     if solid is None:

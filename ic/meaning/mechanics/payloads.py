@@ -59,6 +59,7 @@ def check_payloads(scope: Scope, block: MergedBlock, structure: Structure) -> No
 
 
 def _payload(scope: Scope, item: Item, arm: ResolvedArm, taken: Collection[str]) -> Payload:
+    """One payload, its numbers entered as parameters; mistakes are reported."""
     owner = Owner(f"payload `{item.name}`", item.place, f"payloads.{item.name}", homes=item.homes)
     if item.detail or item.value is not None or item.body is None:
         place = item.detail[0].place if item.detail else value_place(item)

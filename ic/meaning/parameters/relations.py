@@ -121,6 +121,7 @@ def _not_less(unit: str, pairs: np.ndarray) -> tuple[np.ndarray, list[str]]:
 def _check_list(
     scope: Scope, owner: Owner, wanted: Parameter, body: MergedBlock, values: Mapping[str, Any], place: Place
 ) -> None:
+    """Report a list that is not as long as its partner, is empty, or does not rise."""
     numbers = values[wanted.name]
     if wanted.as_many_as and (numbers or wanted.default is None) and len(numbers) != len(values[wanted.as_many_as]):
         count = len(values[wanted.as_many_as])

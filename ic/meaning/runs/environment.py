@@ -51,6 +51,7 @@ def resolve_environment(
 def _environment_use(
     scope: Scope, item: Item, arm: ResolvedArm, base: Base | None, payloads: tuple[Payload, ...], duration: float | None
 ) -> EnvironmentUse | None:
+    """The model of an entry of `environment`; None where it has a mistake, which is reported."""
     owner = Owner(f"environment `{item.name}`", item.place, f"environment.{item.name}", homes=item.homes)
     name = word_of(item.value)
     if item.name == "gravity" and name in (None, "gravity", *scope.definitions.lets):

@@ -21,6 +21,7 @@ def resolve_run_keys(scope: Scope, run: Owner, block: MergedBlock, cls: type) ->
 
 
 def _read(scope: Scope, run: Owner, block: MergedBlock, key: RunKey) -> Any:
+    """The value of one key of a run, in SI; its default where the run does not write it."""
     wanted = key.parameter
     head, _, name = key.path.rpartition(".")
     holder = block.get(head) if head else None

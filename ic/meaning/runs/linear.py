@@ -57,6 +57,7 @@ def resolve_linear(scope: Scope, block: MergedBlock, structure: Structure) -> tu
 
 
 def _answer(scope: Scope, item: Item, structure: Structure, known: Mapping[str, InputSignal]) -> LinearUse | None:
+    """One `linear` block; None where it has a mistake, which is reported."""
     if item.body is None or item.value is not None or item.detail:
         message = f"`linear {item.name}` is a block"
         scope.complaints.error("D375", message, item.place, help=f"write `{LINEAR.written}`")

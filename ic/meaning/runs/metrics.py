@@ -37,6 +37,7 @@ def resolve_metrics(
 def _metric(
     scope: Scope, item: Item, signals: ChannelTable, expressions: dict[str, SignalExpression]
 ) -> MetricUse | None:
+    """The metric of an entry with the channel that it watches; None where it has a mistake, which is reported."""
     if item.detail:
         scope.complaints.error(
             "D129",

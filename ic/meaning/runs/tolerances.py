@@ -40,6 +40,7 @@ def resolve_tolerances(
 
 
 def _tolerance(scope: Scope, item: Item, structure: Structure, known: dict[str, tuple[str, ...]]) -> Tolerance | None:
+    """The tolerance of an entry, SI; None where it has a mistake, which is reported."""
     name = item.name
     if item.kind or item.value is None:
         scope.complaints.error("D239", f"`{item.kind or name}` is no tolerance", item.place, help=WRITE)

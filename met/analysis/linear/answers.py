@@ -259,6 +259,7 @@ class LinearQuestion:
             yield lifted if isinstance(lifted, Problem) else self._answer(case, lifted, *next(more))
 
     def _answer(self, case: int, lifted: LiftedPeriod, slow: tuple[CreepingRate, ...], plant: PlantModel) -> Linearized:
+        """The answers about one case from the maps of its period, with the ticks of an input summed."""
         program, inputs, period = self.program, self.inputs, lifted.map
         paths = [program.inputs[tick.entry].path for tick in period.ticks]
 

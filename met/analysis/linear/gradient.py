@@ -137,6 +137,7 @@ class GradientProgram:
         return MetricGradients(tuple(rows.tolist()), metrics, self.paths, *of_all, why_not)
 
     def _why_not(self, lanes: _Lanes, metrics: Sequence[str]) -> Iterator[tuple[Place, str]]:
+        """The reasons why derivatives are missing, by case, metric and number."""
         failed, value, slope = lanes.failed(), lanes.values(metrics), lanes.slopes(metrics)
         edges = lanes.edges(metrics) if lanes.outputs.shape[2] == len(_POINTS) else np.zeros(slope.shape, dtype=bool)
         for case, metric, number in np.ndindex(*slope.shape):
@@ -244,6 +245,7 @@ def _words(output: str) -> str:
 
 
 def _refuse(experiment: Experiment, metrics: Sequence[str], paths: Sequence[str]) -> None:
+    """Raise Problem D379 where a metric has no gradient, or nothing varies."""
     known = [use.name for use in experiment.structure.metrics]
     linear = [use.name for use in experiment.linear_metrics]
     for name in metrics:

@@ -145,6 +145,7 @@ def _figures(
 
 
 def _figure(figure: LinearFigure, lifted: LiftedPeriod, loops: Sequence[OpenLoop]) -> tuple[float, int]:
+    """The figure of a linear answer, not-a-number where there is none; and the reason, or `ANSWERED`."""
     if not figure.of_loops:
         if lifted.map.at_limit:
             return math.nan, AT_LIMIT
