@@ -33,7 +33,7 @@ Ratios = tuple[Mapping[int, Real], ...]
 of a joint that is not coupled {}."""
 
 
-def solve_coupled(tree: Tree, ratios: Ratios, bends: Sequence[Real] = (), **given: Any) -> Solved:
+def solve_coupled(tree: Tree, ratios: Ratios, bends: Sequence[Real] = (), **arguments: Any) -> Solved:
     """The arm's motion at one instant, as `recursion.solve`, of which it takes the arguments `q`, `qd`, `tau`, `qdd`,
     `mode`, `rotor` and so on, with coupled joints.
 
@@ -44,16 +44,18 @@ def solve_coupled(tree: Tree, ratios: Ratios, bends: Sequence[Real] = (), **give
     given at the followers. Of a follower, `tau` is as given, and `tau_load` what its own link takes.
     """
     n = len(tree.joints)
-    given = {"tau": (0.0,) * n, "qdd": (0.0,) * n, "rotor": (0.0,) * n, "mode": (True,) * n, **given}
+    arguments = {"tau": (0.0,) * n, "qdd": (0.0,) * n, "rotor": (0.0,) * n, "mode": (True,) * n, **arguments}
     leaders = sorted({j for row in ratios for j in row})
     members = [i for i, row in enumerate(ratios) if row]
-    tau, rotor, modes = given["tau"], given["rotor"], given["mode"]
+    tau, rotor, modes = arguments["tau"], arguments["rotor"], arguments["mode"]
     held = tuple(False if row else mode for row, mode in zip(ratios, modes, strict=True))
     own = tuple(bends) or (0.0,) * n
-    rest = tuple(bend if row else x for row, bend, x in zip(ratios, own, given["qdd"], strict=True))
-    first = _told(tree, {**given, "mode": held, "qdd": rest})
+    rest = tuple(bend if row else x for row, bend, x in zip(ratios, own, arguments["qdd"], strict=True))
+    first = _differentiable_pass(tree, {**arguments, "mode": held, "qdd": rest})
     passes = [
-        _told(tree, _at_rest(given, n) | {"mode": held, "qdd": tuple(row.get(j, 0.0) for row in ratios)})
+        _differentiable_pass(
+            tree, _at_rest(arguments, n) | {"mode": held, "qdd": tuple(row.get(j, 0.0) for row in ratios)}
+        )
         for j in leaders
     ]
 
@@ -63,24 +65,24 @@ def solve_coupled(tree: Tree, ratios: Ratios, bends: Sequence[Real] = (), **give
 
     # a leader whose acceleration is given has a row of the identity
     inertia = [
-        [choose(modes[j], at_leader(each.tau, j), float(j == k)) for k, each in zip(leaders, passes, strict=True)]
+        [choose(modes[j], at_leader(solved.tau, j), float(j == k)) for k, solved in zip(leaders, passes, strict=True)]
         for j in leaders
     ]
-    missing = [choose(modes[j], at_leader(tau, j) - at_leader(first.tau, j), given["qdd"][j]) for j in leaders]
+    missing = [choose(modes[j], at_leader(tau, j) - at_leader(first.tau, j), arguments["qdd"][j]) for j in leaders]
     moved, pivots = _eliminated(inertia, missing)
 
     def whole(part: Callable[[Solved], Any]) -> Any:
         """A result of all passes together, numbers in nested tuples."""
         total = part(first)
-        for u, each in zip(moved, passes, strict=True):
-            total = _added(total, u, part(each))
+        for u, solved in zip(moved, passes, strict=True):
+            total = _added(total, u, part(solved))
         return total
 
     qdd = tuple(
         sum((row[j] * u for j, u in zip(leaders, moved, strict=True) if j in row), bend) if row else x
-        for row, bend, x in zip(ratios, own, whole(lambda each: each.qdd), strict=True)
+        for row, bend, x in zip(ratios, own, whole(lambda solved: solved.qdd), strict=True)
     )
-    needed, torques, loads = whole(lambda each: each.tau), list(tau), list(whole(lambda each: each.tau_load))
+    needed, torques, loads = whole(lambda solved: solved.tau), list(tau), list(whole(lambda solved: solved.tau_load))
     singular = list(first.singular)
     for i, row in enumerate(ratios):
         if not row:
@@ -104,48 +106,49 @@ def solve_coupled(tree: Tree, ratios: Ratios, bends: Sequence[Real] = (), **give
     )
 
 
-def inertia_at(tree: Tree, ratios: Ratios, given: Mapping[str, Any], joint: int) -> Real:
+def inertia_at(tree: Tree, ratios: Ratios, arguments: Mapping[str, Any], joint: int) -> Real:
     """The inertia of the arm at a joint that follows none, with all other joints in their modes, kg m^2 (kg):
-    `effective_inertia` with coupled joints. What follows the joint moves with it. given: as `solve_coupled` takes it"""
+    `effective_inertia` with coupled joints. What follows the joint moves with it. arguments: as `solve_coupled`
+    takes them"""
     n = len(tree.joints)
-    mode = tuple(False if i == joint else mode for i, mode in enumerate(given["mode"]))
+    mode = tuple(False if i == joint else mode for i, mode in enumerate(arguments["mode"]))
     unit = tuple(float(i == joint) for i in range(n))
-    return solve_coupled(tree, ratios, **_at_rest(given, n), mode=mode, qdd=unit).tau_load[joint]
+    return solve_coupled(tree, ratios, **_at_rest(arguments, n), mode=mode, qdd=unit).tau_load[joint]
 
 
 def at_leaders(ratios: Ratios, columns: Sequence[tuple[Vector, Vector]]) -> list[tuple[Vector, Vector]]:
     """Columns of a Jacobian, angular and linear by joint, for unit rates of the joints that follow none: those of
     leaders with all that follow them, those of followers zero."""
-    found: list[tuple[Vector, Vector]] = []
+    of_leaders: list[tuple[Vector, Vector]] = []
     for i, own in enumerate(columns):
         total = own if i in ratios[i] or not ratios[i] else (ZERO, ZERO)
         for row, (w, v) in zip(ratios, columns, strict=True):
             if i in row and row is not ratios[i]:
                 total = add(total[0], scale(row[i], w)), add(total[1], scale(row[i], v))
-        found.append(total)
-    return found
+        of_leaders.append(total)
+    return of_leaders
 
 
-def _told(tree: Tree, given: Mapping[str, Any]) -> Solved:
+def _differentiable_pass(tree: Tree, arguments: Mapping[str, Any]) -> Solved:
     """A pass of the recursion, of which the graph is given the derivative."""
-    solved = solve(tree, **given)
+    solved = solve(tree, **arguments)
     defaults = {"wrenches": None, "velocity_products": True, "spin": None, "free_rotors": None}
-    tell(tree, {**defaults, **given}, solved)
+    tell(tree, {**defaults, **arguments}, solved)
     return solved
 
 
-def _at_rest(given: Mapping[str, Any], n: int) -> dict[str, Any]:
+def _at_rest(arguments: Mapping[str, Any], n: int) -> dict[str, Any]:
     """The arguments of a pass at rest, without loads and gravity, with the same rotors."""
-    free = given.get("free_rotors")
+    free = arguments.get("free_rotors")
     return {
-        "q": given["q"],
+        "q": arguments["q"],
         "qd": (0.0,) * n,
         "tau": (0.0,) * n,
-        "rotor": given["rotor"],
-        "spin": given.get("spin"),
+        "rotor": arguments["rotor"],
+        "spin": arguments.get("spin"),
         "free_rotors": None
         if free is None
-        else tuple(None if each is None else FreeRotor(each.inertia, 0.0, 0.0) for each in free),
+        else tuple(None if rotor is None else FreeRotor(rotor.inertia, 0.0, 0.0) for rotor in free),
         "gravity": ZERO,
         "velocity_products": False,
     }

@@ -89,9 +89,9 @@ def corners_of(loop: Loop, joints: Sequence[Joint], number: Callable[[str], Real
             p = add(p, turn_vector(R, vector(f"{joint.name}.at")))
             R = snap_rotation(product(R, rotation_rpy(*vector(f"{joint.name}.rpy"))))
             if joint.kind != "fixed":
-                at = add(p, turn_vector(R, vector(f"{joint.name}.pivot")))
+                pivot = add(p, turn_vector(R, vector(f"{joint.name}.pivot")))
                 axis = turn_vector(R, vector(f"{joint.name}.axis"))
-                rows[-1].append(Corner(joint.name, at, at, joint.kind, axis, along))
+                rows[-1].append(Corner(joint.name, pivot, pivot, joint.kind, axis, along))
         pins.append(add(p, turn_vector(R, vector(f"{loop.name}.{point}"))))
     corners = [*reversed(rows[0]), *rows[1], Corner("", before=pins[1], after=pins[0])]
     first = [corner.name for corner in corners].index(loop.leader)

@@ -39,7 +39,7 @@ class Derivative:
     need     what dry friction must hold where it sticks, by the name of what sticks: of a joint the smooth torque less
              what the arm takes, of a servo's state its slope without friction
     solved   the recursion's own results
-    shown    what servos show of this stage, by channel
+    signals  what servos show of this stage, by channel
     gravity  acceleration of free fall, of all environment models, world axes, m/s^2
     base     where the base is and how it moves
     stored   kinetic and potential energy in the servos, of what does not move with their joints, J
@@ -55,7 +55,7 @@ class Derivative:
     tau: tuple[Real, ...]
     need: Mapping[str, Real]
     solved: Solved
-    shown: Mapping[str, Real]
+    signals: Mapping[str, Real]
     gravity: Vector
     base: BaseMotion
     stored: tuple[Real, Real]
@@ -90,7 +90,7 @@ def derivative(
             None if actuator is None else servo_response(system, actuator, read, y, held[i], time, begin)
             for i, actuator in enumerate(system.actuators)
         )
-    drives = tuple(None if each is None else each.drive for each in driven)
+    drives = tuple(None if response is None else response.drive for response in driven)
     tree, base, n = tree_with_payloads(system, read), base_of(system, read, y, time), len(system.joints)
     with part("environment"):
         loads = _environment(system, tree, read, y, base, time, begin)
@@ -129,7 +129,7 @@ def derivative(
         of_states, state_needs = _slopes(system, driven, friction)
         turning = rotors.of(system, drives, y, of_states, friction, prescribed_qdd)
     with part("dynamics"):
-        given: dict[str, Any] = {
+        arguments: dict[str, Any] = {
             "q": y.q[:n],
             "qd": y.qd[:n],
             "tau": tuple(a - b for a, b in zip(smooth, dry, strict=True)),
@@ -145,10 +145,10 @@ def derivative(
             "velocity_products": system.structure.velocity_products,
         }
         if any(ratios):
-            solved = solve_coupled(tree, ratios, system.bends(read, y), **given)
+            solved = solve_coupled(tree, ratios, system.bends(read, y), **arguments)
         else:
-            solved = solve(tree, **given)
-            tell(tree, given, solved)
+            solved = solve(tree, **arguments)
+            tell(tree, arguments, solved)
     if turning is None:
         of_states, state_needs = _slopes(system, driven, friction)
     else:
@@ -172,7 +172,9 @@ def derivative(
         tau=_servo_torques(system, ratios, drives, loads, smooth, solved),
         need=needs | state_needs,
         solved=solved,
-        shown={path: value for each in driven if each is not None for path, value in each.shown.items()},
+        signals={
+            path: value for response in driven if response is not None for path, value in response.signals.items()
+        },
         gravity=loads.gravity,
         base=base,
         stored=(
@@ -182,7 +184,7 @@ def derivative(
         angular_momenta=() if turning is None else turning.momenta(y.qd),
         out_of_range=tuple(False if drive is None else drive.state_out_of_range for drive in drives),
         loads=tuple(a - b for a, b in zip(solved.tau_load, loads.torques, strict=True)),
-        felt=partial(inertia_at, tree, ratios, given) if any(ratios) else None,
+        felt=partial(inertia_at, tree, ratios, arguments) if any(ratios) else None,
     )
 
 
@@ -192,7 +194,7 @@ class ServoResponse:
 
     drive: Drive
     slopes: Mapping[str, Real]
-    shown: Mapping[str, Real]
+    signals: Mapping[str, Real]
 
 
 def servo_response(
@@ -208,7 +210,7 @@ def servo_response(
     p = system.servo_values(actuator, read)
     q, qd = y.q[actuator.index], y.qd[actuator.index]
     slopes: dict[str, Real] = {}
-    shown: dict[str, Real] = {}
+    signals: dict[str, Real] = {}
     seen = Seen(*sensing.measured(actuator, p, q, qd, natural), Setpoint("none", 0.0, 0.0), 0.0, time, natural)
     of_sensors = sensing.slopes(system, actuator, read, seen, own)
     if parts.continuous:
@@ -216,38 +218,38 @@ def servo_response(
         seen = sensing.seen_at_stage(system, actuator, read, with_setpoint, own)
         seen = failing.seen(system, actuator, read, seen, None)
         integrals = {state.name: own[f"{actuator.path}.{state.name}"] for state in parts.integrals}
-        found = law(actuator, p, NamedValues(owner, integrals), seen)
-        found = failing.law_outputs(system, actuator, read, p, seen.time, found)
-        held = NamedValues(owner, {**found.outputs, **integrals})
-        slopes.update(found.slopes)
-        shown.update({"command": seen.setpoint.value} if actuator.use.command is not None else {}, **found.outputs)
-        for of in map(sensing.quantity, actuator.sensors):
-            shown[f"sensor.{of}"] = sensing.true_value(seen, of)
+        control = law(actuator, p, NamedValues(owner, integrals), seen)
+        control = failing.law_outputs(system, actuator, read, p, seen.time, control)
+        held = NamedValues(owner, {**control.outputs, **integrals})
+        slopes.update(control.slopes)
+        signals.update({"command": seen.setpoint.value} if actuator.use.command is not None else {}, **control.outputs)
+        for quantity in map(sensing.quantity, actuator.sensors):
+            signals[f"sensor.{quantity}"] = sensing.true_value(seen, quantity)
     coupled = failing.coupled(system, actuator, read, begin)
     motion = JointMotion(q, qd, time, begin, actuator.command_kind, 1.0 if coupled is None else coupled)
     drive = answer(owner, servo.drive, p, held, natural, motion)
     if coupled is not None:
-        given = None if drive.given is None else both(drive.given, coupled > 0.0)
-        drive = replace(drive, torque=coupled * drive.torque, dry=coupled * drive.dry, given=given)
+        prescribed = None if drive.given is None else both(drive.given, coupled > 0.0)
+        drive = replace(drive, torque=coupled * drive.torque, dry=coupled * drive.dry, given=prescribed)
     slopes.update(returned(owner, "slopes", drive.slopes, (state.name for state in parts.natural)))
     if coupled is not None:
         for state in parts.natural:
             if state.in_transmission:
                 back = (state.start - own[f"{actuator.path}.{state.name}"]) / system.structure.schedule.step
                 slopes[state.name] = coupled * slopes[state.name] + (1.0 - coupled) * back
-    shown.update(returned(owner, "signals", drive.signals, (signal.name for signal in parts.signals)))
+    signals.update(returned(owner, "signals", drive.signals, (signal.name for signal in parts.signals)))
     by_channel = {f"{actuator.path}.{name}": slope for name, slope in slopes.items()}
-    return ServoResponse(drive, by_channel | of_sensors, {f"{actuator.path}.{name}": x for name, x in shown.items()})
+    return ServoResponse(drive, by_channel | of_sensors, {f"{actuator.path}.{name}": x for name, x in signals.items()})
 
 
 def law(actuator: Actuator, p: NamedValues, held: NamedValues, seen: Seen) -> Control:
     """Outputs and slopes of a servo's control law, checked against its declaration."""
     owner, parts = actuator.owner, actuator.parts
     assert actuator.servo.control is not None
-    found = answer(owner, actuator.servo.control, p, held, seen)
-    returned(owner, "control", found.outputs, (output.name for output in parts.outputs))
-    returned(owner, "slopes of control", found.slopes, (state.name for state in parts.integrals))
-    return found
+    control = answer(owner, actuator.servo.control, p, held, seen)
+    returned(owner, "control", control.outputs, (output.name for output in parts.outputs))
+    returned(owner, "slopes of control", control.slopes, (state.name for state in parts.integrals))
+    return control
 
 
 def _slopes(
@@ -257,13 +259,13 @@ def _slopes(
     slopes: list[Real] = []
     needs: dict[str, Real] = {}
     for actuator in system.working:
-        each = driven[actuator.index]
-        assert each is not None
+        response = driven[actuator.index]
+        assert response is not None
         for channel in actuator.states:
-            slope = each.slopes[channel]
+            slope = response.slopes[channel]
             if channel in friction:
                 s, needs[channel] = friction[channel], slope
-                level = each.drive.friction[channel.removeprefix(f"{actuator.path}.")]
+                level = response.drive.friction[channel.removeprefix(f"{actuator.path}.")]
                 slope = where(s == 0.0, 0.0, slope - s * level)
             slopes.append(slope)
     return tuple(slopes), needs

@@ -219,7 +219,7 @@ class StepPhases:
             tape.write(cell_names.HOLDING(name), answer.need[name])
         for name, slope in zip(self.states, answer.slope.xd, strict=True):
             tape.write(cell_names.SLOPE(name), slope)
-        for channel, value in answer.shown.items():
+        for channel, value in answer.signals.items():
             tape.write(channel, value)
         singular: Real = where(answer.solved.base_singular, float(len(self.joints) + 1), 0.0)
         for i in reversed(range(len(self.joints))):

@@ -177,14 +177,14 @@ class System:
         def row(i: int) -> dict[int, Real]:
             if not self.joints[i].follows:
                 return {i: 1.0}
-            found: dict[int, Real] = {}
+            by_leader: dict[int, Real] = {}
             for other, ratio in self._ratios(self.joints[i], read, q).items():
                 for leader, of_other in row(other).items():
-                    found[leader] = found.get(leader, 0.0) + ratio * of_other
-            return found
+                    by_leader[leader] = by_leader.get(leader, 0.0) + ratio * of_other
+            return by_leader
 
         rows = {i: row(i) for i in map(self.joints.index, self.followers)}
-        leaders = {leader for each in rows.values() for leader in each}
+        leaders = {leader for row_ratios in rows.values() for leader in row_ratios}
         return tuple(rows.get(i, {i: 1.0} if i in leaders else {}) for i in range(len(self.joints)))
 
     def bends(self, read: ReadCell, y: Motion) -> tuple[Real, ...]:
@@ -247,19 +247,19 @@ class System:
     @cached_property
     def failing(self) -> dict[str, list[tuple[str, Environment]]]:
         """Environment models about a servo, by its joint, with the deck's names for them."""
-        found: dict[str, list[tuple[str, Environment]]] = {}
+        by_joint: dict[str, list[tuple[str, Environment]]] = {}
         for name, model in self.environment:
             if model.servo_of:
                 joint = str(self.experiment.parameters[f"environment.{name}.{model.servo_of}"].value)
-                found.setdefault(joint, []).append((name, model))
-        return found
+                by_joint.setdefault(joint, []).append((name, model))
+        return by_joint
 
     @cached_property
     def metrics(self) -> tuple[tuple[str, Metric, Channel], ...]:
-        found = [(use, models.find("metric", use.model)) for use in self.structure.metrics]
+        uses = [(use, models.find("metric", use.model)) for use in self.structure.metrics]
         own = [
             (use.name, (metric.between or metric) if self.between_samples else metric, self.channels[use.of])
-            for use, metric in found
+            for use, metric in uses
         ]
         more = [(name + FURTHEST, furthest(metric), channel) for name, metric, channel in own if self.furthest]
         return (*own, *((name, metric, channel) for name, metric, channel in more if metric is not None))
@@ -293,7 +293,7 @@ class System:
     def ticking_between(self) -> tuple[Actuator, ...]:
         """Servos that tick between instants: faster than the dynamics, or slower and no multiple of them."""
         step = self.structure.schedule.dynamics
-        return tuple(each for each in self.working if each.ticks and each.use.divisor % step)
+        return tuple(actuator for actuator in self.working if actuator.ticks and actuator.use.divisor % step)
 
     @cached_property
     def mounted(self) -> tuple[tuple[Actuator, BedModel, Law], ...]:
