@@ -146,8 +146,8 @@ def _shared(scope: Scope, definition: Definition) -> SharedArm | None:
         memo[key] = _alone(scope, definition)
     if isinstance(memo[key], bytes):
         memo[key] = pickle.loads(memo[key])
-    found: SharedArm | None = memo[key]
-    return found
+    arm: SharedArm | None = memo[key]
+    return arm
 
 
 def _alone(scope: Scope, definition: Definition) -> SharedArm | None:
@@ -202,29 +202,29 @@ def _resolved(
         if known is not None:
             known.entries.enter(scope)
             return known.part
-        there = scope if alone is None else Scope(scope.definitions, scope.complaints)
+        own_scope = scope if alone is None else Scope(scope.definitions, scope.complaints)
         if item.kind == "link":
-            made = resolve_link(there, item, homes)
+            parts = resolve_link(own_scope, item, homes)
         elif item.kind == "loop":
-            made = _loop(there, item, homes, ends)
+            parts = _loop(own_scope, item, homes, ends)
         else:
-            joint = _joint(there, item, homes, block, ends)
-            made = () if joint is None else (joint,)
+            joint = _joint(own_scope, item, homes, block, ends)
+            parts = () if joint is None else (joint,)
         if alone is not None:
-            alone.append(((item.kind, item.name), made, there))
-        return made
+            alone.append(((item.kind, item.name), parts, own_scope))
+        return parts
 
     links, of_booms = list[Link](), list[Joint]()
     for item in block.of_kind("link"):
-        made = part(item)
-        check_names(scope, item, made, block)
-        links += [each for each in made if isinstance(each, Link)]
+        parts = part(item)
+        check_names(scope, item, parts, block)
+        links += [link for link in parts if isinstance(link, Link)]
         ends |= {link.name: None for link in links if link.shape is not None}
-        of_booms += [each for each in made if isinstance(each, Joint)]
+        of_booms += [joint for joint in parts if isinstance(joint, Joint)]
     roots = {link.name: link.root for link in links if link.root}
     written = [part(item) for item in block.of_kind("joint")]
-    own = [each for made in written for each in made if isinstance(each, Joint)]
-    joints = [replace(each, child=roots.get(each.child, each.child)) for each in own]
+    own = [joint for parts in written for joint in parts if isinstance(joint, Joint)]
+    joints = [replace(joint, child=roots.get(joint.child, joint.child)) for joint in own]
     complete = len(joints) == len(written) and not scope.complaints.is_known_to_lack(definition.place, "joint")
     joints += of_booms
     if not any(True for _ in block.of_kind("link")):
@@ -236,14 +236,14 @@ def _resolved(
             help="write `link NAME { ... }` and a joint to hold it",
         )
     check_tree(scope, definition.name, links, joints, complete=complete)
-    loops = [each for item in block.of_kind("loop") for each in part(item) if isinstance(each, Loop)]
+    loops = [loop for item in block.of_kind("loop") for loop in part(item) if isinstance(loop, Loop)]
     if complete:
         joints = close_loops(scope, joints, loops)
     check_followers(scope, joints)
     free_of_errors = not scope.complaints.errors
     names = {item.name for kind in ARM.named for item in block.of_kind(kind)}
     resolved: tuple[Link | Joint | Loop, ...] = (*links, *joints, *loops)
-    failed = frozenset(names - {each.name for each in resolved})
+    failed = frozenset(names - {named.name for named in resolved})
     return ResolvedArm(definition.name, tuple(links), tuple(joints), failed, free_of_errors)
 
 
@@ -455,13 +455,13 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping
         )
         arm = scope.definitions.of_kind("arm").get(item.homes[-1] if item.homes else "")
         block = scope.definitions.block(arm) if arm is not None else None
-        gone = [each for each in block.removed if each.key == f"link {name}"] if block is not None else []
+        gone = [removal for removal in block.removed if removal.key == f"link {name}"] if block is not None else []
         helps = [f"remove joint `{owner.path}` too, or hang it elsewhere"] if gone else near
         scope.complaints.error(
             "D094",
             f"no link `{name}` in this arm",
             value_place(item),
-            also=[Label(each.place, "removed here") for each in gone],
+            also=[Label(removal.place, "removed here") for removal in gone],
             help=[*helps, known_words("links", known)],
         )
     return None
@@ -551,14 +551,14 @@ def check_tree(scope: Scope, name: str, links: list[Link], joints: list[Joint], 
     settled = {BASE} | failed
     for link in links:
         chain: list[Joint] = []
-        at = link.name
+        current = link.name
         passed: dict[str, int] = {}
-        while at in holder and at not in settled and at not in passed:
-            passed[at] = len(chain)
-            chain.append(holder[at])
-            at = holder[at].parent
-        if at in passed:
-            _complain_loop(scope, chain[passed[at] :][::-1])
+        while current in holder and current not in settled and current not in passed:
+            passed[current] = len(chain)
+            chain.append(holder[current])
+            current = holder[current].parent
+        if current in passed:
+            _complain_loop(scope, chain[passed[current] :][::-1])
         settled.update(passed)
     for link in links:
         if link.name in failed and complete:

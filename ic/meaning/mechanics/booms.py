@@ -164,20 +164,20 @@ class _Boom:
     def parts(self, nodes: int, springs: Sequence[Spring]) -> tuple[Link | Joint, ...]:
         """The pieces and joints, entered; the boom's own frame last."""
         name, ends = self.link.name, (0.0, *node_places(nodes), 1.0)
-        made: list[Link | Joint] = [self._piece(0, *ends[:2])]
+        parts: list[Link | Joint] = [self._piece(0, *ends[:2])]
         parent = f"{name}_0"
         for node in range(1, nodes + 1):
-            here = [spring for spring in springs if spring.joint == f"{name}_{node}{spring.axis}"]
-            for spring in here:
-                last = spring is here[-1]
+            node_springs = [spring for spring in springs if spring.joint == f"{name}_{node}{spring.axis}"]
+            for spring in node_springs:
+                last = spring is node_springs[-1]
                 child = f"{name}_{node}" if last else f"{name}_{node}_{spring.axis}"
-                made.append(self._piece(node, *ends[node : node + 2]) if last else self._frame(child))
-                made.append(self._joint(spring.joint, "revolute", parent, child))
+                parts.append(self._piece(node, *ends[node : node + 2]) if last else self._frame(child))
+                parts.append(self._joint(spring.joint, "revolute", parent, child))
                 self._enter(f"{spring.joint}.axis", [float(axis == spring.axis) for axis in XYZ], "1")
                 self._enter(f"{spring.joint}.pivot", self._on_axis(ends[node] * self.length), "m")
                 parent = child
-        made.append(self._joint(f"{name}_tip", "fixed", parent, name))
-        return (*made, Link(name, self.link.place, None, root=f"{name}_0"))
+        parts.append(self._joint(f"{name}_tip", "fixed", parent, name))
+        return (*parts, Link(name, self.link.place, None, root=f"{name}_0"))
 
     def enter_spring(self, spring: Spring, stiffness: Real, decay: Real) -> None:
         """Enter the stiffness of a spring, N m/rad, and its damping, `decay` seconds times that."""
@@ -259,21 +259,21 @@ def check_places(scope: Scope, structure: Structure) -> None:
         springs = [f"{joint.name}.pivot.{along}" for joint in reversed(chain) if joint.kind != "fixed"]
         nodes = [scope.parameters[path].value for path in springs]
         for words, path, link, place in things:
-            at = scope.parameters.get(f"{path}.{along}")
-            if link == boom and at is not None and place is not None and path != f"{chain[0].name}.at":
+            offset = scope.parameters.get(f"{path}.{along}")
+            if link == boom and offset is not None and place is not None and path != f"{chain[0].name}.at":
                 scope.checks.require(
-                    (at.value, *nodes),  # type: ignore[arg-type]  # numbers
+                    (offset.value, *nodes),  # type: ignore[arg-type]  # numbers
                     partial(_before_the_tip, boom),
                     code="D084",
                     message=f"{words} is on boom `{boom}`, and not at its tip",
-                    place=at.origin.place or place,
+                    place=offset.origin.place or place,
                     help=f"what is on `{boom}` moves with its tip: name the piece that is there, or the link before it",
                 )
 
 
 def _is_moment_alone(scope: Scope, path: str) -> bool:
     """True of a wrench without a force in any case, which acts on a boom wherever it is."""
-    forces = [each.value for key, each in scope.parameters.items() if key.startswith(f"{path}.force")]
+    forces = [setting.value for key, setting in scope.parameters.items() if key.startswith(f"{path}.force")]
     return bool(forces) and all(not any(force) if isinstance(force, tuple) else _is_zero(force) for force in forces)
 
 

@@ -32,7 +32,7 @@ def use_follows(scope: Scope, owner: Owner, body: MergedBlock, arm: MergedBlock)
     if item is None:
         for name in ("ratio", "offset"):
             stray = body.get(name)
-            freed = any(each.key == "follows" for each in body.removed)
+            freed = any(removal.key == "follows" for removal in body.removed)
             if stray is not None and not freed and not scope.definitions.robot_files.hold(stray.place):
                 message = f"{owner.label} has `{name}`, and follows no joint"
                 helps = ["write `follows = JOINT;` too", leave_out(f"or leave `{name}` out")]
@@ -94,7 +94,9 @@ def check_followers(scope: Scope, joints: Sequence[Joint]) -> None:
     for joint in joints:
         if joint.place is not None and follows_itself(joint.name, known):
             circle = [known[name] for name in followed(joint.name, known) if name in known and name != joint.name]
-            others = [each for each in circle if each.place is not None and follows_itself(each.name, known)]
+            others = [
+                follower for follower in circle if follower.place is not None and follows_itself(follower.name, known)
+            ]
             scope.complaints.error(
                 "D213",
                 f"joint `{joint.name}` follows itself by way of others",
@@ -107,8 +109,8 @@ def check_followers(scope: Scope, joints: Sequence[Joint]) -> None:
 
 def all_led_by(joint: Joint, joints: Sequence[Joint]) -> list[Joint]:
     """The joints that follow a joint, by way of others too."""
-    known = {each.name: each for each in joints}
-    return [each for each in joints if each is not joint and joint.name in followed(each.name, known)]
+    known = {other.name: other for other in joints}
+    return [other for other in joints if other is not joint and joint.name in followed(other.name, known)]
 
 
 def begin_followers(scope: Scope, joints: Sequence[Joint]) -> None:

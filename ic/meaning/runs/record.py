@@ -42,42 +42,48 @@ def resolve_record(
             ),
         )
         return ()
-    asked = [name for expression in (item.value, *item.appended) for name in _names(scope, item, expression)]
-    names = {name.text for name in asked}
+    names_written = [name for expression in (item.value, *item.appended) for name in _names(scope, item, expression)]
+    names = {name.text for name in names_written}
     known = recordable(structure, known=channels, wanted=names)
     if not names <= known.keys():
         known = recordable(structure, known=channels)  # for suggestions
-    found: dict[str, tuple[Recorded, Place]] = {}
-    for name in asked:
-        made = known.get(name.text)
-        if made is None and scope.failed_servos and not OF_SERVO.isdisjoint(word.text for word in name.path):
+    by_name: dict[str, tuple[Recorded, Place]] = {}
+    for name in names_written:
+        variables = known.get(name.text)
+        if variables is None and scope.failed_servos and not OF_SERVO.isdisjoint(word.text for word in name.path):
             continue
-        if made is None and of_lost(scope, name, structure):
+        if variables is None and of_lost(scope, name, structure):
             continue
-        if made is None and scope.failed_parts and (name.path[0].text in scope.failed_parts or not structure.moving):
+        if (
+            variables is None
+            and scope.failed_parts
+            and (name.path[0].text in scope.failed_parts or not structure.moving)
+        ):
             continue
-        if made is None:
+        if variables is None:
             scope.complaints.error(
                 "D125", f"no channel `{name.text}`", name.place, help=nearest_channels(name, known, structure)
             )
-        for each in made or ():
-            if each.name in found:
+        for variable in variables or ():
+            if variable.name in by_name:
                 scope.complaints.error(
                     "D040",
-                    f"`{each.name}` is recorded twice",
+                    f"`{variable.name}` is recorded twice",
                     name.place,
-                    also=[Label(found[each.name][1], "first")],
+                    also=[Label(by_name[variable.name][1], "first")],
                     help="leave one out",
                 )
             else:
-                found[each.name] = (each, name.place)
-    return tuple(recorded for recorded, _ in found.values())
+                by_name[variable.name] = (variable, name.place)
+    return tuple(recorded for recorded, _ in by_name.values())
 
 
 def names_in_record(item: Item | None) -> list[str]:
     """The names in a record, as far as it is a list of names."""
     lists = [] if item is None else [item.value, *item.appended]
-    return [name.text for each in lists if isinstance(each, List) for name in each.items if isinstance(name, Name)]
+    return [
+        name.text for listed in lists if isinstance(listed, List) for name in listed.items if isinstance(name, Name)
+    ]
 
 
 def of_lost(scope: Scope, name: Name, structure: Structure) -> bool:
@@ -101,17 +107,20 @@ def _names(scope: Scope, item: Item, expression: Expression | None) -> Iterator[
             place_of(expression) if expression else item.place,
             help="write `record = [q, qd, tau];`",
         )
-    for each in items:
-        if isinstance(each, Name):
-            yield each
+    for element in items:
+        if isinstance(element, Name):
+            yield element
         else:
             scope.complaints.error(
                 "D124",
                 "a record is a list of channels; this is none",
-                place_of(each),
+                place_of(element),
                 help=[
                     "write `record = [q, qd, tau];`",
-                    *(["give it a name: `signal NAME = ...;`, and record `signals.NAME`"] * isinstance(each, COMPUTED)),
+                    *(
+                        ["give it a name: `signal NAME = ...;`, and record `signals.NAME`"]
+                        * isinstance(element, COMPUTED)
+                    ),
                 ],
             )
 
@@ -124,28 +133,28 @@ def nearest_channels(name: Name, known: dict[str, tuple[Recorded, ...]], structu
         return [why]
     first, *others = (word.text for word in name.path)
     turned = ".".join((*others, first))
-    ending = [each for each in known if each.endswith(f".{name.text}")]
+    ending = [path for path in known if path.endswith(f".{name.text}")]
     if turned in known and others:
         return [_did_you_mean(name, turned)]
     if len(ending) == 1:
         return [_did_you_mean(name, ending[0])]
     if first == "sensors" and structure.sensors:
-        sensors = [each for each in known if each.startswith("sensors.")]
+        sensors = [path for path in known if path.startswith("sensors.")]
         return [*did_you_mean(name.text, sensors), known_words("sensors of links", sensors)]
-    whole = [each for each in known if each.rpartition(".")[0] not in known]
+    whole = [path for path in known if path.rpartition(".")[0] not in known]
     head = ".".join(word.text for word in name.path[:2]) if first in ("links", "payloads") else first
-    own = [each for each in whole if each.startswith(head + ".")]
+    own = [path for path in whole if path.startswith(head + ".")]
     if own:
-        rests = [each.removeprefix(f"{head}.") for each in known if each.startswith(f"{head}.")]
+        rests = [path.removeprefix(f"{head}.") for path in known if path.startswith(f"{head}.")]
         near = nearest(name.text.removeprefix(f"{head}."), rests)  # all that begins with the joint looks alike
         meant = [] if near is None else [_did_you_mean(name, f"{head}.{near}")]
         return [*meant, known_words(f"channels of `{head}`", own)]
-    joints = [each for each in whole if known[each][0].joints and not each.startswith("links.")]
-    arm = [each for each in whole if each in FAMILIES and not known[each][0].joints]
-    links = [each for each in whole if each.startswith("links.")]
+    joints = [path for path in whole if known[path][0].joints and not path.startswith("links.")]
+    arm = [path for path in whole if path in FAMILIES and not known[path][0].joints]
+    links = [path for path in whole if path.startswith("links.")]
     some = [link for link in links if link.split(".")[1] == links[0].split(".")[1]]
     payloads = [f"payloads.{payload.name}" for payload in structure.payloads[:1]]
-    of_payload = [each for each in whole for payload in payloads if each.startswith(f"{payload}.")]
+    of_payload = [path for path in whole for payload in payloads if path.startswith(f"{payload}.")]
     return [
         *did_you_mean(name.text, known),
         known_words("channels of all joints", joints),
@@ -173,7 +182,7 @@ def _why_none(words: list[str], structure: Structure) -> str:
         )
     if len(words) > 1 and words[-2] == "servo":
         return _under_a_word(words, structure)
-    moving, links = ({each.name for each in group} for group in (structure.moving, structure.links))
+    moving, links = ({part.name for part in group} for group in (structure.moving, structure.links))
     if len(words) < 5 or (words[0], words[2]) != ("links", "jacobian") or words[3] not in FAMILIES["jacobian"]:
         return ""
     link, joint = words[1], words[4]
