@@ -38,6 +38,11 @@ def linear_lines(linearized: Linearized, cases: int = 1) -> Iterator[str]:
         yield ""
         yield "natural modes, while computers hold what they hold"
         yield from _table([_HEAD], [_row(linearized, pole) for pole in natural])
+    if math.isfinite(linearized.bending):
+        yield f"first bending mode while computers hold their joints: {linearized.bending:.4g} Hz"
+    if linearized.bandwidth > 0.0:
+        way = f"from {linearized.inputs[0]} to {linearized.outputs[0]}"
+        yield f"bandwidth {way}: {linearized.bandwidth:.4g} Hz"
     for loop in linearized.loops:
         yield ""
         yield from _loop_lines(loop, linearized)
@@ -176,6 +181,8 @@ def as_data(linearized: Linearized) -> dict[str, Any]:
         "locked": list(linearized.locked),
         "creeping": [{"name": state.name, "rate": state.rate} for state in linearized.creeping],
         "at_limit": list(linearized.at_limit),
+        "bandwidth": linearized.bandwidth if math.isfinite(linearized.bandwidth) else None,
+        "bending": linearized.bending if math.isfinite(linearized.bending) else None,
         "poles": [pole(pole_) for pole_ in linearized.poles],
         "natural": [pole(pole_) for pole_ in linearized.natural],
         "loops": [loop(loop_) for loop_ in linearized.loops],

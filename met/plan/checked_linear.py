@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import math
 
-from met.plan import Experiment
+from met.plan import Experiment, Structure
 from met.plan.channel import recordable
 from met.plan.codec import Damaged
 from met.plan.linear_signals import input_signals
-from met.plan.linear_uses import FIGURES
+from met.plan.linear_uses import FIGURES, LinearUse
 from met.plan.structure import check_name
 
 MOST_SIGNALS = 1000
 """Largest number of inputs, outputs and opened places of one answer, of each kind."""
+
+
+def is_way(use: LinearUse, structure: Structure) -> bool:
+    """True for an answer with one input and one output, both of one number."""
+    known = recordable(structure, use.outputs)
+    return len(use.inputs) == 1 == sum(len(each.channels) for path in use.outputs for each in known[path])
 
 
 def check_linear(experiment: Experiment, where: str) -> None:
@@ -52,3 +58,5 @@ def check_linear(experiment: Experiment, where: str) -> None:
             raise Damaged(f"{place}.of", f"there is no `{metric.of}` among the linear answers")
         if FIGURES[metric.model].of_loops and not answers[metric.of].opened:
             raise Damaged(f"{place}.of", f"`{metric.of}` opens no loop")
+        if FIGURES[metric.model].of_way and not is_way(answers[metric.of], structure):
+            raise Damaged(f"{place}.of", f"`{metric.of}` has not one input and one output")

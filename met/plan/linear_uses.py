@@ -48,6 +48,7 @@ class LinearFigure:
 
     unit      SI;  least: bound below which it never is
     of_loops  whether it is of opened loops: the least of all of them
+    of_way    whether it is of the way from one input to one output
     one_rate  whether a loop has it whose law ticks once in a period alone
     unstable  its value where the loop is unstable as it is
     margin    whether more of it is better
@@ -58,6 +59,7 @@ class LinearFigure:
     doc: str
     least: float = -math.inf
     of_loops: bool = True
+    of_way: bool = False
     one_rate: bool = True
     unstable: float = 0.0
     margin: bool = True
@@ -82,6 +84,12 @@ FIGURES: Mapping[str, LinearFigure] = {
         LinearFigure("decay_time", "s", "time in which the slowest mode decays by a factor of e; infinite if a mode "
                                         "grows",
                      least=0.0, of_loops=False, one_rate=False, margin=False),
+        LinearFigure("bandwidth", "Hz", "lowest frequency at which what comes from the input to the output falls to "
+                                        "1/sqrt(2) of what it is at rest; 0 if a mode grows",
+                     least=0.0, of_loops=False, of_way=True, one_rate=False),
+        LinearFigure("bending_share", "1", "bandwidth as a share of the frequency of the first bending mode of a boom "
+                                           "while computers hold their joints; infinite if a mode grows",
+                     least=0.0, of_loops=False, of_way=True, one_rate=False, unstable=math.inf, margin=False),
     )
 }  # fmt: skip
 """Figures of linear answers, by name."""
@@ -90,7 +98,7 @@ WHY_ANSWER = "linear:"
 """Prefix of a `LinearUse`'s name: the output that says why a case has no answer, a key of `WHY_NONE`; 0 where it has
 one."""
 
-ANSWERED, NOT_ASKED, EVENT, OPEN, SEVERAL_TICKS, NO_EQUILIBRIUM, AT_LIMIT, NOTHING_DECAYS = range(8)
+ANSWERED, NOT_ASKED, EVENT, OPEN, SEVERAL_TICKS, NO_EQUILIBRIUM, AT_LIMIT, NOTHING_DECAYS, NO_REST = range(9)
 
 WHY_NONE: Mapping[int, str] = {
     NOT_ASKED: "it is not computed of a case that is driven on beds, or run by itself",
@@ -99,6 +107,7 @@ WHY_NONE: Mapping[int, str] = {
     SEVERAL_TICKS: "its law ticks several times in a period, and has no phase, delay or disk of one rate",
     AT_LIMIT: "something is at its limit there, so that its poles are not those of its loops",
     NOTHING_DECAYS: "nothing decays or grows there: all of it stays, or is held",
+    NO_REST: "its output is nothing, or has no end, for an input that stays",
     NO_EQUILIBRIUM: "its servos cannot hold it there, or something moves that no servo holds",
 }
 """Reasons why a case has no answer, in words."""

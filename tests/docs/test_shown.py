@@ -16,7 +16,7 @@ from tests.docs.pages import Page, differs
         ("bed", 6),
         ("bench", 4),
         ("best", 5),
-        ("booms", 2),
+        ("booms", 5),
         ("coupled", 3),
         ("environments", 1),
         ("evidence", 2),

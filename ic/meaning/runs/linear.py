@@ -21,6 +21,7 @@ from met.diagnostic import Place, Problem, did_you_mean, error, write
 from met.parameter import Parameter
 from met.plan import Joint, Structure
 from met.plan.channel import recordable
+from met.plan.checked_linear import is_way
 from met.plan.judged import MetricUse
 from met.plan.linear_signals import InputSignal, input_signals, no_computer
 from met.plan.linear_uses import FIGURES, LinearUse
@@ -211,6 +212,17 @@ def _metric(
         helps = [f"write `open = {places[0]};` in it"] if places else [*no_computer(structure)]
         helps += [known_words("places to open a loop", places)] if len(places) > 1 else []
         scope.complaints.error("D376", message, _place(item, of_item), help=helps)
+        return None
+    if figure.of_way and not is_way(use, structure):
+        message = f"`linear {use.name}` has not one input and one output, so it has no `{figure.name}`"
+        commands = [each for each in input_signals(structure) if not each.is_output]
+        helps = [f"write one of each in it: `inputs = {each.path};  outputs = {each.joint}.q;`" for each in commands]
+        scope.complaints.error("D376", message, _place(item, of_item), help=helps[:1] or [*no_computer(structure)])
+        return None
+    if figure.name == "bending_share" and not structure.springs:
+        message = f"a `{figure.name}` is of an arm with a boom, and `{structure.arm}` has none"
+        helps = ["a link that bends is `link NAME boom { EI = ...; ... }`: `met doc boom`"]
+        scope.complaints.error("D376", message, item.place, help=helps)
         return None
     scope.keep_in_deck(f"metrics.{item.name}.model", figure.name, item)
     scope.keep_in_deck(f"metrics.{item.name}.of", use.name, of_item)

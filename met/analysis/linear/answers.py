@@ -13,7 +13,16 @@ from met import run as engine
 from met.analysis.linear.creeping import CreepingRate, creeping
 from met.analysis.linear.flow import Flow
 from met.analysis.linear.jacobian import PeriodMap, at_instants, failed, period_maps
-from met.analysis.linear.margins import FARTHEST, STABLE, LoopMargins, ScalarLoop, comes_back, gain_limits, margins
+from met.analysis.linear.margins import (
+    FARTHEST,
+    STABLE,
+    LoopMargins,
+    ScalarLoop,
+    bandwidth,
+    comes_back,
+    gain_limits,
+    margins,
+)
 from met.analysis.linear.period import PeriodProgram
 from met.analysis.linear.plant import PlantModel, plants
 from met.analysis.linear.standing import moves, refusal, settled, standing, weak
@@ -123,6 +132,8 @@ class Linearized:
     creeping  what slides so slowly that it nearly does;  at_limit: paths of limits
     joints    of each state, the joint or body or computer that it belongs to
     stands    whether it stands still there, and `time` is none of the run's
+    bandwidth  from its only input to its only output, Hz (`margins.bandwidth`); not a number without them
+    bending   frequency of the first bending mode, Hz (`PlantModel.first_bending`); infinite without one
     """
 
     experiment: str
@@ -144,6 +155,8 @@ class Linearized:
     joints: Mapping[str, str]
     stands: bool = False
     locked: tuple[str, ...] = ()
+    bandwidth: float = math.nan
+    bending: float = math.inf
 
     @property
     def where(self) -> str:
@@ -275,6 +288,7 @@ class LinearQuestion:
             period.outputs, lifted.A, summed(lifted.B), lifted.C, summed(period.D), plant,
             tuple(lifted.opened(loop) for loop in self.loops), period.held, slow, period.at_limit,
             {name: program.joint_of(name) for name in program.states}, self.stands, period.locked,
+            lifted.bandwidth(inputs), plant.first_bending(self.experiment.structure.springs),
         )  # fmt: skip
 
 
@@ -366,6 +380,15 @@ class LiftedPeriod:
         """The poles without participation, unordered."""
         roots = np.linalg.eigvals(self.A).tolist() if len(self.A) else []
         return [_of_period(complex(z), (), self.map.seconds) for z in roots]
+
+    def bandwidth(self, inputs: Sequence[str]) -> float:
+        """The bandwidth from the only one of these inputs, at all its ticks alike, to the only output, Hz; not a
+        number where there are several or none."""
+        ticks = [k for k, tick in enumerate(self.map.ticks) if self.program.inputs[tick.entry].path in inputs]
+        if len(inputs) != 1 or len(self.C) != 1:
+            return math.nan
+        B, D = self.B[:, ticks].sum(1), float(self.map.D[0, ticks].sum())
+        return bandwidth(ScalarLoop(self.A, B, self.C[0], D, self.map.seconds, self.drift))
 
     def opened(self, paths: tuple[str, ...]) -> OpenLoop:
         """The loop opened at these signals: the map from the signals put in to those that come back."""

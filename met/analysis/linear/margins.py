@@ -161,6 +161,17 @@ def margins(loop: ScalarLoop) -> LoopMargins | None:
     return LoopMargins(up[0], down[0], phase, delay, disk, up[1], down[1], at_phase, at_delay, at_disk)
 
 
+def bandwidth(way: ScalarLoop) -> float:
+    """The lowest frequency at which |P| is 1/sqrt(2) of its value at rest, Hz. It is infinite where |P| never is, 0
+    of what grows, and not a number where P has no value at rest or that is 0."""
+    if way.grows(0.0):
+        return 0.0
+    own = way.minimal()
+    rest = abs(own.at(1.0)) if _is_number(own, 0.0) else 0.0
+    found = _where_size_is(own, rest / math.sqrt(2.0)) if rest else [math.nan]
+    return min(found, default=math.inf) / (2.0 * math.pi)
+
+
 def _gains(loop: ScalarLoop) -> tuple[tuple[float | None, float | None], tuple[float | None, float | None]]:
     """The gains at which the closed loop comes to the unit circle: the least above 1 and the largest below, each with
     its frequency."""

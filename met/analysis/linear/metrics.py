@@ -16,6 +16,7 @@ import numpy as np
 from met import run as engine
 from met.analysis.linear.answers import MOST_TOGETHER, LiftedPeriod, LinearQuestion, OpenLoop, of_deck
 from met.analysis.linear.flow import Flow
+from met.analysis.linear.plant import plants
 from met.analysis.linear.standing import settled
 from met.diagnostic import Problem
 from met.passing import Memories
@@ -26,6 +27,7 @@ from met.plan.linear_uses import (
     EVENT,
     FIGURES,
     NO_EQUILIBRIUM,
+    NO_REST,
     NOTHING_DECAYS,
     OPEN,
     SEVERAL_TICKS,
@@ -118,7 +120,7 @@ def _answer(
         maps = iter(linear_question.lifted([flow for flow in stood if flow is not None]))
         for place, flow in zip(places, stood, strict=True):
             lifted = NO_EQUILIBRIUM if flow is None else next(maps)
-            outputs[place, columns], outputs[place, why] = _figures(linear_question, wanted, lifted)
+            outputs[place, columns], outputs[place, why] = _figures(linear_question, wanted, lifted, flow)
             if progress is not None:
                 progress(place + 1)
 
@@ -129,19 +131,42 @@ def _standing(linear_question: LinearQuestion, flows: Sequence[Flow]) -> Sequenc
 
 
 def _figures(
-    linear_question: LinearQuestion, wanted: Sequence[MetricUse], lifted: LiftedPeriod | Problem | int
+    linear_question: LinearQuestion,
+    wanted: Sequence[MetricUse],
+    lifted: LiftedPeriod | Problem | int,
+    flow: Flow | None,
 ) -> tuple[list[float], float]:
     """The figures of a case, and the reasons why one or all are missing: `ANSWERED` where none is. lifted: its period,
-    or why it has none"""
-    if not isinstance(lifted, LiftedPeriod):
-        return [math.nan] * len(wanted), float(EVENT if isinstance(lifted, Problem) else lifted)
+    or why it has none; flow: where it stands"""
+    if not isinstance(lifted, LiftedPeriod) or flow is None:
+        return [math.nan] * len(wanted), float(lifted if isinstance(lifted, int) else EVENT)
     loops = (
         [lifted.opened(loop) for loop in linear_question.loops]
         if any(FIGURES[e.model].of_loops for e in wanted)
         else []
     )
-    figures = [_figure(FIGURES[metric.model], lifted, loops) for metric in wanted]
-    return [value for value, _ in figures], float(max(why for _, why in figures))
+    figures = [FIGURES[metric.model] for metric in wanted]
+    answers = [
+        _of_way(figure, linear_question, lifted, flow) if figure.of_way else _figure(figure, lifted, loops)
+        for figure in figures
+    ]
+    return [value for value, _ in answers], float(max(why for _, why in answers))
+
+
+def _of_way(
+    figure: LinearFigure, linear_question: LinearQuestion, lifted: LiftedPeriod, flow: Flow
+) -> tuple[float, int]:
+    """A figure of the way from one input to one output."""
+    if lifted.map.at_limit:
+        return math.nan, AT_LIMIT
+    bandwidth = lifted.bandwidth(linear_question.inputs)
+    if math.isnan(bandwidth):
+        return math.nan, NO_REST
+    if figure.name == "bandwidth" or bandwidth == 0.0:
+        return bandwidth or figure.unstable, ANSWERED
+    [plant] = plants(linear_question.program, [flow], [lifted.states])
+    bending = plant.first_bending(linear_question.experiment.structure.springs)
+    return bandwidth / bending if math.isfinite(bending) else 0.0, ANSWERED
 
 
 def _figure(figure: LinearFigure, lifted: LiftedPeriod, loops: Sequence[OpenLoop]) -> tuple[float, int]:

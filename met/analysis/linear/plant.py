@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,37 @@ class PlantModel:
     inputs: tuple[str, ...]
     A: np.ndarray
     B: np.ndarray
+
+    def first_bending(self, springs: Collection[str]) -> float:
+        """The frequency of the slowest mode in which one of these springs of booms turns most while the joints that
+        computers move are held, Hz; infinite where none swings.
+
+        A joint is held by the output of its computer that keeps its acceleration at 0: without the joint's own states,
+        s x = A x + B u and 0 = C x + D u. These are the zeros from outputs to joints.
+        """
+        from scipy.linalg import eig
+
+        if not springs:
+            return math.inf
+        held: dict[str, int] = {}
+        for k, path in enumerate(self.inputs):
+            joint = path.rpartition(".servo.")[0]
+            if f"{joint}.qd" in self.states and self.B[:, k].any():
+                held.setdefault(joint, k)
+        kept = [k for k, name in enumerate(self.states) if name.rpartition(".")[0] not in held]
+        rows = [*kept, *(self.states.index(f"{joint}.qd") for joint in held)]
+        system = np.hstack([self.A[np.ix_(rows, kept)], self.B[np.ix_(rows, [*held.values()])]])
+        roots, moves = eig(system, np.diag([1.0] * len(kept) + [0.0] * len(held)))
+        sizes = np.abs(moves[: len(kept)])
+        turns = np.array([self.states[k].endswith(".q") for k in kept], bool)
+        own = np.array([self.states[k].removesuffix(".q") in springs for k in kept], bool)
+        most = sizes[own].max(axis=0, initial=0.0)
+        swings = (most >= sizes[turns].max(axis=0, initial=0.0)) & (most > MOVES * sizes.max(axis=0, initial=0.0))
+        return float(np.abs(roots[swings & (roots.imag > 0.0)]).min(initial=math.inf)) / (2.0 * math.pi)
+
+
+MOVES = 1e-9
+"""Share of the largest part of a mode up to which a spring's angle is rounding: the mode is one of filters alone."""
 
 
 def plants(program: PeriodProgram, flows: Sequence[Flow], case_states: Sequence[Sequence[str]]) -> list[PlantModel]:
