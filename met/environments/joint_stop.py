@@ -23,13 +23,17 @@ import math
 from typing import Any
 
 from met.environments.environment import Environment, Loads, World
-from met.parameter import Limit, Parameter
+from met.parameter import Limit, Parameter, Signal
 from met.trace import Real, maximum, where
 
 
 def loads(p: Any, world: World) -> Loads:
+    return Loads(torques={p.joint: show(p, world)["tau"]})
+
+
+def show(p: Any, world: World) -> dict[str, Real]:
     q, qd = world.q(p.joint), world.qd(p.joint)
-    return Loads(torques={p.joint: _push(p, p.lower - q, -qd) - _push(p, q - p.upper, qd)})
+    return {"tau": _push(p, p.lower - q, -qd) - _push(p, q - p.upper, qd)}
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
@@ -85,4 +89,6 @@ ENVIRONMENT = Environment(
         Limit(parameter="upper", reached=lambda p, world: world.q(p.joint) > p.upper),
     ),
     initial_range=("lower", "upper"),
+    signals=(Signal(name="tau", unit="effort", doc="torque of the stops on the joint; force on a prismatic one"),),
+    show=show,
 )

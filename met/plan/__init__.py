@@ -268,12 +268,16 @@ class Substitution:
 
 @frozen
 class EnvironmentUse:
-    """An environment model under a name of the deck's. divisor None: evaluated at every stage."""
+    """An environment model under a name of the deck's. divisor None: evaluated at every stage.
+
+    slides  whether the joint that it is about is prismatic, where units of its signals depend on it
+    """
 
     name: str
     model: str
     divisor: int | None = None
     place: Place | None = keyed("never", default=None)
+    slides: bool = keyed("never", default=False)
 
 
 @frozen

@@ -316,7 +316,7 @@ def _channels(structure: Structure, names: list[str], *, all_owners: bool) -> di
     for load in structure.environment:
         for signal in models.find("environment", load.model, load.place).signals:
             own = f"environment.{load.name}.{signal.name}"
-            derive(own, signal.unit, signal.doc, XYZ if signal.axes else (), signal.axes)
+            derive(own, _unit_of(signal.unit, load.slides, None), signal.doc, XYZ if signal.axes else (), signal.axes)
     limited = any(joint.limits for joint in structure.moving)
     for name, unit, doc, components, frame in OF_ARM:
         if limited or name != "limits.margin":

@@ -120,4 +120,5 @@ def _environment_use(
         if not (duration is not None and remark_idle(scope, environment, item, {**values, **words}, duration)):
             remark_ground(scope, item, arm, base, environment, values, payloads)
             remark_kinds(scope, environment, item, arm)
-    return EnvironmentUse(item.name, environment.name, None, item.place)
+    slides = owner.joint == "prismatic" and any("effort" in signal.unit for signal in environment.signals)
+    return EnvironmentUse(item.name, environment.name, None, item.place, slides)

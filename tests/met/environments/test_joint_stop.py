@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from scipy.optimize import brentq
 
 from met import run as engine
 from met.environments.joint_stop import ENVIRONMENT, loads
+from met.plan.channel import channels
+from met.plan.keys import structure_key
 from tests.ic.small_decks import changed, check, codes, experiment, messages
 from tests.met.environments.worlds import Given, given
 
@@ -45,6 +48,25 @@ def given_back(v: float, a: float) -> float:
     """The rate at which a joint leaves that came in at v."""
     entry = a * v - math.log1p(a * v)
     return float(brentq(lambda u: -a * u - math.log1p(-a * u) - entry, 0.0, min(v, 1.0 / a - 1e-12)))
+
+
+@pytest.mark.parametrize(("deck", "inertia", "unit"), [(SLIDER, 2.0, "N"), (HINGE, 0.008, "N*m")])
+def test_its_push_is_a_channel_in_the_unit_of_its_joint(tmp_path: Path, deck: str, inertia: float, unit: str) -> None:
+    """Nothing else acts: it is inertia times acceleration; a sphere's is 2/5 m r^2."""
+    text = changed(deck, ("qdd, tau]", "qdd, environment.end.tau]"), ("record = 50 Hz", "record = 500 Hz"))
+    made = experiment(tmp_path, text)
+    assert channels(made.structure)["environment.end.tau"].unit == unit
+    found = engine.run(made)
+    tau = found.signals["environment.end.tau"]
+    np.testing.assert_allclose(tau, inertia * found.signals["qdd"][..., 0], rtol=1e-12, atol=1e-12)
+    assert np.ptp(tau) > 1e-3
+
+
+def test_the_unit_of_a_stops_push_changes_no_key(tmp_path: Path) -> None:
+    structure = experiment(tmp_path, SLIDER).structure
+    [use] = structure.environment
+    plain = replace(structure, environment=(replace(use, slides=False),))
+    assert use.slides and plain != structure and structure_key(plain) == structure_key(structure)
 
 
 def test_it_pushes_back_from_either_end_and_never_pulls() -> None:
