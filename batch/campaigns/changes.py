@@ -4,6 +4,7 @@ for comparisons of archives."""
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -101,18 +102,43 @@ def _figures(experiment: Experiment) -> dict[str, str]:
 
 def _parameters(before: Experiment, now: Experiment, new: set[str]) -> Iterator[Change]:
     """Changes of parameters. new: prefixes of the paths of things that are new, gone, or of another kind"""
-    computed = _Computed(before, now)
+    computed, booms = _Computed(before, now), dict[str, Change]()
+    springs = before.structure.springs & now.structure.springs
     for path, old in sorted(before.parameters.items()):
         if path in now.parameters and _unlike(old, now.parameters[path]):
-            yield _changed(path, old, now.parameters[path])
+            sides = (before, old), (now, now.parameters[path])
+            found = _of_spring(path, *sides) if path.partition(".")[0] in springs else None
+            if found is None:
+                yield _changed(path, old, now.parameters[path])
+            else:
+                booms.setdefault(found.text, found)
         elif path in now.parameters:
             yield from computed.change(path)
+    yield from booms.values()
     for word, mine, other in (("new", now, before), ("gone", before, now)):
         for name, members in _vectors(sorted(mine.parameters.keys() - other.parameters.keys())).items():
             first, *_ = quantities = [mine.parameters[member] for member in members]
             follows = first.origin.kind == "derived" or any(name.startswith(entity) for entity in new)
             places = (None, first.origin.place) if mine is now else (first.origin.place, None)
             yield Change(f"{name} is {word}: {_shown_all(quantities)}{_place_text(first)}", follows, *places)
+
+
+def _of_spring(path: str, *sides: tuple[Experiment, Quantity]) -> Change | None:
+    """The change of a number of a boom's spring as that of the boom; None where it is none of the boom's, or varied."""
+    joint, _, name = path.partition(".servo.")
+    boom, values = joint.rpartition("_")[0], [quantity.value for _, quantity in sides]
+    if name == "damping":
+        return _changed(f"damping of the springs of boom {boom}", *(quantity for _, quantity in sides))
+    way = [[each.parameters[f"links.{boom}.com.{axis}"].value for axis in AXES] for each, _ in sides]
+    if name != "stiffness" or not all(isinstance(each, float) for each in (*values, *way[0], *way[1])):
+        return None
+    # at each of `alike` springs an equal share of the length bends, which is twice the way to the centre of mass
+    alike = sum(each.startswith(f"{boom}_") and each[-1] == joint[-1] for each in sides[0][0].structure.springs)
+    beams = [value * 2.0 * math.hypot(*each) / alike for value, each in zip(values, way, strict=True)]  # type: ignore
+    if math.isclose(*beams, rel_tol=1e-12):
+        return None
+    changed = (replace(quantity, value=beam, unit="N*m^2") for (_, quantity), beam in zip(sides, beams, strict=True))
+    return _changed(f"links.{boom}.{'GJ' if alike == 1 else 'EI'}", *changed)
 
 
 def _unlike(old: Quantity, new: Quantity) -> bool:

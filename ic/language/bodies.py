@@ -146,7 +146,8 @@ JOINT = BlockDeclaration(
               doc="the joint that this one follows, as by gears, or several, `[JOINT, ...]`: its position is their "
                   "positions times `ratio`, plus `offset`; all move as one, and what acts on one acts on all"),
         Entry(name="ratio", written="ratio = -1;", parameter=RATIO, varies="number", path="JOINT.ratio", default="1",
-              doc="position of the joint for each unit of the joint that it follows; a list, one for each of several"),
+              doc="position of the joint for each unit of the joint that it follows; of several a list, one for each, "
+                  "and 1 for each by default"),
         Entry(name="offset", written="offset = 5 mm;", parameter=OFFSET, varies="number", path="JOINT.offset",
               default="0", doc="position of the joint where all that it follows are at 0"),
     ),

@@ -43,6 +43,12 @@ NOT_OF_A_JOINT = {
     "mimic": "a joint that follows another has `follows = JOINT;`, and where they are needed `ratio` and `offset`",
 }
 
+OF_A_TUBE = dict.fromkeys(("E", "tube"), "write `EI`: of a tube of radius r and wall t it is E pi r^3 t")
+OF_A_BOOM = dict.fromkeys(
+    ("EI", "GJ", "damping_ratio", "nodes", *OF_A_TUBE),
+    "it is of a link that bends: write `link NAME boom { ... }`, with its `EI`",
+)
+
 
 @frozen
 class ResolvedArm:
@@ -298,7 +304,9 @@ def resolve_link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Part:
             help=f"write `link {item.name} {{ mass = ...; shape = ...; }}`",
         )
         return ()
-    check_keys(scope, item.body, KEYS if written_boom else LINK.keys, owner)
+    check_keys(scope, item.body, KEYS if written_boom else LINK.keys, owner, OF_A_TUBE if is_boom else OF_A_BOOM)
+    if not written_boom and any(name in OF_A_BOOM for name in item.body.items):
+        return ()
     written = item.body.get(LUMPED.name)
     lumped = written is not None and scope.word(owner, LUMPED, written) != "off"  # None: no such word, already reported
     link = Link(item.name, item.place, use_matter(scope, owner, "link", item.name, item.body, lumped=lumped), lumped)

@@ -22,6 +22,7 @@ import numpy as np
 from ic.grammar.syntax import List, WithUnit
 from ic.language.bodies import BOOM, DAMPING_RATIO, EI, GJ, NODES
 from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import XYZ, Owner
 from ic.meaning.parameters.scope import Scope
 from met.diagnostic import leave_out
@@ -182,9 +183,14 @@ class _Boom:
     def enter_spring(self, spring: Spring, stiffness: Real, decay: Real) -> None:
         """Enter the stiffness of a spring, N m/rad, and its damping, `decay` seconds times that."""
         note = f"a spring of boom `{self.link.name}`"
-        servo = Owner(f"joint `{spring.joint}`", self.item.place, f"{spring.joint}.servo")
-        stiff = self.scope.derived(servo, "stiffness", stiffness, STIFFNESS, note)
-        self.scope.derived(servo, "damping", stiff * decay, DAMPING, note)
+        beam = (GJ if spring.axis == self.along else EI).name
+        for name, value, unit, of in (
+            ("stiffness", stiffness, STIFFNESS, beam),
+            ("damping", stiffness * decay, DAMPING, DAMPING_RATIO.name),
+        ):
+            path = f"{spring.joint}.servo.{name}"
+            self.scope.keep_derived(path, value, unit, self.item, note)
+            self.scope.not_sweepable[path] = NotSweepable("follows from the boom", one_of=f"`{self.owner.join(of)}`")
 
     def _piece(self, number: int, begin: float, end: float) -> Link:
         """The piece between two shares of the length, uniform, with the rotary inertia of the cross-section."""

@@ -87,13 +87,16 @@ def names_in_record(item: Item | None) -> list[str]:
 
 
 def of_lost(scope: Scope, name: Name, structure: Structure) -> bool:
-    """Return True if this is a channel of a guide or a link's sensor that failed (already reported)."""
+    """Return True if this is a channel of a link, a guide or a link's sensor that failed (already reported); of a boom
+    also one of its springs or pieces."""
     words = [word.text for word in name.path]
     lost = {
+        "links": scope.failed_parts | {each for each in words[1:2] if each.rpartition("_")[0] in scope.failed_parts},
         "guides": set(scope.guides) - {guide.name for guide in structure.guides},
         "sensors": scope.sensors - {sensor.name for sensor in structure.sensors},
     }.get(words[0], set())
-    return bool(lost) and (len(words) == 1 or words[1] in lost)
+    of_spring = words[0].rpartition("_")[0] in scope.failed_parts
+    return of_spring or (bool(lost) and (len(words) == 1 or words[1] in lost))
 
 
 def _names(scope: Scope, item: Item, expression: Expression | None) -> Iterator[Name]:

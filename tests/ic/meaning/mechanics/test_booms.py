@@ -112,3 +112,44 @@ def test_where_a_spring_begins_is_lost_in_a_balanced_start(tmp_path: Path) -> No
 
 def test_a_stubby_boom_is_told(tmp_path: Path) -> None:
     assert "a tube of 5 widths" in messages(check(tmp_path, changed(BOOM, ("[7, 0.2, 0.1] m", "[7, 2, 2] m"))))
+
+
+RECORDED = (
+    ("record = [q];", "record = [q, links.jib.deflection, jib_1y.q];  signal way = abs(links.jib.deflection.z);"),
+    ("    arm = crane;", "    arm = crane;  metric most = max { of = links.jib.bend.y; }"),
+)
+
+
+def test_what_only_a_boom_has_names_the_word_and_no_channel_is_missed_besides(tmp_path: Path) -> None:
+    plain = changed(BOOM, ("link jib boom", "link jib"), *RECORDED)
+    found = check(tmp_path, plain).diagnostics
+    assert [each.message for each in found] == [f"link `jib` has no `{n}`" for n in ("EI", "GJ", "damping_ratio")]
+    assert all("write `link NAME boom { ... }`, with its `EI`" in str(each.help[0]) for each in found)
+
+
+def test_no_channel_is_missed_of_a_boom_that_has_a_mistake(tmp_path: Path) -> None:
+    assert [each.code for each in check(tmp_path, changed(BOOM, *RECORDED)).diagnostics] == []
+    for wrong in ("EI = [3e6, 1e6] N*m^2;  nodes = 3;", "EI = 3e6 N*m^2;  EJ = 2;", "EI = 3 N;"):
+        said = check(tmp_path, changed(BOOM, ("EI = [3e6, 1e6] N*m^2;", wrong), *RECORDED)).diagnostics
+        assert len(said) == 1 and said[0].code != "D125", wrong
+    tube = changed(BOOM, ("EI = [3e6, 1e6] N*m^2;", "EI = 3e6 N*m^2;  tube = 3;"))
+    assert "write `EI`: of a tube of radius r and wall t it is E pi r^3 t" in messages(check(tmp_path, tube))
+
+
+@pytest.mark.parametrize(
+    ("path", "unit", "instead"),
+    [
+        ("jib_1y.servo.stiffness", "N*m/rad", "links.jib.EI"),
+        ("jib_3x.servo.stiffness", "N*m/rad", "links.jib.GJ"),
+        ("jib_2z.servo.damping", "N*m*s/rad", "links.jib.damping_ratio"),
+    ],
+)
+def test_no_number_of_one_spring_varies_or_is_set_alone(tmp_path: Path, path: str, unit: str, instead: str) -> None:
+    one = changed(BOOM, ("[3e6, 1e6] N*m^2", "3e6 N*m^2"))
+    said = messages(check(tmp_path, f"{one}sweep soft of hang {{ vary {path} = [1, 2] {unit}; }}\n", select="all"))
+    assert f"error[D122]: `{path}` cannot vary" in said
+    assert f"it follows from the boom; vary `{instead}`" in said
+    said = messages(check(tmp_path, one, set=[f"{path}=1 {unit}"]))
+    assert f"error[D235]: `{path}` cannot be set" in said and f"set `{instead}`" in said
+    numbers = {"EI": "1e6 N*m^2", "GJ": "2e6 N*m^2", "damping_ratio": "3 %"}[instead.rpartition(".")[2]]
+    assert check(tmp_path, one, set=[f"{instead}={numbers}"]).diagnostics == ()
