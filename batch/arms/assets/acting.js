@@ -15,7 +15,7 @@ MET.acting = (() => {
   const KINDS = {
     force: ["#b5127f", "#ff7ad1", "a", "joint forces", "Forces of the joints on their links, as the run records them (a)"],
     load: ["#00807a", "#35d0c5", "l", "loads", "Forces and, with two heads, moments of the environment, where they act (l)"],
-    contact: ["#cc2a12", "#ff4f4f", "c", "contact", "Joints that touch a stop, and what the stop does to them (c)"],
+    contact: ["#cc2a12", "#ff4f4f", "c", "contact", "Joints that touch a stop, and bodies that touch each other: what is done to them there (c)"],
     plume: ["#6b46d6", "#b39bff", "p", "plumes", "Gas of thrusters while they fire, and what it does; a cone's edge has half the density of its axis (p)"],
     payload: ["#e0a02a", "#e0b44a", "o", "payloads", "Payloads: pale while they fly, with a line to the place where their link holds them (o)"],
   };

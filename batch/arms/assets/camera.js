@@ -64,7 +64,7 @@ MET.camera = (() => {
       made.target = plus(made.target, up, share * FIELD * made.distance);
     };
 
-    // From where the most of these points' spread is seen; from higher where it is flat.
+    // From where the most of these points' spread is seen; from higher where it is flat, and not along a straight arm.
     made.choose = (points) => {
       const mean = points.reduce((a, b) => plus(a, b, 1 / points.length), [0, 0, 0]);
       const spread = (u, v) => points.reduce((sum, p) => sum + dot(u, plus(p, mean, -1)) * dot(v, plus(p, mean, -1)), 0);
@@ -74,7 +74,7 @@ MET.camera = (() => {
       for (let n = 0; n < 36; n++) {
         made.azimuth = AZIMUTH + (n * Math.PI) / 18;
         const { right, up } = made.axes();
-        const area = spread(right, right) * spread(up, up) - spread(right, up) ** 2 + 1e-3 * (1 + Math.cos(made.azimuth - AZIMUTH)) * (xx + yy) ** 2;
+        const area = spread(right, right) * spread(up, up) - spread(right, up) ** 2 + (1e-3 * (1 + Math.cos(made.azimuth - AZIMUTH)) * (xx + yy) + 0.01 * Math.min(spread(right, right), 0.3 * (xx + yy))) * (xx + yy);
         if (area > best) [best, made.best] = [area, made.azimuth];
       }
       made.azimuth = made.best;
