@@ -99,7 +99,7 @@ def plant_c(experiment: Experiment, joint: str, *, case: int = 0, period: float 
     """
     period = servo_period(experiment) if period is None else period
     source = emit(record(plant_program(experiment, joint, case=case, period=period)))
-    into, out = source.inputs, source.outputs
+    into, out = ({name: f"plant.{member}" for name, member in each.items()} for each in (source.inputs, source.outputs))
     named = joint.replace("*/", "* /")
     return "\n".join(
         [
@@ -107,6 +107,8 @@ def plant_c(experiment: Experiment, joint: str, *, case: int = 0, period: float 
             '#include "plant.h"',
             "",
             source.text,
+            "static met_case plant;",
+            "",
             f"const double plant_period = {literal(period)};",
             "",
             "void plant_start(double rate, double seed, double repeat)",
@@ -114,16 +116,16 @@ def plant_c(experiment: Experiment, joint: str, *, case: int = 0, period: float 
             f"    {into['voltage']} = 0.0;",
             f"    {into['current']} = 0.0;",
             *(f"    {into[name]} = {name};" for name in ("rate", "seed", "repeat")),
-            "    met_start();",
-            "    met_tick(0);",
-            "    met_end();",
+            "    met_start(&plant);",
+            "    met_tick(&plant, 0);",
+            "    met_end(&plant);",
             "}",
             "",
             "void plant_tick(double voltage, double current)",
             "{",
             *(f"    {into[name]} = {name};" for name in ("voltage", "current")),
-            "    met_tick((int64_t)met.tick + 1);",
-            "    met_end();",
+            "    met_tick(&plant, (int64_t)plant.tick + 1);",
+            "    met_end(&plant);",
             "}",
             *(
                 line

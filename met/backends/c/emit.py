@@ -5,11 +5,11 @@ Each section is a function, each node of its graph a constant of that function, 
 fused where `met.trace.fuse` fused. So the bits are the kernel's, whatever compiles it, at any level (the sign of a
 not-a-number aside), as long as the compiler fuses nothing by itself: -std=c11 -ffp-contract=off.
 
-    static void met_start(void)         before tick 0, once the inputs are set
-    static void met_tick(int64_t k)     tick k; at ticks that are recorded the columns are in met.row
-    static void met_end(void)           sets the outputs
+    static void met_start(met_case *met)             before tick 0, once the inputs are set
+    static void met_tick(met_case *met, int64_t k)   tick k; at ticks that are recorded the columns are in met->row
+    static void met_end(met_case *met)               sets the outputs
 
-All that lasts is in the one struct `met`.
+All that lasts of a case is in its struct, so any number of cases can run side by side.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ _INFIX = {"mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "and": "&&"
 
 @frozen
 class CSource:
-    """A program in C: its text, and the C names of its inputs, outputs and cells, by their names in the program."""
+    """A program in C: its text, and the members of its struct that are its inputs, outputs and cells, by their names in
+    the program."""
 
     text: str
     inputs: Mapping[str, str]
@@ -88,13 +89,7 @@ class _CEmitter:
             for table, name in self.tables.items()
         ]
         parts = [HEAD, functions(self.called), self._memory(), *tables, *sections, *entries]
-        return CSource(
-            "\n".join(part for part in parts if part),
-            *(
-                {name: f"met.{member}" for name, member in names.items()}
-                for names in (self.inputs, self.outputs, self.cells)
-            ),
-        )
+        return CSource("\n".join(part for part in parts if part), self.inputs, self.outputs, self.cells)
 
     def _memory(self) -> str:
         members = [*self.inputs.values(), *self.cells.values(), *self.outputs.values()]
@@ -102,24 +97,26 @@ class _CEmitter:
             members.append(f"row[{self.program.columns}]")
         lines = "".join(f"    double {member};\n" for member in members)
         now = "tick, time" if self.timed else "tick"
-        return f"static struct {{\n    double {now};\n{lines}}} met;\n"
+        return f"typedef struct {{\n    double {now};\n{lines}}} met_case;\n"
 
     # Control
 
     def _start(self) -> str:
-        zero = [f"    met.{member} = 0.0;" for member in self.cells.values()]
-        return _function("met_start(void)", [*self._now("0.0"), *zero, *self._steps(self.recording.start, 1)])
+        zero = [f"    met->{member} = 0.0;" for member in self.cells.values()]
+        return _function("met_start(met_case *met)", [*self._now("0.0"), *zero, *self._steps(self.recording.start, 1)])
 
     def _tick(self) -> str:
-        return _function("met_tick(int64_t k)", [*self._now("(double)k"), *self._steps(self.recording.tick, 1)])
+        return _function(
+            "met_tick(met_case *met, int64_t k)", [*self._now("(double)k"), *self._steps(self.recording.tick, 1)]
+        )
 
     def _end(self) -> str:
-        return _function("met_end(void)", self._steps(self.recording.end, 1))
+        return _function("met_end(met_case *met)", self._steps(self.recording.end, 1))
 
     def _now(self, tick: str) -> list[str]:
         """Lines that give the tick's number, and its time where it is needed."""
-        time = [f"    met.time = met.tick / {literal(self.program.base_hz)};"] if self.timed else []
-        return [f"    met.tick = {tick};", *time]
+        time = [f"    met->time = met->tick / {literal(self.program.base_hz)};"] if self.timed else []
+        return [f"    met->tick = {tick};", *time]
 
     def _steps(self, body: Sequence[RecordedControl], depth: int) -> list[str]:
         pad = "    " * depth
@@ -127,9 +124,9 @@ class _CEmitter:
         for node in body:
             match node:
                 case RunSection(section):
-                    lines.append(f"{pad}{self.names[section]}();")
+                    lines.append(f"{pad}{self.names[section]}(met);")
                 case RecordSection(section, divisor):
-                    lines.append(f"{pad}if (k % {divisor} == 0) {self.names[section]}();")
+                    lines.append(f"{pad}if (k % {divisor} == 0) {self.names[section]}(met);")
                 case Branch(condition, inner):
                     match condition:
                         case Every(divisor):
@@ -138,7 +135,7 @@ class _CEmitter:
                             head = "if (k != 0)"
                         case WhileAny(cell, at_most):
                             n = f"n{depth}"
-                            head = f"for (int64_t {n} = 0; {n} < {at_most} && met.{self.cells[cell]} != 0.0; {n}++)"
+                            head = f"for (int64_t {n} = 0; {n} < {at_most} && met->{self.cells[cell]} != 0.0; {n}++)"
                     lines += [f"{pad}{head} {{", *self._steps(inner, depth + 1), f"{pad}}}"]
         return lines
 
@@ -163,18 +160,18 @@ class _CEmitter:
             *((f"row[{column}]", ref) for column, ref in section.records),
             *((self.outputs[self.program.outputs[n]], ref) for n, ref in section.outputs),
         ):
-            lines.append(f"    met.{place} = {self._of(nodes, ref)};")
-        return _function(f"{self.names[number]}(void)", lines)
+            lines.append(f"    met->{place} = {self._of(nodes, ref)};")
+        return _function(f"{self.names[number]}(met_case *met)", lines)
 
     def _value(self, nodes: Sequence[Node], node: Node) -> str:
         """The C expression of a node that is not a constant."""
         op = node[0]
         if op == "input":
-            return f"met.{self.inputs[node[1]]}"
+            return f"met->{self.inputs[node[1]]}"
         if op == "cell":
-            return f"met.{self.cells[node[1]]}"
+            return f"met->{self.cells[node[1]]}"
         if op in ("tick", "time"):
-            return f"met.{op}"
+            return f"met->{op}"
         operands = [self._of(nodes, ref) for ref in node[1 : 1 + OPERANDS[op]]]
         if op in _INFIX:
             return f" {_INFIX[op]} ".join(operands)
@@ -218,4 +215,4 @@ def _pattern(value: float) -> str:
 
 
 def _function(head: str, lines: Sequence[str]) -> str:
-    return "\n".join([f"static void {head}", "{", *lines, "}", ""])
+    return "\n".join([f"static void {head}", "{", *(lines or ["    (void)met;"]), "}", ""])

@@ -1,4 +1,4 @@
-"""A program in C, compiled here and called: each block is a library of its own, since its memory is static."""
+"""A program in C, compiled here and called."""
 
 from __future__ import annotations
 
@@ -19,13 +19,15 @@ from met.trace.recording import Recording
 FLAGS = ("-std=c11", "-O1", "-ffp-contract=off", "-fPIC", "-shared")
 
 _ENTRIES = """
-void met_give(const double *inputs) {{ {inputs} }}
-void met_begin(void) {{ met_start(); }}
-void met_advance(int64_t k) {{ met_tick(k); }}
-void met_finish(void) {{ met_end(); }}
-void met_take(double *outputs) {{ {outputs} }}
-double *met_row(void) {{ return {row}; }}
-double *met_cells(void) {{ return {cells}; }}
+#include <stddef.h>
+size_t met_size(void) {{ return sizeof(met_case); }}
+size_t met_row(void) {{ return {row}; }}
+size_t met_cells(void) {{ return {cells}; }}
+void met_give(met_case *met, const double *inputs) {{ (void)met; (void)inputs; {inputs} }}
+void met_begin(met_case *met) {{ met_start(met); }}
+void met_advance(met_case *met, int64_t k) {{ met_tick(met, k); }}
+void met_finish(met_case *met) {{ met_end(met); }}
+void met_take(const met_case *met, double *outputs) {{ (void)met; (void)outputs; {outputs} }}
 """
 
 
@@ -42,8 +44,7 @@ class Library:
 
     def __init__(self, recording: Recording) -> None:
         self.recording = recording
-        self.object = _compiled(recording)
-        self.code_bytes = len(self.object)
+        self.called, self.code_bytes = _compiled(recording)
         self.functions = len(recording.sections)
 
     @property
@@ -85,54 +86,49 @@ class CBlock:
         self.program = program
         self.inputs = np.ascontiguousarray(np.atleast_2d(np.asarray(inputs, dtype=np.float64)).T)
         self.outputs = np.zeros((len(program.outputs), 1))
-        with tempfile.TemporaryDirectory() as folder:  # a loaded library stays when its file is gone
-            path = Path(folder) / "program.so"
-            path.write_bytes(library.object)
-            self._called = ctypes.CDLL(str(path))
+        self._called = library.called
+        self._memory = np.zeros(self._called.met_size() // 8)
+        self._case = self._memory.ctypes.data_as(ctypes.c_void_p)
         self._names = library.recording.cells
-        self.state = self._numbers("met_cells", len(self._names)).reshape(-1, 1)
-        self._row = self._numbers("met_row", program.columns)
+        self.state = self._numbers(self._called.met_cells(), len(self._names)).reshape(-1, 1)
+        self._row = self._numbers(self._called.met_row(), program.columns)
 
-    def _numbers(self, entry: str, count: int) -> np.ndarray:
-        """A view of the doubles that a function of the library points to."""
-        if not count:
-            return np.empty(0)
-        function = getattr(self._called, entry)
-        function.restype = ctypes.POINTER(ctypes.c_double)
-        return np.ctypeslib.as_array(function(), (count,))
+    def _numbers(self, offset: int, count: int) -> np.ndarray:
+        """A view of doubles of the case's struct, from this offset in bytes on."""
+        return self._memory[offset // 8 : offset // 8 + count]
 
     def step(self, first: int, last: int) -> None:
         self.recorded(first, last)
 
     def recorded(self, first: int, last: int) -> np.ndarray:
         rows = []
-        self._called.met_give(self.inputs.ctypes.data_as(ctypes.c_void_p))
+        self._called.met_give(self._case, self.inputs.ctypes.data_as(ctypes.c_void_p))
         if first == 0:
-            self._called.met_begin()
+            self._called.met_begin(self._case)
         for k in range(first, last + 1):
-            self._called.met_advance(ctypes.c_int64(k))
+            self._called.met_advance(self._case, ctypes.c_int64(k))
             if k % self.program.record_divisor == 0:
                 rows.append(self._row.copy())
-        self._called.met_finish()
-        self._called.met_take(self.outputs.ctypes.data_as(ctypes.c_void_p))
+        self._called.met_finish(self._case)
+        self._called.met_take(self._case, self.outputs.ctypes.data_as(ctypes.c_void_p))
         return np.array(rows).reshape(1, len(rows), self.program.columns)
 
     def cells(self) -> Mapping[str, np.ndarray]:
         return {name: self.state[slot] for slot, name in enumerate(self._names)}
 
 
-def _compiled(recording: Recording) -> bytes:
-    """The shared library of a program."""
+def _compiled(recording: Recording) -> tuple[ctypes.CDLL, int]:
+    """The shared library of a program, loaded, and its size in bytes."""
     compiler = shutil.which("cc")
     if compiler is None:
         raise RuntimeError("there is no C compiler `cc` here")
     source = emit(recording)
     program = recording.program
     text = source.text + _ENTRIES.format(
-        inputs=" ".join(f"{source.inputs[name]} = inputs[{n}];" for n, name in enumerate(program.inputs)),
-        outputs=" ".join(f"outputs[{n}] = {source.outputs[name]};" for n, name in enumerate(program.outputs)),
-        row="met.row" if program.columns else "0",
-        cells=f"&{source.cells[recording.cells[0]]}" if recording.cells else "0",  # neighbours in the struct
+        inputs=" ".join(f"met->{source.inputs[name]} = inputs[{n}];" for n, name in enumerate(program.inputs)),
+        outputs=" ".join(f"outputs[{n}] = met->{source.outputs[name]};" for n, name in enumerate(program.outputs)),
+        row="offsetof(met_case, row)" if program.columns else "0",
+        cells=f"offsetof(met_case, {source.cells[recording.cells[0]]})" if recording.cells else "0",  # neighbours there
     )
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)
@@ -141,4 +137,5 @@ def _compiled(recording: Recording) -> bytes:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             raise RuntimeError(f"`cc` refuses the program:\n{done.stderr}")
-        return (path / "program.so").read_bytes()
+        # A loaded library stays when its file is gone.
+        return ctypes.CDLL(str(path / "program.so")), (path / "program.so").stat().st_size

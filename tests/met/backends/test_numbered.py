@@ -18,7 +18,7 @@ from met.trace.recording import Recording
 
 EMITTED = {
     "llvm": (1, "a1e7cd38e71183e9b15efb2e0a95dafe57424dc2492546e32ec024a3afda4b88"),
-    "c": (1, "6d2544a5d72aff947232ffc4ae61751789146ac7b42dd98d833f55e5332e6b5c"),
+    "c": (1, "98a25e53dab88ed92b8ec364c056cd22708a8ea93707bcdf444a73c8c25df4e3"),
     "wasm": (1, "0c42442889f1cc4047344906f5de0f8a3843083a55fd23e1037c1528845cac17"),
     "reference": (1, "d6a25374b0e6cb6afa4bf48bd9298cfb16205ee16aa62398f26b455bad70059c"),
 }

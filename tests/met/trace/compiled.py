@@ -78,13 +78,14 @@ def driver(program: Program) -> str:
         ),
     ]
     lines += [
+        "static met_case now;",
         "static void put_inputs(const double *given)",
         "{",
-        *(f"    {source.inputs[name]} = given[{i}];" for i, name in enumerate(program.inputs)),
+        *(f"    now.{source.inputs[name]} = given[{i}];" for i, name in enumerate(program.inputs)),
         "}",
         "static void get_outputs(double *outputs)",
         "{",
-        *(f"    outputs[{i}] = {source.outputs[name]};" for i, name in enumerate(program.outputs)),
+        *(f"    outputs[{i}] = now.{source.outputs[name]};" for i, name in enumerate(program.outputs)),
         "}",
         '#include "run_program.c"',
         "",

@@ -267,8 +267,11 @@ def test_control_and_memory_are_the_programs(tmp_path: Path) -> None:
 def test_the_text_is_the_same_each_time_and_asks_for_no_library(tmp_path: Path) -> None:
     need("gcc")
     assert driver(table(operations)) == driver(table(operations))
-    source = emit(record(table(operations))).text + "double met_any(int64_t k);\ndouble met_any(int64_t k)\n{\n"
-    text = source + "    met_start();\n    met_tick(k);\n    met_end();\n    return met.row[0];\n}\n"
+    source = (
+        emit(record(table(operations))).text
+        + "met_case now;\ndouble met_any(int64_t k);\ndouble met_any(int64_t k)\n{\n"
+    )
+    text = source + "    met_start(&now);\n    met_tick(&now, k);\n    met_end(&now);\n    return now.row[0];\n}\n"
     (tmp_path / "program.c").write_text(text, encoding="utf-8")
     for level in ("-O0", "-O3"):
         words = ["gcc", *STRICT, level, "-ffreestanding", "-c", "-o", tmp_path / "program.o", tmp_path / "program.c"]
