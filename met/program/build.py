@@ -8,7 +8,7 @@ between instants, on the state carried forward.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from met.plan import Experiment
 from met.plan.channel import Channel
@@ -38,7 +38,14 @@ COORDINATE, METRIC = "coordinate:", "metric:"
 """Prefixes of outputs, and cells, that a deck names: so no name of a deck's clashes with one of the engine's."""
 
 
-def build(experiment: Experiment, *, wire: bool = False, late: int = 0, furthest: bool = False) -> Program:
+def build(
+    experiment: Experiment,
+    *,
+    wire: bool = False,
+    late: int = 0,
+    furthest: bool = False,
+    changing: tuple[str, ...] = (),
+) -> Program:
     """The program of an experiment: inputs are its coordinates and the seeds of a case's own noise, columns its
     recorded channels.
 
@@ -47,15 +54,18 @@ def build(experiment: Experiment, *, wire: bool = False, late: int = 0, furthest
           `wire:<joint>.current` (A)
     late  ticks of a bed's `delay` that pass on the wire: what is told now is held from so many ticks later on
     furthest  as `System` has it
+    changing  coordinates that may change during a run: the parameters that follow them directly are set anew at each
+              tick, once the step that ends there is finished
     """
-    return Builder(System(experiment, furthest=furthest), wire=wire, late=late).program()
+    return Builder(System(experiment, furthest=furthest), wire=wire, late=late, changing=changing).program()
 
 
 class Builder:
     """The phases of one system's program. Every method that takes a tape is the body of a phase."""
 
-    def __init__(self, system: System, *, wire: bool = False, late: int = 0) -> None:
+    def __init__(self, system: System, *, wire: bool = False, late: int = 0, changing: tuple[str, ...] = ()) -> None:
         self.system = system
+        self.changing = tuple(c for c in system.experiment.cases.coordinates if c.path in changing)
         self.schedule = system.structure.schedule
         self.joints = tuple(joint.name for joint in system.joints)
         self.step = StepPhases(system, wire=wire, late=late)
@@ -68,6 +78,7 @@ class Builder:
         held, at_rows = derived(self.system)
         tick: list[Control] = [
             Unless0((Every(instant, (*self.limits.counting(), *self.step.finish())),)),
+            *([CallPhase(Phase("change", self.change))] if self.changing else []),
             *self.step.follow(),
             *self.step.grapple.events(),
         ]
@@ -150,11 +161,7 @@ class Builder:
     def begin(self, tape: Tape) -> dict[str, dict[str, Real]]:
         """Write varied parameters, then the state at t = 0 with servos unbalanced; returns each servo's memory and
         states, by joint and name."""
-        experiment = self.system.experiment
-        inputs = {coordinate.path: tape.input(coordinate.path) for coordinate in experiment.cases.coordinates}
-        values = experiment.formulas.replay(inputs)
-        for path in self.system.varying:
-            tape.write(PARAMETER + path, values[experiment.parameters[path].value.output])  # type: ignore[union-attr]
+        self._write_varied(tape, self.system.varying)
         self.system.keep_tree(tape.read, tape.write)
         for joint in self.joints:
             for name in ("q", "qd"):
@@ -168,6 +175,18 @@ class Builder:
             balancing.settle_booms(self.system, tape, self.step.state(tape), begun)
         link_sensors.start(self.system, tape, lambda y: gravity(self.system, tape.read, y, 0.0))
         return begun
+
+    def change(self, tape: Tape) -> None:
+        """Write anew the parameters that follow the coordinates that change."""
+        self._write_varied(tape, [path for coordinate in self.changing for path in coordinate.sets])
+
+    def _write_varied(self, tape: Tape, paths: Iterable[str]) -> None:
+        """Write varied parameters, as they follow from the coordinates."""
+        experiment = self.system.experiment
+        inputs = {coordinate.path: tape.input(coordinate.path) for coordinate in experiment.cases.coordinates}
+        values = experiment.formulas.replay(inputs)
+        for path in paths:
+            tape.write(PARAMETER + path, values[experiment.parameters[path].value.output])  # type: ignore[union-attr]
 
     def _begin_servo(self, tape: Tape, actuator: Actuator) -> dict[str, Real]:
         """Write a servo's memory and states where a run begins, and return them by name."""
