@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,11 +11,16 @@ from met.cli import YES, check_options, deck_options, format_option, loudness_op
 from met.host.streams import kept
 from met.messages.visible import say
 
+if TYPE_CHECKING:
+    from met.plan import Experiment
 
-@click.command(short_help="Compile a run or sweep to WebAssembly, for pages and node.")
+
+@click.command(short_help="Compile a run or sweep to WebAssembly, or to an FMU.")
 @click.argument("source", metavar="DECK|PLAN.json|ARCHIVE.h5")
 @click.argument("name", metavar="[NAME]", required=False)
-@click.option("-o", "--output", metavar="FILE.wasm", help="The module to write [NAME.wasm, in this folder].")
+@click.option(
+    "-o", "--output", metavar="FILE.wasm|FILE.fmu", help="The module or FMU to write [NAME.wasm, in this folder]."
+)
 @deck_options
 @format_option
 @loudness_options
@@ -28,12 +33,12 @@ def compile(
     verbose: bool,
     **options: Any,
 ) -> int:
-    """Compile a deck's only run or sweep, the one marked `default`, or NAME, to a WebAssembly module. Of an archive,
-    what was run is compiled.
+    """Compile a deck's only run or sweep, the one marked `default`, or NAME, to a WebAssembly module, or with `-o
+    FILE.fmu` to an FMU for co-simulation (FMI 3.0). Of an archive, what was run is compiled.
 
-    The module computes the bits of `met run`, wherever it runs. FILE.json beside it describes the places of inputs,
-    recorded numbers and metrics in its memory, and has the inputs of the cases. What a sweep varies is an input; all
-    else is constant in the code. Only files that this command wrote are overwritten.
+    Both compute the bits of `met run`, wherever they run. What a sweep varies is an input or a parameter; all else is
+    constant in the code. FILE.json beside a module describes the places of inputs, recorded numbers and metrics in its
+    memory, and has the inputs of the cases. Only files that this command wrote are overwritten.
     """
     import json
 
@@ -49,6 +54,8 @@ def compile(
     target = Path(f"{experiment.name}{files.ENDING}" if output is None else output)
     if output is None:
         files.check(target)
+    if target.suffix == files.FMU_ENDING:
+        return _compile_fmu(experiment, target, form=form, quiet=quiet)
     done = files.write(experiment, target)
     with kept(f"{done.module} and {done.description} are whole"):
         if form == "json":
@@ -63,4 +70,29 @@ def compile(
                     f"  not computed in it: {', '.join(each['name'] for each in of['not_computed'])}, of linear answers"
                 )
             say(f"{done.description}  ({size(done.description.stat().st_size)})")
+    return YES
+
+
+def _compile_fmu(experiment: Experiment, target: Path, *, form: str, quiet: bool) -> int:
+    """Write an FMU, and say what it has."""
+    import json
+
+    from batch.portable import files
+    from ic.printing.columns import size
+
+    fmu = files.write_fmu(experiment, target)
+    counts = {f"{kind}s": sum(each.kind == kind for each in fmu.variables) for kind in ("parameter", "input", "output")}
+    unknown = [use.name for use in experiment.linear_metrics]
+    with kept(f"{target} is whole"):
+        if form == "json":
+            told = {"fmu": str(target), "platform": fmu.platform or None, **counts, "not_computed": unknown}
+            click.echo(json.dumps(told, indent=1))
+        elif not quiet:
+            what = ", ".join(f"{count} {kinds}" for kinds, count in counts.items())
+            say(f"{target}  ({size(target.stat().st_size)})  {what}")
+            if unknown:
+                say(f"  not computed in it: {', '.join(unknown)}, of linear answers")
+            say(f"  C sources, and a binary for {fmu.platform}" if fmu.platform else "  C sources alone")
+        if not fmu.platform:
+            say(f"no binary in {target}: {fmu.why_none}", err=True)
     return YES

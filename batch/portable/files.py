@@ -1,4 +1,5 @@
-"""The files of a module: the choice of its experiment, checks of the places, and writing whole or not at all."""
+"""The files of a module or an FMU: the choice of its experiment, checks of the places, and writing whole or not at
+all."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ from typing import Any
 from batch.archive.read import ArchiveFile
 from batch.campaigns.choosing import experiments_named
 from batch.campaigns.plans import read_plan
+from batch.fmu.package import Fmu, fmu_of, is_fmu
 from batch.modules.description import FORMAT, described
 from batch.portable.page import GENERATOR
 from met.backends.wasm.module import compiled
@@ -20,7 +22,7 @@ from met.outputs import cannot_write, check_overwrite, check_place, quoted
 from met.plan import Experiment
 from met.run import prepare
 
-ENDING = ".wasm"
+ENDING, FMU_ENDING = ".wasm", ".fmu"
 
 
 @frozen
@@ -65,11 +67,13 @@ def _the_one(experiments: tuple[Experiment, ...], source: str) -> Experiment:
 
 
 def check(output: Path) -> None:
-    """Refuse places before anything is compiled. Raises Problem E470, or E471 where the name does not suit a module."""
-    if output.suffix != ENDING and not output.is_dir():
-        helps = [f"`-o {quoted(output.with_suffix(ENDING))}`"] if output.name else []
-        raise Problem(error("E471", f"cannot write {output}: modules are .wasm files", help=helps))
-    for path, own in ((output, _is_module), (output.with_suffix(".json"), _is_description)):
+    """Refuse places before anything is compiled. Raises Problem E470, or E471 where the name suits neither a module nor
+    an FMU."""
+    if output.suffix not in (ENDING, FMU_ENDING) and not output.is_dir():
+        helps = [f"`-o {quoted(output.with_suffix(ending))}`" for ending in (ENDING, FMU_ENDING) if output.name]
+        raise Problem(error("E471", f"cannot write {output}: modules are .wasm files, and FMUs .fmu files", help=helps))
+    module = ((output, _is_module), (output.with_suffix(".json"), _is_description))
+    for path, own in ((output, is_fmu),) if output.suffix == FMU_ENDING else module:
         try:
             check_place(path, code="E470", inside=output / "module.wasm")
             check_overwrite(path, own, code="E470", because=" and was not written by `met compile`")
@@ -85,12 +89,23 @@ def write(experiment: Experiment, output: Path) -> ModuleFiles:
     text = json.dumps(description, indent=1, allow_nan=False) + "\n"
     beside = output.with_suffix(".json")
     for path, data in ((output, module.code), (beside, text.encode())):
-        try:
-            with whole_file(path) as file:
-                file.write(data)
-        except OSError as reason:
-            raise _cannot_write(path, reason) from reason
+        _write(path, data)
     return ModuleFiles(output, beside, description)
+
+
+def write_fmu(experiment: Experiment, output: Path) -> Fmu:
+    """Write the FMU of an experiment. Raises Problem E470."""
+    fmu = fmu_of(experiment)
+    _write(output, fmu.data)
+    return fmu
+
+
+def _write(path: Path, data: bytes) -> None:
+    try:
+        with whole_file(path) as file:
+            file.write(data)
+    except OSError as reason:
+        raise _cannot_write(path, reason) from reason
 
 
 def check_page(output: Path) -> None:

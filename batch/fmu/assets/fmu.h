@@ -1,0 +1,277 @@
+/* One instance of a co-simulation FMU: the part that does not depend on the version of FMI. Written by MET.
+
+   model.h comes before: the program of a case (`met_case`, `met_start`, `met_tick`, `met_end`) and the table of
+   variables. A variable's value reference is its place in the table.
+
+   Ticks are numbered from the start of the simulation, MODEL_BASE_HZ of them a second. `now` is the memory before tick
+   `next`. `seen` is the memory from which outputs are read: at a communication point on a tick, `now` after this tick
+   with the inputs as they are; between ticks, `now` itself. So inputs that change at a communication point act from the
+   tick there on, and the step that ends there is not computed again. */
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#ifdef _WIN32
+#define EXPORTED __declspec(dllexport)
+#elif defined(__GNUC__)
+#define EXPORTED __attribute__((visibility("default")))
+#else
+#define EXPORTED
+#endif
+
+#define VARIABLES (sizeof met_variables / sizeof met_variables[0])
+
+/* Times within this share of a tick of it are on it: those of a master are sums of its steps. */
+#define ON_TICK 1e-4
+
+/* Whole numbers up to here are doubles, and so are those of ticks. */
+#define MOST_TICKS 9007199254740992.0
+
+typedef enum { INSTANTIATED, INITIALIZING, STEPPING, TERMINATED } Mode;
+
+/* All that lasts of an instance, so that a copy of it is a state.
+
+   on_tick   whether the communication point is on tick `next`
+   changed   whether inputs have changed since `seen` was computed
+   failed    whether the case has failed */
+typedef struct {
+    int32_t mode, on_tick, changed, failed, has_stop;
+    int64_t next;
+    double start, time, stop;
+    met_case now, seen;
+} Data;
+
+typedef void (*Log)(void *instance, const char *message);
+
+typedef struct {
+    Data data;
+    Log log;
+} Instance;
+
+typedef enum { OK, DISCARD, ERROR } Answer;
+
+static double *place_of(met_case *memory, size_t variable)
+{
+    return (double *)(void *)((char *)memory + met_variables[variable].place);
+}
+
+static bool is_finite(double x)
+{
+    return x - x == 0.0;
+}
+
+static bool is_whole(double x)
+{
+    return x > -MOST_TICKS && x < MOST_TICKS && x == (double)(int64_t)x;
+}
+
+static Answer refuse(Instance *instance, const char *message)
+{
+    if (instance->log) instance->log(instance, message);
+    return ERROR;
+}
+
+/* A new or former instance as it is after instantiation: its variables have their start values. */
+static void reset(Instance *instance)
+{
+    Data *const data = &instance->data;
+    memset(data, 0, sizeof *data);
+    for (size_t i = 1; i < VARIABLES; i++) {
+        if (met_variables[i].kind != OUTPUT) *place_of(&data->now, i) = met_variables[i].start;
+    }
+}
+
+/* The outputs of the case in `seen`. */
+static Answer finish(Instance *instance)
+{
+    Data *const data = &instance->data;
+    met_end(&data->seen);
+    for (size_t i = 0; i < sizeof met_alarms / sizeof met_alarms[0]; i++) {
+        if (*(double *)(void *)((char *)&data->seen + met_alarms[i]) != 0.0) data->failed = 1;
+    }
+    if (data->failed) {
+        char message[160];
+        snprintf(message, sizeof message, "the case has failed by %.9g s: `met run` of its values says why",
+                 data->seen.tick / MODEL_BASE_HZ);
+        return refuse(instance, message);
+    }
+    return OK;
+}
+
+/* Compute `seen` as of the inputs. */
+static Answer look(Instance *instance)
+{
+    Data *const data = &instance->data;
+    if (!data->on_tick || !data->changed) return OK;
+    if (data->mode == INITIALIZING) {
+        data->failed = 0;
+        met_start(&data->now);
+    }
+    if (data->failed) return refuse(instance, "the case has failed: reset it, or set an earlier state");
+    data->seen = data->now;
+    data->changed = 0;
+    met_tick(&data->seen, data->next);
+    return finish(instance);
+}
+
+static Answer initialize(Instance *instance, double start, bool has_stop, double stop)
+{
+    Data *const data = &instance->data;
+    if (data->mode != INSTANTIATED) return refuse(instance, "only a new or reset instance can be initialized");
+    if (!is_finite(start) || (has_stop && !(stop >= start))) {
+        return refuse(instance, "the start must be a finite time, and the stop not before it");
+    }
+    data->mode = INITIALIZING;
+    data->start = data->time = start;
+    data->has_stop = has_stop;
+    data->stop = stop;
+    data->on_tick = data->changed = 1;
+    return OK;
+}
+
+static Answer begin_stepping(Instance *instance)
+{
+    if (instance->data.mode != INITIALIZING) return refuse(instance, "the instance is not being initialized");
+    if (look(instance) != OK || instance->data.failed) return ERROR;
+    instance->data.mode = STEPPING;
+    return OK;
+}
+
+static Answer terminate(Instance *instance)
+{
+    if (instance->data.mode != STEPPING) return refuse(instance, "only an instance that steps can be terminated");
+    instance->data.mode = TERMINATED;
+    return OK;
+}
+
+static Answer set_values(Instance *instance, const uint32_t *variables, size_t count, const double *values)
+{
+    Data *const data = &instance->data;
+    char message[160];
+    if (count && (!variables || !values)) return refuse(instance, "no variables or values are given");
+    if (data->mode == TERMINATED) return refuse(instance, "the simulation is terminated");
+    for (size_t i = 0; i < count; i++) { /* all are checked before the first is set */
+        const char *why = 0;
+        if (variables[i] >= VARIABLES) {
+            why = "there is no such variable";
+        } else {
+            const met_variable *const variable = &met_variables[variables[i]];
+            if (variables[i] == 0 || variable->kind == OUTPUT) {
+                why = "it is computed and cannot be set";
+            } else if (variable->kind == PARAMETER && data->mode == STEPPING) {
+                why = "a parameter is fixed once the simulation runs";
+            } else if (!is_finite(values[i]) || values[i] < variable->min || values[i] > variable->max ||
+                       (variable->whole && !is_whole(values[i]))) {
+                snprintf(message, sizeof message, "value reference %u: it cannot be %.17g", (unsigned)variables[i],
+                         values[i]);
+                refuse(instance, message);
+                return DISCARD;
+            }
+        }
+        if (why) {
+            snprintf(message, sizeof message, "value reference %u: %s", (unsigned)variables[i], why);
+            return refuse(instance, message);
+        }
+    }
+    for (size_t i = 0; i < count; i++) *place_of(&data->now, variables[i]) = values[i];
+    if (count) data->changed = 1;
+    return OK;
+}
+
+static Answer get_values(Instance *instance, const uint32_t *variables, size_t count, double *values)
+{
+    Data *const data = &instance->data;
+    char message[120];
+    if (count && (!variables || !values)) return refuse(instance, "no variables or values are given");
+    for (size_t i = 0; i < count; i++) {
+        if (variables[i] >= VARIABLES) {
+            snprintf(message, sizeof message, "value reference %u: there is no such variable", (unsigned)variables[i]);
+            return refuse(instance, message);
+        }
+        if (variables[i] == 0) {
+            values[i] = data->time;
+        } else if (met_variables[variables[i]].kind == OUTPUT) {
+            if (data->mode == INSTANTIATED) return refuse(instance, "outputs are known from the initialization on");
+            if (data->mode != TERMINATED && look(instance) != OK) return ERROR;
+            values[i] = *place_of(&data->seen, variables[i]);
+        } else {
+            values[i] = *place_of(&data->now, variables[i]);
+        }
+    }
+    return OK;
+}
+
+/* Advance from the communication point `time` by `size`: all ticks before the new point are computed with the inputs as
+   they are, and outputs are those of the tick at the new point; where there is none, of the last tick before it. */
+static Answer advance(Instance *instance, double time, double size)
+{
+    Data *const data = &instance->data;
+    double ticks, least;
+    int64_t last;
+    bool on_tick;
+    if (data->mode != STEPPING) return refuse(instance, "only an initialized instance can step");
+    if (data->failed) return refuse(instance, "the case has failed: reset it, or set an earlier state");
+    least = ON_TICK / MODEL_BASE_HZ;
+    if (!(time - data->time <= least && data->time - time <= least)) {
+        return refuse(instance, "the step does not begin where the last one ended");
+    }
+    ticks = (time + size - data->start) * MODEL_BASE_HZ;
+    if (!(size > 0.0) || !(ticks < MOST_TICKS)) return refuse(instance, "a step must be a finite time above 0");
+    if (data->has_stop && time + size > data->stop + least) return refuse(instance, "the step ends after the stop");
+    last = (int64_t)(ticks + 0.5);
+    on_tick = ticks - (double)last < ON_TICK && (double)last - ticks < ON_TICK;
+    if (!on_tick) last = (int64_t)ticks + 1; /* the first tick after the new point */
+    if (last > data->next) {
+        if (look(instance) != OK) return ERROR;
+        if (data->on_tick) {
+            data->now = data->seen;
+            data->next++;
+        }
+        for (; data->next < last; data->next++) met_tick(&data->now, data->next);
+        data->seen = data->now;
+        if (on_tick) met_tick(&data->seen, data->next);
+        data->changed = 0;
+        data->on_tick = on_tick;
+    } else if (on_tick && !data->on_tick) { /* from between ticks to the next one */
+        data->seen = data->now;
+        met_tick(&data->seen, data->next);
+        data->changed = 0;
+        data->on_tick = on_tick;
+    }
+    data->time = time + size;
+    return finish(instance);
+}
+
+/* A state as bytes is the data after the name of the program, so that no other FMU takes it. */
+#define STATE_BYTES (sizeof MODEL_TOKEN + sizeof(Data))
+
+static Data *copy_of(const Data *data)
+{
+    Data *const copy = malloc(sizeof *copy);
+    if (copy) *copy = *data;
+    return copy;
+}
+
+static void write_state(const Data *data, unsigned char *bytes)
+{
+    memcpy(bytes, MODEL_TOKEN, sizeof MODEL_TOKEN);
+    memcpy(bytes + sizeof MODEL_TOKEN, data, sizeof *data);
+}
+
+/* The state in these bytes; none where they are not of this program. */
+static Data *read_state(const unsigned char *bytes, size_t size)
+{
+    Data *data;
+    if (!bytes || size != STATE_BYTES || memcmp(bytes, MODEL_TOKEN, sizeof MODEL_TOKEN)) return 0;
+    data = malloc(sizeof *data);
+    if (!data) return 0;
+    memcpy(data, bytes + sizeof MODEL_TOKEN, sizeof *data);
+    if (data->mode >= INSTANTIATED && data->mode <= TERMINATED && data->next >= 0 && (double)data->next < MOST_TICKS) {
+        return data;
+    }
+    free(data);
+    return 0;
+}

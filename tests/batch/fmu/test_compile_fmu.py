@@ -1,0 +1,75 @@
+"""`met compile -o FILE.fmu`: its words, the archive that it writes, and what it refuses; without a compiler."""
+
+from __future__ import annotations
+
+import json
+import re
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from met import cli
+from met.version import VERSION
+from tests.batch.fmu.arms import SHORT
+
+MARGIN = """
+run held like nominal {
+    duration = 0.4 s;  remove settle;
+    linear loop { at = equilibrium();  open = shoulder.servo.voltage; }
+    require phase_margin(loop) > 40 deg;
+}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("batch.fmu.package.shutil.which", lambda name: None)
+    (tmp_path / "deck.ic").write_text(SHORT + MARGIN, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.mark.slow
+def test_an_fmu_without_a_binary_has_its_sources_and_says_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["compile", "deck.ic", "tuned", "-o", "arm.fmu"]) == 0
+    out, err = capsys.readouterr()
+    assert re.sub(r"\([\d.]+ KiB\)", "(SIZE)", out) == (
+        "arm.fmu  (SIZE)  2 parameters, 2 inputs, 10 outputs\n  C sources alone\n"
+    )
+    assert err == "no binary in arm.fmu: there is no C compiler `cc` here\n"
+    with zipfile.ZipFile("arm.fmu") as archive:
+        assert archive.namelist() == [
+            "modelDescription.xml", "documentation/index.html", "documentation/licenses/license.txt",
+            "sources/buildDescription.xml", "sources/CMakeLists.txt", "sources/model.h", "sources/fmu.h",
+            "sources/fmi3.c",
+        ]  # fmt: skip
+        text = archive.read("modelDescription.xml").decode()
+        token = re.search(r'instantiationToken="(\w+)"', text)
+        assert token is not None and f'"{token[1]}"' in archive.read("sources/model.h").decode()
+        assert f'generationTool="MET {VERSION}"' in text
+        assert 'description="Ticks of 0.005 s from the start. Inputs act from the tick at which they are set. ' in text
+        assert 'fixedInternalStepSize="0.02"' in text and 'stopTime="2.0" stepSize="0.04"' in text
+    data = (folder / "arm.fmu").read_bytes()
+    assert cli.main(["compile", "deck.ic", "tuned", "-o", "arm.fmu", "-q"]) == 0  # over its own
+    assert (folder / "arm.fmu").read_bytes() == data
+
+
+def test_json_tells_what_an_fmu_has(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["compile", "deck.ic", "held", "-o", "held.fmu", "--format", "json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "fmu": "held.fmu", "platform": None, "parameters": 0, "inputs": 0, "outputs": 7,
+        "not_computed": ["loop_phase_margin"],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("content", [b"mine", b"PK\x05\x06" + bytes(18)])
+def test_what_is_no_fmu_of_met_is_not_written_over(
+    folder: Path, capsys: pytest.CaptureFixture[str], content: bytes
+) -> None:
+    (folder / "arm.fmu").write_bytes(content)
+    assert cli.main(["compile", "deck.ic", "tuned", "-o", "arm.fmu"]) == 2
+    assert (
+        "error[E470]: arm.fmu exists and was not written by `met compile`: it is not written over\n"
+    ) in capsys.readouterr().err
+    assert (folder / "arm.fmu").read_bytes() == content

@@ -1,0 +1,87 @@
+"""FMUs in FMPy, another's master: its checks of the description, and its simulation."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.batch.fmu.arms import NAMES, deck, packed, run_rows
+
+pytestmark = [pytest.mark.oracle, pytest.mark.compiler, pytest.mark.slow]
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("fmpy")
+    folder = tmp_path_factory.mktemp("fmpy")
+    found = packed(folder)
+    if not found.platform:
+        pytest.skip("no cc; on Debian or Ubuntu: apt-get install gcc libc6-dev")
+    (folder / "arm.fmu").write_bytes(found.data)
+    return folder / "arm.fmu"
+
+
+@pytest.mark.parametrize("name", ["tuned", "seeded"])
+def test_the_description_is_valid(tmp_path: Path, name: str) -> None:
+    fmpy = pytest.importorskip("fmpy.validation")
+    path = tmp_path / "arm.fmu"
+    path.write_bytes(packed(tmp_path, name).data)
+    assert fmpy.validate_fmu(str(path)) == []
+
+
+def test_the_files_match_the_schemas_of_fmi(file: Path, tmp_path: Path) -> None:
+    import zipfile
+
+    import fmpy
+    from lxml import etree
+
+    schemas = Path(fmpy.__file__).parent / "schema" / "fmi3"
+    for name, schema in (("modelDescription", "ModelDescription"), ("sources/buildDescription", "BuildDescription")):
+        with zipfile.ZipFile(file) as archive:
+            text = archive.read(f"{name}.xml")
+        etree.XMLSchema(etree.parse(schemas / f"fmi3{schema}.xsd")).assertValid(etree.fromstring(text))
+
+
+@pytest.mark.parametrize("case", range(3))
+def test_fmpy_simulates_the_bits_of_a_run(file: Path, case: int) -> None:
+    import fmpy
+
+    found = deck(file.parent)
+    times, rows, _ = run_rows(found, case)
+    names = [channel for each in found.structure.record for channel in each.channels]
+    values = {c.path: float(c.values[case]) for c in found.cases.coordinates}
+    result = fmpy.simulate_fmu(str(file), start_values=values, output=names, output_interval=0.04)
+    assert np.array_equal(np.column_stack([result[name] for name in names]), rows)
+    assert np.allclose(result["time"], times, rtol=0.0, atol=1e-12)
+
+
+def test_inputs_of_fmpy_move_the_arm(file: Path) -> None:
+    import fmpy
+
+    steps = np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 0.05), (2.0, 0.05)], dtype=[("time", "f8"), (NAMES[2], "f8")])
+    result = fmpy.simulate_fmu(str(file), input=steps, output=["shoulder.qd"], output_interval=0.04)
+    rate = dict(zip(result["time"].round(6), result["shoulder.qd"], strict=True))
+    assert abs(rate[0.48]) < 1e-3 and rate[2.0] > 0.03
+
+
+def test_the_sources_are_built_by_cmake(file: Path, tmp_path: Path) -> None:
+    import zipfile
+
+    import fmpy
+
+    if shutil.which("cmake") is None:
+        pytest.skip("no cmake; on Debian or Ubuntu: apt-get install cmake")
+    with zipfile.ZipFile(file) as archive:
+        archive.extractall(tmp_path / "arm")
+    (binary,) = (tmp_path / "arm" / "binaries").glob("*/*.so")
+    former = fmpy.simulate_fmu(str(tmp_path / "arm"))
+    binary.unlink()
+    build = tmp_path / "build"
+    for words in (["-S", tmp_path / "arm" / "sources", "-B", build], ["--build", build]):
+        subprocess.run(["cmake", *words], check=True, capture_output=True)
+    shutil.copy(build / binary.name, binary)
+    assert fmpy.simulate_fmu(str(tmp_path / "arm")).tobytes() == former.tobytes()
