@@ -1,6 +1,6 @@
 """Servo models, one a file. To add one: write its file, add it to `SERVOS`."""
 
-from met.servos import cascade, compliant_gearbox, ideal, locked, passive, rigid_gearbox
+from met.servos import cascade, compliant_gearbox, external, ideal, locked, passive, rigid_gearbox
 from met.servos.servo import Servo
 
 SERVOS: tuple[Servo, ...] = (
@@ -8,6 +8,7 @@ SERVOS: tuple[Servo, ...] = (
     compliant_gearbox.SERVO,
     cascade.SERVO,
     ideal.SERVO,
+    external.SERVO,
     passive.SERVO,
     locked.SERVO,
 )

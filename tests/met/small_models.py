@@ -127,6 +127,7 @@ SMALLEST: dict[tuple[str, str], Small] = {
         "stiffness": 900.0, "hardening": 4e3, "backlash": 1e-3, "damping": 5.0, "f_c_joint": 0.1, "f_v_joint": 0.2,
     }, command="rate"),
     ("servo", "ideal"): Small({"bandwidth": 30.0}),
+    ("servo", "external"): Small({"rotor": 0.1}),
     ("servo", "passive"): Small({"friction": 1.0}),
     ("servo", "locked"): Small({"release": 0.1}),
     ("sensor", "tachometer"): Small({"cutoff": 15.0, "noise": 0.01, "resolution": 1e-3, "delay": 1.0}),

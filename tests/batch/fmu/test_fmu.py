@@ -96,23 +96,33 @@ def test_steps_of_any_length_see_the_same_motion(fmu: Fmu, folder: Path) -> None
     assert bits(found) == bits(at_ticks[np.floor(points / 0.005 + 1e-6).astype(int)])
 
 
+DRIVEN = """\
+#include <two_link.ic>
+servo outside { model = external;  command = torque(0 N*m); }
+run mixed like nominal { duration = 2 s;  remove settle;  servos { elbow = outside; } }
+sweep driven of mixed {
+    vary shoulder.servo.command.value = [0, 0.1] rad/s;
+    vary elbow.servo.command.value = [0, 1] N*m;
+}
+"""
+
+
 @pytest.mark.slow
 def test_inputs_that_change_have_the_bits_of_a_stepped_run(tmp_path: Path) -> None:
-    text = SHORT.replace("sweep tuned", "sweep both of nominal { vary shoulder.servo.command.value = [0, 1] rad/s; "
-                         "vary elbow.servo.command.value = [0, 1] rad/s; }\nsweep tuned")  # fmt: skip
-    fmu = load(packed(tmp_path, "both", text), tmp_path)
-    stepped = Simulation(text=text, run="nominal").start(commands=["shoulder", "elbow"])
+    fmu = load(packed(tmp_path, "driven", DRIVEN), tmp_path)
+    stepped = Simulation(text=DRIVEN, run="mixed").start(commands=["shoulder", "elbow"])
     instance = fmu.instance()
-    instance.begin(shoulder__servo__command__value=0.0, elbow__servo__command__value=0.0)
+    instance.begin()
     angles = ("shoulder.q", "elbow.q", "shoulder.qd", "elbow.qd")
     for step in range(40):
-        at = stepped.seen
-        assert bits(instance.get(*angles)) == bits([*at.q, *at.qd]), step
-        commands = [0.03 * math.sin(step), 0.2 - at.q[0]]
+        seen = stepped.seen
+        assert bits(instance.get(*angles)) == bits([*seen.q, *seen.qd]), step
+        commands = [0.2 * math.sin(0.2 * step), -50.0 * seen.q[1] - 20.0 * seen.qd[1]]
         stepped.step(commands)
         assert instance.set("shoulder.servo.command.value", commands[0]) == OK
         assert instance.set("elbow.servo.command.value", commands[1]) == OK
         assert instance.step(step * 0.04, 0.04) == OK
+    assert np.ptp(stepped.seen.q) > 1e-3 and fmu.attributes["elbow.servo.command.value"]["unit"] == "N.m"
 
 
 @pytest.mark.slow
