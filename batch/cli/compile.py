@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 @click.option(
     "-o", "--output", metavar="FILE.wasm|FILE.fmu", help="The module or FMU to write [NAME.wasm, in this folder]."
 )
+@click.option("--fmi", type=click.Choice(["2", "3"]), help="The version of FMI of an FMU, 2.0 or 3.0 [3].")
 @deck_options
 @format_option
 @loudness_options
@@ -28,13 +29,14 @@ def compile(
     source: str,
     name: str | None,
     output: str | None,
+    fmi: str | None,
     form: str,
     quiet: bool,
     verbose: bool,
     **options: Any,
 ) -> int:
     """Compile a deck's only run or sweep, the one marked `default`, or NAME, to a WebAssembly module, or with `-o
-    FILE.fmu` to an FMU for co-simulation (FMI 3.0). Of an archive, what was run is compiled.
+    FILE.fmu` to an FMU for co-simulation. Of an archive, what was run is compiled.
 
     Both compute the bits of `met run`, wherever they run. What a sweep varies is an input or a parameter; all else is
     constant in the code. FILE.json beside a module describes the places of inputs, recorded numbers and metrics in its
@@ -48,6 +50,8 @@ def compile(
 
     names = (name,) if name is not None else ()
     check_options(source, names, **options)
+    if fmi is not None and (output is None or path_of(output).suffix != files.FMU_ENDING):
+        raise click.UsageError("--fmi is for FMUs: `-o FILE.fmu` writes one")
     if output is not None:
         files.check(path_of(output))
     experiment = files.experiment_of(source, names, **options, quiet=quiet or form == "json")
@@ -55,7 +59,7 @@ def compile(
     if output is None:
         files.check(target)
     if target.suffix == files.FMU_ENDING:
-        return _compile_fmu(experiment, target, form=form, quiet=quiet)
+        return _compile_fmu(experiment, target, int(fmi or 3), form=form, quiet=quiet)
     done = files.write(experiment, target)
     with kept(f"{done.module} and {done.description} are whole"):
         if form == "json":
@@ -73,19 +77,25 @@ def compile(
     return YES
 
 
-def _compile_fmu(experiment: Experiment, target: Path, *, form: str, quiet: bool) -> int:
-    """Write an FMU, and say what it has."""
+def _compile_fmu(experiment: Experiment, target: Path, version: int, *, form: str, quiet: bool) -> int:
+    """Write an FMU, and say what it has. version: of FMI"""
     import json
 
     from batch.portable import files
     from ic.printing.columns import size
 
-    fmu = files.write_fmu(experiment, target)
+    fmu = files.write_fmu(experiment, target, version)
     counts = {f"{kind}s": sum(each.kind == kind for each in fmu.variables) for kind in ("parameter", "input", "output")}
     unknown = [use.name for use in experiment.linear_metrics]
     with kept(f"{target} is whole"):
         if form == "json":
-            told = {"fmu": str(target), "platform": fmu.platform or None, **counts, "not_computed": unknown}
+            told = {
+                "fmu": str(target),
+                "fmi": f"{version}.0",
+                "platform": fmu.platform or None,
+                **counts,
+                "not_computed": unknown,
+            }
             click.echo(json.dumps(told, indent=1))
         elif not quiet:
             what = ", ".join(f"{count} {kinds}" for kinds, count in counts.items())

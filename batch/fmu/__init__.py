@@ -1,4 +1,4 @@
-"""A run or sweep as a functional mock-up unit (FMU): FMI 3.0 for co-simulation.
+"""A run or sweep as a functional mock-up unit (FMU) for co-simulation, of FMI 2.0 or 3.0.
 
 variables    of an FMU: what it takes and gives
 description  the XML files

@@ -45,57 +45,67 @@ def unit_name(unit: str) -> str:
     return "" if unit == "1" else unit.replace("*", ".").replace("^", "")
 
 
-def model_description(experiment: Experiment, variables: Sequence[Variable], naming: Naming) -> str:
-    """The text of modelDescription.xml in FMI 3.0."""
+def model_description(experiment: Experiment, variables: Sequence[Variable], naming: Naming, version: int) -> str:
+    """The text of modelDescription.xml. version: of FMI, 2 or 3"""
     schedule = experiment.structure.schedule
-    step = schedule.dynamics / schedule.base_hz
-    references = {each.name: number for number, each in enumerate(variables, start=1)}
-    outputs = [{"valueReference": references[each.name]} for each in variables if each.kind == "output"]
-    abilities = ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUState", "canSerializeFMUState")
+    outputs = [number for number, each in enumerate(variables, start=1) if each.kind == "output"]
     attributes = {
-        "fmiVersion": "3.0",
+        "fmiVersion": f"{version}.0",
         "modelName": naming.model,
-        "instantiationToken": naming.token,
+        "instantiationToken" if version == 3 else "guid": naming.token,
         "description": _summary(schedule.base_hz),
         "generationTool": f"{TOOL}{VERSION}",
         "variableNamingConvention": "flat",
     }
-    time = {"name": "time", "valueReference": 0, "causality": "independent", "variability": "continuous", "unit": "s"}
+    experiment_times = {
+        "startTime": 0.0,
+        "stopTime": schedule.ticks / schedule.base_hz,
+        "stepSize": schedule.record / schedule.base_hz,
+    }
+    variable = _variable if version == 3 else _scalar_variable
     parts = [
-        element(
-            "CoSimulation",
-            {
-                "modelIdentifier": naming.identifier,
-                **dict.fromkeys(abilities, True),
-                "fixedInternalStepSize": step,
-            },
-        ),
+        _co_simulation(naming, version, schedule.dynamics / schedule.base_hz),
         element("UnitDefinitions", {}, _units(variables)),
         element("LogCategories", {}, [element("Category", {"name": "logStatusError", "description": "wrong calls"})]),
-        element(
-            "DefaultExperiment",
-            {
-                "startTime": 0.0,
-                "stopTime": schedule.ticks / schedule.base_hz,
-                "stepSize": schedule.record / schedule.base_hz,
-            },
-        ),
+        element("DefaultExperiment", experiment_times),
         element(
             "ModelVariables",
             {},
-            [element("Float64", time), *(_variable(each, references[each.name]) for each in variables)],
+            [
+                *([element("Float64", TIME)] if version == 3 else []),
+                *(variable(each, number) for number, each in enumerate(variables, start=1)),
+            ],
         ),
-        element(
-            "ModelStructure",
-            {},
-            [element(kind, each) for kind in ("Output", "InitialUnknown") for each in outputs],
-        ),
+        element("ModelStructure", {}, _structure(outputs, version)),
     ]
     return f"{HEAD}{element('fmiModelDescription', attributes, parts)}\n"
 
 
+TIME = {"name": "time", "valueReference": 0, "causality": "independent", "variability": "continuous", "unit": "s"}
+"""The variable that FMI 3.0 asks for besides those of the model."""
+
+
+def _co_simulation(naming: Naming, version: int, step: float) -> str:
+    """What the FMU can do. step: of the dynamics, s"""
+    state = "State" if version == 3 else "state"
+    abilities = ("canHandleVariableCommunicationStepSize", f"canGetAndSetFMU{state}", f"canSerializeFMU{state}")
+    attributes = {"modelIdentifier": naming.identifier, **dict.fromkeys(abilities, True)}
+    if version == 3:
+        return element("CoSimulation", {**attributes, "fixedInternalStepSize": step})
+    return element("CoSimulation", attributes, [element("SourceFiles", {}, [element("File", {"name": "fmi2.c"})])])
+
+
+def _structure(outputs: Sequence[int], version: int) -> list[str]:
+    """The variables that depend on others: numbers of the outputs."""
+    kinds = ("Output", "InitialUnknown")
+    if version == 3:
+        return [element(kind, {"valueReference": number}) for kind in kinds for number in outputs]
+    listed = [element("Unknown", {"index": number}) for number in outputs]
+    return [element(f"{kind}s", {}, listed) for kind in kinds if listed]
+
+
 def build_description(naming: Naming, options: Sequence[str]) -> str:
-    """The text of sources/buildDescription.xml in FMI 3.0. options: of a C compiler"""
+    """The text of sources/buildDescription.xml, which FMI 3.0 asks for. options: of a C compiler"""
     source = element("SourceFile", {"name": "fmi3.c"})
     files = element("SourceFileSet", {"language": "C11", "compilerOptions": " ".join(options)}, [source])
     build = element("BuildConfiguration", {"modelIdentifier": naming.identifier}, [files])
@@ -111,24 +121,33 @@ def _summary(base_hz: float) -> str:
 
 
 def _variable(variable: Variable, reference: int) -> str:
-    settable = variable.start is not None
+    return element("Float64", {**_head(variable, reference), **_type(variable)})
+
+
+def _scalar_variable(variable: Variable, reference: int) -> str:
+    return element("ScalarVariable", _head(variable, reference), [element("Real", _type(variable))])
+
+
+def _head(variable: Variable, reference: int) -> dict[str, object]:
+    return {
+        "name": variable.name,
+        "valueReference": reference,
+        "description": variable.description,
+        "causality": variable.kind,
+        "variability": "fixed" if variable.kind == "parameter" else "continuous",
+        "initial": "calculated" if variable.start is None else None,
+    }
+
+
+def _type(variable: Variable) -> dict[str, object]:
+    scaled = variable.start is not None and variable.scale != 1.0
     bounds = {"min": variable.low, "max": variable.high}
-    scaled = settable and variable.scale != 1.0
-    return element(
-        "Float64",
-        {
-            "name": variable.name,
-            "valueReference": reference,
-            "description": variable.description,
-            "causality": variable.kind,
-            "variability": "fixed" if variable.kind == "parameter" else "continuous",
-            "initial": None if settable else "calculated",
-            "unit": unit_name(variable.unit),
-            "displayUnit": unit_name(variable.shown) if scaled else None,
-            **{key: value for key, value in bounds.items() if math.isfinite(value)},
-            "start": variable.start,
-        },
-    )
+    return {
+        "unit": unit_name(variable.unit),
+        "displayUnit": unit_name(variable.shown) if scaled else None,
+        **{key: value for key, value in bounds.items() if math.isfinite(value)},
+        "start": variable.start,
+    }
 
 
 def _units(variables: Sequence[Variable]) -> Iterator[str]:

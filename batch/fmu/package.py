@@ -34,13 +34,16 @@ LIBRARY = ("-std=c11", "-ffp-contract=off")
 ENDINGS = {"Linux": ("linux", ".so"), "Darwin": ("darwin", ".dylib")}
 """The name of a system in FMI's platforms, and the ending of its shared libraries, by its name in Python."""
 
+FORMER = {"x86_64-linux": "linux64", "x86_64-darwin": "darwin64", "aarch64-darwin": "darwin64"}
+"""The names of platforms in FMI 2.0, by those in FMI 3.0, where they differ."""
+
 MACHINES = {"x86_64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
 """The name of a processor in FMI's platforms, by its name in Python."""
 
 CMAKE = """\
 cmake_minimum_required(VERSION 3.16)
 project({identifier} C)
-add_library({identifier} SHARED fmi3.c)
+add_library({identifier} SHARED fmi{version}.c)
 set_target_properties({identifier} PROPERTIES PREFIX "" C_STANDARD 11 C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden)
 if(NOT MSVC)
   target_compile_options({identifier} PRIVATE -ffp-contract=off)
@@ -48,8 +51,8 @@ endif()
 """
 
 NOTICE = f"""\
-The files fmi3.c, fmu.h and CMakeLists.txt in `sources`, and the functions in model.h whose names begin with `met_` and
-that are not of one run alone, are part of MET {VERSION}. You may use them under the Apache License, Version 2.0:
+In the folder `sources`, the file fmi2.c or fmi3.c, fmu.h and CMakeLists.txt, and in model.h the functions before
+`met_case`, are part of MET {VERSION}. You may use them under the Apache License, Version 2.0:
 https://www.apache.org/licenses/LICENSE-2.0. They come without warranty of any kind.
 
 All else in this FMU was made from a deck and from the files that it reads. MET's licence does not apply to it: it is
@@ -80,8 +83,8 @@ class Fmu:
     why_none: str
 
 
-def fmu_of(experiment: Experiment) -> Fmu:
-    """The FMU of an experiment's first case."""
+def fmu_of(experiment: Experiment, version: int = 3) -> Fmu:
+    """The FMU of an experiment's first case. version: of FMI, 2 or 3"""
     found = variables(experiment)
     text = _model(emit(_recording(experiment)), found, experiment.structure.schedule.base_hz)
     identifier = re.sub(r"\W", "_", experiment.name, flags=re.ASCII)
@@ -89,23 +92,25 @@ def fmu_of(experiment: Experiment) -> Fmu:
     naming = Naming(experiment.name, identifier, hashlib.sha256(text.encode()).hexdigest()[:32])
     sources = {
         "model.h": f'#define MODEL_TOKEN "{naming.token}"\n{text}',
-        **{name: (ASSETS / name).read_text(encoding="utf-8") for name in ("fmu.h", "fmi3.c")},
+        **{name: (ASSETS / name).read_text(encoding="utf-8") for name in ("fmu.h", f"fmi{version}.c")},
     }
     files = {
-        "modelDescription.xml": model_description(experiment, found, naming),
+        "modelDescription.xml": model_description(experiment, found, naming, version),
         "documentation/index.html": PAGE.format(identifier=identifier, version=VERSION),
         "documentation/licenses/license.txt": NOTICE,
-        "sources/buildDescription.xml": build_description(naming, LIBRARY),
-        "sources/CMakeLists.txt": CMAKE.format(identifier=identifier),
+        **({"sources/buildDescription.xml": build_description(naming, LIBRARY)} if version == 3 else {}),
+        "sources/CMakeLists.txt": CMAKE.format(identifier=identifier, version=version),
         **{f"sources/{name}": source for name, source in sources.items()},
     }
     packed = {name: source.encode() for name, source in files.items()}
     system, ending = ENDINGS.get(platform.system(), ("", ""))
     machine = MACHINES.get(platform.machine(), "")
-    binary, why = _binary(sources) if system and machine else (b"", "MET does not know FMI's name of this platform")
+    known = bool(system and machine)
+    binary, why = _binary(sources) if known else (b"", "MET does not know FMI's name of this platform")
+    name = f"{machine}-{system}" if version == 3 else FORMER.get(f"{machine}-{system}", f"{machine}-{system}")
     if binary:
-        packed[f"binaries/{machine}-{system}/{identifier}{ending}"] = binary
-    return Fmu(_zipped(packed), found, f"{machine}-{system}" if binary else "", why)
+        packed[f"binaries/{name}/{identifier}{ending}"] = binary
+    return Fmu(_zipped(packed), found, name if binary else "", why)
 
 
 def is_fmu(path: Path) -> bool:
@@ -162,7 +167,8 @@ def _binary(sources: dict[str, str]) -> tuple[bytes, str]:
     with tempfile.TemporaryDirectory() as folder:
         for name, text in sources.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
-        command = [compiler, *FLAGS, "-fvisibility=hidden", "-o", "fmu.so", "fmi3.c"]
+        main = next(name for name in sources if name.endswith(".c"))
+        command = [compiler, *FLAGS, "-fvisibility=hidden", "-o", "fmu.so", main]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             return b"", f"`cc` refuses the sources: {(done.stderr.splitlines() or [''])[0]}"

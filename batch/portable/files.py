@@ -93,9 +93,9 @@ def write(experiment: Experiment, output: Path) -> ModuleFiles:
     return ModuleFiles(output, beside, description)
 
 
-def write_fmu(experiment: Experiment, output: Path) -> Fmu:
-    """Write the FMU of an experiment. Raises Problem E470."""
-    fmu = fmu_of(experiment)
+def write_fmu(experiment: Experiment, output: Path, version: int) -> Fmu:
+    """Write the FMU of an experiment. version: of FMI. Raises Problem E470."""
+    fmu = fmu_of(experiment, version)
     _write(output, fmu.data)
     return fmu
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 
@@ -44,8 +47,8 @@ def deck(folder: Path, name: str = "tuned", text: str = SHORT) -> Experiment:
 
 
 @cache
-def packed(folder: Path, name: str = "tuned", text: str = SHORT) -> Packed:
-    return fmu_of(deck(folder, name, text))
+def packed(folder: Path, name: str = "tuned", text: str = SHORT, version: int = 3) -> Packed:
+    return fmu_of(deck(folder, name, text), version)
 
 
 def load(packed: Packed, folder: Path, compiler: tuple[str, ...] = ()) -> Fmu:
@@ -68,3 +71,25 @@ def run_rows(found: Experiment, case: int) -> tuple[np.ndarray, np.ndarray, dict
     run = engine.run(found, [case])
     rows = [run.signals[each.name][0].reshape(len(run.time), -1) for each in found.structure.record]
     return run.time, np.concatenate(rows, axis=1), {name: float(of[0]) for name, of in run.metrics.items()}
+
+
+def run_sanitized(script: str, packed: Packed, folder: Path, compiler: str) -> None:
+    """Run a script that prints `done` with the sanitizers of a compiler, without which the test is skipped. Its
+    arguments: the FMU, a folder to unpack it, and the command that compiles its sources."""
+    if shutil.which(compiler) is None:
+        pytest.skip(f"no {compiler}; on Debian or Ubuntu: apt-get install {compiler}")
+    (folder / "arm.fmu").write_bytes(packed.data)
+    flags = ("-std=c11", "-ffp-contract=off", "-O1", "-g", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow",
+             "-Werror", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")  # fmt: skip
+    library = "libasan.so" if compiler == "gcc" else "libclang_rt.asan-x86_64.so"
+    found = subprocess.run([compiler, f"-print-file-name={library}"], capture_output=True, text=True, check=True)
+    if not Path(found.stdout.strip()).is_absolute():
+        pytest.skip(f"{compiler} has no {library}")
+    shared = ("-shared-libasan",) if compiler == "clang" else ()
+    done = subprocess.run(
+        [sys.executable, "-c", script, folder / "arm.fmu", folder / "unpacked", compiler, *flags, *shared],
+        env={"LD_PRELOAD": found.stdout.strip(), "PYTHONPATH": ":".join(sys.path), "ASAN_OPTIONS": "detect_leaks=0",
+             "PATH": "/usr/bin:/bin", "PYTHONMALLOC": "malloc"},
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 0 and done.stdout == "done\n", done.stderr[-3000:]

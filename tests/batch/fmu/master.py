@@ -1,4 +1,4 @@
-"""A master of FMUs by ctypes alone: FMI 3.0 for co-simulation."""
+"""Masters of FMUs by ctypes alone: FMI 3.0 and, smaller, FMI 2.0, for co-simulation."""
 
 from __future__ import annotations
 
@@ -28,18 +28,26 @@ class Fmu:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             archive.extractall(folder)
         root = ElementTree.parse(folder / "modelDescription.xml").getroot()
-        self.token = root.attrib["instantiationToken"]
-        self.attributes = {each.attrib["name"]: each.attrib for each in root.iter("Float64")}
+        self.version = int(root.attrib["fmiVersion"][0])
+        self.token = root.attrib["instantiationToken" if self.version == 3 else "guid"]
+        variables = root.iter("Float64" if self.version == 3 else "ScalarVariable")
+        self.attributes = {each.attrib["name"]: each.attrib for each in variables}
         self.references = {name: int(each["valueReference"]) for name, each in self.attributes.items()}
         self.outputs = [name for name, each in self.attributes.items() if each["causality"] == "output"]
         if compiler:
             path = folder / "fmu.so"
-            subprocess.run([*compiler, "-shared", "-fPIC", "-o", path, folder / "sources" / "fmi3.c"], check=True)
+            subprocess.run(
+                [*compiler, "-shared", "-fPIC", "-o", path, folder / "sources" / f"fmi{self.version}.c"], check=True
+            )
         else:
             (path,) = (folder / "binaries").glob("*/*")
         self.called = ctypes.CDLL(str(path))
-        self.called.fmi3InstantiateCoSimulation.restype = c_void_p
-        self.called.fmi3GetVersion.restype = c_char_p
+        if self.version == 3:
+            self.called.fmi3InstantiateCoSimulation.restype = c_void_p
+            self.called.fmi3GetVersion.restype = c_char_p
+        else:
+            self.called.fmi2Instantiate.restype = c_void_p
+            self.called.fmi2GetVersion.restype = self.called.fmi2GetTypesPlatform.restype = c_char_p
 
     def instance(self, token: str | None = None, *, event_mode: bool = False) -> Instance:
         return Instance(self, self.token if token is None else token, event_mode=event_mode)
@@ -139,3 +147,50 @@ class Instance:
     def from_bytes(self, data: bytes) -> tuple[int, c_void_p]:
         state = c_void_p()
         return self.call("fmi3DeserializeFMUState", data, c_size_t(len(data)), byref(state)), state
+
+
+LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
+
+
+class Callbacks(ctypes.Structure):
+    """The functions of a master of FMI 2.0."""
+
+    _fields_ = (
+        ("logger", LOGGER), ("allocate", c_void_p), ("release", c_void_p), ("finished", c_void_p),
+        ("environment", c_void_p),
+    )  # fmt: skip
+
+
+class Instance2:
+    """One instance of an FMU of FMI 2.0. Methods return the status; `messages` has what was logged."""
+
+    def __init__(self, fmu: Fmu, token: str | None = None, kind: int = 1) -> None:
+        self.fmu, self.messages = fmu, list[str]()
+        self._callbacks = Callbacks(logger=LOGGER(lambda e, name, status, category, text: self._log(name, text)))
+        self.handle = c_void_p(
+            fmu.called.fmi2Instantiate(
+                b"arm", kind, (token or fmu.token).encode(), None, byref(self._callbacks), False, False
+            )
+        )
+
+    def _log(self, name: bytes, text: bytes) -> None:
+        assert name == b"arm"
+        self.messages.append(text.decode())
+
+    def call(self, name: str, *words: object) -> int:
+        return int(getattr(self.fmu.called, name)(self.handle, *words))
+
+    def set_up(self, start: float = 0.0, stop: float | None = None) -> int:
+        times = c_double(0.0), c_double(start), stop is not None, c_double(stop or 0.0)
+        return self.call("fmi2SetupExperiment", False, *times)
+
+    def set(self, name: str, value: float) -> int:
+        return self.call("fmi2SetReal", byref(c_uint32(self.fmu.references[name])), c_size_t(1), byref(c_double(value)))
+
+    def get(self, *names: str) -> list[float]:
+        values, references = (c_double * len(names))(), (c_uint32 * len(names))(*map(self.fmu.references.get, names))
+        assert self.call("fmi2GetReal", references, c_size_t(len(names)), values) == OK, self.messages
+        return list(values)
+
+    def step(self, time: float, size: float) -> int:
+        return self.call("fmi2DoStep", c_double(time), c_double(size), True)

@@ -58,9 +58,21 @@ def test_an_fmu_without_a_binary_has_its_sources_and_says_so(folder: Path, capsy
 def test_json_tells_what_an_fmu_has(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["compile", "deck.ic", "held", "-o", "held.fmu", "--format", "json"]) == 0
     assert json.loads(capsys.readouterr().out) == {
-        "fmu": "held.fmu", "platform": None, "parameters": 0, "inputs": 0, "outputs": 7,
+        "fmu": "held.fmu", "fmi": "3.0", "platform": None, "parameters": 0, "inputs": 0, "outputs": 7,
         "not_computed": ["loop_phase_margin"],
     }  # fmt: skip
+
+
+def test_fmi_2_is_chosen_for_an_fmu_alone(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["compile", "deck.ic", "held", "-o", "held.fmu", "--fmi", "2", "-q"]) == 0
+    with zipfile.ZipFile("held.fmu") as archive:
+        assert '<fmiModelDescription fmiVersion="2.0" ' in archive.read("modelDescription.xml").decode()
+        assert [name for name in archive.namelist() if name.startswith("sources/fmi")] == ["sources/fmi2.c"]
+        assert "SHARED fmi2.c)" in archive.read("sources/CMakeLists.txt").decode()
+    capsys.readouterr()
+    for words in ([], ["-o", "held.wasm"]):
+        assert cli.main(["compile", "deck.ic", "held", "--fmi", "2", *words]) == 2
+        assert capsys.readouterr().err.endswith("Error: --fmi is for FMUs: `-o FILE.fmu` writes one\n")
 
 
 @pytest.mark.parametrize("content", [b"mine", b"PK\x05\x06" + bytes(18)])

@@ -14,36 +14,39 @@ from tests.batch.fmu.arms import NAMES, deck, packed, run_rows
 pytestmark = [pytest.mark.oracle, pytest.mark.compiler, pytest.mark.slow]
 
 
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture(scope="module", params=[2, 3], ids=["fmi2", "fmi3"])
+def file(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
     pytest.importorskip("fmpy")
     folder = tmp_path_factory.mktemp("fmpy")
-    found = packed(folder)
+    found = packed(folder, version=request.param)
     if not found.platform:
         pytest.skip("no cc; on Debian or Ubuntu: apt-get install gcc libc6-dev")
     (folder / "arm.fmu").write_bytes(found.data)
     return folder / "arm.fmu"
 
 
+@pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("name", ["tuned", "seeded"])
-def test_the_description_is_valid(tmp_path: Path, name: str) -> None:
+def test_the_description_is_valid(tmp_path: Path, name: str, version: int) -> None:
     fmpy = pytest.importorskip("fmpy.validation")
     path = tmp_path / "arm.fmu"
-    path.write_bytes(packed(tmp_path, name).data)
+    path.write_bytes(packed(tmp_path, name, version=version).data)
     assert fmpy.validate_fmu(str(path)) == []
 
 
-def test_the_files_match_the_schemas_of_fmi(file: Path, tmp_path: Path) -> None:
+def test_the_files_match_the_schemas_of_fmi(file: Path) -> None:
     import zipfile
 
     import fmpy
     from lxml import etree
 
-    schemas = Path(fmpy.__file__).parent / "schema" / "fmi3"
-    for name, schema in (("modelDescription", "ModelDescription"), ("sources/buildDescription", "BuildDescription")):
-        with zipfile.ZipFile(file) as archive:
-            text = archive.read(f"{name}.xml")
-        etree.XMLSchema(etree.parse(schemas / f"fmi3{schema}.xsd")).assertValid(etree.fromstring(text))
+    schemas = {"modelDescription.xml": "ModelDescription", "sources/buildDescription.xml": "BuildDescription"}
+    with zipfile.ZipFile(file) as archive:
+        texts = {name: archive.read(name) for name in schemas if name in archive.namelist()}
+    version = 3 if len(texts) == 2 else 2
+    for name, text in texts.items():
+        path = Path(fmpy.__file__).parent / "schema" / f"fmi{version}" / f"fmi{version}{schemas[name]}.xsd"
+        etree.XMLSchema(etree.parse(path)).assertValid(etree.fromstring(text))
 
 
 @pytest.mark.parametrize("case", range(3))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ import pytest
 
 import ic
 from batch import Simulation
-from tests.batch.fmu.arms import NAMES, SHORT, begin_case, deck, load, packed, run_rows
+from tests.batch.fmu.arms import NAMES, SHORT, begin_case, deck, load, packed, run_rows, run_sanitized
 from tests.batch.fmu.master import DISCARD, ERROR, OK, Fmu, Instance
 
 pytestmark = [pytest.mark.compiler]
@@ -302,23 +301,7 @@ print("done")
 @pytest.mark.slow
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_sanitizers_find_nothing(folder: Path, tmp_path: Path, compiler: str) -> None:
-    if shutil.which(compiler) is None:
-        pytest.skip(f"no {compiler}; on Debian or Ubuntu: apt-get install {compiler}")
-    (tmp_path / "arm.fmu").write_bytes(packed(folder).data)
-    flags = ("-std=c11", "-ffp-contract=off", "-O1", "-g", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow",
-             "-Werror", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")  # fmt: skip
-    library = "libasan.so" if compiler == "gcc" else "libclang_rt.asan-x86_64.so"
-    found = subprocess.run([compiler, f"-print-file-name={library}"], capture_output=True, text=True, check=True)
-    if not Path(found.stdout.strip()).is_absolute():
-        pytest.skip(f"{compiler} has no {library}")
-    shared = ("-shared-libasan",) if compiler == "clang" else ()
-    done = subprocess.run(
-        [sys.executable, "-c", SANITIZED, tmp_path / "arm.fmu", tmp_path / "unpacked", compiler, *flags, *shared],
-        env={"LD_PRELOAD": found.stdout.strip(), "PYTHONPATH": ":".join(sys.path), "ASAN_OPTIONS": "detect_leaks=0",
-             "PATH": "/usr/bin:/bin", "PYTHONMALLOC": "malloc"},
-        capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 0 and done.stdout == "done\n", done.stderr[-3000:]
+    run_sanitized(SANITIZED, packed(folder), tmp_path, compiler)
 
 
 def test_only_functions_of_fmi_are_exported(fmu: Fmu, folder: Path) -> None:
