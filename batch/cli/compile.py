@@ -85,18 +85,21 @@ def _compile_fmu(experiment: Experiment, target: Path, version: int, *, form: st
     from ic.printing.columns import size
 
     fmu = files.write_fmu(experiment, target, version)
-    counts = {f"{kind}s": sum(each.kind == kind for each in fmu.variables) for kind in ("parameter", "input", "output")}
+    counts = {
+        f"{kind}s": sum(variable.kind == kind for variable in fmu.variables)
+        for kind in ("parameter", "input", "output")
+    }
     unknown = [use.name for use in experiment.linear_metrics]
     with kept(f"{target} is whole"):
         if form == "json":
-            told = {
+            contents = {
                 "fmu": str(target),
                 "fmi": f"{version}.0",
                 "platform": fmu.platform or None,
                 **counts,
                 "not_computed": unknown,
             }
-            click.echo(json.dumps(told, indent=1))
+            click.echo(json.dumps(contents, indent=1))
         elif not quiet:
             what = ", ".join(f"{count} {kinds}" for kinds, count in counts.items())
             say(f"{target}  ({size(target.stat().st_size)})  {what}")

@@ -32,7 +32,7 @@ def element(name: str, attributes: Mapping[str, object], inside: Iterable[str] =
     words = "".join(
         f" {key}={quoteattr(_text(value))}" for key, value in attributes.items() if value is not None and value != ""
     )
-    lines = [f"  {line}" for each in inside for line in each.split("\n")]
+    lines = [f"  {line}" for text in inside for line in text.split("\n")]
     return "\n".join([f"<{name}{words}>", *lines, f"</{name}>"]) if lines else f"<{name}{words}/>"
 
 
@@ -48,7 +48,8 @@ def unit_name(unit: str) -> str:
 def model_description(experiment: Experiment, variables: Sequence[Variable], naming: Naming, version: int) -> str:
     """The text of modelDescription.xml. version: of FMI, 2 or 3"""
     schedule = experiment.structure.schedule
-    outputs = [number for number, each in enumerate(variables, start=1) if each.kind == "output"]
+    numbered = list(enumerate(variables, start=1))
+    outputs = [number for number, variable in numbered if variable.kind == "output"]
     attributes = {
         "fmiVersion": f"{version}.0",
         "modelName": naming.model,
@@ -62,7 +63,7 @@ def model_description(experiment: Experiment, variables: Sequence[Variable], nam
         "stopTime": schedule.ticks / schedule.base_hz,
         "stepSize": schedule.record / schedule.base_hz,
     }
-    variable = _variable if version == 3 else _scalar_variable
+    write = _variable if version == 3 else _scalar_variable
     parts = [
         _co_simulation(naming, version, schedule.dynamics / schedule.base_hz),
         element("UnitDefinitions", {}, _units(variables)),
@@ -73,7 +74,7 @@ def model_description(experiment: Experiment, variables: Sequence[Variable], nam
             {},
             [
                 *([element("Float64", TIME)] if version == 3 else []),
-                *(variable(each, number) for number, each in enumerate(variables, start=1)),
+                *(write(variable, number) for number, variable in numbered),
             ],
         ),
         element("ModelStructure", {}, _structure(outputs, version)),
@@ -140,32 +141,32 @@ def _head(variable: Variable, reference: int) -> dict[str, object]:
 
 
 def _type(variable: Variable) -> dict[str, object]:
-    scaled = variable.start is not None and variable.scale != 1.0
     bounds = {"min": variable.low, "max": variable.high}
     return {
         "unit": unit_name(variable.unit),
-        "displayUnit": unit_name(variable.shown) if scaled else None,
+        "displayUnit": unit_name(variable.display) if has_display(variable) else None,
         **{key: value for key, value in bounds.items() if math.isfinite(value)},
         "start": variable.start,
     }
 
 
+def has_display(variable: Variable) -> bool:
+    """True where the deck writes a variable in a unit of its own."""
+    return variable.start is not None and variable.scale != 1.0 and variable.unit != "1"
+
+
 def _units(variables: Sequence[Variable]) -> Iterator[str]:
     """Each unit, with those in which the deck writes its values."""
-    shown: dict[str, dict[str, float]] = {"s": {}}
-    for each in variables:
-        if each.unit != "1":
-            of_unit = shown.setdefault(each.unit, {})
-            if each.start is not None and each.scale != 1.0:
-                of_unit[each.shown] = 1.0 / each.scale
-    for unit, displays in sorted(shown.items()):
-        measure = parse_unit(unit)
-        exponents = {name: power for name, power in measure.dimension._asdict().items() if power}
-        yield element(
-            "Unit",
-            {"name": unit_name(unit)},
-            [
-                element("BaseUnit", exponents),
-                *(element("DisplayUnit", {"name": unit_name(n), "factor": f}) for n, f in sorted(displays.items())),
-            ],
-        )
+    displays: dict[str, dict[str, float]] = {"s": {}}
+    for variable in variables:
+        if variable.unit != "1":
+            factors = displays.setdefault(variable.unit, {})
+            if has_display(variable):
+                factors[variable.display] = 1.0 / variable.scale
+    for unit, factors in sorted(displays.items()):
+        exponents = {name: power for name, power in parse_unit(unit).dimension._asdict().items() if power}
+        display_units = [
+            element("DisplayUnit", {"name": unit_name(name), "factor": factor})
+            for name, factor in sorted(factors.items())
+        ]
+        yield element("Unit", {"name": unit_name(unit)}, [element("BaseUnit", exponents), *display_units])

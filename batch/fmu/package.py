@@ -18,6 +18,7 @@ from batch.fmu.variables import Variable, changing, variables
 from met.backends.c.emit import CSource, emit, literal
 from met.backends.c.library import FLAGS
 from met.frozen import frozen
+from met.host.files import open_regular
 from met.plan import Experiment
 from met.program import plausible
 from met.program.build import UNHELD, build
@@ -25,6 +26,8 @@ from met.program.step import FAILURE
 from met.trace.recorder import record
 from met.trace.recording import Recording, RecordSection, RunSection
 from met.version import VERSION
+
+DESCRIPTION = "modelDescription.xml"
 
 ASSETS = Path(__file__).parent / "assets"
 
@@ -85,8 +88,8 @@ class Fmu:
 
 def fmu_of(experiment: Experiment, version: int = 3) -> Fmu:
     """The FMU of an experiment's first case. version: of FMI, 2 or 3"""
-    found = variables(experiment)
-    text = _model(emit(_recording(experiment)), found, experiment.structure.schedule.base_hz)
+    listed = variables(experiment)
+    text = _model(emit(_recording(experiment)), listed, experiment.structure.schedule.base_hz)
     identifier = re.sub(r"\W", "_", experiment.name, flags=re.ASCII)
     identifier = identifier if identifier[:1].isalpha() else f"met_{identifier}"
     naming = Naming(experiment.name, identifier, hashlib.sha256(text.encode()).hexdigest()[:32])
@@ -95,7 +98,7 @@ def fmu_of(experiment: Experiment, version: int = 3) -> Fmu:
         **{name: (ASSETS / name).read_text(encoding="utf-8") for name in ("fmu.h", f"fmi{version}.c")},
     }
     files = {
-        "modelDescription.xml": model_description(experiment, found, naming, version),
+        DESCRIPTION: model_description(experiment, listed, naming, version),
         "documentation/index.html": PAGE.format(identifier=identifier, version=VERSION),
         "documentation/licenses/license.txt": NOTICE,
         **({"sources/buildDescription.xml": build_description(naming, LIBRARY)} if version == 3 else {}),
@@ -110,37 +113,35 @@ def fmu_of(experiment: Experiment, version: int = 3) -> Fmu:
     name = f"{machine}-{system}" if version == 3 else FORMER.get(f"{machine}-{system}", f"{machine}-{system}")
     if binary:
         packed[f"binaries/{name}/{identifier}{ending}"] = binary
-    return Fmu(_zipped(packed), found, name if binary else "", why)
+    return Fmu(_zipped(packed), listed, name if binary else "", why)
 
 
 def is_fmu(path: Path) -> bool:
-    """True for an FMU that MET wrote."""
-    try:
-        with zipfile.ZipFile(path) as file, file.open("modelDescription.xml") as description:
-            return f'generationTool="{TOOL}'.encode() in description.read(2000)
-    except (zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError):
-        return False
+    """True for an FMU that MET wrote: its description comes first, and is not compressed."""
+    with open_regular(path) as file:
+        return f'generationTool="{TOOL}'.encode() in file.read(2000)
 
 
 def _recording(experiment: Experiment) -> Recording:
     """The program of an experiment in which coordinates may change, and rows are recorded at its end: where a master
     reads outputs, at any tick."""
     recording = record(build(experiment, changing=changing(experiment)))
-    rows = [RunSection(each.section) for each in recording.tick if isinstance(each, RecordSection)]
-    tick = tuple(each for each in recording.tick if not isinstance(each, RecordSection))
+    rows = [RunSection(node.section) for node in recording.tick if isinstance(node, RecordSection)]
+    tick = tuple(node for node in recording.tick if not isinstance(node, RecordSection))
     return replace(recording, tick=tick, end=(*rows, *recording.end))
 
 
-def _model(source: CSource, found: tuple[Variable, ...], base_hz: float) -> str:
+def _model(source: CSource, listed: tuple[Variable, ...], base_hz: float) -> str:
     """The text of model.h but for its token: the program, and the table of variables."""
     members = {**source.outputs, **source.inputs}
     alarms = [members[name] for name in (FAILURE[0], plausible.FAILED_TICK, UNHELD) if name in source.outputs]
     rows = []
-    for each in found:
-        place = f"row[{each.source}]" if isinstance(each.source, int) else members[each.source]
-        kind = "OUTPUT" if each.start is None else each.kind.upper()
-        numbers = ", ".join(_number(x) for x in (each.start or 0.0, each.low, each.high))
-        rows.append(f"    {{offsetof(met_case, {place}), {kind}, {int(each.whole)}, {numbers}}},\n")
+    for variable in listed:
+        source_name = variable.source
+        place = f"row[{source_name}]" if isinstance(source_name, int) else members[source_name]
+        kind = "OUTPUT" if variable.start is None else variable.kind.upper()
+        numbers = ", ".join(_number(x) for x in (variable.start or 0.0, variable.low, variable.high))
+        rows.append(f"    {{offsetof(met_case, {place}), {kind}, {int(variable.whole)}, {numbers}}},\n")
     return (
         f"/* The program of one run. Written by MET {VERSION}. */\n\n{source.text}\n"
         "#include <stddef.h>\n\n"
@@ -181,7 +182,7 @@ def _zipped(files: dict[str, bytes]) -> bytes:
     with zipfile.ZipFile(data, "w") as archive:
         for name, content in files.items():
             info = zipfile.ZipInfo(name)
-            info.compress_type = zipfile.ZIP_DEFLATED
+            info.compress_type = zipfile.ZIP_STORED if name == DESCRIPTION else zipfile.ZIP_DEFLATED
             info.external_attr = 0o644 << 16
             archive.writestr(info, content)
     return data.getvalue()

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
+from batch.archive.layout import coordinate_unit
 from batch.modules.description import described_columns
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import REPEAT, Coordinate, Experiment
+from met.plan import REPEAT, Coordinate, Experiment, Formula
 from met.plan.defaults import declared
 from met.plan.outputs import metric_units
 from met.program.build import METRIC
@@ -32,7 +34,7 @@ class Variable:
 
     kind      parameter: set before the run;  input: may change at every step;  output: recorded;  local: a metric
     source    its name in the program: of an input or an output; of a recorded channel its column
-    unit      SI, as MET writes it;  shown, scale: as the deck writes it, where shown = value / scale
+    unit      SI, as MET writes it;  display, scale: the deck's, where display = value / scale
     start     where it is set from outside, else None
     low, high bounds that are included
     whole     whether it takes whole numbers alone
@@ -47,7 +49,7 @@ class Variable:
     low: float = -math.inf
     high: float = math.inf
     whole: bool = False
-    shown: str = ""
+    display: str = ""
     scale: float = 1.0
 
 
@@ -68,50 +70,56 @@ def changing(experiment: Experiment) -> tuple[str, ...]:
         for axis in "xyz"
     }
     free = constant | wrenches
-    return tuple(c.path for c in experiment.cases.coordinates if c.sets and free.issuperset(c.sets))
+    coordinates = experiment.cases.coordinates
+    return tuple(coord.path for coord in coordinates if coord.sets and free.issuperset(coord.sets))
 
 
 def variables(experiment: Experiment) -> tuple[Variable, ...]:
     """All variables, in the order of their value references, which count from 1."""
-    taken = {"time"}
-    found = []
-    for each in (*_outputs(experiment), *_metrics(experiment), *_settable(experiment)):
-        name = each.name if each.name not in taken else f"coordinates.{each.name}"
-        taken.add(name)
-        found.append(each if name == each.name else Variable(**{**vars(each), "name": name}))
+    listed: dict[str, Variable] = {}
+    for variable in (*_outputs(experiment), *_metrics(experiment), *_settable(experiment)):
+        clashes = variable.name in listed or variable.name == "time"
+        name = f"coordinates.{variable.name}" if clashes else variable.name
+        listed[name] = replace(variable, name=name)
     order: tuple[Kind, ...] = ("parameter", "input", "output", "local")
-    return tuple(sorted(found, key=lambda each: order.index(each.kind)))
+    return tuple(sorted(listed.values(), key=lambda variable: order.index(variable.kind)))
 
 
 def _settable(experiment: Experiment) -> Iterator[Variable]:
+    """The variables that are set from outside, in the order of the program's inputs."""
     cases = experiment.cases
-    first = inputs(experiment, np.zeros(1, dtype=np.int64))[0].tolist()
-    held = {path: parameter for path, _, _, parameter in declared(experiment) if parameter is not None}
-    moving = changing(experiment)
-    for coordinate, start in zip(cases.coordinates, first, strict=False):
-        parameters = [held[path] for path in coordinate.sets if path in held]
+    starts = inputs(experiment, np.zeros(1, dtype=np.int64))[0].tolist()
+    declarations = {path: parameter for path, _, _, parameter in declared(experiment) if parameter is not None}
+    inputs_of_fmu = changing(experiment)
+    for coordinate, start in zip(cases.coordinates, starts, strict=False):
+        parameters = [declarations[path] for path in _equals(experiment, coordinate) if path in declarations]
         yield Variable(
             coordinate.path,
-            "input" if coordinate.path in moving else "parameter",
+            "input" if coordinate.path in inputs_of_fmu else "parameter",
             coordinate.path,
-            _si_unit(experiment, coordinate),
+            coordinate_unit(experiment, coordinate),
             parameters[0].doc if parameters else "",
             start,
-            max((_low(each) for each in parameters), default=-math.inf),
-            min((_high(each) for each in parameters), default=math.inf),
-            any(each.whole for each in parameters),
+            max(map(_low, parameters), default=-math.inf),
+            min(map(_high, parameters), default=math.inf),
+            any(parameter.whole for parameter in parameters),
             coordinate.unit,
             coordinate.scale,
         )
-    for name, start in zip(cases.noise, first[len(cases.coordinates) :], strict=True):
+    for name, start in zip(cases.noise, starts[len(cases.coordinates) :], strict=True):
         what = "number of the repeat, which has noise of its own" if name == REPEAT else "seed of the noise"
         yield Variable(name, "parameter", name, "1", what, start, 0.0, BELOW_SEED - 1.0, True)
 
 
-def _si_unit(experiment: Experiment, coordinate: Coordinate) -> str:
-    """The SI unit of a coordinate: that of the first parameter that it sets."""
-    units = [experiment.parameters[path].unit for path in coordinate.sets if path in experiment.parameters]
-    return units[0] if units else "1"
+def _equals(experiment: Experiment, coordinate: Coordinate) -> Iterator[str]:
+    """The parameters that are a coordinate's value itself, by path, and not computed from it."""
+    formulas = experiment.formulas
+    for path in coordinate.sets:
+        value = experiment.parameters[path].value
+        if isinstance(value, Formula):
+            reference = formulas.outputs[value.output]
+            if not reference & 1 and formulas.nodes[reference >> 1] == ("input", coordinate.path):
+                yield path
 
 
 def _low(parameter: Parameter) -> float:
@@ -125,9 +133,9 @@ def _high(parameter: Parameter) -> float:
 
 
 def _outputs(experiment: Experiment) -> Iterator[Variable]:
-    docs = {each.name: each.doc for each in experiment.structure.record}
-    for column, each in enumerate(described_columns(experiment)):
-        yield Variable(each["channel"], "output", column, each["unit"], docs[each["signal"]])
+    docs = {recorded.name: recorded.doc for recorded in experiment.structure.record}
+    for number, column in enumerate(described_columns(experiment)):
+        yield Variable(column["channel"], "output", number, column["unit"], docs[column["signal"]])
 
 
 def _metrics(experiment: Experiment) -> Iterator[Variable]:

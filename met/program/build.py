@@ -65,7 +65,7 @@ class Builder:
 
     def __init__(self, system: System, *, wire: bool = False, late: int = 0, changing: tuple[str, ...] = ()) -> None:
         self.system = system
-        self.changing = tuple(c for c in system.experiment.cases.coordinates if c.path in changing)
+        self.changing = tuple(coord for coord in system.experiment.cases.coordinates if coord.path in changing)
         self.schedule = system.structure.schedule
         self.joints = tuple(joint.name for joint in system.joints)
         self.step = StepPhases(system, wire=wire, late=late)

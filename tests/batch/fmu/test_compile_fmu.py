@@ -75,7 +75,33 @@ def test_fmi_2_is_chosen_for_an_fmu_alone(folder: Path, capsys: pytest.CaptureFi
         assert capsys.readouterr().err.endswith("Error: --fmi is for FMUs: `-o FILE.fmu` writes one\n")
 
 
-@pytest.mark.parametrize("content", [b"mine", b"PK\x05\x06" + bytes(18)])
+LETS = """
+let time = 2;
+let half = 0.01 V*s/rad;
+run scaled like nominal {
+    duration = 2 s;  remove settle;
+    servos { shoulder = gearbox { kp = 2 * half;  command = rate(slow * time); }; }
+}
+sweep lets of scaled { zip { time = [200, 300] %;  slow = [1, 2] deg/s;  half = [0.01, 0.02] V*s/rad; } }
+"""
+
+
+def test_bounds_of_a_model_hold_for_its_own_numbers_and_not_for_what_they_are_computed_from(folder: Path) -> None:
+    (folder / "lets.ic").write_text("#include <two_link.ic>\n" + LETS, encoding="utf-8")
+    assert cli.main(["compile", "lets.ic", "lets", "-o", "lets.fmu", "-q"]) == 0
+    with zipfile.ZipFile("lets.fmu") as archive:
+        text = archive.read("modelDescription.xml").decode()
+    variables = [line.strip() for line in text.splitlines() if "<Float64 name=" in line][:4]
+    assert [re.sub(r' (description|valueReference)="[^"]*"', "", line) for line in variables] == [
+        '<Float64 name="time" causality="independent" variability="continuous" unit="s"/>',
+        '<Float64 name="half" causality="parameter" variability="fixed" unit="V.s/rad" start="0.01"/>',
+        '<Float64 name="coordinates.time" causality="input" variability="continuous" start="2.0"/>',
+        '<Float64 name="slow" causality="input" variability="continuous" unit="rad/s" displayUnit="deg/s" '
+        'start="0.017453292519943295"/>',
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("content", [b"mine", b"PK\x03\x04" + bytes(99)])
 def test_what_is_no_fmu_of_met_is_not_written_over(
     folder: Path, capsys: pytest.CaptureFixture[str], content: bytes
 ) -> None:
