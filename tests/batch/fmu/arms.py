@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import shutil
 import subprocess
 import sys
@@ -81,7 +82,7 @@ def run_sanitized(script: str, packed: Packed, folder: Path, compiler: str) -> N
     (folder / "arm.fmu").write_bytes(packed.data)
     flags = ("-std=c11", "-ffp-contract=off", "-O1", "-g", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow",
              "-Werror", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")  # fmt: skip
-    library = "libasan.so" if compiler == "gcc" else "libclang_rt.asan-x86_64.so"
+    library = "libasan.so" if compiler == "gcc" else f"libclang_rt.asan-{platform.machine()}.so"
     found = subprocess.run([compiler, f"-print-file-name={library}"], capture_output=True, text=True, check=True)
     if not Path(found.stdout.strip()).is_absolute():
         pytest.skip(f"{compiler} has no {library}")
