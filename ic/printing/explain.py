@@ -17,7 +17,6 @@ from ic.printing.columns import columns, number, quantity, vector
 from ic.printing.settings import settings
 from ic.robots.entries import NOTES
 from ic.text.complaints import known_words
-from met import models
 from met.diagnostic import Diagnostic, Label, Place, Problem, error, nearest
 from met.messages import render
 from met.messages.message import shown_place
@@ -26,6 +25,7 @@ from met.parameter import Parameter
 from met.plan import Coordinate, Experiment, Formula, Origin, Quantity
 from met.plan.channel import recordable
 from met.plan.columns import span
+from met.plan.uses import model_uses
 from met.substitution import bed_scale
 from met.unit_parser import decimals, written
 
@@ -355,39 +355,15 @@ def _series(values: np.ndarray, unit: str) -> str:
 
 def _declaration(experiment: Experiment, name: str) -> tuple[Parameter | None, str]:
     """The model's declaration of a parameter, and the model's name; None and "" where no model declares it."""
-    structure = experiment.structure
-    words = name.split(".")
-    model: Any = None
-    for use in structure.servos:
-        if name.startswith(f"{use.joint}.servo.command.") and use.command is not None and use.command.model:
-            model, own = models.find("command", use.command.model), words[len(use.joint.split(".")) + 2]
-        elif name.startswith(f"{use.joint}.servo."):
-            model, own = models.find("servo", use.model), words[len(use.joint.split(".")) + 1]
-    for on_bed in structure.substitutions:
-        if name.startswith(f"{on_bed.joint}.bed.scale."):
-            return next((parameter for parameter in bed_scale.PARAMETERS if parameter.name == words[3]), None), "scale"
-        if name.startswith(f"{on_bed.joint}.bed."):
-            model, own = models.find("bed", on_bed.bed), words[2]
-        elif name.startswith(f"{on_bed.joint}.law."):
-            model, own = models.find("law", on_bed.law), words[2]
-    for environment in structure.environment:
-        if name.startswith(f"environment.{environment.name}."):
-            model, own = models.find("environment", environment.model), words[2]
-    for guide in structure.guides:
-        courses = {course.component: course.model for course in guide.courses}
-        if name.startswith(f"guides.{guide.name}."):
-            model, own = models.find("guide", guide.model), words[2]
-            if own in courses and len(words) > 3:
-                model, own = models.find("command", courses[own]), words[3]
-            elif own in guide.joints and len(words) > 3:
-                own = words[3]
-    for sensor in structure.sensors:
-        if name.startswith(f"sensors.{sensor.name}."):
-            model, own = models.find("sensor", sensor.model), words[2]
-    for metric in structure.metrics:
-        if name.startswith(f"metrics.{metric.name}."):
-            model, own = models.find("metric", metric.model), words[2]
-    return (None, "") if model is None else (declared(model, own), f"{model.name}")
+    around = [use for use in model_uses(experiment.structure) if name.startswith(f"{use.head}.")]
+    if not around:
+        return None, ""
+    use = around[-1]
+    first, *rest = name.removeprefix(f"{use.head}.").split(".")
+    if use.kind == "bed" and first == "scale":
+        return next((parameter for parameter in bed_scale.PARAMETERS if parameter.name == rest[0]), None), "scale"
+    of_joint = use.kind == "guide" and any(joint.name == first for joint in experiment.structure.joints)
+    return declared(use.declaration, rest[0] if of_joint and rest else first), use.model
 
 
 def _place_json(place: Place | None) -> dict[str, Any] | None:

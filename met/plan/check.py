@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from met import models, units
+from met import units
 from met.parameter import Parameter
 from met.plan import BASE, Coordinate, Experiment, Formula, Quantity
 from met.plan import guides as guides
@@ -30,6 +30,7 @@ from met.plan.defaults import INERTIA, declared, heads_of_models, related
 from met.plan.judged import Requirement
 from met.plan.outputs import tolerable
 from met.plan.swept import blocks
+from met.plan.uses import ModelUse, model_uses
 from met.statistics.confidence import can_be_shown
 from met.trace.graph import Formulas
 from met.trace.nodes import TRUTHS
@@ -261,39 +262,22 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
     for path in parameters:
         if path not in known and not path.startswith(models_of):  # a model's own: `plan_defaults`
             raise Damaged(f"{where}.{path}", "nothing in this run has this parameter")
-    for use in structure.servos:
-        if use.command is not None and use.command.model in TABLES:
-            _check_table(experiment, f"{use.joint}.servo.command", TABLES[use.command.model], where)
-        for name, word in _words(models.find("servo", use.model, use.place), use.words):
-            _is_word(parameters, f"{use.joint}.servo.{name}", word, where)
-        for sensor in use.sensors:
-            for name, word in _words(models.find("sensor", sensor.model, sensor.place), sensor.words):
-                _is_word(parameters, f"{use.joint}.servo.sensor.{sensor.of}.{name}", word, where)
-    for on_link in structure.sensors:
-        for name, word in _words(models.find("sensor", on_link.model, on_link.place), on_link.words):
-            _is_word(parameters, f"sensors.{on_link.name}.{name}", word, where)
-    for course in structure.base.courses if structure.base is not None else ():
-        if course.model in TABLES:
-            _check_table(experiment, f"base.{course.component}", TABLES[course.model], where)
-    for guide in structure.guides:
-        for course in guide.courses:
-            if course.model in TABLES:
-                _check_table(experiment, f"guides.{guide.name}.{course.component}", TABLES[course.model], where)
+    for use in model_uses(structure):
+        if use.kind == "command" and use.model in TABLES:
+            _check_table(experiment, use.head, TABLES[use.model], where)
+        for name, word in _words(use) if use.kind in ("servo", "sensor") else ():
+            _is_word(parameters, f"{use.head}.{name}", word, where)
     guides.check_paths(experiment, where)
     _check_bodies(experiment, where)
 
 
-def _words(model: Any, chosen: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
-    """Every word of a model that a structure decides: the chosen one, else the default."""
-    deciding = getattr(
-        model,
-        "deciding",
-        [word_parameter.name for word_parameter in model.parameters if word_parameter.shape == "word"],
-    )
-    words = dict(chosen)
+def _words(use: ModelUse) -> Iterator[tuple[str, str]]:
+    """Every word of a servo or sensor that a structure decides: the chosen one, else the default."""
+    model, chosen = use.declaration, dict(use.words)
+    words = [parameter.name for parameter in model.parameters if parameter.shape == "word"]
     for parameter in model.parameters:
-        if parameter.name in deciding and isinstance(parameter.default, str):
-            yield parameter.name, words.get(parameter.name, parameter.default)
+        if parameter.name in getattr(model, "deciding", words) and isinstance(parameter.default, str):
+            yield parameter.name, chosen.get(parameter.name, parameter.default)
 
 
 def _is_word(parameters: Mapping[str, Quantity], path: str, word: str, where: str) -> None:

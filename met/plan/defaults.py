@@ -11,7 +11,7 @@ from met.parameter import Parameter, is_present, under
 from met.plan import COMPONENTS, Course, Experiment, Joint, Origin, Quantity, Structure
 from met.plan.channel import JOINT_LIMITS, channels, joint_unit, ratio_unit, watched_unit
 from met.plan.loops import of_joints
-from met.plan.uses import quantities, sensor_parts, servo_parts
+from met.plan.uses import model_uses, quantities, sensor_parts, servo_parts
 from met.substitution import bed_scale
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -55,15 +55,7 @@ def unknown_parameters(experiment: Experiment) -> Iterator[tuple[str, str | None
 
 def heads_of_models(structure: Structure) -> tuple[str, ...]:
     """Prefixes of the paths of parameters that a model of the structure declares."""
-    return (
-        *(f"{use.joint}.servo." for use in structure.servos),
-        *(f"{use.joint}.{kind}." for use in structure.substitutions for kind in ("bed", "law")),
-        *(f"base.{course.component}." for course in (structure.base.courses if structure.base else ())),
-        *(f"environment.{use.name}." for use in structure.environment),
-        *(f"guides.{use.name}." for use in structure.guides),
-        *(f"sensors.{use.name}." for use in structure.sensors),
-        *(f"metrics.{use.name}." for use in structure.metrics),
-    )
+    return tuple(f"{use.head}." for use in model_uses(structure) if use.head)
 
 
 Declared = tuple[str, str, float | tuple[float, ...] | str | None, Parameter | None]

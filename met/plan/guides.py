@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
 from met import models
-from met.plan import COMPONENTS, Experiment, GuideUse, Structure
+from met.plan import COMPONENTS, Base, Experiment, GuideUse, Structure
 from met.plan.channel import carries
 from met.plan.codec import Damaged
 
@@ -31,13 +32,7 @@ def check(structure: Structure, where: str) -> None:
             raise Damaged(f"{path}.divisor", "of a guide that does not tick it should be that of the dynamics")
         if use.divisor % step:
             raise Damaged(f"{path}.divisor", f"it should be a multiple of that of the dynamics, {step}")
-        known = list(COMPONENTS if guide.components is not None else ())
-        for number, course in enumerate(use.courses):
-            if course.component not in known:
-                listed = ", ".join(known) or "none"
-                raise Damaged(f"{path}.courses[{number}].component", f"it should be one of: {listed}")
-            known = known[known.index(course.component) + 1 :]
-            models.find("command", course.model, use.place)
+        check_courses(use, COMPONENTS if guide.components is not None else (), path)
     for index, servo in enumerate(structure.servos):
         command, path = servo.command, f"{where}.servos[{index}].command"
         if command is None or not command.guide:
@@ -50,6 +45,17 @@ def check(structure: Structure, where: str) -> None:
             raise Damaged(f"{path}.kind", f"a {use_of.model} gives no command `{command.kind}`, but {', '.join(taken)}")
         if command.model:
             raise Damaged(f"{path}.model", "a command that follows a guide has none")
+
+
+def check_courses(use: Base | GuideUse, components: Sequence[str], path: str) -> None:
+    """Check that courses are those of components, in their order, and that there are their models."""
+    known = list(components)
+    for index, course in enumerate(use.courses):
+        if course.component not in known:
+            listed = f"it should be one of {', '.join(components)}, in this order"
+            raise Damaged(f"{path}.courses[{index}].component", listed if components else "this guide has no path")
+        known = known[known.index(course.component) + 1 :]
+        models.find("command", course.model, use.place)
 
 
 def check_paths(experiment: Experiment, where: str) -> None:

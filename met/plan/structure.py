@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from met import models
 from met.parameter import WORLD
@@ -43,6 +44,14 @@ def check_name(text: str, where: str, before: Collection[str] = ()) -> None:
         raise Damaged(where, f"`{text}` is there twice")
 
 
+def _check_names(parts: Sequence[Any], where: str, before: Collection[str] = ()) -> None:
+    """Check that parts have names, which are neither one another's nor those before them."""
+    names = [*before]
+    for index, part in enumerate(parts):
+        check_name(part.name, f"{where}[{index}].name", names)
+        names.append(part.name)
+
+
 def check_whole(number: int | None, low: int, high: int, where: str) -> None:
     if number is not None and not low <= number <= high:
         raise Damaged(where, f"it should be a whole number from {low} to {high}")
@@ -50,18 +59,14 @@ def check_whole(number: int | None, low: int, high: int, where: str) -> None:
 
 def _check_arm(structure: Structure, where: str) -> None:
     """Check that links and joints form a tree that stands on the base."""
-    links: list[str] = []
-    for index, link in enumerate(structure.links):
-        check_name(link.name, f"{where}.links[{index}].name", links)
-        links.append(link.name)
+    _check_names(structure.links, f"{where}.links")
+    links = [link.name for link in structure.links]
     if not links:
         raise Damaged(f"{where}.links", "there is none")
-    names: list[str] = []
+    _check_names(structure.joints, f"{where}.joints")
     parents: dict[str, str] = {}
     for index, joint in enumerate(structure.joints):
         path = f"{where}.joints[{index}]"
-        check_name(joint.name, f"{path}.name", names)
-        names.append(joint.name)
         for end, name in (("parent", joint.parent), ("child", joint.child)):
             if name not in (BASE, *links) or (end == "child" and name == BASE):
                 raise Damaged(f"{path}.{end}", f"there is no link `{name}`")
@@ -115,13 +120,7 @@ def _check_base(structure: Structure, where: str) -> None:
         raise Damaged(f"{where}.base", f"there is no link `{BASE}`, and it moves")
     if base.kind == "free" and base.courses:
         raise Damaged(f"{where}.base.courses", "a free base has none")
-    known = list(COMPONENTS)
-    for index, course in enumerate(base.courses):
-        if course.component not in known:
-            listed = ", ".join(COMPONENTS)
-            raise Damaged(f"{where}.base.courses[{index}].component", f"it should be one of {listed}, in this order")
-        known = known[known.index(course.component) + 1 :]
-        models.find("command", course.model, base.place)
+    guides.check_courses(base, COMPONENTS, f"{where}.base")
     if not structure.velocity_products and base.turns:
         raise Damaged(f"{where}.velocity_products", "a base that turns needs them")
 
@@ -129,11 +128,9 @@ def _check_base(structure: Structure, where: str) -> None:
 def _check_payloads(structure: Structure, where: str) -> None:
     """Check that payloads have names of their own and links that carry them; their flight keeps the velocity
     products."""
-    names = [BASE, WORLD, *(link.name for link in structure.links)]
     links = (BASE, *(link.name for link in structure.links))
+    _check_names(structure.payloads, where, (WORLD, *links))
     for index, payload in enumerate(structure.payloads):
-        check_name(payload.name, f"{where}[{index}].name", names)
-        names.append(payload.name)
         if payload.link not in links:
             raise Damaged(f"{where}[{index}].link", f"there is no link `{payload.link}`")
     if not structure.velocity_products and any(payload.flies for payload in structure.payloads):
@@ -147,10 +144,9 @@ def _check_schedule(structure: Structure, where: str) -> None:
     check_whole(schedule.ticks, 0, MOST_TICKS, f"{path}.ticks")
     check_whole(schedule.dynamics, 1, MOST_TICKS, f"{path}.dynamics")
     check_whole(schedule.record, 1, MOST_TICKS, f"{path}.record")
-    for index, use in enumerate(structure.servos):
-        check_whole(use.divisor, 1, MOST_TICKS, f"{where}.servos[{index}].divisor")
-    for index, environment in enumerate(structure.environment):
-        check_whole(environment.divisor, 1, MOST_TICKS, f"{where}.environment[{index}].divisor")
+    for field in ("servos", "environment", "guides", "sensors"):
+        for index, ticking in enumerate(getattr(structure, field)):
+            check_whole(ticking.divisor, 1, MOST_TICKS, f"{where}.{field}[{index}].divisor")
 
 
 def _check_uses(structure: Structure, where: str) -> None:
@@ -178,22 +174,13 @@ def _check_uses(structure: Structure, where: str) -> None:
         _check_sensors(use, path)
         if use.continuous and use.divisor != structure.schedule.dynamics:
             raise Damaged(f"{path}.divisor", "of a continuous law it should be that of the dynamics")
-    names: list[str] = []
-    for index, environment in enumerate(structure.environment):
-        check_name(environment.name, f"{where}.environment[{index}].name", names)
-        names.append(environment.name)
-    names = []
-    for index, guide in enumerate(structure.guides):
-        check_name(guide.name, f"{where}.guides[{index}].name", names)
-        check_whole(guide.divisor, 1, MOST_TICKS, f"{where}.guides[{index}].divisor")
-        names.append(guide.name)
+    _check_names(structure.environment, f"{where}.environment")
+    _check_names(structure.guides, f"{where}.guides")
     _check_link_sensors(structure, f"{where}.sensors")
-    names = []
     _check_expressions(structure, f"{where}.expressions")
+    _check_names(structure.metrics, f"{where}.metrics")
     known_channels = channels(structure) if structure.metrics else {}
     for index, metric in enumerate(structure.metrics):
-        check_name(metric.name, f"{where}.metrics[{index}].name", names)
-        names.append(metric.name)
         if metric.of not in known_channels:
             raise Damaged(f"{where}.metrics[{index}].of", f"there is no channel `{metric.of}`")
     models.find("integrator", structure.integrator)
@@ -240,18 +227,15 @@ def _check_sensors(use: ServoUse, path: str) -> None:
 def _check_link_sensors(structure: Structure, where: str) -> None:
     """Check that sensors of links have names of their own, models that measure a quantity of a link, and ticks at
     instants."""
-    names: list[str] = []
+    _check_names(structure.sensors, where)
     for index, use in enumerate(structure.sensors):
         path = f"{where}[{index}]"
-        check_name(use.name, f"{path}.name", names)
-        names.append(use.name)
         model = models.find("sensor", use.model, use.place)
         if model.measures is None:
             raise Damaged(f"{path}.model", f"`{use.model}` is a sensor of a joint: it stands in a servo")
         words = [parameter.name for parameter in model.parameters if parameter.shape == "word" and not parameter.names]
         if unknown := [name for name, _ in use.words if name not in words]:
             raise Damaged(f"{path}.words", f"`{use.model}` has no word `{unknown[0]}`")
-        check_whole(use.divisor, 1, MOST_TICKS, f"{path}.divisor")
         step = structure.schedule.dynamics
         if use.divisor % step:
             raise Damaged(f"{path}.divisor", f"it should be a multiple of that of the dynamics, {step}")

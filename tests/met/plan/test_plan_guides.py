@@ -108,15 +108,15 @@ def test_a_plan_with_guides_is_read_as_it_was_written(tmp_path: Path) -> None:
         (command(2, model="ramp"), "structure.servos[2].command.model: a command that follows a guide has none"),
         (
             course(0, component="w"),
-            "structure.guides[0].courses[0].component: it should be one of: x, y, z, roll, pitch, yaw",
+            "structure.guides[0].courses[0].component: it should be one of x, y, z, roll, pitch, yaw, in this order",
         ),
         (
             course(1, component="x"),
-            "structure.guides[0].courses[1].component: it should be one of: y, z, roll, pitch, yaw",
+            "structure.guides[0].courses[1].component: it should be one of x, y, z, roll, pitch, yaw, in this order",
         ),
         (
             lambda e: e["structure"]["guides"][1].update(courses=[{"component": "x", "model": "ramp"}]),
-            "structure.guides[1].courses[0].component: it should be one of: none",
+            "structure.guides[1].courses[0].component: this guide has no path",
         ),
         (value("tip.x.values", [0.0]), "parameters.guides.tip.x.values: there are 1 for 2 times"),
         (value("tip.x.times", [1.0, 0.0]), "parameters.guides.tip.x.times: they do not rise"),
