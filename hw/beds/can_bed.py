@@ -585,7 +585,7 @@ def _opened_port(opening: Opening) -> CanBed:
         drive=drive,
         believed=can_deck.believed_loop(opening),
         torque_believed=0.0 if opening.experiment is None else can_deck.believed_torque(opening),
-        of_deck=can_deck.warnings(bench, path, opening),
+        of_deck=tuple(can_deck.warnings(bench, path, opening)),
     )
 
 

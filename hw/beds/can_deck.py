@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from hw.drives import DIALECTS
 from hw.drives.bench_file import TwoDrives, two_drives
 from hw.ports import Opening
@@ -62,16 +64,15 @@ def _check_told(path: str, bench: TwoDrives, use: Substitution) -> None:
     raise Problem(error("E438", message, bench.dialect_at, also=also, help=helps), {path: bench.text})
 
 
-def warnings(bench: TwoDrives, path: str, opening: Opening) -> tuple[Diagnostic, ...]:
+def warnings(bench: TwoDrives, path: str, opening: Opening) -> Iterator[Diagnostic]:
     """Warnings about permissible differences of the bench from the deck: E444."""
     if opening.experiment is None:
-        return ()
-    diagnostics = []
+        return
     if bench.filter_at is None:
         cut = opening.bed_values()["f_cut"]
         message = f"the bench has no filter: the deck's `f_cut`, {cut:g} Hz, has to be that of the drive's own rate"
         remedy = (f'else `filter = "{cut:g} Hz"` in `[shaft]` of {path}',)
-        diagnostics.append(Diagnostic("E444", message, help=remedy, severity="warning"))
+        yield Diagnostic("E444", message, help=remedy, severity="warning")
     most, believed = bench.drive.figures["torque_max"], believed_torque(opening)
     if most < (1.0 - 1e-9) * believed and bench.torque_at is not None:
         message = (
@@ -83,8 +84,7 @@ def warnings(bench: TwoDrives, path: str, opening: Opening) -> tuple[Diagnostic,
             WEAKER,
             "a larger `torque_max` of `[drive]`, if drive and shaft bear it, or a smaller `tau_max` in the deck",
         )
-        diagnostics.append(Diagnostic("E444", message, Label(bench.torque_at), also, helps, "warning"))
-    return tuple(diagnostics)
+        yield Diagnostic("E444", message, Label(bench.torque_at), also, helps, "warning")
 
 
 def believed_torque(opening: Opening) -> float:

@@ -51,7 +51,8 @@ class SteppedPlant(Protocol):
         """Advance one tick with the amplifiers' held outputs, V and A. Returns the filtered rate after it, rad/s."""
 
     @property
-    def shaft_angle(self) -> float: ...
+    def shaft_angle(self) -> float:
+        """The shaft's angle, rad."""
 
 
 def scales(values: Mapping[str, float], drive: DriveCommand = "voltage") -> Scales:

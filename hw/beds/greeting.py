@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from hw.bed import LIMIT_NAMES, About, Capability, Limits, Scales
 from hw.protocol import messages
@@ -119,15 +119,13 @@ def _scales(scales: Scales, capabilities: Capability) -> list[str]:
     ]
 
 
-def _limits(limits: Limits, scales: Scales) -> list[str]:
-    wrong = []
+def _limits(limits: Limits, scales: Scales) -> Iterator[str]:
     for name, value in limits.__dict__.items():
         scale = getattr(scales, name, None)
         if not (math.isfinite(value) and value > 0.0):
-            wrong.append(f"its limit of {_words(name)} is {value:g} {_UNITS[name]}")
+            yield f"its limit of {_words(name)} is {value:g} {_UNITS[name]}"
         elif scale is not None and scale > 0.0 and not 1.0 <= value / scale <= messages.MOST:
-            wrong.append(f"its limit of {_words(name)}, {value:g} {_UNITS[name]}, is {value / scale:.3g} counts")
-    return wrong
+            yield f"its limit of {_words(name)}, {value:g} {_UNITS[name]}, is {value / scale:.3g} counts"
 
 
 def _words(name: str) -> str:

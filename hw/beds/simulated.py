@@ -20,7 +20,7 @@ from hw.bed import Capability
 from hw.beds import emulated
 from hw.beds.wire import WireBed
 from hw.boards.build import Config, Shaft, Uncountable, build, qemu
-from hw.line import BAUD, BedLine
+from hw.line import BAUD, BedLine, HostClock
 from hw.lines.transcript import TranscribedLine, TranscriptWriter
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
@@ -104,15 +104,12 @@ class SimulatedBed(WireBed):
                     time.sleep(0.01)
 
 
-class SocketLine:
+class SocketLine(HostClock):
     """A line over a socket that is connected already."""
 
     def __init__(self, connection: socket.socket) -> None:
         connection.setblocking(False)
         self._connection = connection
-
-    def now(self) -> float:
-        return time.perf_counter()
 
     def send(self, frame: bytes) -> None:
         try:
@@ -130,9 +127,6 @@ class SocketLine:
         if not data:
             raise _lost("it was closed")
         return data
-
-    def sleep(self, seconds: float) -> None:
-        time.sleep(seconds)
 
     def close(self) -> None:
         with contextlib.suppress(OSError):

@@ -16,7 +16,7 @@ from hw.drives.bench_file import FDCANUSB, SERIAL
 from hw.drives.fdcanusb import LOST, FdcanusbLine
 from hw.drives.frames import CanFrame, CanLine
 from hw.drives.odrive_lines import PULLED, OdriveLines
-from hw.line import BAUD
+from hw.line import BAUD, HostClock
 from hw.lines.serial_port import SerialLine
 from met.diagnostic import Problem, error
 
@@ -31,7 +31,7 @@ def open_bus(settings: Mapping[str, Any]) -> CanLine:
     return FdcanusbLine(SerialLine(str(settings["channel"]), BAUD, "the fdcanusb", LOST), settings)
 
 
-class PythonCanLine:
+class PythonCanLine(HostClock):
     """A bus of python-can, open as soon as it is made. Making it raises Problem E400 or E449, its methods raise E401.
 
     settings  what `can.Bus` is called with: interface, channel, bitrate ...
@@ -54,9 +54,6 @@ class PythonCanLine:
             message = f"CAN bus {self._name} cannot be opened: {' '.join(str(reason).split()) or type(reason).__name__}"
             raise Problem(error("E400", message, help=helps)) from None
         self._offset = time.perf_counter() - time.time()  # interfaces stamp frames by the time of day
-
-    def now(self) -> float:
-        return time.perf_counter()
 
     def send(self, frame: CanFrame) -> None:
         message = self._message(
@@ -94,9 +91,6 @@ class PythonCanLine:
                 came,
             )
 
-    def sleep(self, seconds: float) -> None:
-        time.sleep(seconds)
-
     def close(self) -> None:
         with contextlib.suppress(*self._failures):
             self._bus.shutdown()
@@ -110,7 +104,7 @@ class PythonCanLine:
         return Problem(error("E401", message, help=helps))
 
 
-class SerialPair:
+class SerialPair(HostClock):
     """The bytes of serial lines, as frames whose identifier is the number of the line's drive, however they are cut.
     Making it raises Problem E400, its methods raise E401.
 
@@ -126,9 +120,6 @@ class SerialPair:
             self.close()
             raise
 
-    def now(self) -> float:
-        return time.perf_counter()
-
     def send(self, frame: CanFrame) -> None:
         self._lines[frame.id].send(frame.data)
 
@@ -142,9 +133,6 @@ class SerialPair:
                     return CanFrame(number, data, time=time.perf_counter())
             if time.perf_counter() >= until:
                 return None
-
-    def sleep(self, seconds: float) -> None:
-        time.sleep(seconds)
 
     def close(self) -> None:
         for line in self._lines.values():

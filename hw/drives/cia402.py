@@ -89,7 +89,6 @@ class Cia402Drive(CanDrive):
     """The host's side of a CiA 402 drive."""
 
     dialect = "cia402"
-    answers_commands = True
     takes_rates = True
     unseen = f"on another port of a drive, such as USB, {SELDOM}"
 
@@ -300,9 +299,6 @@ class Cia402Drive(CanDrive):
     def idle(self) -> Sequence[CanFrame]:
         self._wanted = False
         return (self._pdo(OFF),)
-
-    def halted(self) -> Sequence[CanFrame]:
-        return self.idle()
 
     def cleared(self) -> Sequence[CanFrame]:
         self._wanted, self._error = False, 0

@@ -60,7 +60,6 @@ class DamiaoDrive(CanDrive):
     """The host's side of a Damiao drive."""
 
     dialect = "damiao"
-    answers_commands = True
 
     def __init__(self, entry: DriveEntry) -> None:
         super().__init__(entry)
@@ -163,9 +162,6 @@ class DamiaoDrive(CanDrive):
     def idle(self) -> Sequence[CanFrame]:
         """Send no torque while the drive still takes it, so that none is left when it is enabled."""
         return (*self.command(0.0), self._frame(DISABLE))
-
-    def halted(self) -> Sequence[CanFrame]:
-        return self.idle()
 
     def cleared(self) -> Sequence[CanFrame]:
         return (self._frame(CLEAR), self._frame(DISABLE))

@@ -121,7 +121,7 @@ class CanDrive(ABC):
     """
 
     dialect: str
-    answers_commands = False
+    answers_commands = True
     """True where its answer to a command has its angle, rate and state, so that it need not be asked."""
     unseen = "commands on another port of a drive, such as USB"
     """What another master may do to it without being noticed, in words."""
@@ -174,10 +174,10 @@ class CanDrive(ABC):
     def idle(self) -> Sequence[CanFrame]:
         """Frames that switch its output off."""
 
-    @abstractmethod
     def halted(self) -> Sequence[CanFrame]:
         """Frames that switch its output off so that it does not drive again until its errors are cleared, where the
         dialect has such; else those of `idle`."""
+        return self.idle()
 
     @abstractmethod
     def cleared(self) -> Sequence[CanFrame]:

@@ -21,7 +21,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hw.drives.frames import SIZES, CanFrame
-from hw.line import BedLine
+from hw.line import BedLine, LineOverLine
 from met.diagnostic import Problem, error
 
 SPEEDS = {"bitrate": "can.bitrate", "data_bitrate": "can.fd_bitrate"}
@@ -56,7 +56,7 @@ LOST = (
 _FRAME = re.compile(rb"rcv ([0-9A-F]{1,8}) ((?:[0-9A-F]{2})*) ([EeBbFfRr](?: [EeBbFfRr]){3})((?: [tfx]-?[0-9A-F]+)*)")
 
 
-class FdcanusbLine:
+class FdcanusbLine(LineOverLine):
     """A CAN bus behind an fdcanusb, open as soon as it is made. Making it raises Problem E400, its methods raise E401.
 
     line      carries the adapter's bytes
@@ -65,7 +65,8 @@ class FdcanusbLine:
     """
 
     def __init__(self, line: BedLine, settings: Mapping[str, Any]) -> None:
-        self._line, self._name = line, str(settings["channel"])
+        super().__init__(line)
+        self._name = str(settings["channel"])
         self._rest, self._lines, self._frames = b"", deque[bytes](), deque[CanFrame]()
         self.refused = 0
         self._sent = deque[float]()
@@ -77,15 +78,6 @@ class FdcanusbLine:
         except BaseException:
             line.close()
             raise
-
-    def now(self) -> float:
-        return self._line.now()
-
-    def sleep(self, seconds: float) -> None:
-        self._line.sleep(seconds)
-
-    def close(self) -> None:
-        self._line.close()
 
     def send(self, frame: CanFrame) -> None:
         if not frame.data:

@@ -39,7 +39,8 @@ class CanLine(Protocol):
     def now(self) -> float:
         """The time of the line's clock, s."""
 
-    def send(self, frame: CanFrame) -> None: ...
+    def send(self, frame: CanFrame) -> None:
+        """Send a frame."""
 
     def receive(self, until: float) -> CanFrame | None:
         """The next frame that has come, or comes until this time of the line's clock, s; else None."""
@@ -47,7 +48,8 @@ class CanLine(Protocol):
     def sleep(self, seconds: float) -> None:
         """Let `seconds` pass on the line's clock."""
 
-    def close(self) -> None: ...
+    def close(self) -> None:
+        """Close the line."""
 
 
 def on_bus(frame: CanFrame, bitrate: float = NOMINAL, fast: float = FAST) -> float:

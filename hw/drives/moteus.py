@@ -144,7 +144,6 @@ class MoteusDrive(CanDrive):
     """The host's side of a moteus."""
 
     dialect = "moteus"
-    answers_commands = True
 
     def __init__(self, entry: DriveEntry) -> None:
         super().__init__(entry)
@@ -199,9 +198,6 @@ class MoteusDrive(CanDrive):
         if self.state == DriveState.FAILED:
             return ()
         return (self._frame(written(INT8, MODE, BRAKING if self.entry.role == "drive" else STOPPED) + _STATE),)
-
-    def halted(self) -> Sequence[CanFrame]:
-        return self.idle()
 
     def cleared(self) -> Sequence[CanFrame]:
         return (self._frame(written(INT8, MODE, STOPPED)),)

@@ -69,6 +69,7 @@ class OdriveDrive(OdriveAxis):
     """The host's side of an ODrive's axis."""
 
     dialect = "odrive"
+    answers_commands = False
 
     def __init__(self, entry: DriveEntry) -> None:
         super().__init__(entry)

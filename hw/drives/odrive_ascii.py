@@ -56,7 +56,6 @@ class OdriveAsciiDrive(OdriveAxis):
 
     dialect = ASCII
     unseen = SELDOM
-    answers_commands = True  # each command goes with the questions of an exchange
 
     def __init__(self, entry: DriveEntry) -> None:
         super().__init__(entry)
@@ -180,9 +179,6 @@ class OdriveAsciiDrive(OdriveAxis):
 
     def idle(self) -> Sequence[CanFrame]:
         return (self._command(0.0), self._text(f"w {REQUESTED} {IDLE}"))
-
-    def halted(self) -> Sequence[CanFrame]:
-        return self.idle()
 
     def cleared(self) -> Sequence[CanFrame]:
         return (self._text("sc"), *self.idle())

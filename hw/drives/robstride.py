@@ -100,7 +100,6 @@ class RobstrideDrive(CanDrive):
     """The host's side of a RobStride drive."""
 
     dialect = "robstride"
-    answers_commands = True
 
     def __init__(self, entry: DriveEntry) -> None:
         super().__init__(entry)
@@ -251,9 +250,6 @@ class RobstrideDrive(CanDrive):
         """Send no torque while the drive still takes it, so that none is left when it is enabled."""
         self._wanted = self._ran = False
         return (*self.command(0.0), self._frame(STOP))
-
-    def halted(self) -> Sequence[CanFrame]:
-        return self.idle()
 
     def cleared(self) -> Sequence[CanFrame]:
         self._wanted, self._ran, self._faults = False, False, 0

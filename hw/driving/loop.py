@@ -31,10 +31,11 @@ late. Not longer, for the system throttles a process that only watches clocks.""
 
 
 class Compute(Protocol):
-    """Computes the commands after exchange e. rates: rad/s, one a bed; commands: [voltage V, current A] of each bed,
-    changed in place."""
+    """The computing of commands between two exchanges with the beds."""
 
-    def __call__(self, e: int, rates: Sequence[float], commands: list[list[float]]) -> None: ...
+    def __call__(self, e: int, rates: Sequence[float], commands: list[list[float]]) -> None:
+        """Compute the commands after exchange `e`: [voltage V, current A] of each bed, changed in place. rates: rad/s,
+        one a bed."""
 
 
 @frozen

@@ -11,7 +11,7 @@ mixed      three sines of the voltage and two of the current
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from met.frozen import frozen
 
@@ -76,16 +76,14 @@ def _steps() -> list[Move]:
     ]
 
 
-def _loaded() -> list[Move]:
-    moves = []
+def _loaded() -> Iterator[Move]:
     for volts, amperes in [(0.3, 0.5), (0.5, -0.6), (0.15, 0.35), (0.4, 0.25)]:
         for sign in (1.0, -1.0):
             v, a = sign * volts, sign * amperes
-            moves.append(Move("loaded", 0.8, _levels(0.2, (v, 0.0), (v, a), (v, -a), (v, 0.5 * a))))
-    return moves
+            yield Move("loaded", 0.8, _levels(0.2, (v, 0.0), (v, a), (v, -a), (v, 0.5 * a)))
 
 
-def _slow() -> list[Move]:
+def _slow() -> Iterator[Move]:
     def ramps(volts: float, amperes: float, time: float) -> Callable[[], Profile]:
         def profile(t: float, w: float) -> tuple[float, float]:
             turn = math.sin(2.0 * math.pi * t / time)
@@ -93,15 +91,13 @@ def _slow() -> list[Move]:
 
         return lambda: profile
 
-    moves = []
     for share in (1.0, -1.0):
-        moves += [
+        yield from [
             Move("slow", 1.6, ramps(share * 0.12, 0.0, 1.6)),
             Move("slow", 1.6, ramps(share * 0.25, 0.0, 0.8)),
             Move("slow", 1.6, ramps(0.0, share * 0.6, 1.6)),
             Move("slow", 1.2, ramps(0.0, share * 0.9, 0.6)),
         ]
-    return moves
 
 
 def _limited(top: float) -> list[Move]:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from hw.line import HostClock
 from met.diagnostic import Diagnostic, Problem, error
 
 _WRITE_TIMEOUT = 1.0
@@ -42,7 +43,7 @@ LOST = (
 """Remedy where the line to a bed was lost."""
 
 
-class SerialLine:
+class SerialLine(HostClock):
     """A serial line, open as soon as it is made. Making it raises Problem E400, its methods raise E401.
 
     A device is open for this process alone: the system lets no other open it then (TIOCEXCL), but one of the
@@ -81,9 +82,6 @@ class SerialLine:
         """The number of its file, by which the system can wait for it; None where it has none."""
         return self._file
 
-    def now(self) -> float:
-        return time.perf_counter()
-
     def send(self, frame: bytes) -> None:
         try:
             self._port.write(frame)
@@ -104,9 +102,6 @@ class SerialLine:
                     return b""
         except OSError as reason:
             raise self._lost(reason) from None
-
-    def sleep(self, seconds: float) -> None:
-        time.sleep(seconds)
 
     def close(self) -> None:
         # pyserial does not close a socket whose other end has gone

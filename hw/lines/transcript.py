@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from hw.line import BedLine
+from hw.line import BedLine, LineOverLine
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import parse_json, read_regular, settle
@@ -92,17 +92,15 @@ class TranscriptFile:
         self._file.close()
 
 
-class TranscribedLine:
+class TranscribedLine(LineOverLine):
     """A line with a transcript of its traffic. If the transcript cannot be written, that is raised once, and the line
     goes on without it."""
 
     def __init__(self, line: BedLine, writer: TranscriptWriter) -> None:
-        self._line, self._writer = line, writer
+        super().__init__(line)
+        self._writer = writer
         self._writing = True
         self._add(OPENED, b"")
-
-    def now(self) -> float:
-        return self._line.now()
 
     def send(self, frame: bytes) -> None:
         try:
@@ -122,12 +120,6 @@ class TranscribedLine:
         if data:
             self._add(RECEIVED, data)
         return data
-
-    def sleep(self, seconds: float) -> None:
-        self._line.sleep(seconds)
-
-    def close(self) -> None:
-        self._line.close()
 
     def _lost(self, lost: Problem) -> None:
         self._add(LOST, lost.diagnostics[0].message.encode())

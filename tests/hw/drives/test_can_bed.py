@@ -362,7 +362,7 @@ def test_probe_has_words_for_what_a_bench_of_drives_is(tmp_path: Path) -> None:
     for kind, told in kinds.items():
         with host_of(two_drives(path), PlayedLine(played_bench()), drive=kind) as bed:
             about = bed.connect()
-            rows = lines(ProbeResult("can:bench.toml", about, bed.read(), (), 0, 0.0, (), bed.remarks))
+            rows = list(lines(ProbeResult("can:bench.toml", about, bed.read(), (), 0, 0.0, (), bed.remarks)))
         assert rows[1].endswith(", of what both drives say of themselves; they speak no protocol of MET's")
         assert rows[2] == (
             f"  has       {told}, load torque by a current, rate as the drive tells it, encoder, "
