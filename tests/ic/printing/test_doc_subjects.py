@@ -67,7 +67,7 @@ def test_units_lists_them_all_with_what_they_are_in_si(capsys: pytest.CaptureFix
 
 def test_the_list_of_models_ends_with_what_else_there_is(capsys: pytest.CaptureFixture[str]) -> None:
     assert printed(capsys).endswith(
-        "Blocks of a deck: arm, link, boom, joint, run, rates, initial, payload, substitute, scale, linear, tolerances, sweep, search, tune.\n"
+        "Blocks of a deck: arm, link, boom, joint, loop, run, rates, initial, payload, substitute, scale, linear, tolerances, sweep, search, tune.\n"
         "Also: designs, dh, distributions, functions, language, shapes, units; and the code of a message, as in `met doc D060`.\n"
     )
 

@@ -75,4 +75,4 @@ def test_a_used_deck_is_named_as_one(desk: Desk):
 
 
 def test_the_words_of_definitions_that_a_condition_knows_are_those_of_the_language():
-    assert {*DEFINITIONS, "let", "param", "link", "joint", "unit", "as"} == set(NAMING)
+    assert {*DEFINITIONS, "let", "param", "link", "joint", "loop", "unit", "as"} == set(NAMING)

@@ -46,7 +46,13 @@ def test_all_have_the_bits_of_the_default(name: str, run: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize(("text", "sweep"), [(GROUPS, "ratios"), (LINKED, "places")], ids=["ratios", "loops"])
+@pytest.mark.parametrize(
+    ("text", "sweep"),
+    [
+        pytest.param(GROUPS, "ratios", id="ratios"),
+        pytest.param(LINKED, "places", marks=pytest.mark.release, id="loops"),
+    ],
+)
 def test_joints_that_follow_others_have_the_bits_of_the_default(
     text: str, sweep: str, name: str, tmp_path: Path
 ) -> None:
