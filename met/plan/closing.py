@@ -82,7 +82,7 @@ def corners_of(loop: Loop, joints: Sequence[Joint], number: Callable[[str], Real
 
     rows: list[list[Corner]] = []
     pins: list[Vector] = []
-    for way, along, point in zip(ways(loop, joints), (-1, 1), ("at", "to_at"), strict=True):
+    for way, along, pin in zip(ways(loop, joints), (-1, 1), ("at", "to_at"), strict=True):
         R, p = IDENTITY, ZERO
         rows.append([])
         for joint in way:
@@ -92,7 +92,7 @@ def corners_of(loop: Loop, joints: Sequence[Joint], number: Callable[[str], Real
                 pivot = add(p, turn_vector(R, vector(f"{joint.name}.pivot")))
                 axis = turn_vector(R, vector(f"{joint.name}.axis"))
                 rows[-1].append(Corner(joint.name, pivot, pivot, joint.kind, axis, along))
-        pins.append(add(p, turn_vector(R, vector(f"{loop.name}.{point}"))))
+        pins.append(add(p, turn_vector(R, vector(f"{loop.name}.{pin}"))))
     corners = [*reversed(rows[0]), *rows[1], Corner("", before=pins[1], after=pins[0])]
     first = [corner.name for corner in corners].index(loop.leader)
     return corners[first:] + corners[:first]

@@ -139,9 +139,9 @@ def test_the_motion_is_that_of_the_closed_form(
     tmp_path: Path, text: str, leader: str, pose: Pose, matter: tuple[float, ...], spring: tuple[float, float]
 ) -> None:
     """J u'' + J' u'^2/2 + V' = 0, with J and V of bodies whose places are found by trigonometry."""
-    made = experiment(tmp_path, text)
-    run, names = engine.run(made), [joint.name for joint in made.structure.moving]
-    u, ud, udd = (run.signals[each][0, :, names.index(leader)] for each in ("q", "qd", "qdd"))
+    compiled = experiment(tmp_path, text)
+    run, names = engine.run(compiled), [joint.name for joint in compiled.structure.moving]
+    u, ud, udd = (run.signals[name][0, :, names.index(leader)] for name in ("q", "qd", "qdd"))
     masses = [x for m, moment in zip(matter[::2], matter[1::2], strict=True) for x in (m, m, moment)]
 
     def inertia(x: float) -> float:
@@ -149,8 +149,8 @@ def test_the_motion_is_that_of_the_closed_form(
         return float(sum(m * rate**2 for m, rate in zip(masses, rates, strict=True)))
 
     def energy(z: complex) -> complex:
-        at = pose(z)
-        return sum(m * G * at[3 * k + 1] for k, m in enumerate(matter[::2])) + spring[0] / 2 * (z - spring[1]) ** 2
+        places = pose(z)
+        return sum(m * G * places[3 * k + 1] for k, m in enumerate(matter[::2])) + spring[0] / 2 * (z - spring[1]) ** 2
 
     step = 1e-5
     for k in range(0, len(u), 10):
@@ -176,7 +176,7 @@ def test_integrators_keep_their_order_and_energy_stays(tmp_path: Path, text: str
         ends.append(signals["q"][0])
         energy = signals["energy.kinetic"][0] + signals["energy.potential"][0]
         drifts.append(np.abs(energy - energy[0]).max() / np.ptp(signals["energy.kinetic"][0]))
-    errors = np.array([np.abs(each - ends[3]).max() for each in ends[:3]])
+    errors = np.array([np.abs(history - ends[3]).max() for history in ends[:3]])
     assert np.log2(errors[:-1] / errors[1:]) == pytest.approx(order, abs=0.1)
     assert drifts[-1] < 1e-6
 
@@ -184,7 +184,7 @@ def test_integrators_keep_their_order_and_energy_stays(tmp_path: Path, text: str
 @pytest.mark.parametrize("text", [CRANE, BARS], ids=["ram", "four bars"])
 def test_a_loop_stays_closed_to_rounding(tmp_path: Path, text: str) -> None:
     wanted = "links.rod, links.boom" if text is CRANE else "links.coupler, links.rocker"
-    names = [f"{each}.{kind}" for each in wanted.split(", ") for kind in ("position", "orientation")]
+    names = [f"{link}.{kind}" for link in wanted.split(", ") for kind in ("position", "orientation")]
     signals = engine.run(
         experiment(tmp_path, changed(text, ("record = [q,", f"record = [{', '.join(names)}, q,")))
     ).signals
@@ -245,8 +245,8 @@ def test_a_loop_sticks_as_one(tmp_path: Path, push: float, slides: bool) -> None
 
 def ratios(folder: Path, text: str) -> dict[str, float]:
     """The sizes of the rates of the crane's joints for each unit of the stroke's, where it begins."""
-    made = experiment(folder, text)
-    rates = {name: made.parameters[f"initial.{name}.qd"].value for name in ("hinge", "swing", "stroke")}
+    compiled = experiment(folder, text)
+    rates = {name: compiled.parameters[f"initial.{name}.qd"].value for name in ("hinge", "swing", "stroke")}
     return {name: abs(rate / rates["stroke"]) for name, rate in rates.items()}  # type: ignore[operator]
 
 
@@ -298,8 +298,8 @@ def test_a_payload_that_a_boom_grapples_strikes_the_ram(tmp_path: Path) -> None:
     )  # fmt: skip
     place = engine.run(experiment(tmp_path, text)).signals
     tip = np.array([2 * np.cos(place["q"][0, 1, 0]), 0, 1 + 2 * np.sin(place["q"][0, 1, 0])])
-    told = changed(text, ("position = [0, 0, 0] m", f"position = {[float(x) for x in tip]} m"))
-    signals = engine.run(experiment(tmp_path, told)).signals
+    at_tip = changed(text, ("position = [0, 0, 0] m", f"position = {[float(x) for x in tip]} m"))
+    signals = engine.run(experiment(tmp_path, at_tip)).signals
     ratio = signals["qd"][0, 1, 0] / signals["qd"][0, 1, 2]
     before, J = engine.run(experiment(tmp_path, CRANE)).signals["qd"][0, 0, 2], signals["stroke.J_eff"][0]
     assert J[1] - J[0] == pytest.approx(10 * (2 * ratio) ** 2, rel=1e-2)

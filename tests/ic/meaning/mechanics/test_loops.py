@@ -86,9 +86,9 @@ def test_a_loop_that_does_not_close_three_joints_of_a_plane_is_refused(
 def test_a_loop_that_is_open_where_its_leader_begins_says_where_it_closes(
     tmp_path: Path, text: str, start: str, far: str, way: str
 ) -> None:
-    said = messages(check(tmp_path, changed(text, (start, far))))
-    assert "does not close where its leader begins" in said and way in said
-    (remedy,) = re.findall(r"it closes at `initial \{ (.*); \}`, the nearest", said)
+    refusal = messages(check(tmp_path, changed(text, (start, far))))
+    assert "does not close where its leader begins" in refusal and way in refusal
+    (remedy,) = re.findall(r"it closes at `initial \{ (.*); \}`, the nearest", refusal)
     parameters = experiment(tmp_path, changed(text, (start, remedy))).parameters
     assert all(np.isfinite(quantity.value) for path, quantity in parameters.items() if path.endswith(".q"))  # type: ignore[arg-type]
 
@@ -118,7 +118,7 @@ def test_a_joint_that_carries_a_whole_loop_has_a_reaction(tmp_path: Path) -> Non
         ("record = [q,", "record = [reaction, q,"),
     )  # fmt: skip
     recorded = experiment(tmp_path, text).structure.record
-    assert [each.joints for each in recorded if each.name.startswith("reaction.")] == [("foot",), ("foot",)]
+    assert [variable.joints for variable in recorded if variable.name.startswith("reaction.")] == [("foot",), ("foot",)]
 
 
 def test_a_motor_is_on_the_joint_that_leads(tmp_path: Path) -> None:
