@@ -244,7 +244,7 @@ def search_of(group: StoredGroup) -> Search | None:
         steers=attrs.get("search_steers", 0) == 1,
         judged=_decoded(attrs, "search_judged", Judged),
         starts=_decoded(attrs, "search_starts", Starts),
-        fresh=((),) * sum(confirmation_.cases for confirmation_ in confirmation[:1]),
+        fresh=((),) * sum(confirmation.cases for confirmation in confirmation[:1]),
         confirmation=confirmation[:1],
         gradients="search_along_slopes" in attrs,
         along_slopes=attrs.get("search_along_slopes", 0),

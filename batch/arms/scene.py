@@ -218,7 +218,7 @@ def _size(experiment: Experiment, first: Mapping[str, float], name: str) -> floa
 def _end(arm: ArmNumbers, name: str) -> Vector:
     """A link's far end in its frame, m: of its shape; else of the last joint that it carries, or its centre of mass."""
     structure = arm.experiment.structure
-    link = next((link_ for link_ in structure.links if link_.name == name), None)
+    link = next((link for link in structure.links if link.name == name), None)
     carried = [joint for joint in structure.joints if joint.parent == name]
     if link is not None and drawn(link) and link.shape is not None:
         kind, sizes = shape_of(arm, link)

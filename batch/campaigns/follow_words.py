@@ -45,43 +45,43 @@ def not_followed(
     return [Diagnostic("D348", message, None if place is None else Label(place), (), tuple(helps), "warning")]
 
 
-def _off(experiment: Experiment, unfollowed_: Unfollowed) -> str:
+def _off(experiment: Experiment, follower: Unfollowed) -> str:
     """The error in words: `1.047 rad off, of 1.047 rad that it is told to move`."""
-    straight = unfollowed_.kind == "path" or any(
-        joint.name == unfollowed_.subject and joint.kind == "prismatic" for joint in experiment.structure.joints
+    straight = follower.kind == "path" or any(
+        joint.name == follower.subject and joint.kind == "prismatic" for joint in experiment.structure.joints
     )
-    unit = ("m" if straight else "rad") + ("/s" if unfollowed_.kind == "rate" else "")
-    off = f"{number_text(unfollowed_.off)} {unit} off"
-    if not unfollowed_.commanded:
+    unit = ("m" if straight else "rad") + ("/s" if follower.kind == "rate" else "")
+    off = f"{number_text(follower.off)} {unit} off"
+    if not follower.commanded:
         return f"{off}, and is told to stay"
-    does = {"position": "it is told to move", "rate": "it is told", "path": "it leads"}[unfollowed_.kind]
-    return f"{off}, of {number_text(unfollowed_.commanded)} {unit} that {does}"
+    does = {"position": "it is told to move", "rate": "it is told", "path": "it leads"}[follower.kind]
+    return f"{off}, of {number_text(follower.commanded)} {unit} that {does}"
 
 
-def _remedy(experiment: Experiment, unfollowed_: Unfollowed) -> str:
+def _remedy(experiment: Experiment, follower: Unfollowed) -> str:
     """The remedies, in words, with which it may follow."""
-    if unfollowed_.kind == "path":
+    if follower.kind == "path":
         return "let the path stay where the arm reaches, and within what rates and damping leave"
     structure, beside = experiment.structure, []
     for use in structure.environment:
         about = experiment.parameters.get(f"environment.{use.name}.joint")
-        if about is not None and about.value == unfollowed_.subject:
+        if about is not None and about.value == follower.subject:
             beside.append(f"`{use.name}`")
     other = f", or take away what holds it: {', '.join(beside)}" if beside else ""
-    if unfollowed_.limit:
-        return f"raise `{unfollowed_.limit}`, give it less to move{other}"
+    if follower.limit:
+        return f"raise `{follower.limit}`, give it less to move{other}"
     return f"look at its servo's gains, ratio and friction, and at what it has to move{other}"
 
 
-def _place(experiment: Experiment, unfollowed_: Unfollowed) -> Place | None:
+def _place(experiment: Experiment, follower: Unfollowed) -> Place | None:
     """The place where the command, or the guide, is written."""
-    if unfollowed_.kind == "path":
-        return next(use.place for use in experiment.structure.guides if use.name == unfollowed_.subject)
+    if follower.kind == "path":
+        return next(use.place for use in experiment.structure.guides if use.name == follower.subject)
     commands = (
         parameter
         for path, parameter in experiment.parameters.items()
-        if path.startswith(f"{unfollowed_.subject}.servo.command.")
+        if path.startswith(f"{follower.subject}.servo.command.")
     )
     places = [command.origin.place for command in commands if command.origin.place is not None]
-    servos = [use.place for use in experiment.structure.servos if use.joint == unfollowed_.subject]
+    servos = [use.place for use in experiment.structure.servos if use.joint == follower.subject]
     return (places or servos)[0]

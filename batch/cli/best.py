@@ -102,12 +102,12 @@ def best(
     with ArchiveFile(archive) as file:
         file.need_every_row("choosing among designs")
         pools_ = pools(groups_named(file, [experiment] if experiment else []))
-        pools_ = [pool_ for pool_ in pools_ if pool_.count > 1 or search_of(pool_.groups[0]) is not None]
+        pools_ = [pool for pool in pools_ if pool.count > 1 or search_of(pool.groups[0]) is not None]
         if not pools_:
             helps = "a sweep has several: `vary`, `sample`"
             raise Problem(error("E395", f"{archive} has no designs to choose among: each run is one case", help=helps))
         if len(pools_) > 1:
-            helps = f"name one: {', '.join(f'`--run {pool_.name}`' for pool_ in pools_)}"
+            helps = f"name one: {', '.join(f'`--run {pool.name}`' for pool in pools_)}"
             raise Problem(error("E395", f"{archive} holds several sweeps", help=helps))
         pool = pools_[0]
         searched = search_result(file, pool.groups[0])

@@ -81,7 +81,7 @@ def residuals(
     with ArchiveFile(archive) as file:
         group = groups_named(file, [run] if run is not None else [])[0]
         position = group.recorded_position(case if case is not None else "#0")
-        experiment = next(experiment_ for experiment_ in file.plan().experiments if experiment_.name == group.name)
+        experiment = next(experiment for experiment in file.plan().experiments if experiment.name == group.name)
         recorded = described_columns(experiment)
         measured = read_log(log, recorded, [mapped_column(column) for column in columns], zero)
         joints = [joint.name for joint in experiment.structure.joints]

@@ -61,7 +61,7 @@ def arm_of(plan: Plan, case: ExportedCase, prefix: str) -> PosedArm:
     not tell the arm."""
     group = case.group
     with reading(group.path):
-        experiment = next((experiment_ for experiment_ in plan.experiments if experiment_.name == group.name), None)
+        experiment = next((experiment for experiment in plan.experiments if experiment.name == group.name), None)
         if experiment is None:
             raise LookupError(group.name)
         varied = {v.path: group.at(v.name, [case.position])[0] for v in group.role("coordinate")}

@@ -65,7 +65,7 @@ def _describe(message: Any, fields: Sequence[MessageField], path: str) -> None:
             continue
         if field.within not in types:
             own = f"Part{len(types) + 1}"
-            while any(own == field_.name for field_ in fields):  # types and fields share their names
+            while any(own == field.name for field in fields):  # types and fields share their names
                 own += "_"
             types[field.within] = own
             _describe(message.nested_type.add(name=own), field.within, f"{path}.{own}")

@@ -278,7 +278,7 @@ def _movable(paths: Sequence[str], runs: Sequence[GivenRun]) -> set[str]:
 def _listing(path: str, run: GivenRun) -> str:
     """The command that lists numbers of a run: those that begin as a path does, or else as the first one does."""
     heads = [name.partition(".")[0] for name in _names(run)]
-    head = next((head_ for head_ in heads if head_ == path.partition(".")[0]), heads[0])
+    head = next((head for head in heads if head == path.partition(".")[0]), heads[0])
     return f"`met explain {quoted(run.deck.file)} {head} --run {run.name}` lists those of `{head}`"
 
 

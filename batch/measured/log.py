@@ -143,7 +143,7 @@ def _with_names(table: CsvTable, mapped: Sequence[MappedColumn], channels: Seque
     head = table.columns[0].place
     added: list[CsvColumn] = []
     for mapping in mapped:
-        if any(mapping.channel == column_.name for column_ in added):
+        if any(mapping.channel == column.name for column in added):
             message = f"`{visible(mapping.channel)}` has two columns"
             raise Problem(error("E478", message, help="leave one of them out"))
         if mapping.channel == TIME and mapping.factor < 0.0:
@@ -154,7 +154,7 @@ def _with_names(table: CsvTable, mapped: Sequence[MappedColumn], channels: Seque
             raise Problem(error("E478", f"the run does not record `{visible(mapping.channel)}`", help=helps))
         column = table.column(mapping.column)
         if column is None:
-            names = [visible(column_.name) for column_ in table.columns]
+            names = [visible(column.name) for column in table.columns]
             message = f"`{table.file}` has no column `{visible(mapping.column)}`"
             raise Problem(
                 error("E478", message, head, help=did_you_mean(mapping.column, names) or f"it has {_listed(names)}")

@@ -284,7 +284,7 @@ def _explained(pair: Pair, features: Sequence[_Feature]) -> tuple[FollowedCause,
     explained = 0.0
     while left:
         shares = [
-            _share(residual, np.hstack([numbers[feature_] for feature_ in (*chosen, feature)]), halves)
+            _share(residual, np.hstack([numbers[feature] for feature in (*chosen, feature)]), halves)
             for feature in left
         ]
         best = int(np.argmax(shares))

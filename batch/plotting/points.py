@@ -53,18 +53,24 @@ def scatter(ax: Any, metric: MapMetric, x: CaseColumn, by: CaseColumn | None, sh
     style: dict[str, Any] = {"s": size, "linewidths": 0, "rasterized": len(drawn) > RASTERED}
     mapped = None
     sets = _sets(x, by)
-    if by is not None and not any(set_.text for set_ in sets):
+    if by is not None and not any(point_set.text for point_set in sets):
         mapped = _scale(by)
     if not sets and by is not None:
         style |= {"cmap": "viridis", "norm": _scale(by).norm}
         mapped = ax.scatter(x.values[drawn], metric.values[drawn], c=by.values[drawn], **style)
-    for set_ in sets:
-        own = drawn[np.isin(drawn, set_.places)] if len(sets) > 1 else drawn
-        if set_.joined:
-            order = set_.places[np.argsort(x.values[set_.places])]
+    for point_set in sets:
+        own = drawn[np.isin(drawn, point_set.places)] if len(sets) > 1 else drawn
+        if point_set.joined:
+            order = point_set.places[np.argsort(x.values[point_set.places])]
             y = np.where(np.isfinite(metric.values[order]), metric.values[order], np.nan)
-            ax.plot(x.values[order], y, color=set_.colour, linewidth=1.0)
-        ax.scatter(x.values[own], metric.values[own], color=set_.colour, label=layout.legend_label(set_.text), **style)
+            ax.plot(x.values[order], y, color=point_set.colour, linewidth=1.0)
+        ax.scatter(
+            x.values[own],
+            metric.values[own],
+            color=point_set.colour,
+            label=layout.legend_label(point_set.text),
+            **style,
+        )
     if metric.theirs is not None:
         _theirs(ax, metric, x, sets, by)
         _edge(ax, np.where(metric.both, metric.theirs, 0.0), x.values, 4.0 * max(12.0, size), hollow=True)
@@ -118,14 +124,14 @@ def _theirs(ax: Any, metric: MapMetric, x: CaseColumn, sets: list[Set], by: Case
     y = np.where(np.isfinite(metric.theirs), metric.theirs, np.nan)
     drawn = _apart(x.values, y)
     size = 2.6 * MARKER / marker_scale(len(x.values)) ** 2
-    for set_ in sets or [Set(drawn, FAINT, "", False)]:
-        own = drawn[np.isin(drawn, set_.places)]
-        if set_.joined:
-            order = set_.places[np.argsort(x.values[set_.places])]
+    for point_set in sets or [Set(drawn, FAINT, "", False)]:
+        own = drawn[np.isin(drawn, point_set.places)]
+        if point_set.joined:
+            order = point_set.places[np.argsort(x.values[point_set.places])]
             ax.plot(
                 x.values[order],
                 y[order],
-                color=set_.colour,
+                color=point_set.colour,
                 linewidth=1.0 + BEHIND,
                 alpha=PALE,
                 zorder=0.8,
@@ -136,7 +142,7 @@ def _theirs(ax: Any, metric: MapMetric, x: CaseColumn, sets: list[Set], by: Case
             y[own],
             s=size,
             facecolors="none",
-            edgecolors=[set_.colour],
+            edgecolors=[point_set.colour],
             linewidths=0.7,
             zorder=0.9,
             rasterized=len(drawn) > RASTERED,

@@ -78,7 +78,7 @@ def view(
                 error("E473", f"a page is of one run or sweep, and {file.path} has {len(groups)}", help=helps)
             )
         (group,) = groups
-        experiment = next(experiment_ for experiment_ in file.plan().experiments if experiment_.name == group.name)
+        experiment = next(experiment for experiment in file.plan().experiments if experiment.name == group.name)
         data = data_of(experiment, file, group)
         data["report"] = visible(f"met report {quoted(Path(archive).name)}")
         answer = design_answer(file, pools(groups)[0])

@@ -280,7 +280,7 @@ def _command(use: ServoUse, kind: str, structure: Structure, *, is_set: bool) ->
     if use.continuous:
         message = f"the law of joint `{use.joint}` is continuous: it has no tick at which it takes a command"
         raise Problem(error("E435", message, help=f'give it a rate: `set={{"{use.joint}.servo.rate": "1 kHz"}}`'))
-    (joint,) = (joint_ for joint_ in structure.moving if joint_.name == use.joint)
+    (joint,) = (joint for joint in structure.moving if joint.name == use.joint)
     unit = joint_unit(COMMAND_UNIT[kind], joint)
     is_decks = (
         not is_set and command is not None and (command.kind, command.model, command.guide) == (kind, "constant", "")

@@ -143,7 +143,7 @@ def compiled(
     words, files = _words(compiled_deck.diagnostics, compiled_deck.sources), tuple(compiled_deck.sources)
     if compiled_deck.plan is None:
         return DeckAnswer(words, names, files)
-    experiments = {experiment_.name: experiment_ for experiment_ in compiled_deck.plan.experiments}
+    experiments = {experiment.name: experiment for experiment in compiled_deck.plan.experiments}
     experiment = experiments.get(group or "", compiled_deck.plan.experiments[0])
     if experiment.search is not None:
         return DeckAnswer(_words([_search(deck, experiment)], {}), names, files)
