@@ -90,16 +90,17 @@ def _unlike(a: ArchiveGroup, b: ArchiveGroup, name: str) -> bool:
 
 
 def _versions(a: ArchiveFile, b: ArchiveFile) -> list[str]:
-    versions_a, two = a.provenance, b.provenance
+    """Lines about packages and commits of MET that differ between the two archives."""
+    facts_a, facts_b = a.provenance, b.provenance
     out = []
-    for name in sorted({*versions_a, *two}):
-        if name.startswith("version_") and versions_a.get(name) != two.get(name):
+    for name in sorted({*facts_a, *facts_b}):
+        if name.startswith("version_") and facts_a.get(name) != facts_b.get(name):
             out.append(
-                f"{name.removeprefix('version_')} {versions_a.get(name, 'unknown')}, now {two.get(name, 'unknown')}"
+                f"{name.removeprefix('version_')} {facts_a.get(name, 'unknown')}, now {facts_b.get(name, 'unknown')}"
             )
     commits = [
         (str(versions.get("git_commit", "unknown")), str(versions.get("git_dirty", "unknown")))
-        for versions in (versions_a, two)
+        for versions in (facts_a, facts_b)
     ]
     if commits[0] != commits[1]:
         out.append("MET's commit " + ", now ".join(f"{commit[:10]}{_dirty(dirty)}" for commit, dirty in commits))

@@ -84,6 +84,8 @@ def _loaded() -> Iterator[Move]:
 
 
 def _slow() -> Iterator[Move]:
+    """Slow sines of the voltage, and of the current, through rest: for dry friction and misalignment."""
+
     def ramps(volts: float, amperes: float, time: float) -> Callable[[], Profile]:
         def profile(t: float, w: float) -> tuple[float, float]:
             turn = math.sin(2.0 * math.pi * t / time)
@@ -101,8 +103,11 @@ def _slow() -> Iterator[Move]:
 
 
 def _limited(top: float) -> list[Move]:
+    """The largest voltage and 0 V by turns, as the rate goes up and down between shares of `top`, rad/s, under several
+    loads."""
+
     def relay(sign: float, load: float, low: float, high: float) -> Callable[[], Profile]:
-        def profile() -> Profile:
+        def new_profile() -> Profile:
             up = True
 
             def profile(t: float, w: float) -> tuple[float, float]:
@@ -112,7 +117,7 @@ def _limited(top: float) -> list[Move]:
 
             return profile
 
-        return profile
+        return new_profile
 
     return [
         Move("limited", 0.8, relay(sign, load, low * top, high * top))
@@ -122,6 +127,8 @@ def _limited(top: float) -> list[Move]:
 
 
 def _mixed() -> list[Move]:
+    """Sums of three sines of the voltage and two of the current, for several sets of frequencies, both ways."""
+
     def sines(volts: Sequence[float], amperes: Sequence[float], hertz: Sequence[float]) -> Callable[[], Profile]:
         def profile(t: float, w: float) -> tuple[float, float]:
             waves = [math.sin(2.0 * math.pi * f * t) for f in hertz]
