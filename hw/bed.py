@@ -251,4 +251,5 @@ class BedDriver(ABC):
 
 
 def real_plant() -> Problem:
+    """The error that a bed with a motor cannot be started anew."""
     return Problem(error("E406", "only a simulated bed can be started anew", help="this one has a motor"))

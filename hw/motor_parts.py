@@ -112,6 +112,7 @@ class _File(TomlFile):
         super().__init__(path, code="E441", most=MOST_BYTES, kind="a file of parts is TOML", about=about)
 
     def parts(self) -> PartsList:
+        """The motors, benches and other parts of the file. Raises Problem E441."""
         for key in self.tables:
             if key not in ("motor", "bench", "part"):
                 helps = "motors are `[[motor]]`, benches `[[bench]]`, what else a bench needs `[[part]]`"

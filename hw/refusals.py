@@ -90,6 +90,7 @@ def words(faults: Fault) -> str:
 
 
 def remedies(faults: Fault) -> list[str]:
+    """What to do about each of these faults, in words."""
     return [_FAULTS[fault][1] for fault in Fault if fault in faults]
 
 
@@ -141,11 +142,13 @@ def check_stopped(beds: Sequence[BedDriver], abouts: Sequence[About], why: str) 
 
 
 def not_connected(name: str) -> Problem:
+    """The error for a bed to which there is no line."""
     helps = "connect to it first; a line that was lost is not taken up again by itself"
     return Problem(error("E401", f"there is no line to a bed on {name}", help=helps))
 
 
 def other_version(version: int) -> Problem:
+    """The error for a bed that speaks another version of the protocol."""
     message = f"the bed speaks version {version} of the protocol, and this MET {VERSION}"
     helps = "put the firmware of this version of MET on it, or take the MET that its firmware came with"
     return Problem(error("E403", message, help=helps))

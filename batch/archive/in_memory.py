@@ -69,6 +69,8 @@ class DatasetMaker:
         return dataset
 
     def _lay_out(self, count: int, signals: frozenset[str]) -> DatasetLayout:
+        """What all Datasets of `count` cases with these signals share: their variables, and the values that no run
+        changes."""
         import xarray
 
         prepared, experiment = self._prepared, self._prepared.experiment

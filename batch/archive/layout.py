@@ -228,6 +228,8 @@ def coordinate_unit(experiment: Experiment, coordinate: Coordinate) -> str:
 
 
 def _case_variables(experiment: Experiment) -> list[Variable]:
+    """The variables along `case`: identity, varied values, how it ended, limits and metrics."""
+
     def variable(name: str, kind: Kind, long_name: str, **attributes: Any) -> Variable:
         return Variable(name, kind, ("case",), "case", long_name, attributes=attributes)
 
@@ -433,6 +435,8 @@ def _signal_unit(recorded: Recorded) -> tuple[str, dict[str, Any]]:
 
 
 def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, Any]:
+    """The attributes of an experiment's group: names, integrator, rates (Hz), duration (s), key of the structure,
+    allowances."""
     from met.plan import keys
 
     structure, schedule = experiment.structure, experiment.structure.schedule

@@ -66,6 +66,7 @@ class Revision:
 
 
 def version(package: str) -> str:
+    """The version of an installed package; `UNKNOWN` where it is not installed, or says none."""
     try:
         return metadata.version(package) or UNKNOWN  # None where its metadata is missing
     except metadata.PackageNotFoundError:

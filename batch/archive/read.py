@@ -411,6 +411,7 @@ def _damaged(path: Path, why: str = "") -> Any:
 
 
 def _stored(name: str, node: Any) -> Stored:
+    """A variable of a group as it is described in the file. Raises Unlike where its role is no word."""
     attributes = {key: _plain(node.attrs[key]) for key in node.attrs if key not in INTERNAL}
     if node.is_scale:
         dims: tuple[str, ...] = (name,)

@@ -16,10 +16,12 @@ SCRIPTS = ("formulas.js", "arm.js", "camera.js", "webgl.js", "painter.js", "acti
 
 @cache
 def arm_scripts() -> str:
+    """The scripts that draw an arm on a page, with the colours and sizes that they use, as one text."""
     texts = [(FOLDER / name).read_text(encoding="utf-8").strip() for name in SCRIPTS]
     return "\n".join([f"MET.look = {json.dumps(look_json())};", *texts])
 
 
 @cache
 def arm_style() -> str:
+    """The style sheet of the stage on which an arm is drawn."""
     return (FOLDER / "stage.css").read_text(encoding="utf-8").strip()

@@ -178,6 +178,7 @@ def _rails(arm: ArmNumbers, carried: Sequence[Joint]) -> list[ArmShape]:
 
 
 def line(role: Literal["link", "payload", "joint", "rail"], begin: Vector, end: Vector) -> ArmShape:
+    """A line between two points of a body's frame, m."""
     return ArmShape("line", role, begin, sub(end, begin))
 
 

@@ -137,6 +137,7 @@ def _bench(bench: Bench, listed: PartsList) -> tuple[Candidate, Candidate]:
 
 
 def _notes(experiment: Experiment, joint: str, figures: BedFigures, candidates: Sequence[Candidate]) -> Iterator[str]:
+    """Sentences on what the sizes of a bed leave out, and on cases in which a motor was at its limit."""
     use, schedule = servo_of(experiment, joint), experiment.structure.schedule
     assert use is not None
     yield "all of it is simulated: no real bed has been driven with this version"

@@ -39,4 +39,5 @@ def clear(word: str, baud: int) -> tuple[About, Fault]:
 
 
 def cleared_line(faults: Fault) -> str:
+    """The line that says which latched faults were cleared."""
     return f"cleared: {refusals.words(faults)}" if faults else "nothing was latched"

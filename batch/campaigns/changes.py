@@ -245,6 +245,8 @@ def _shown_all(quantities: Sequence[Quantity]) -> str:
 
 
 def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
+    """Changes of the cases: number, varied values, seeds and repeats. ordered: whether another order of values is a
+    change"""
     old, new = ({c.path: c for c in cases.coordinates} for cases in (before, now))
     if before.count != now.count:
         yield f"{_count(before)} -> {_count(now)}"

@@ -107,6 +107,7 @@ def keep(words: str | int | Sequence[str | int], experiments: Sequence[Experimen
 
 
 def _with(rules: Keep, word: str | int, experiments: Sequence[Experiment]) -> Keep:
+    """The rules with those of one more word. Raises Problem E351 where it is none."""
     from dataclasses import replace
 
     if not isinstance(word, str):

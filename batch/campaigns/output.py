@@ -79,6 +79,7 @@ OF_OTHER_FILES = frozenset(
 
 
 def sidecar_path(output: Path) -> Path:
+    """The file beside an archive with what is no part of its bytes: machine, dates and durations."""
     return output.with_name(output.name + ".run.json")
 
 
@@ -93,6 +94,7 @@ def check_output(output: Path, plan: Plan) -> None:
 
 
 def _check_output(output: Path, plan: Plan) -> None:
+    """Raise Problem E305 where an archive, its sidecar and its campaign's folder cannot be written to these places."""
     from batch.archive.read import is_archive
 
     for folder in (output, *output.parents):
@@ -162,6 +164,7 @@ def more_files() -> str:
 
 
 def busy(output: Path) -> Any:
+    """The error that another run is writing this archive now."""
     helps = [
         f"`met status {quoted(output)}` says how far it is",
         "wait until it is done, or give another name with `-o`",

@@ -192,6 +192,7 @@ class _CampaignWork:
         self.folder.remove_partial_shards()
 
     def run(self, executor: Executor, together: bool) -> Performed:
+        """Run all missing cases, and write the archive. Raises Stopped where cases stay missing."""
         driver = self.driver = Driver(self.folder, executor, self.reporter, self.max_failures, len(self.values))
         executor.open(self.folder, self.sections, driver.tell)
         try:
@@ -328,6 +329,7 @@ class _CampaignWork:
         return merge.results(self.folder, section, wanted)
 
     def _merge(self, histories: Mapping[int, CampaignSection]) -> None:
+        """Write the archive from all shards, under a temporary name that becomes its own when it is whole."""
         from batch.archive.provenance import machine
         from batch.archive.write import ArchivePart, ArchiveWriter
 
@@ -426,6 +428,7 @@ class _CampaignWork:
             writer.put_verified(number, verified)
 
     def _timings(self) -> list[dict[str, Any]]:
+        """The number of cases of each experiment, and the seconds that they took, for the sidecar."""
         counts = self.driver.counts if self.driver else {}
         return [
             {

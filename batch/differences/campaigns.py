@@ -265,6 +265,7 @@ class _Scores:
     def ranked(
         self, a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, signals: Sequence[SignalDiff]
     ) -> list[RankedCase]:
+        """The cases that differ most, the worst first, each with the signal and the place of its largest difference."""
         by_name = {signal.name: signal for signal in signals}
         places = sorted(self.where, key=lambda place: (-self.score[place], place))[:WORST]
         if not places:
@@ -294,6 +295,7 @@ class _Scores:
 def _metric(
     a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, name: str, allowed: Tolerances, scores: _Scores
 ) -> SignalDiff:
+    """The differences of one metric over all matched cases; their scores are added to `scores`."""
     unit = (a if name in a.variables else b).variables[name].unit
     tolerance = replace(allowed.of(name), time=0.0)
     out = SignalDiff(name, unit, True, tolerance)
@@ -336,6 +338,7 @@ def _rank_metric(
     group: ArchiveGroup,
     matched: MatchedCases,
 ) -> None:
+    """Score the cases whose metric differs by more than its tolerance, and rank the worst of them."""
     with np.errstate(invalid="ignore", over="ignore"):
         apart = np.abs(b[unlike] - a[unlike])
         limit = allowed.absolute + allowed.relative * magnitude(a[unlike], b[unlike])
@@ -380,6 +383,7 @@ def _add(out: SignalDiff, difference: Difference, where: DiffPlace) -> None:
 def _signals(
     a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, allowed: Tolerances, scores: _Scores, about: ExperimentDiff
 ) -> Iterator[SignalDiff]:
+    """The differences of each signal of both, at common instants; notes on these go to `about`."""
     names = matching.names([v.name for v in a.role("signal")], [v.name for v in b.role("signal")])
     if not names:
         return

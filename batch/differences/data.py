@@ -30,6 +30,7 @@ def as_data(differences: Diff) -> dict[str, Any]:
 
 
 def _experiment(experiment: ExperimentDiff) -> dict[str, Any]:
+    """The differences of one experiment as plain data, with values in SI."""
     return {
         "name_a": experiment.name_a,
         "name_b": experiment.name_b,
@@ -67,6 +68,7 @@ def _experiment(experiment: ExperimentDiff) -> dict[str, Any]:
 
 
 def _signal(signal: SignalDiff) -> dict[str, Any]:
+    """The differences of a signal or metric as plain data, with values in SI."""
     copied = (
         "name",
         "unit",

@@ -61,6 +61,7 @@ def unmatched_runs(difference: Diff) -> list[str]:
 
 
 def heading(experiment: ExperimentDiff) -> str:
+    """The names of a pair of experiments, the number of their common cases, and the verdict on these."""
     names = dict.fromkeys([experiment.name_a, experiment.name_b])
     count = experiment.cases.count
     how = experiment.of_values
@@ -371,6 +372,8 @@ DISTRIBUTION_HEADS = (
 
 
 def distribution(metric: MetricSamples) -> Distribution:
+    """The row of a metric that is compared as two samples, as texts; `*` marks samples that differ by more than
+    chance."""
     chance = f"{metric.probability:.2g}" + (" *" if metric.unlike else "")
     cases, medians = [f"{count:,}" for count in metric.cases], [number_text(median) for median in metric.medians]
     return Distribution(metric.name, (cases[0], cases[1]), (medians[0], medians[1]), f"{metric.distance:.3g}", chance)

@@ -412,6 +412,8 @@ class Fitter:
     def _answer(
         self, values: np.ndarray, residuals: np.ndarray, slopes: np.ndarray, converged: bool, rival: np.ndarray | None
     ) -> Fit:
+        """The fit that ends at these values, SI [path], with its covariance, and which of the values are at their
+        limits."""
         weighted, least = self._weighted(slopes), 1e-6 * self.size
         beside = np.vstack([values + np.diag(least), values - np.diag(least)])
         at_limit = np.array(np.any(self.logs.refused(beside).reshape(2, -1), axis=0))

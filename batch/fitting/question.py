@@ -320,6 +320,8 @@ def _check_varies(path: str, start: tuple[float, str], run: GivenRun) -> None:
 
 
 def _prior(text: str, starts: Mapping[str, tuple[float, str]]) -> tuple[str, Prior]:
+    """The path and the normal distribution, SI, of a text such as `gearbox.kt=normal(0.061, 0.002) N*m/A`. Raises
+    Problem."""
     match = _PRIOR.fullmatch(text.strip())
     if match is None:
         raise _wrong(f"`{text}` is not what is known of a parameter", _EXAMPLE)

@@ -76,6 +76,7 @@ def _frequencies(linearized: Linearized) -> np.ndarray:
 
 
 def _bode(size: Any, phase: Any, loops: list[OpenLoop], linearized: Linearized) -> None:
+    """Draw size and phase of the opened loops over the frequency, Hz, with the margins marked."""
     w = _frequencies(linearized)
     for number, loop in enumerate(loops):
         assert loop.loop is not None
@@ -132,6 +133,7 @@ def _degrees(axis: Any) -> tuple[float, float]:
 
 
 def _nichols(ax: Any, loops: list[OpenLoop], linearized: Linearized) -> None:
+    """Draw size over phase of the opened loops, with the curves on which |S| is 2 and 4."""
     w = _frequencies(linearized)
     for number, loop in enumerate(loops):
         assert loop.loop is not None
@@ -151,6 +153,7 @@ def _nichols(ax: Any, loops: list[OpenLoop], linearized: Linearized) -> None:
 
 
 def _step(ax: Any, linearized: Linearized, row: int, name: str, *, last: bool) -> None:
+    """Draw the response of an output, by its row in C, to a step of each input, over the periods."""
     period = linearized.seconds
     slowest = max((pole.seconds for pole in linearized.poles if pole.s.real < 0.0 and pole.seconds < 1e7 * period),
                   default=period)  # fmt: skip

@@ -64,6 +64,8 @@ def column_doubts(pairs: Mapping[str, Pair], kinds: Mapping[str, tuple[str, str]
 
 
 def _column_doubt(name: str, pair: Pair, unit: str, now: float, white: bool) -> str:
+    """The change of unit, sign or offset with which a column of a log fits much better, in words; "" where none
+    does."""
     course = pair.course.at(pair.instants)
     if not white and not np.ptp(pair.measured) and np.ptp(course):
         return f"`{name}` of the log does not change"

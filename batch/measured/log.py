@@ -105,6 +105,7 @@ def read_log(
 def _csv_signals(
     path: str | Path, columns: Sequence[Mapping[str, str]], mapped: Sequence[MappedColumn]
 ) -> MeasuredSignals:
+    """The channels of a run that a CSV file has, in SI. Raises Problem E478."""
     table = _with_names(read_csv(str(path)), mapped, [TIME, *(column["channel"] for column in columns)])
     changes = {mapping.channel: mapping for mapping in mapped}
     head = table.columns[0].place

@@ -176,6 +176,8 @@ def _span(times: Sequence[np.ndarray]) -> tuple[float, float]:
 def _residual(
     name: str, pair: Pair, courses: Mapping[str, ComputedChannel], units: Mapping[str, str], joint: str
 ) -> Residual:
+    """What is left of a channel where the run's numbers are taken from the log's, and what it follows. joint: its
+    joint, if any"""
     residual, usual = pair.residual, pair.usual()
     largest = int(np.argmax(np.abs(residual)))
     correlation, white = _whiteness(usual.residual)
@@ -228,6 +230,7 @@ class _Feature:
 def _features(
     name: str, courses: Mapping[str, ComputedChannel], units: Mapping[str, str], joint: str
 ) -> list[_Feature]:
+    """The quantities that a channel's residual may follow: itself, its rate, time, and those of its joint."""
     own, unit = courses[name], units[name]
     slope, middle = own.rate, float(own.times.mean())
     q, qd, tau = (f"{joint}.{signal}" for signal in ("q", "qd", "tau"))

@@ -54,6 +54,7 @@ def frames(
 def _frames(
     path: Path, data: xarray.Dataset, group: ArchiveGroup, own: Experiment, links: Sequence[str]
 ) -> xarray.Dataset:
+    """The frames of these links in the world, by case and instant: position (m) and orientation (w, x, y, z)."""
     q = _positions(data, own)
     instants = q[0] if q else _instants(data)
     dims, shape = instants.dims, instants.shape

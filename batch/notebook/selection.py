@@ -94,6 +94,7 @@ def _names(data: xarray.Dataset, dim: str) -> list[str]:
 
 
 def _numbers(values: np.ndarray, wanted: Any, name: str, attributes: Mapping[str, Any]) -> np.ndarray:
+    """A mask of the cases whose value is one of those wanted, or in a range of them. Raises Problem E386, E387."""
     unit = str(attributes.get("units", ""))
     if isinstance(wanted, slice):
         if wanted.step is not None:

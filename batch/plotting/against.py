@@ -78,6 +78,7 @@ def _channels(group: ArchiveGroup, name: str) -> dict[str, tuple[int, str]]:
 
 
 def other_unit(name: str, mine: str, theirs: str, beside: OtherGroup) -> Problem:
+    """The problem that the two archives have a quantity in different units."""
     units = [pretty_unit(unit) if unit not in ("", "1") else "no unit" for unit in (mine, theirs)]
     message = f"`{name}` is in {units[0]} in {beside.own}, and in {units[1]} in {beside.name}"
     helps = ("name what is alike in both", _differ(beside.drawn.path, beside.group.path))

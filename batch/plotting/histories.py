@@ -97,6 +97,7 @@ class Histories:
         return pairs, columns
 
     def draw(self) -> Any:
+        """The figure: a panel for each quantity, over time, with a legend and a title."""
         rows = panel_grid(self.group, self.panels)
         most = MOST_COLUMNS if not self.sheet.width else max(1, int(self.sheet.width / LEAST_COLUMN))
         by_joint = self.single or len(rows[0]) > most

@@ -260,6 +260,7 @@ def _striped(metric: MapMetric, map_layout: MapLayout) -> list[tuple[np.ndarray,
 
 
 def _points(ax: Any, metric: MapMetric, map_layout: MapLayout, part: np.ndarray, norm: Any) -> Any:
+    """Draw the cases of this part as coloured points; returns the mappable for a colour bar."""
     values = _values(metric, map_layout)
     x, y = map_layout.x.of_cases(), map_layout.y.of_cases()
     finite = part & np.isfinite(values)

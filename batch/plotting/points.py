@@ -241,6 +241,7 @@ def legend_of(known: Mapping[str, Any], other: tuple[str, str] | None) -> dict[s
 
 
 def bar(figure: Any, mapped: Any, axes: list[Any], by: CaseColumn, sheet: PictureSheet) -> None:
+    """Draw the colour bar of a column by which points are coloured."""
     drawn = figure.colorbar(mapped, ax=axes, pad=0.01, aspect=18 * len(axes))
     if is_log(by):
         side = line(by)

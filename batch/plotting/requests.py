@@ -128,6 +128,7 @@ def map_axes(archive: ArchiveFile, pool: Pool, names: Sequence[str]) -> tuple[Ca
 
 
 def _not_varied(archive: ArchiveFile, pool: Pool, name: str, known: Sequence[str]) -> Problem:
+    """The problem that a name after `--over` is not varied: it has one value, is a metric, or does not exist."""
     helps = [*did_you_mean(name, known), _varied_text(known)]
     for column in pool.columns:
         if column.label == name and column.role != "metric":

@@ -31,6 +31,7 @@ def other_group(archive: ArchiveFile, group: ArchiveGroup, other: ArchiveFile) -
 
 
 def is_archive(path: str | Path) -> bool:
+    """True for the name of an archive; other files are read as logs."""
     return names_archive(str(path))
 
 

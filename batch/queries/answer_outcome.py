@@ -58,6 +58,7 @@ def answer_outcome(group_answer: SearchAnswer) -> AnswerOutcome:
 
 
 def _required(answer: SearchAnswer, requirement: GroupRequirement) -> AnswerRequirement:
+    """How a requirement came out in the cases of a search's answer, with the furthest value and others that miss it."""
     group, cases = answer.group, np.array(answer.best.cases)
     variable, values = group.variables[requirement.metric], group.values(requirement.metric)
     met, numbers = outcomes(group)[:, requirement.place], group.values("case")
@@ -124,6 +125,7 @@ def _misses(judged: tuple[AnswerRequirement, ...], *, named: bool) -> str:
 
 
 def _of_tuning(answer: SearchAnswer, judged: tuple[AnswerRequirement, ...]) -> str:
+    """The headline of a tuning's answer: what it fails or misses, its margin, and the sweeps that do not confirm it."""
     best, sweep = answer.best, answer.search.against
     if best.failed:
         return f"The answer fails in case #{answer.position}"

@@ -87,6 +87,8 @@ def reach(
 
 
 def _reach(finite: np.ndarray, limits: Sequence[float], *, parting: bool) -> tuple[float, float, bool]:
+    """The ends of a range of colours, and whether it is by logarithms. finite: ascending; parting: about 0, as of
+    changes"""
     if parting:
         far = np.sort(np.abs(finite))
         _, top, _ = _inner(_thinned(far))

@@ -131,6 +131,7 @@ def _designs(group: ArchiveGroup) -> tuple[bool, bool]:
 def _of_metric(
     group: ArchiveGroup, row: EvidenceRow, condition: str, error: float | None, archive: str, several: bool
 ) -> RequirementEvidence:
+    """A row of the table: a requirement on a metric, under these conditions. error: the metric's by the step"""
     required, case = row.requirement, int(group.at("case", [row.worst])[0])
     variable = group.variables[required.metric]
     return RequirementEvidence(
@@ -168,6 +169,7 @@ def _of_metric(
 def _of_step_error(
     group: ArchiveGroup, verdict: StepErrorVerdict, condition: str, archive: str, several: bool
 ) -> RequirementEvidence:
+    """A row of the table: a requirement on an error due to the step, under these conditions."""
     limit = verdict.limit
     variable = group.variables[limit.metric]
     units = (

@@ -211,6 +211,7 @@ class Pool:
         return list({v.name: v for group in reversed(self.groups) for v in group.role(role)}.values())
 
     def _numbers(self, variable: Stored, role: Role) -> CaseColumn:
+        """A column of a variable's numbers, in the deck's unit, with the limits that are required of it."""
         scale, unit = deck_unit(variable)
         limits = tuple(
             RequirementLimit(requirement.text, requirement.value / scale, requirement.sense)

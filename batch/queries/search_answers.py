@@ -267,6 +267,7 @@ class SearchAnswer:
         return ", ".join(f"{chosen.path} = {chosen.text}" for chosen in self.values())
 
     def _tuned(self) -> list[str]:
+        """Lines about the result of a tuning: the values to use, what they miss, and how sure that is."""
         best, search = self.best, self.search
         none = f"none of the {self._tried} is found to meet all that is required; nearest: {self._chosen}"
         out = [f"use {self._chosen}" if self.ok else f"not advised: {self._chosen}" if best.stands else none]

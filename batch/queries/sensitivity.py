@@ -174,6 +174,8 @@ def _explained(
     before: tuple[ArchiveGroup, np.ndarray, np.ndarray] | None,
     designed: tuple[list[np.ndarray], str],
 ) -> Sensitivity:
+    """The shares of one output's variance. metric: None for failing; before: the archive from which a change is
+    taken"""
     scale, unit, measure = 1.0, "", ""
     if metric is None:
         output, name, measure = failed.astype(float), FAILURE, FAILURE

@@ -34,6 +34,7 @@ def summed_up(group: ArchiveGroup) -> CaseSummary | None:
 
 
 def _of_rows(group: ArchiveGroup) -> CaseSummary | None:
+    """The summary of a group's rows, read in blocks; None for an older archive, or too many design points."""
     required = group_requirements(group)
     if len(required) < len(requirement_texts(group)):  # an older archive, which lacks parts of some
         return None

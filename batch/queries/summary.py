@@ -279,6 +279,7 @@ def _of_summary(group: ArchiveGroup, case_summary: CaseSummary) -> Summary:
 
 
 def _summed(variable: Stored, case_summary: CaseSummary, place: int) -> SummedMetric:
+    """A metric of a summary of cases, from its moments and extremes; of one finite value this is the median."""
     sums = {name: case_summary.values[name][place].item() for name in SUMMED}
     return SummedMetric(
         minimum=sums["least"],

@@ -183,6 +183,7 @@ class Simulation:
         return SteppedRun(stepped_program, {**table, **zeros}, repeat)
 
     def _in_si(self, values: Mapping[str, Any] | None) -> dict[str, np.ndarray]:
+        """Values by path in SI, one or many of each. Raises Problem E431 where they are not given by path."""
         in_si: dict[str, np.ndarray] = {}
         values = {} if values is None else values
         if not isinstance(values, Mapping) or not all(isinstance(path, str) for path in values):

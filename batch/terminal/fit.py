@@ -280,6 +280,7 @@ def _as_paths(question: FitQuestion, known: Known) -> list[dict[str, float]]:
 
 
 def _together(question: FitQuestion, known: Known) -> Iterator[str]:
+    """Lines about changes of several parameters that leave no mark in the logs, the first few of them."""
     for change in known.together[:SHOWN]:
         largest = sorted(change, key=lambda place: -abs(change[place] / known.size[place]))[:MOST_PARTS]
         parts = [

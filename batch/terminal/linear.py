@@ -91,6 +91,7 @@ def _table(head: Sequence[tuple[str, ...]], rows: Sequence[tuple[str, ...]]) -> 
 
 
 def _loop_lines(loop: OpenLoop, answers: Linearized) -> Iterator[str]:
+    """Lines about an opened loop: whether it is stable, and its margins of gain, phase, delay and disk."""
     period, several = answers.seconds, len(loop.paths) > 1
     yield f"loops of {', '.join(loop.paths)}, all at once" if several else f"loop of {loop.paths[0]}"
     limits = ", ".join(answers.at_limit)

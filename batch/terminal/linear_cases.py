@@ -62,6 +62,7 @@ def _table(
     head: tuple[str, ...],
     cells: Callable[[Linearized], tuple[str, ...]],
 ) -> Iterator[str]:
+    """A table of cases with what is varied, and the cells of each answer."""
     varied = question.experiment.cases.coordinates
     heads = [
         f"{coordinate.path} ({coordinate.unit})" if coordinate.unit not in ("", "1") else coordinate.path

@@ -329,6 +329,7 @@ def _counts(summary: Summary) -> str:
 
 
 def _metric_table(summary: Summary) -> list[str]:
+    """The table of metrics, with their spread over the cases and the error by the step where it is known."""
     single = summary.cases == 1
     columns = SUMMED_COLUMNS if isinstance(summary.metrics[0], SummedMetric) else SPREAD_COLUMNS
     head = ("",) if single else tuple(column.head for column in columns)

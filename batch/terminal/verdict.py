@@ -59,6 +59,7 @@ def writing(campaign: Campaign) -> str:
 
 
 def _part_lines(part: CampaignPart, verbose: bool) -> list[str]:
+    """Lines about an experiment before it runs: its cases, and the histories to be kept."""
     experiment = part.experiment
     schedule = experiment.structure.schedule
     count, whole = len(part.rows), experiment.cases.count

@@ -75,6 +75,7 @@ class Door:
         self._listen_to(connection)
 
     def _listen_to(self, connection: socket) -> None:
+        """Take what somebody sends: admit who asks for the page's path, and turn away who does not."""
         address, _, request = self._outside[connection]
         try:
             more = connection.recv(LONGEST_METHOD + 1 + len(self._path_start) - len(request))

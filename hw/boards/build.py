@@ -454,6 +454,7 @@ def _sources(kind: Kind, *, plant: bool) -> list[Path]:
 
 
 def _compiler(kind: Kind) -> str:
+    """The compiler for a kind of firmware, by name. Raises Problem E410, E411 where there is none."""
     if kind in _CROSS:
         if shutil.which(CROSS_COMPILER) is None:
             raise Problem(
@@ -483,6 +484,7 @@ def _compiler(kind: Kind) -> str:
 def _compile(
     kind: Kind, compiler: str, words: list[str], files: Sequence[Path], texts: Mapping[str, str], folder: Path
 ) -> None:
+    """Compile the firmware into a folder. texts: generated files. Raises Problem where the compiler refuses it."""
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     include = [f"-I{FIRMWARE / name}" for name in (".", "core", "plant", *(["pico"] if kind == "pico" else []))]

@@ -140,6 +140,7 @@ class _BenchFile(TomlFile):
         super().__init__(path, code="E446", most=MOST_BYTES, kind="a bench file is TOML", about=about)
 
     def bench(self) -> TwoDrives:
+        """The bench that the file describes. Raises Problem where it has too little, too much, or wrong values."""
         for key, value in self.tables.items():
             if key not in ("name", *_TABLES):
                 helps = (*did_you_mean(key, ("name", *_TABLES)), f"a bench has name, {', '.join(_TABLES)}")

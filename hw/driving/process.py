@@ -169,5 +169,6 @@ def talk(
 
 
 def ended(status: int) -> Problem:
+    """The error that the process which drives the beds has ended, with its exit status."""
     message = f"the process that drives the beds ended with {status}"
     return Problem(error("E417", message, help="the beds stop themselves; run it again"))

@@ -177,6 +177,7 @@ class _UnixSocket:
 
 
 def _not_opened(url: str, reason: Exception) -> Problem:
+    """The error that a line cannot be opened, with the system's reason and what to do."""
     number, why = _number(reason), _why(reason)
     if number == errno.ENOTTY:
         why, helps = "it is no serial line", [_ports()]

@@ -84,6 +84,7 @@ def figures(group: ArchiveGroup, position: int | None = None) -> Verification | 
 
 
 def _of_metric(verified: Verified, column: int, own: np.ndarray, rows: list[int]) -> MetricError:
+    """The error by the step of a metric, by its column: the largest of the verified cases in these rows."""
     half, quarter, missed = verified.half[:, column], verified.quarter[:, column], verified.missed[:, column]
     instant = float(verified.instant[column])
     errors = tuple(

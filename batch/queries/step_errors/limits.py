@@ -47,6 +47,7 @@ def verdicts(group: ArchiveGroup, verification: Verification | None) -> tuple[St
 
 
 def _verdict(group: ArchiveGroup, limit: StepErrorLimit, verification: Verification | None) -> StepErrorVerdict:
+    """The verdict on one limit of an error by the step: on the largest error of the verified cases."""
     if verification is None:
         return StepErrorVerdict(limit.text, None, "nothing is verified: `met run --verify some`", limit)
     metric = verification.metrics.get(limit.metric)

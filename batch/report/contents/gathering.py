@@ -130,6 +130,7 @@ def _section(
     file: ArchiveFile,
     simulate: bool,
 ) -> ReportSection:
+    """All that the page says of a run or sweep. only: its name in commands; values: the most numbers of histories"""
     own = {group.name: experiments[group.name] for group in pool.groups if group.name in experiments}
     beds: Stability | None = None
     rows: tuple[Any, ...] = ()
@@ -220,6 +221,7 @@ def _lede(pool: Pool) -> str:
 
 
 def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Fact, ...]:
+    """What was run: duration, integrator, rates, servos, beds, guides, sensors and environment, a fact each."""
     recorded = sum(group.recorded for group in pool.groups)
     facts = [
         Fact("arm", _all(pool, "arm")),
@@ -278,6 +280,7 @@ def _sources(archive: ArchiveFile) -> tuple[SourceListing, ...]:
 
 
 def _provenance(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> tuple[Fact, ...]:
+    """Where the archive comes from: its file, deck, commit, versions and keys, a fact each."""
     provenance = archive.provenance
     size = archive.path.stat().st_size
     changed = {"yes": ", with changes that were not committed", "unknown": ""}.get(str(provenance.get("git_dirty")), "")

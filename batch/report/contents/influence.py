@@ -41,6 +41,7 @@ def _metrics(group: ArchiveGroup) -> list[str]:
 
 
 def _part(sensitivity: Sensitivity) -> InfluencePart:
+    """The parameters that explain a metric, as texts of the page; without rows where there are too few cases."""
     count = f"{sensitivity.cases:,} cases" + (
         f"; {sensitivity.left:,} are left out, with no finite value" if sensitivity.left else ""
     )

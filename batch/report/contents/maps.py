@@ -31,6 +31,7 @@ def maps(pool: Pool, varied: Sequence[CaseColumn], metrics: Sequence[CaseColumn]
 
 
 def _map(pool: Pool, x: CaseColumn, y: CaseColumn, metrics: Sequence[CaseColumn]) -> Map:
+    """The map of metrics over two parameters: of each cell its case, value, misses and failures."""
     across, up = column_levels(x.values, x.words), column_levels(y.values, y.words)
     shape = (len(up.texts), len(across.texts))
     cells = cells_of(across, up)

@@ -75,6 +75,7 @@ def _joint_margin(case: Sequence[Margin], joint: str) -> Margin | None:
 
 
 def _bed(joint: str, margins_of_cases: Sequence[Margin | None], spans: bool) -> BedStability:
+    """The stability of a joint's bed over the examined cases; None among these where the joint has no bed."""
     with_bed = [margin for margin in margins_of_cases if margin is not None]
     tightest = min(with_bed, key=lambda margin: margin.room)
     r = np.array([np.nan if margin is None else margin.together for margin in margins_of_cases])

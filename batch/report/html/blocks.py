@@ -237,6 +237,7 @@ def _bar_of(parts: Sequence[tuple[str, str, int]]) -> Html:
 
 
 def _demands(verdict_part: Verdict) -> Html | None:
+    """The table of requirements beside a verdict; None where there are none."""
     if not verdict_part.demands:
         return None
     if verdict_part.kind == "answer":
@@ -281,6 +282,7 @@ def _answered(requirements: Sequence[RequirementCounts]) -> Html:
 def _demand(
     requirement: RequirementCounts, single: bool, shares: bool, missed: bool, unknown: bool
 ) -> list[Html | None]:
+    """The cells of a requirement's row. single: the run has one case; shares, missed, unknown: columns of the table"""
     name = el("th", el("code", breaking(requirement.text)), scope="row")
     if single:
         word = "met" if requirement.met else "missed" if requirement.missed else "not known"
@@ -352,6 +354,7 @@ def _failing(failures: Sequence[FailureRow], *, single: bool) -> Html:
 
 
 def facts(fact_list: Sequence[Fact]) -> Html:
+    """Facts as a list of names and texts."""
     return el(
         "dl",
         [
@@ -363,6 +366,7 @@ def facts(fact_list: Sequence[Fact]) -> Html:
 
 
 def varied(parameters: Sequence[VariedParameter], anchors: Anchors) -> Html | None:
+    """The table of what is varied, each with the line of the deck; None where nothing is."""
     if not parameters:
         return None
     decides = any(parameter.sets for parameter in parameters)

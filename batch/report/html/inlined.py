@@ -32,6 +32,7 @@ LAST = "report.js"
 
 @cache
 def style() -> str:
+    """The style sheet of the page, as one text."""
     return "\n".join(_read(name) for name in STYLES)
 
 

@@ -81,6 +81,7 @@ def _about(report: Report) -> str:
 
 
 def _links(number: int, section: ReportSection, report: Report) -> list[tuple[str, str]]:
+    """The places and names of a section's parts, for the page's menu."""
     if len(report.sections) > 1:
         return [(f"s{number}", section.name)]
     links = [
@@ -116,6 +117,7 @@ def _signals_name(section: ReportSection) -> str:
 
 
 def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
+    """The page in its order: the design to use, what changed, verdicts, sections, parameters and provenance."""
     several = len(report.sections) > 1
     first, name = report.chosen_design, _verdict_name(report)
     tried = name != "Verdict"
@@ -153,6 +155,8 @@ def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
 
 
 def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head: str) -> list[Child]:
+    """The parts of a run or sweep, in the order of the page. head: the element of their headings"""
+
     def part(key: str, name: str, *children: Child, about: str = "") -> Html:
         paragraph = el("p", about, cls="said") if about else None
         return el("section", el(head, name), paragraph, *children, id=f"s{number}-{key}", cls=key)
@@ -258,6 +262,7 @@ ABOUT_STABILITY = (
 
 
 def _parameters(report: Report, anchors: blocks.Anchors) -> Html:
+    """The parameters of all sections, folded, with a field to search them."""
     out: list[Child] = [el("h2", "Parameters")]
     for number, section in enumerate(report.sections):
         if not section.parameters:

@@ -95,6 +95,7 @@ def modules_script(sections: Sequence[ReportSection]) -> str:
 
 
 def _column(column: CaseColumn) -> dict[str, Any]:
+    """The data of a column of numbers over cases, for the page's scripts."""
     return {
         "key": visible(column.key),
         "label": visible(column.label),
@@ -134,6 +135,7 @@ def overview_data(overview: Overview) -> dict[str, Any]:
 
 
 def _map(case_map: Map) -> dict[str, Any]:
+    """The data of a map, for the page's scripts."""
     return {
         "x": visible(case_map.x),
         "y": visible(case_map.y),
@@ -178,6 +180,7 @@ def _reach(colours: Reach | None) -> dict[str, Any] | None:
 
 
 def _signals(signals: Signals) -> dict[str, Any]:
+    """The data of recorded signals, for the page's scripts."""
     return {
         "joints": [visible(joint) for joint in signals.joints],
         "clocks": [packed(clock) for clock in signals.clocks],
@@ -223,6 +226,7 @@ def _simulation(page_simulation: PageSimulation) -> dict[str, Any]:
 
 
 def _structure(structure: SimulatedStructure) -> dict[str, Any]:
+    """The data with which the page runs the cases of a structure again."""
     description, kernel = structure.description, structure.description["kernel"]
     metrics = {metric["name"]: metric["output"] for metric in description["metrics"]}
     return {

@@ -165,6 +165,7 @@ def _tornado(row: InfluenceRow, mean: float, low: float, high: float) -> Html:
 
 
 def beds(bed_stability: Stability) -> Html:
+    """The table of the beds' stability, a row for each joint."""
     several = len(bed_stability.beds) > 1
     stable = stable_head(bed_stability.spans)
     heads = ("joint", "law", "servo", "delay", "r, together" if several else "r", stable, "margin")
@@ -179,6 +180,7 @@ def beds(bed_stability: Stability) -> Html:
 
 
 def parameters(rows_of_parameters: Sequence[ParameterRow], anchors: Anchors) -> Html:
+    """The table of parameters, each with its origin and the line of the deck."""
     among = any(row.among for row in rows_of_parameters)
     heads = ["parameter", "value", "unit", "from", "written in", *(["structures"] if among else [])]
     rows = [
