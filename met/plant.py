@@ -99,7 +99,9 @@ def plant_c(experiment: Experiment, joint: str, *, case: int = 0, period: float 
     """
     period = servo_period(experiment) if period is None else period
     source = emit(record(plant_program(experiment, joint, case=case, period=period)))
-    into, out = ({name: f"plant.{member}" for name, member in each.items()} for each in (source.inputs, source.outputs))
+    into, out = (
+        {name: f"plant.{member}" for name, member in members.items()} for members in (source.inputs, source.outputs)
+    )
     named = joint.replace("*/", "* /")
     return "\n".join(
         [

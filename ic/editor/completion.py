@@ -47,7 +47,7 @@ _NOT_VARIED = ("seed", "record")
 
 COMPARISONS = ("<", "<=", ">", ">=")
 
-_SAID = {"of": "the unit of the signal", "command": "the unit of the command"}
+_UNIT_WORDS = {"of": "the unit of the signal", "command": "the unit of the command"}
 """Units that depend on another word of the deck, in words."""
 
 _SIGNALS_ALONE = ("record", "open")
@@ -486,5 +486,5 @@ def _named(names: NamesInTexts, *kinds: str, around: TextEntry | None = None) ->
 
 
 def _of_parameter(parameter: Parameter) -> Offer:
-    unit = f"; in {_SAID.get(parameter.unit, parameter.unit)}" if parameter.unit not in ("", "1") else ""
+    unit = f"; in {_UNIT_WORDS.get(parameter.unit, parameter.unit)}" if parameter.unit not in ("", "1") else ""
     return Offer(parameter.name, types.CompletionItemKind.Property, f"{parameter.doc}{unit}")

@@ -18,7 +18,7 @@ MOST_SIGNALS = 1000
 def is_way(use: LinearUse, structure: Structure) -> bool:
     """True for an answer with one input and one output, both of one number."""
     known = recordable(structure, use.outputs)
-    return len(use.inputs) == 1 == sum(len(each.channels) for path in use.outputs for each in known[path])
+    return len(use.inputs) == 1 == sum(len(variable.channels) for path in use.outputs for variable in known[path])
 
 
 def check_linear(experiment: Experiment, where: str) -> None:

@@ -184,13 +184,15 @@ class _Boom:
         """Enter the stiffness of a spring, N m/rad, and its damping, `decay` seconds times that."""
         note = f"a spring of boom `{self.link.name}`"
         beam = (GJ if spring.axis == self.along else EI).name
-        for name, value, unit, of in (
+        for name, value, unit, source in (
             ("stiffness", stiffness, STIFFNESS, beam),
             ("damping", stiffness * decay, DAMPING, DAMPING_RATIO.name),
         ):
             path = f"{spring.joint}.servo.{name}"
             self.scope.keep_derived(path, value, unit, self.item, note)
-            self.scope.not_sweepable[path] = NotSweepable("follows from the boom", one_of=f"`{self.owner.join(of)}`")
+            self.scope.not_sweepable[path] = NotSweepable(
+                "follows from the boom", one_of=f"`{self.owner.join(source)}`"
+            )
 
     def _piece(self, number: int, begin: float, end: float) -> Link:
         """The piece between two shares of the length, uniform, with the rotary inertia of the cross-section."""

@@ -215,8 +215,10 @@ def _metric(
         return None
     if figure.of_way and not is_way(use, structure):
         message = f"`linear {use.name}` has not one input and one output, so it has no `{figure.name}`"
-        commands = [each for each in input_signals(structure) if not each.is_output]
-        helps = [f"write one of each in it: `inputs = {each.path};  outputs = {each.joint}.q;`" for each in commands]
+        commands = [command for command in input_signals(structure) if not command.is_output]
+        helps = [
+            f"write one of each in it: `inputs = {command.path};  outputs = {command.joint}.q;`" for command in commands
+        ]
         scope.complaints.error("D376", message, _place(item, of_item), help=helps[:1] or [*no_computer(structure)])
         return None
     if figure.name == "bending_share" and not structure.springs:

@@ -91,7 +91,7 @@ def of_lost(scope: Scope, name: Name, structure: Structure) -> bool:
     also one of its springs or pieces."""
     words = [word.text for word in name.path]
     lost = {
-        "links": scope.failed_parts | {each for each in words[1:2] if each.rpartition("_")[0] in scope.failed_parts},
+        "links": scope.failed_parts | {word for word in words[1:2] if word.rpartition("_")[0] in scope.failed_parts},
         "guides": set(scope.guides) - {guide.name for guide in structure.guides},
         "sensors": scope.sensors - {sensor.name for sensor in structure.sensors},
     }.get(words[0], set())

@@ -168,8 +168,8 @@ def bandwidth(way: ScalarLoop) -> float:
         return 0.0
     own = way.minimal()
     rest = abs(own.at(1.0)) if _is_number(own, 0.0) else 0.0
-    found = _where_size_is(own, rest / math.sqrt(2.0)) if rest else [math.nan]
-    return min(found, default=math.inf) / (2.0 * math.pi)
+    frequencies = _where_size_is(own, rest / math.sqrt(2.0)) if rest else [math.nan]
+    return min(frequencies, default=math.inf) / (2.0 * math.pi)
 
 
 def _gains(loop: ScalarLoop) -> tuple[tuple[float | None, float | None], tuple[float | None, float | None]]:

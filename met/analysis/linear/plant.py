@@ -42,13 +42,13 @@ class PlantModel:
             joint = path.rpartition(".servo.")[0]
             if f"{joint}.qd" in self.states and self.B[:, k].any():
                 held.setdefault(joint, k)
-        kept = [k for k, name in enumerate(self.states) if name.rpartition(".")[0] not in held]
-        rows = [*kept, *(self.states.index(f"{joint}.qd") for joint in held)]
-        system = np.hstack([self.A[np.ix_(rows, kept)], self.B[np.ix_(rows, [*held.values()])]])
-        roots, moves = eig(system, np.diag([1.0] * len(kept) + [0.0] * len(held)))
-        sizes = np.abs(moves[: len(kept)])
-        turns = np.array([self.states[k].endswith(".q") for k in kept], bool)
-        own = np.array([self.states[k].removesuffix(".q") in springs for k in kept], bool)
+        free = [k for k, name in enumerate(self.states) if name.rpartition(".")[0] not in held]
+        rows = [*free, *(self.states.index(f"{joint}.qd") for joint in held)]
+        system = np.hstack([self.A[np.ix_(rows, free)], self.B[np.ix_(rows, [*held.values()])]])
+        roots, moves = eig(system, np.diag([1.0] * len(free) + [0.0] * len(held)))
+        sizes = np.abs(moves[: len(free)])
+        turns = np.array([self.states[k].endswith(".q") for k in free], bool)
+        own = np.array([self.states[k].removesuffix(".q") in springs for k in free], bool)
         most = sizes[own].max(axis=0, initial=0.0)
         swings = (most >= sizes[turns].max(axis=0, initial=0.0)) & (most > MOVES * sizes.max(axis=0, initial=0.0))
         return float(np.abs(roots[swings & (roots.imag > 0.0)]).min(initial=math.inf)) / (2.0 * math.pi)

@@ -56,15 +56,15 @@ def literal(value: float) -> str:
 
 def _members(prefix: str, names: Iterable[str]) -> dict[str, str]:
     """Distinct names of members of the C struct, by the names of the program's numbers."""
-    made: dict[str, str] = {}
+    members: dict[str, str] = {}
     for name in names:
         base = member = prefix + "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
         n = 1
-        while member in made.values():
+        while member in members.values():
             n += 1
             member = f"{base}_{n}"
-        made[name] = member
-    return made
+        members[name] = member
+    return members
 
 
 class _CEmitter:
@@ -76,13 +76,15 @@ class _CEmitter:
         self.inputs = _members("in_", self.program.inputs)
         self.cells = _members("cell_", recording.cells)
         self.outputs = _members("out_", self.program.outputs)
-        self.names = [f"met_{n}_{_members('', [one.name])[one.name]}" for n, one in enumerate(recording.sections)]
+        self.names = [
+            f"met_{n}_{_members('', [section.name])[section.name]}" for n, section in enumerate(recording.sections)
+        ]
         self.called: set[str] = set()
         self.tables: dict[tuple[float, ...], str] = {}
-        self.timed = any(one.nodes[i][0] == "time" for one in recording.sections for i in one.order)
+        self.timed = any(section.nodes[i][0] == "time" for section in recording.sections for i in section.order)
 
     def source(self) -> CSource:
-        sections = [self._section(n, one) for n, one in enumerate(self.recording.sections)]
+        sections = [self._section(n, section) for n, section in enumerate(self.recording.sections)]
         entries = [self._start(), self._tick(), self._end()]
         tables = [
             f"static const uint64_t {name}[] = {{{', '.join(_pattern(x) for x in table)}}};\n"
@@ -160,7 +162,7 @@ class _CEmitter:
             *((f"row[{column}]", ref) for column, ref in section.records),
             *((self.outputs[self.program.outputs[n]], ref) for n, ref in section.outputs),
         ):
-            lines.append(f"    met->{place} = {self._of(nodes, ref)};")
+            lines.append(f"    met->{place} = {self._expression(nodes, ref)};")
         return _function(f"{self.names[number]}(met_case *met)", lines)
 
     def _value(self, nodes: Sequence[Node], node: Node) -> str:
@@ -172,12 +174,12 @@ class _CEmitter:
             return f"met->{self.cells[node[1]]}"
         if op in ("tick", "time"):
             return f"met->{op}"
-        operands = [self._of(nodes, ref) for ref in node[1 : 1 + OPERANDS[op]]]
+        operands = [self._expression(nodes, ref) for ref in node[1 : 1 + OPERANDS[op]]]
         if op in _INFIX:
             return f" {_INFIX[op]} ".join(operands)
         if op in ("add", "sub"):
             self.called.add("add")
-            return f"met_add({operands[0]}, {self._of(nodes, node[2] ^ (op == 'sub'))})"
+            return f"met_add({operands[0]}, {self._expression(nodes, node[2] ^ (op == 'sub'))})"
         if op == "where":
             return "{} ? {} : {}".format(*operands)
         if op == "gather":
@@ -190,12 +192,12 @@ class _CEmitter:
         """A call of the function for a node, with its operands and further arguments."""
         self.called.add(op)
         count = OPERANDS[op]
-        words = [self._of(nodes, ref) for ref in node[1 : 1 + count]]
+        words = [self._expression(nodes, ref) for ref in node[1 : 1 + count]]
         if op in ("bit", "flip"):
             words.append(str(node[1 + count]))
         return f"met_{op}({', '.join([*words, *more])})"
 
-    def _of(self, nodes: Sequence[Node], ref: int) -> str:
+    def _expression(self, nodes: Sequence[Node], ref: int) -> str:
         """The C expression of a reference, including its sign."""
         node = nodes[ref >> 1]
         if node[0] == "const":

@@ -64,11 +64,11 @@ class Library:
         rows = np.empty((len(inputs), ticks // program.record_divisor + 1, program.columns)) if record else None
         outputs = np.empty((len(inputs), len(program.outputs)))
         block = CBlock(self, np.zeros((1, len(program.inputs))))
-        for case, given in enumerate(inputs):
-            block.inputs[:, 0] = given
-            found = block.recorded(0, ticks)
+        for case, case_inputs in enumerate(inputs):
+            block.inputs[:, 0] = case_inputs
+            recorded = block.recorded(0, ticks)
             if rows is not None:
-                rows[case] = found[0]
+                rows[case] = recorded[0]
             outputs[case] = block.outputs[:, 0]
             if progress is not None:
                 progress(case + 1)
