@@ -27,6 +27,7 @@ Derived channels, computed from the state only where a record or a metric asks f
                                     joint in a loop
     links.<link>.position, .orientation, .velocity, .rate       of the link's frame, in world axes
     links.<boom>.deflection, .bend  of the tip of a link that bends, against its root
+    links.<boom>.displacement       of that tip, against the arm with straight booms
     links.<link>.jacobian.angular|linear.<joint>                rate and velocity for each unit of the joint's rate
     energy.kinetic|potential, momentum.linear|angular           of all that the joints move, and of payloads
     payloads.<payload>.position, .orientation, .velocity, .rate of the payload's frame, in world axes
@@ -101,6 +102,7 @@ OF_BOOM = (
         "axes of the boom's root",
     ),
     ("bend", "rad", "angle of the boom's tip against its root", XYZ, "about each axis of the boom"),
+    ("displacement", "m", "way to the boom's tip from where it would be if all booms were straight", XYZ, WORLD_AXES),
 )
 OF_PAYLOAD = (
     ("position", "m", "position of the origin of the payload's frame", XYZ, WORLD_AXES),

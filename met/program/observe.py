@@ -105,9 +105,17 @@ class Observed:
         if kind == "jacobian":
             angular, linear = self._jacobian(link)[self.joints.index(channel.joint)]
             return (angular if rest[0] == "angular" else linear)[XYZ.index(rest[-1])]
-        if kind in ("bend", "deflection"):
-            return (self._bend if kind == "bend" else self._deflection)(link)[XYZ.index(rest[0])]
+        of_booms = {"bend": self._bend, "deflection": self._deflection, "displacement": self._displacement}
+        if kind in of_booms:
+            return of_booms[kind](link)[XYZ.index(rest[0])]
         return _of_frame(self.motions[link], kind, rest[0])
+
+    def _displacement(self, boom: str) -> Vector:
+        """The way to a boom's tip from its place on the arm with all booms straight, world axes, m."""
+        springs, tip = self.system.structure.springs, scale(2.0, self.system.com(boom, self.read))
+        q = [0.0 if joint in springs else angle for joint, angle in zip(self.joints, self.q, strict=True)]
+        straight = motions(self.tree, q, self.qd, self.base)[boom]
+        return sub(self.motions[boom].position(tip), straight.position(tip))
 
     def _bend(self, boom: str) -> Vector:
         """The angles of a boom's tip against its root about each axis of the boom, rad: sums over its springs."""

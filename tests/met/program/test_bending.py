@@ -206,3 +206,34 @@ def test_values_of_all_joints_are_without_springs_but_for_positions(tmp_path: Pa
     tau, q, one, *_ = found.structure.record
     assert (tau.joints, one.channels) == (("root",), ("jib_1y.tau",))
     assert set(q.joints) == {"root"} | found.structure.springs and len(q.joints) == 10
+
+
+def test_the_displacement_of_a_second_boom_is_what_both_bend_together(tmp_path: Path) -> None:
+    """For small bends: the deflection of the first, the lever of its tip's angle, and the deflection of the second."""
+    second = (
+        "link fore boom { mass = 1 kg;  shape = cylinder(radius = 1 mm, length = 2 m, along = x);  "
+        "EI = 1 N*m^2;  damping_ratio = 0; }"
+    )
+    two = changed(
+        BOOM,
+        ("    link load { mass = 0 kg; }", f"    {second}"),
+        ("child = load;", "child = fore;"),
+        ("root = locked", "* = locked"),
+        (
+            "    rates",
+            "    initial { servos = balanced; }\n    environment { gravity = [0, 2e-5, -1e-5] m/s^2; }\n    rates",
+        ),
+        ("duration = 1 s", "duration = 10 ms"),
+        (
+            "[q, links.jib.bend,",
+            "[q, links.jib.bend, links.fore.displacement, links.fore.deflection, links.jib.displacement,",
+        ),
+    )
+    found = engine.run(experiment(tmp_path, two)).signals
+    jib, fore, bend, both = (
+        found[f"links.{name}"][0, -1] for name in ("jib.deflection", "fore.deflection", "jib.bend", "fore.displacement")
+    )
+    np.testing.assert_allclose(found["links.jib.displacement"][0, -1], jib, rtol=1e-9, atol=1e-15)
+    lever = np.cross(bend, [2.0, 0.0, 0.0])
+    np.testing.assert_allclose(both[1:], (jib + lever + fore)[1:], rtol=1e-3)
+    assert np.abs(both[1:]).min() > 2.0 * np.abs(jib[1:]).max() > 1e-6
