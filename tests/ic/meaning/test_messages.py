@@ -114,7 +114,7 @@ error[D140]: no servo model `rigid_gearbx`
 6 |     model = rigid_gearbx;
   |             ^^^^^^^^^^^^
   = help: did you mean `rigid_gearbox`?
-  = help: servo models: cascade, compliant_gearbox, ideal, locked, passive, rigid_gearbox
+  = help: servo models: cascade, compliant_gearbox, external, ideal, locked, passive, rigid_gearbox
 """,
     ),
     "a model with its parameters behind its name": (

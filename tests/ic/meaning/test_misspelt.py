@@ -17,7 +17,7 @@ OF_LINK = "it has: mass, shape, com, inertia, lumped"
 OF_SERVO = (
     "it has: ratio, kp, ki, v_max, k_position, resistance, kt, tau_max, j_m, f_c, f_v, friction, model, command, rate"
 )
-MODELS = "servo models: cascade, compliant_gearbox, ideal, locked, passive, rigid_gearbox"
+MODELS = "servo models: cascade, compliant_gearbox, external, ideal, locked, passive, rigid_gearbox"
 OF_PAYLOAD = "it has: mass, com, inertia, shape, on, at, rpy, grapple, release, position, attitude, velocity, rate"
 RATES = "rates: dynamics, servos, record, base"
 

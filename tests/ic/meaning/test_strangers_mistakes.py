@@ -178,7 +178,7 @@ error[D140]: no servo model `my_pd`
   |
 6 |     model = my_pd;
   |             ^^^^^
-  = help: servo models: cascade, compliant_gearbox, ideal, locked, passive, rigid_gearbox
+  = help: servo models: cascade, compliant_gearbox, external, ideal, locked, passive, rigid_gearbox
   = help: a model of your own is known once its package is installed, `pip install -e FOLDER`; `met new` writes such a package
 """
     )
