@@ -45,7 +45,7 @@ def compile(
     import json
 
     from batch.portable import files
-    from ic.printing.columns import size
+    from ic.printing.columns import count, size
     from met.outputs import path_of
 
     names = (name,) if name is not None else ()
@@ -67,7 +67,8 @@ def compile(
             click.echo(json.dumps(told, indent=1))
         elif not quiet:
             of = done.described
-            what = f"{len(of['inputs'])} inputs, {len(of['columns'])} recorded numbers, {len(of['metrics'])} metrics"
+            numbers = (("inputs", "input"), ("columns", "recorded number"), ("metrics", "metric"))
+            what = ", ".join(count(len(of[key]), name) for key, name in numbers)
             say(f"{done.module}  ({size(done.module.stat().st_size)})  {what}")
             if of["not_computed"]:
                 say(
@@ -82,12 +83,11 @@ def _compile_fmu(experiment: Experiment, target: Path, version: int, *, form: st
     import json
 
     from batch.portable import files
-    from ic.printing.columns import size
+    from ic.printing.columns import count, size
 
     fmu = files.write_fmu(experiment, target, version)
     counts = {
-        f"{kind}s": sum(variable.kind == kind for variable in fmu.variables)
-        for kind in ("parameter", "input", "output")
+        kind: sum(variable.kind == kind for variable in fmu.variables) for kind in ("parameter", "input", "output")
     }
     unknown = [use.name for use in experiment.linear_metrics]
     with kept(f"{target} is whole"):
@@ -96,12 +96,12 @@ def _compile_fmu(experiment: Experiment, target: Path, version: int, *, form: st
                 "fmu": str(target),
                 "fmi": f"{version}.0",
                 "platform": fmu.platform or None,
-                **counts,
+                **{f"{kind}s": number for kind, number in counts.items()},
                 "not_computed": unknown,
             }
             click.echo(json.dumps(contents, indent=1))
         elif not quiet:
-            what = ", ".join(f"{count} {kinds}" for kinds, count in counts.items())
+            what = ", ".join(count(number, kind) for kind, number in counts.items())
             say(f"{target}  ({size(target.stat().st_size)})  {what}")
             if unknown:
                 say(f"  not computed in it: {', '.join(unknown)}, of linear answers")

@@ -65,7 +65,7 @@ def test_a_module_and_its_description_belong_together(folder: Path, capsys: pyte
     assert met("compile", "deck.ic", "tuned") == 0
     said = re.sub(r"\([\d.]+ KiB\)", "(SIZE)", capsys.readouterr().out)
     assert said == (
-        "tuned.wasm  (SIZE)  1 inputs, 13 recorded numbers, 1 metrics\n"
+        "tuned.wasm  (SIZE)  1 input, 13 recorded numbers, 1 metric\n"
         "tuned.json  (SIZE)\n"
     )  # fmt: skip
     module, told = (folder / "tuned.wasm").read_bytes(), json.loads((folder / "tuned.json").read_text())
