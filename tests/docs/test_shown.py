@@ -17,7 +17,7 @@ from tests.docs.pages import Page, differs
         ("bench", 4),
         ("best", 5),
         ("booms", 5),
-        ("coupled", 3),
+        ("coupled", 4),
         ("environments", 1),
         ("evidence", 2),
         ("fit", 9),
