@@ -107,11 +107,11 @@ def _parameters(before: Experiment, now: Experiment, new: set[str]) -> Iterator[
     for path, old in sorted(before.parameters.items()):
         if path in now.parameters and _unlike(old, now.parameters[path]):
             sides = (before, old), (now, now.parameters[path])
-            found = _of_spring(path, *sides) if path.partition(".")[0] in springs else None
-            if found is None:
+            boom_change = _of_spring(path, *sides) if path.partition(".")[0] in springs else None
+            if boom_change is None:
                 yield _changed(path, old, now.parameters[path])
             else:
-                booms.setdefault(found.text, found)
+                booms.setdefault(boom_change.text, boom_change)
         elif path in now.parameters:
             yield from computed.change(path)
     yield from booms.values()
@@ -129,12 +129,12 @@ def _of_spring(path: str, *sides: tuple[Experiment, Quantity]) -> Change | None:
     boom, values = joint.rpartition("_")[0], [quantity.value for _, quantity in sides]
     if name == "damping":
         return _changed(f"damping of the springs of boom {boom}", *(quantity for _, quantity in sides))
-    way = [[each.parameters[f"links.{boom}.com.{axis}"].value for axis in AXES] for each, _ in sides]
-    if name != "stiffness" or not all(isinstance(each, float) for each in (*values, *way[0], *way[1])):
+    way = [[experiment.parameters[f"links.{boom}.com.{axis}"].value for axis in AXES] for experiment, _ in sides]
+    if name != "stiffness" or not all(isinstance(number, float) for number in (*values, *way[0], *way[1])):
         return None
     # at each of `alike` springs an equal share of the length bends, which is twice the way to the centre of mass
-    alike = sum(each.startswith(f"{boom}_") and each[-1] == joint[-1] for each in sides[0][0].structure.springs)
-    beams = [value * 2.0 * math.hypot(*each) / alike for value, each in zip(values, way, strict=True)]  # type: ignore
+    alike = sum(spring.startswith(f"{boom}_") and spring[-1] == joint[-1] for spring in sides[0][0].structure.springs)
+    beams = [value * 2.0 * math.hypot(*vector) / alike for value, vector in zip(values, way, strict=True)]  # type: ignore
     if math.isclose(*beams, rel_tol=1e-12):
         return None
     changed = (replace(quantity, value=beam, unit="N*m^2") for (_, quantity), beam in zip(sides, beams, strict=True))
