@@ -19,9 +19,8 @@ Parameters are named by paths, the ones a deck uses inside a run:
     <joint>.servo.<parameter>              as the servo declares
     <joint>.servo.command.<parameter>      as the command declares
     <joint>.servo.sensor.<of>.<parameter>  as the sensor declares through which the servo's law sees a quantity
-    <joint>.bed.<parameter>                as the bed declares that the joint's motor is on
+    <joint>.bed|law.<parameter>            as the bed declares that the joint's motor is on, or the law of its load
     <joint>.bed.scale.torque|rate|voltage  of a bed whose motor is of another size than the joint's
-    <joint>.law.<parameter>                as the law declares that drives the bed's load
     initial.<joint>.q|qd                   rad, rad/s (m, m/s)
     initial.base.position|velocity.x|y|z   of a free base, world axes, m, m/s; .rpy (rad, fixed x-y-z), .rate (rad/s)
     base.<component>.<parameter>           of a prescribed base, as the profile declares that gives this component
@@ -29,8 +28,7 @@ Parameters are named by paths, the ones a deck uses inside a run:
     guides.<name>.<parameter>              as the guide declares
     guides.<name>.<joint>.<parameter>      of each joint that the guide moves, as the guide declares
     guides.<name>.<component>.<parameter>  of its path, as the profile declares that gives this component
-    metrics.<name>.<parameter>             as the metric declares
-    sensors.<name>.<parameter>             as the sensor declares that is on a link
+    metrics|sensors.<name>.<parameter>     as the metric declares, or the sensor that is on a link
     payloads.<name>.mass .com.x .inertia.xx ...             of a payload, as of a link, in its own frame
     payloads.<name>.at|rpy.x|y|z           its frame in its link's, m, rad (fixed x-y-z): where it is held from the
                                            start; of one that is grappled `at` alone, the point that it should come to
@@ -268,10 +266,8 @@ class Substitution:
 
 @frozen
 class EnvironmentUse:
-    """An environment model under a name of the deck's. divisor None: evaluated at every stage.
-
-    slides  whether the joint that it is about is prismatic, where units of its signals depend on it
-    """
+    """An environment model under a name of the deck's. divisor None: evaluated at every stage; slides: whether its
+    joint is prismatic, where units of its signals depend on that."""
 
     name: str
     model: str
