@@ -91,7 +91,7 @@ def _exchanged(a: str, b: str, pairs: Mapping[str, Pair], residuals: Mapping[str
         return []
     left = [_mean_square(pair.residual) for pair in crossed]
     now, after = residuals[a] + residuals[b], sum(left)
-    if after > HALVED * now or left[0] > residuals[b] or left[1] > residuals[a]:
+    if now == 0.0 or after > HALVED * now or left[0] > residuals[b] or left[1] > residuals[a]:
         return []
     return [f"`{a}` and `{b}` of the log fit when they change places: {_left(after, now)}"]
 

@@ -54,6 +54,16 @@ def of(found: Comparison, channel: str) -> Residual:
     return next(each for each in found.residuals if each.channel == channel)
 
 
+def test_equal_columns_that_fit_to_the_last_bit_are_not_doubted() -> None:
+    """As the torques of two idle joints in a run's own export."""
+    exact = run() | {"luff.tau": np.zeros(len(TIME)), "fold.tau": np.zeros(len(TIME))}
+    courses = {name: ComputedChannel(TIME, values) for name, values in exact.items()}
+    log = MeasuredSignals({name: (TIME, values) for name, values in exact.items()}, [], [])
+    comparison = compare(courses, COLUMNS, ["luff", "fold"], log)
+    assert not comparison.doubts
+    assert all(residual.rms == 0.0 for residual in comparison.residuals)
+
+
 def test_noise_is_white_and_follows_nothing() -> None:
     found = compared(untouched)
     assert all(each.white and not each.explained for each in found.residuals)
