@@ -50,10 +50,10 @@ def _cause_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
     where = f" ({joint.place.file}:{joint.place.line})" if joint.place else ""
     if failure == SINGULAR and joint.loop is not None:
         return (
-            f"{head}loop {joint.loop.name} is stretched or folded flat, or its links no longer meet, so that joint "
-            f"{joint.loop.leader} does not lead it on{_where(joint.loop.place)}. Keep that joint off there, as by a "
-            f"`joint_stop`, or let another one lead. Where it was not near, a step is too long: try a faster rate for "
-            f"the dynamics."
+            f"{head}loop {joint.loop.name} comes to be stretched or folded flat, or its links no longer meet, so that "
+            f"joint {joint.loop.leader} does not lead it on{_where(joint.loop.place)}. Keep that joint off there, as "
+            f"by a `joint_stop`, or let another one lead. Where it was not near, a step is too long: try a faster "
+            f"rate for the dynamics."
         )
     if failure == SINGULAR and tick > 0.0:
         return (

@@ -147,7 +147,8 @@ class _Along:
         for i, (joint, actuator) in enumerate(zip(self.system.joints, self.system.actuators, strict=True)):
             if joint.follows:
                 leaders = " and ".join(f"`{name}`" for name in joint.follows)
-                assumed = f"follows {leaders} without play, elasticity or forces between teeth"
+                lost = "forces between teeth" if joint.loop is None else "friction in the loop's pin"
+                assumed = f"follows {leaders} without play, elasticity or {lost}"
                 yield Assumption(f"joint `{joint.name}`", assumed)
             elif not structure.free:
                 yield from self._drive(i, joint, actuator)

@@ -67,11 +67,13 @@ class Led:
     q      position, rad, without jumps; whole turns are open
     ratio  rate for each unit of the leader's; not a number where the triangle is flat or cannot be put together
     bend   derivative of `ratio` by the leader's position
+    flattening  share of the square of the triangle's area that is lost for each unit of the leader's way
     """
 
     q: Real
     ratio: Real
     bend: Real
+    flattening: Real
 
 
 def corners_of(loop: Loop, joints: Sequence[Joint], number: Callable[[str], Real]) -> list[Corner]:
@@ -156,7 +158,8 @@ def close(corners: Sequence[Corner], u: Real, left: bool) -> tuple[dict[str, Led
     followers = {}
     for corner, *numbers in values:
         direction = corner.along * sign(dot(corner.axis, across))
-        followers[corner.name] = Led(*(direction * number for number in numbers))
+        position, ratio, bend = (direction * number for number in numbers)
+        followers[corner.name] = Led(position, ratio, bend, flattening=-2.0 * k_v * m / square)
     return followers, (sqrt(vv), sqrt(pp), sqrt(rr))
 
 

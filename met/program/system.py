@@ -6,6 +6,7 @@ from the case's memory where a sweep varies it (`PARAMETER` cells, computed once
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -44,7 +45,7 @@ from met.program.values import NamedValues, answer, parameters, returned
 from met.sensors.sensor import Sensor
 from met.servos.servo import Drive, JointMotion, Parts, Servo
 from met.substitution import BedModel, Law
-from met.trace import Formulas, Graph, Real, Scalar
+from met.trace import Formulas, Graph, Real, Scalar, where
 from met.vectors import Vector
 
 PARAMETER, TREE, FURTHEST = "parameter:", "tree:", ":furthest"
@@ -188,14 +189,16 @@ class System:
         return tuple(rows.get(i, {i: 1.0} if i in leaders else {}) for i in range(len(self.joints)))
 
     def bends(self, read: ReadCell, y: Motion) -> tuple[Real, ...]:
-        """The accelerations of joints that follow while those that lead have none, as loops have it, rad/s^2."""
+        """The accelerations of joints that follow while those that lead have none, as loops have it, rad/s^2. Not a
+        number of a loop that would be flat within two steps: a longer one jumps across, onto the same branch."""
 
         def bend(i: int) -> Real:
             joint = self.joints[i]
             own: Real = 0.0
             if joint.loop is not None:
-                rate = y.qd[self.numbers[joint.loop.leader]]
-                own = self.led(joint, read, y.q).bend * rate * rate
+                rate, led = y.qd[self.numbers[joint.loop.leader]], self.led(joint, read, y.q)
+                is_flat_soon = 2.0 * self.structure.schedule.step * led.flattening * rate > 1.0
+                own = where(is_flat_soon, math.nan, led.bend) * rate * rate
             return sum((ratio * bend(other) for other, ratio in self._ratios(joint, read, y.q).items()), own)
 
         return tuple(map(bend, range(len(self.joints))))

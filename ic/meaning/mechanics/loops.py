@@ -95,10 +95,21 @@ def begin_in_loop(scope: Scope, joint: Joint, joints: Sequence[Joint]) -> None:
         led = followers[joint.name]
         if joint.name == next(other.name for other in joints if other.loop is loop):
             _check(scope, loop, corners, q, (led.ratio, *sides))  # type: ignore[arg-type]
-    turns = -2.0 * math.pi * rint(led.q / (2.0 * math.pi))
+    ends = [
+        scope.parameters[path].value
+        for end in ("q_min", "q_max")
+        if (path := f"{joint.name}.{end}") in scope.parameters
+    ]
+    middle = 0.5 * (ends[0] + ends[1]) if len(ends) == 2 else 0.0  # type: ignore[operator]
+    turns = -2.0 * math.pi * rint((led.q - middle) / (2.0 * math.pi))
     note = f"from `{loop.leader}`, which it follows by loop `{loop.name}`"
     for path, value, unit, why in (
-        (f"{joint.name}.offset", turns, "joint", "whole turns, so that it begins within 180 deg"),
+        (
+            f"{joint.name}.offset",
+            turns,
+            "joint",
+            "whole turns, so that it begins within 180 deg of the middle of its range, or of 0",
+        ),
         (f"initial.{joint.name}.q", led.q + turns, "joint", note),
         (f"initial.{joint.name}.qd", led.ratio * qd, "joint/s", note),  # type: ignore[operator]
     ):
@@ -125,8 +136,11 @@ def _check(scope: Scope, loop: Loop, corners: Sequence[Corner], q: Real, closed:
     def opens(table: np.ndarray) -> tuple[np.ndarray, list[str]]:
         bad = np.isnan(table[:, 0])
         v, p, r = table[np.argmax(bad), 1:]
+        if not (p > 0.0 and r > 0.0):
+            return bad, ["two of its corners are one point"]
         reach = f"and the links reach from {abs(p - r):.4g} to {p + r:.4g} m"
-        return bad, [f"from {names[3]} to {names[1]} there are {v:.4g} m, {reach}"]
+        flat = ": there it is flat" if abs(p - r) < v * (1.0 + TOLERANCE) and v < (p + r) * (1.0 + TOLERANCE) else ""
+        return bad, [f"from {names[3]} to {names[1]} there are {v:.4g} m, {reach}{flat}"]
 
     for values, test, message, helps in (
         (tuple(off), leaves_plane, "leaves its plane", (PLANE, SOFTLY)),
