@@ -7,12 +7,16 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from met.diagnostic import Problem, error
 from met.host.files import settle_folder
+
+ELSEWHERE = "`-o FILE` names another place"
+"""The remedy where a file cannot be written."""
 
 
 def path_of(output: str | os.PathLike[str]) -> Path:
@@ -76,9 +80,14 @@ def not_overwritten(output: Path, *, code: str, because: str, remedy: str = "rem
     return error(code, f"{output} exists{because}: it is not written over", help=helps)
 
 
-def cannot_write(output: Path, reason: OSError, *, code: str, help: str | Sequence[str] = ()) -> Problem:
-    """The problem that the system refuses to write a file, in the system's words."""
-    return Problem(error(code, f"cannot write {output}: {refusal_text(reason)}", help=help))
+@contextmanager
+def writing(output: Path, *, code: str, help: str | Sequence[str] = ()) -> Iterator[None]:
+    """A block in which a file is looked at or written. Where the system refuses, it raises Problem, in the system's
+    words."""
+    try:
+        yield
+    except OSError as reason:
+        raise Problem(error(code, f"cannot write {output}: {refusal_text(reason)}", help=help)) from reason
 
 
 def settle_named(output: Path, *, code: str) -> None:

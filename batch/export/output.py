@@ -8,7 +8,7 @@ from pathlib import Path
 
 from batch.archive.sink import FileBusy, Sink, temporary_of
 from met.diagnostic import Problem, error
-from met.outputs import cannot_write, check_overwrite, check_place, settle_named
+from met.outputs import ELSEWHERE, check_overwrite, check_place, settle_named, writing
 
 
 def check(output: Path, archive: Path, own: Callable[[Path], bool], *, force: bool | None) -> None:
@@ -18,7 +18,7 @@ def check(output: Path, archive: Path, own: Callable[[Path], bool], *, force: bo
     own    whether a file that is there is an export of MET's, and may go
     force  whether any other may; None where the user has no way to say so
     """
-    try:
+    with writing(output, code="E305", help=ELSEWHERE):
         check_place(output, code="E305", inside=output / archive.with_suffix(".mcap").name)
         if output.exists() and archive.exists() and output.samefile(archive):
             message = f"{output} is the archive itself: it is not written over"
@@ -27,8 +27,6 @@ def check(output: Path, archive: Path, own: Callable[[Path], bool], *, force: bo
             because = ", and may hold work that is not in the archive"
             remedy = "remove the file" if force is None else "say `--force`"
             check_overwrite(output, own, code="E374", because=because, remedy=remedy)
-    except OSError as reason:
-        raise _cannot_write(output, reason) from reason
 
 
 @contextlib.contextmanager
@@ -37,8 +35,13 @@ def whole(output: Path) -> Iterator[Sink]:
     raises, nothing is left; a killed process leaves a file under a temporary name, which the next one takes over.
     Raises Problem E305, E307."""
     temporary = temporary_of(output)
-    try:
-        sink = Sink(temporary)
+    with writing(output, code="E305", help=ELSEWHERE):
+        try:
+            sink = Sink(temporary)
+        except FileBusy:
+            helps = "wait until it is done, or give another name with `-o`"
+            message = f"cannot write {output}: another export is writing it now"
+            raise Problem(error("E307", message, help=helps)) from None
         try:
             yield sink
             sink.settle()
@@ -49,12 +52,3 @@ def whole(output: Path) -> Iterator[Sink]:
         finally:
             sink.close()
         settle_named(output, code="E305")
-    except FileBusy:
-        helps = "wait until it is done, or give another name with `-o`"
-        raise Problem(error("E307", f"cannot write {output}: another export is writing it now", help=helps)) from None
-    except OSError as reason:
-        raise _cannot_write(output, reason) from reason
-
-
-def _cannot_write(output: Path, reason: OSError) -> Problem:
-    return cannot_write(output, reason, code="E305", help="`-o FILE` names another place")

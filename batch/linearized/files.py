@@ -14,7 +14,7 @@ from batch.linearized.data import arrays, axes
 from met.analysis.linear.answers import Linearized
 from met.diagnostic import Problem, error
 from met.host.files import whole_file
-from met.outputs import cannot_write, check_place
+from met.outputs import check_place, writing
 
 ENDINGS = (".npz", ".h5", ".csv")
 
@@ -35,11 +35,8 @@ def write(linearized: Linearized, output: Path) -> None:
     """Writes the answers. Raises Problem E305."""
     kind = output.suffix.lower()
     content = {".npz": _npz, ".h5": _hdf5, ".csv": _csv}[kind](linearized)
-    try:
-        with whole_file(output) as file:
-            file.write(content)
-    except OSError as reason:
-        raise cannot_write(output, reason, code="E305") from reason
+    with writing(output, code="E305"), whole_file(output) as file:
+        file.write(content)
 
 
 def _about(linearized: Linearized) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, whole_file
 from met.messages.visible import visible
-from met.outputs import cannot_write, check_overwrite, check_place, quoted
+from met.outputs import check_overwrite, check_place, quoted, writing
 
 SOFTWARE = "MET"
 MOST_DOTS = 200_000_000
@@ -31,14 +31,12 @@ MARKS = {
 
 def check(output: Path) -> None:
     """Refuse to overwrite a file that is not a picture of MET's. Raises Problem E305; E326 for another ending."""
-    try:
+    with writing(output, code="E305"):
         if output.suffix.lower() not in METADATA and not output.is_dir():
             helps = [f"`-o {quoted(output.with_suffix('.png'))}`"] if output.name else []
             raise Problem(error("E326", f"cannot write {output}: pictures are PNG, SVG or PDF files", help=helps))
         check_place(output, code="E305", inside=output / "plot.png")
         check_overwrite(output, own, code="E305", because=" and was not drawn by MET")
-    except OSError as reason:
-        raise cannot_write(output, reason, code="E305") from reason
 
 
 def own(output: Path) -> bool:
@@ -68,12 +66,10 @@ def save(figure: Any, output: Path) -> None:
     }[kind]
     drawn = getattr(importlib.import_module(f"matplotlib.backends.backend_{backend}"), canvas)(figure)
     try:
-        with whole_file(output) as file, warnings.catch_warnings():
+        with writing(output, code="E305"), whole_file(output) as file, warnings.catch_warnings():
             warnings.filterwarnings("error", message="constrained_layout not applied")
             warnings.filterwarnings("ignore", message="Glyph .* missing from font")
             getattr(drawn, f"print_{kind[1:]}")(file, metadata=METADATA[kind])
-    except OSError as reason:
-        raise cannot_write(output, reason, code="E305") from reason
     except UserWarning as reason:
         wide, high = (f"{2.54 * side:.3g}" for side in figure.get_size_inches())
         message = f"{wide} x {high} cm have no room for {len(figure.axes)} panels, with what is written on them"

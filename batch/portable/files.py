@@ -18,7 +18,7 @@ from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import open_regular, whole_file
 from met.host.sources import names_archive, names_plan
-from met.outputs import cannot_write, check_overwrite, check_place, quoted
+from met.outputs import ELSEWHERE, check_overwrite, check_place, quoted, writing
 from met.plan import Experiment
 from met.run import prepare
 
@@ -74,11 +74,9 @@ def check(output: Path) -> None:
         raise Problem(error("E471", f"cannot write {output}: modules are .wasm files, and FMUs .fmu files", help=helps))
     module = ((output, _is_module), (output.with_suffix(".json"), _is_description))
     for path, own in ((output, is_fmu),) if output.suffix == FMU_ENDING else module:
-        try:
+        with writing(path, code="E470", help=ELSEWHERE):
             check_place(path, code="E470", inside=output / "module.wasm")
             check_overwrite(path, own, code="E470", because=" and was not written by `met compile`")
-        except OSError as reason:
-            raise _cannot_write(path, reason) from reason
 
 
 def write(experiment: Experiment, output: Path) -> ModuleFiles:
@@ -101,11 +99,8 @@ def write_fmu(experiment: Experiment, output: Path, version: int) -> Fmu:
 
 
 def _write(path: Path, data: bytes) -> None:
-    try:
-        with whole_file(path) as file:
-            file.write(data)
-    except OSError as reason:
-        raise _cannot_write(path, reason) from reason
+    with writing(path, code="E470", help=ELSEWHERE), whole_file(path) as file:
+        file.write(data)
 
 
 def check_page(output: Path) -> None:
@@ -113,20 +108,15 @@ def check_page(output: Path) -> None:
     if output.suffix.lower() not in (".html", ".htm") and not output.is_dir():
         helps = [f"`-o {quoted(output.with_suffix('.html'))}`"] if output.name else []
         raise Problem(error("E475", f"cannot write {output}: pages are HTML files", help=helps))
-    try:
+    with writing(output, code="E474", help=ELSEWHERE):
         check_place(output, code="E474", inside=output / "view.html")
         check_overwrite(output, _is_page, code="E474", because=" and was not written by `met view`")
-    except OSError as reason:
-        raise _cannot_write(output, reason, code="E474") from reason
 
 
 def write_page(text: str, output: Path) -> None:
     """Write the page under its name, whole or not at all. Raises Problem E474."""
-    try:
-        with whole_file(output) as file:
-            file.write(text.encode())
-    except OSError as reason:
-        raise _cannot_write(output, reason, code="E474") from reason
+    with writing(output, code="E474", help=ELSEWHERE), whole_file(output) as file:
+        file.write(text.encode())
 
 
 def _is_page(path: Path) -> bool:
@@ -142,7 +132,3 @@ def _is_module(path: Path) -> bool:
 def _is_description(path: Path) -> bool:
     with open_regular(path) as file:
         return f'"format": "{FORMAT}"'.encode() in file.read(100)
-
-
-def _cannot_write(path: Path, reason: OSError, code: str = "E470") -> Problem:
-    return cannot_write(path, reason, code=code, help="`-o FILE` names another place")

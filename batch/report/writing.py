@@ -7,7 +7,7 @@ from pathlib import Path
 from batch.report.html.page import GENERATOR
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, whole_file
-from met.outputs import cannot_write, check_overwrite, check_place, quoted
+from met.outputs import ELSEWHERE, check_overwrite, check_place, quoted, writing
 
 ENDINGS = (".html", ".htm")
 HEAD_BYTES = 400
@@ -21,7 +21,7 @@ def default(archive: Path) -> Path:
 
 def check(output: Path) -> None:
     """Refuse a place before anything is computed. Raises Problem E380, or E381 where the name is not that of a page."""
-    try:
+    with writing(output, code="E380", help=ELSEWHERE):
         if output.suffix.lower() not in ENDINGS and not output.is_dir():
             helps = [f"`-o {quoted(output.with_suffix('.html'))}`"] if output.name else []
             if output.suffix.lower() == ".pdf":
@@ -29,8 +29,6 @@ def check(output: Path) -> None:
             raise Problem(error("E381", f"cannot write {output}: reports are HTML files", help=helps))
         check_place(output, code="E380", inside=output / "report.html")
         check_overwrite(output, is_report, code="E380", because=" and is no report of MET")
-    except OSError as reason:
-        raise _cannot_write(output, reason) from reason
 
 
 def is_report(path: Path) -> bool:
@@ -41,12 +39,5 @@ def is_report(path: Path) -> bool:
 
 def write(output: Path, text: str) -> None:
     """Write the page under its name, whole or not at all. Raises Problem E380 where the system refuses."""
-    try:
-        with whole_file(output) as file:
-            file.write(text.encode("utf-8"))
-    except OSError as reason:
-        raise _cannot_write(output, reason) from reason
-
-
-def _cannot_write(output: Path, reason: OSError) -> Problem:
-    return cannot_write(output, reason, code="E380", help="`-o FILE` names another place")
+    with writing(output, code="E380", help=ELSEWHERE), whole_file(output) as file:
+        file.write(text.encode("utf-8"))
