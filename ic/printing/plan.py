@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -86,59 +86,30 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
     """One run or sweep, line by line."""
     structure = experiment.structure
     yield f"{deck}: {experiment.name}"
-    yield ""
-    yield from _arm(experiment)
-    if verbose:
-        yield from _bodies(experiment)
-    if structure.base is not None:
-        yield ""
-        yield from _base(experiment, structure.base)
-    if structure.payloads:
-        yield ""
-        yield from _payloads(experiment)
-    yield ""
-    yield from _schedule(experiment)
-    yield ""
-    if structure.substitutions:
-        yield from _substitutions(experiment)
-        yield ""
-    if structure.guides:
-        yield from _guides(experiment)
-        yield ""
-    if structure.sensors:
-        yield from _sensors(experiment)
-        yield ""
-    yield from _environment(experiment)
-    chosen = [entry for entry in kept_keys(experiment) if entry[0].listed and entry[1] != entry[0].parameter.default]
-    if chosen:
-        yield "Set by the run, and not the default"
-        rows = []
-        for key, value in chosen:
-            text = value if isinstance(value, str) else written(value, key.parameter.unit)
-            rows.append((key.path, text, key.parameter.doc))
-        yield from columns(rows)
-    yield ""
-    yield from _channels(structure)
-    if experiment.linear:
-        yield ""
-        yield from _linear(experiment)
-    if experiment.metrics:
-        yield ""
-        yield from _metrics(experiment)
-    if experiment.tolerances:
-        yield ""
-        yield "Tolerances: by how much another version may differ before `met diff` says so"
-        yield from columns([(tolerance.of, tolerance.text) for tolerance in experiment.tolerances])
-    yield ""
-    yield from _cases(experiment)
-    if experiment.allowances:
-        yield ""
-        yield from (f"allowed: {allowance}" for allowance in experiment.allowances)
-    notes = [note for note in experiment.notes if not note.startswith(STEP_SIZE)]
-    if notes:
-        yield ""
-        yield "Notes"
-        yield from (f"  {note}" for note in notes)
+    for section in (
+        [*_arm(experiment), *(_bodies(experiment) if verbose else ())],
+        _base(experiment, structure.base) if structure.base is not None else (),
+        _payloads(experiment),
+        _schedule(experiment),
+        _substitutions(experiment),
+        _guides(experiment),
+        _sensors(experiment),
+        [*_environment(experiment), *_keys(experiment)],
+        _channels(structure),
+        _linear(experiment),
+        _metrics(experiment),
+        _tolerances(experiment),
+        _cases(experiment),
+        [f"allowed: {allowance}" for allowance in experiment.allowances],
+        _table("Notes", [(note,) for note in experiment.notes if not note.startswith(STEP_SIZE)]),
+    ):
+        if lines := list(section):
+            yield from ["", *lines]
+
+
+def _table(title: str, rows: Sequence[Sequence[str]]) -> list[str]:
+    """A table with its title; nothing where it has no rows."""
+    return [title, *columns(rows)] if rows else []
 
 
 def _arm(experiment: Experiment) -> Iterator[str]:
@@ -235,17 +206,16 @@ def _base(experiment: Experiment, base: Base) -> Iterator[str]:
     )
 
 
-def _payloads(experiment: Experiment) -> Iterator[str]:
+def _payloads(experiment: Experiment) -> list[str]:
     """The payloads of a run, and when they are grappled and released."""
     values = _Values(experiment)
-    yield "Payloads"
-    rows: list[tuple[str, ...]] = [("payload", "mass", "link", "grappled", "released")]
+    rows = []
     for payload in experiment.structure.payloads:
         head = f"payloads.{payload.name}"
         grappled = values.text(f"{head}.grapple") if payload.grappled else "held from the start"
         released = values.text(f"{head}.release") if payload.released else "never"
         rows.append((payload.name, values.text(f"{head}.mass"), payload.link, grappled, released))
-    yield from columns(rows)
+    return _table("Payloads", [("payload", "mass", "link", "grappled", "released"), *rows] if rows else [])
 
 
 def _settings(experiment: Experiment, prefix: str, parameters: Iterable[Parameter]) -> list[str]:
@@ -315,12 +285,11 @@ def _schedule(experiment: Experiment) -> Iterator[str]:
     yield from (f"Step size: {note.removeprefix(STEP_SIZE)}" for note in experiment.notes if note.startswith(STEP_SIZE))
 
 
-def _substitutions(experiment: Experiment) -> Iterator[str]:
+def _substitutions(experiment: Experiment) -> list[str]:
     """Motors on beds, with the chosen values of each bed and law: those that are neither defaults nor the servo's."""
     values, parameters = _Values(experiment), experiment.parameters
     joints = ", ".join(use.joint for use in experiment.structure.substitutions)
     motors = "motor" if len(experiment.structure.substitutions) == 1 else "motors"
-    yield f"On a bed: the {motors} of {joints}; what is not told here is the servo's, or the default"
     rows = []
     for use in experiment.structure.substitutions:
         for joint, kind, model in (
@@ -346,12 +315,11 @@ def _substitutions(experiment: Experiment) -> Iterator[str]:
             names = [declared.name for declared in bed_scale.PARAMETERS]
             scales = (f"{name} = {values.text(f'{use.joint}.bed.scale.{name}')}" for name in names)
             rows.append(("", "scale", "", f"{', '.join(scales)}; the servo's is over it"))
-    yield from columns(rows)
+    return _table(f"On a bed: the {motors} of {joints}; what is not told here is the servo's, or the default", rows)
 
 
-def _guides(experiment: Experiment) -> Iterator[str]:
+def _guides(experiment: Experiment) -> list[str]:
     """The guides: the joints that follow each, its parameters, those of its joints and of its path's components."""
-    yield "Guides: each commands the joints that follow it"
     rows: list[tuple[str, ...]] = []
     for use in experiment.structure.guides:
         guide, head = models.find("guide", use.model, use.place), f"guides.{use.name}"
@@ -364,17 +332,16 @@ def _guides(experiment: Experiment) -> Iterator[str]:
                 experiment, f"{head}.{course.component}", models.find("command", course.model).parameters
             )
             rows.append(("", course.component, ", ".join([course.model, *settings])))
-    yield from columns(rows)
+    return _table("Guides: each commands the joints that follow it", rows)
 
 
-def _sensors(experiment: Experiment) -> Iterator[str]:
+def _sensors(experiment: Experiment) -> list[str]:
     """The sensors of links, with their parameters."""
-    yield "Sensors of links"
     rows = []
     for use in experiment.structure.sensors:
         settings = _settings(experiment, f"sensors.{use.name}", sensor_parts(use, "parameters"))
         rows.append((use.name, use.model, ", ".join(settings)))
-    yield from columns(rows)
+    return _table("Sensors of links", rows)
 
 
 def _environment(experiment: Experiment) -> Iterator[str]:
@@ -391,6 +358,16 @@ def _environment(experiment: Experiment) -> Iterator[str]:
         yield from columns([(name, settings) for name, _, settings in rows])
     else:
         yield from columns(rows)
+
+
+def _keys(experiment: Experiment) -> list[str]:
+    """The listed keys of a run that are not at their defaults."""
+    rows = []
+    for key, value in kept_keys(experiment):
+        if key.listed and value != key.parameter.default:
+            text = value if isinstance(value, str) else written(value, key.parameter.unit)
+            rows.append((key.path, text, key.parameter.doc))
+    return _table("Set by the run, and not the default", rows)
 
 
 def _channels(structure: Structure) -> Iterator[str]:
@@ -410,24 +387,27 @@ def _channels(structure: Structure) -> Iterator[str]:
     yield from columns(rows)
 
 
-def _linear(experiment: Experiment) -> Iterator[str]:
-    yield "Linear answers: `met linear` gives them"
+def _linear(experiment: Experiment) -> list[str]:
     rows = []
     for use in experiment.linear:
         parts = [("of", use.inputs), ("to", use.outputs), ("open at", use.opened)]
         answers = "; ".join(f"{word} {', '.join(paths)}" for word, paths in parts if paths)
         rows.append((use.name, use.where, answers))
-    yield from columns(rows)
+    return _table("Linear answers: `met linear` gives them", rows)
 
 
-def _metrics(experiment: Experiment) -> Iterator[str]:
-    yield "Metrics and what is required of them"
+def _metrics(experiment: Experiment) -> list[str]:
     rows = []
     for use in experiment.metrics:
         required = [requirement.text for requirement in experiment.requirements if requirement.metric == use.name]
         required += [step_error.text for step_error in experiment.step_errors if step_error.metric == use.name]
         rows.append((use.name, f"{use.model} of {use.of}", ", ".join(f"require {text}" for text in required)))
-    yield from columns(rows)
+    return _table("Metrics and what is required of them", rows)
+
+
+def _tolerances(experiment: Experiment) -> list[str]:
+    rows = [(tolerance.of, tolerance.text) for tolerance in experiment.tolerances]
+    return _table("Tolerances: by how much another version may differ before `met diff` says so", rows)
 
 
 def _cases(experiment: Experiment) -> Iterator[str]:
