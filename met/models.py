@@ -42,9 +42,12 @@ class Model(Protocol):
     """The fields that all declarations share."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The name by which decks ask for it."""
+
     @property
-    def doc(self) -> str: ...
+    def doc(self) -> str:
+        """Its description, a sentence."""
 
 
 @frozen

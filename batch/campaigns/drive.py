@@ -30,12 +30,16 @@ AHEAD = 1
 
 
 class Progress(Protocol):
-    """The display of a campaign's progress (batch/terminal/progress.py). cases: 0 where their number is not known;
-    more: further text"""
+    """The display of a campaign's progress (batch/terminal/progress.py)."""
 
-    def begin(self, name: str, cases: int, done: int, failed: int, workers: str) -> None: ...
-    def advance(self, done: int, failed: int, more: str = "") -> None: ...
-    def end(self) -> None: ...
+    def begin(self, name: str, cases: int, done: int, failed: int, workers: str) -> None:
+        """Begin with a run or sweep. cases: 0 where their number is not known."""
+
+    def advance(self, done: int, failed: int, more: str = "") -> None:
+        """Show how many cases are done, and how many failed. more: further text."""
+
+    def end(self) -> None:
+        """End the display of this run or sweep."""
 
 
 class Stopped(Exception):

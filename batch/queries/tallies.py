@@ -67,15 +67,24 @@ class RequiredOfCases(Protocol):
     """A requirement, of a plan or of an archive: the limit in SI, the share of cases and the confidence."""
 
     @property
-    def metric(self) -> str: ...
+    def metric(self) -> str:
+        """The name of its metric."""
+
     @property
-    def comparison(self) -> str: ...
+    def comparison(self) -> str:
+        """`<`, `<=`, `>` or `>=`."""
+
     @property
-    def limit(self) -> float: ...
+    def limit(self) -> float:
+        """The limit, SI."""
+
     @property
-    def share(self) -> float | None: ...
+    def share(self) -> float | None:
+        """The share of cases that must meet it; None: all."""
+
     @property
-    def confidence(self) -> float | None: ...
+    def confidence(self) -> float | None:
+        """The confidence with which that share is to be shown; None: it is counted."""
 
 
 @frozen

@@ -38,12 +38,7 @@ class Block(Protocol):
 
 
 class Kernel(Protocol):
-    """A program that is ready to run many cases.
-
-    lanes       cases of a block;  vector: cases that one register holds
-    cached      whether it was found in the cache rather than made
-    processor   what it was made for;  code_bytes, functions: how large it is
-    """
+    """A program that is ready to run many cases."""
 
     @property
     def recording(self) -> Recording:
@@ -54,22 +49,28 @@ class Kernel(Protocol):
         """The program of the recording."""
 
     @property
-    def lanes(self) -> int: ...
+    def lanes(self) -> int:
+        """Number of cases of a block."""
 
     @property
-    def vector(self) -> int: ...
+    def vector(self) -> int:
+        """Number of cases that one register holds."""
 
     @property
-    def cached(self) -> bool: ...
+    def cached(self) -> bool:
+        """Whether the kernel was in the cache, rather than compiled now."""
 
     @property
-    def processor(self) -> str: ...
+    def processor(self) -> str:
+        """The processor that the kernel is for."""
 
     @property
-    def code_bytes(self) -> int: ...
+    def code_bytes(self) -> int:
+        """Size of the code in bytes."""
 
     @property
-    def functions(self) -> int: ...
+    def functions(self) -> int:
+        """Number of functions of the code."""
 
     def run(
         self,
@@ -100,16 +101,15 @@ def checked_inputs(program: Program, inputs: np.ndarray) -> np.ndarray:
 
 
 class Backend(Protocol):
-    """A back end.
-
-    version  of its lowering: it is part of every code key, and is raised when the bits that a recording gives change
-    """
+    """A back end."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The name by which it is chosen."""
 
     @property
-    def version(self) -> int: ...
+    def version(self) -> int:
+        """Version of its lowering, part of every code key: it is raised when the bits that a recording gives change."""
 
     def emit(self, recording: Recording) -> str:
         """The program as text, as `load` would compile it here; for people, and for `met dump kernel`."""

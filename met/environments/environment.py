@@ -25,15 +25,6 @@ class World(Protocol):
     begin, step          time at which the dynamics step began that the stage is part of, and its length, s
     joints, links        names, in the plan's order; joints are those that move, but for springs of booms, and payloads
                          follow the links: where a link is asked for, a payload may be, whether a link carries it or not
-    slides(joint)        whether it is prismatic
-    q(joint), qd(joint)  rad, rad/s (m, m/s)
-    position(link, point)  world position of a point given in the link's frame (m)
-    velocity(link, point)  its velocity in the world (m/s)
-    to_world(link, vector) a vector given in the link's axes, in the world's
-    orientation(link)    rows of the rotation that turns components in link axes into components in world axes
-    rate(link)           angular velocity of the link, world axes (rad/s)
-    mass(link), com(link), inertia(link)  kg; centre of mass in the link's frame (m); xx, yy, zz, xy, xz, yz about the
-                         centre of mass in link axes (kg m^2)
 
     Where a link is asked for, but for its mass, centre and inertia, `WORLD` of `met.parameter` may be: it is at rest.
     """
@@ -44,17 +35,38 @@ class World(Protocol):
     joints: tuple[str, ...]
     links: tuple[str, ...]
 
-    def slides(self, joint: str) -> bool: ...
-    def q(self, joint: str) -> Real: ...
-    def qd(self, joint: str) -> Real: ...
-    def position(self, link: str, point: Vector = (0.0, 0.0, 0.0)) -> Vector: ...
-    def velocity(self, link: str, point: Vector = (0.0, 0.0, 0.0)) -> Vector: ...
-    def to_world(self, link: str, vector: Vector) -> Vector: ...
-    def orientation(self, link: str) -> Matrix: ...
-    def rate(self, link: str) -> Vector: ...
-    def mass(self, link: str) -> Real: ...
-    def com(self, link: str) -> Vector: ...
-    def inertia(self, link: str) -> tuple[Real, Real, Real, Real, Real, Real]: ...
+    def slides(self, joint: str) -> bool:
+        """Whether a joint is prismatic."""
+
+    def q(self, joint: str) -> Real:
+        """A joint's position, rad (m)."""
+
+    def qd(self, joint: str) -> Real:
+        """A joint's rate, rad/s (m/s)."""
+
+    def position(self, link: str, point: Vector = (0.0, 0.0, 0.0)) -> Vector:
+        """World position, m, of a point given in the link's frame, m."""
+
+    def velocity(self, link: str, point: Vector = (0.0, 0.0, 0.0)) -> Vector:
+        """Velocity in the world, m/s, of a point given in the link's frame, m."""
+
+    def to_world(self, link: str, vector: Vector) -> Vector:
+        """Components in world axes of a vector given in the link's axes."""
+
+    def orientation(self, link: str) -> Matrix:
+        """Rows of the rotation that turns components in link axes into components in world axes."""
+
+    def rate(self, link: str) -> Vector:
+        """The link's angular velocity, rad/s, world axes."""
+
+    def mass(self, link: str) -> Real:
+        """The link's mass, kg."""
+
+    def com(self, link: str) -> Vector:
+        """The link's centre of mass in its own frame, m."""
+
+    def inertia(self, link: str) -> tuple[Real, Real, Real, Real, Real, Real]:
+        """xx, yy, zz, xy, xz, yz about the centre of mass, kg m^2, link axes."""
 
 
 @frozen

@@ -32,16 +32,16 @@ class Arm(Protocol):
     """The arm at a tick, with the guide's joints at some positions. The guided frame has the axes of the parameter
     `link`, and its origin at the parameter `point` of it.
 
-    stance(answers)   the guided frame; its velocities are those that it has with the guide's joints at rest
-    columns(answers)  for each of the guide's joints, in order: angular velocity and velocity of the frame, world axes,
-                      for each unit of the joint's rate
-
     answers  whether a free base answers the joints' rates as the conservation of momentum has it (the generalized
              Jacobian). Else it is taken as held. A base that is fixed or prescribed does what it does either way
     """
 
-    def stance(self, *, answers: bool) -> Stance: ...
-    def columns(self, *, answers: bool) -> Sequence[tuple[Vector, Vector]]: ...
+    def stance(self, *, answers: bool) -> Stance:
+        """The guided frame; its velocities are those that it has with the guide's joints at rest."""
+
+    def columns(self, *, answers: bool) -> Sequence[tuple[Vector, Vector]]:
+        """The frame's angular velocity and velocity, world axes, for a unit of the rate of each guide's joint, in
+        order."""
 
 
 @frozen

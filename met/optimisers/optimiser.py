@@ -16,9 +16,7 @@ class Optimiser(Protocol):
 
     def ask(self) -> np.ndarray:
         """The points of the next generation, [candidate, dimension]; empty, [0, dimension], after the end."""
-        ...
 
     def tell(self, values: np.ndarray) -> None:
         """Take the values of the points that were asked last, [candidate]: +inf and -inf may be among them, NaN is
         not."""
-        ...

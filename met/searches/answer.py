@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -213,13 +213,11 @@ def _room(limit: MetricLimit, values: np.ndarray) -> float:
     return float(np.min(inside)) / (abs(limit.limit) or 1.0)
 
 
-def _ends(search: Search, case: np.ndarray) -> list[tuple[str, str]]:
-    ends = []
+def _ends(search: Search, case: np.ndarray) -> Iterator[tuple[str, str]]:
     for parameter, value in zip(search.parameters, case, strict=False):
         share = float(shares_of_range(parameter, value))
         if not NEAR < share < 1.0 - NEAR:
-            ends.append((parameter.path, "lower" if share < 0.5 else "upper"))
-    return ends
+            yield (parameter.path, "lower" if share < 0.5 else "upper")
 
 
 NEAR = 0.005

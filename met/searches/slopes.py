@@ -45,7 +45,8 @@ class SlopeSource(Protocol):
     """Source of slopes of a tuning's cases, with the requirements on them."""
 
     @property
-    def requirements(self) -> Sequence[MetricLimit]: ...
+    def requirements(self) -> Sequence[MetricLimit]:
+        """The requirements on the metrics."""
 
     def slopes(self, cases: np.ndarray) -> CaseSlopes | str:
         """The slopes of these cases, [case, coordinate], SI; or the reason why there are none."""

@@ -32,11 +32,16 @@ class MetricLimit(Protocol):
     """A requirement as used here: the name of its metric, `<` or `>` with or without `=`, its limit."""
 
     @property
-    def metric(self) -> str: ...
+    def metric(self) -> str:
+        """The name of its metric."""
+
     @property
-    def comparison(self) -> str: ...
+    def comparison(self) -> str:
+        """`<`, `<=`, `>` or `>=`."""
+
     @property
-    def limit(self) -> float: ...
+    def limit(self) -> float:
+        """The limit, SI."""
 
 
 def hurt(goal: np.ndarray, largest: bool, done: np.ndarray) -> np.ndarray:

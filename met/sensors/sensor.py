@@ -25,18 +25,18 @@ class Felt(World, Protocol):
     """The view of the arm that a sensor of a link has: the methods of a `World`, and quantities that only show on
     board. Links are those of a World, and `base`, whether it moves or not.
 
-    acceleration(link, point)    of a point given in the link's frame (m), the second derivative of its position: world
-                                 axes, m/s^2
-    specific_force(link, point)  that acceleration less the one with which a body would fall freely there: link axes
-    spin(link)                   angular velocity against directions that do not turn: link axes, rad/s
-
     Accelerations follow from a derivative: a circuit may ask for them, a reading at a tick may not, since what acts
     from the tick on is not yet known.
     """
 
-    def acceleration(self, link: str, point: Vector = ZERO) -> Vector: ...
-    def specific_force(self, link: str, point: Vector = ZERO) -> Vector: ...
-    def spin(self, link: str) -> Vector: ...
+    def acceleration(self, link: str, point: Vector = ZERO) -> Vector:
+        """Second derivative of the world position of a point given in the link's frame, m: world axes, m/s^2."""
+
+    def specific_force(self, link: str, point: Vector = ZERO) -> Vector:
+        """That acceleration less the one with which a body would fall freely there: link axes, m/s^2."""
+
+    def spin(self, link: str) -> Vector:
+        """Angular velocity against directions that do not turn: link axes, rad/s."""
 
 
 @frozen

@@ -10,31 +10,39 @@ from met.diagnostic import Label, Place
 
 
 class Ticking(Protocol):
-    """A guide or a sensor of the run.
-
-    label     in words: "guide `tip`";  kind: "guide";  path: of its parameters
-    verb      of what it does at its ticks: "ticks", "reads"
-    code      of what is wrong with its rate
-    rate      as it says; None: that of the servos
-    ticks     whether it has a computer
-    """
+    """A guide or a sensor of the run."""
 
     @property
-    def label(self) -> str: ...
+    def label(self) -> str:
+        """Its name in words: "guide `tip`"."""
+
     @property
-    def kind(self) -> str: ...
+    def kind(self) -> str:
+        """Its kind in a word: "guide"."""
+
     @property
-    def path(self) -> str: ...
+    def path(self) -> str:
+        """The path of its parameters."""
+
     @property
-    def verb(self) -> str: ...
+    def verb(self) -> str:
+        """What it does at its ticks: "ticks", "reads"."""
+
     @property
-    def code(self) -> str: ...
+    def code(self) -> str:
+        """The code of what is wrong with its rate."""
+
     @property
-    def rate(self) -> Rate | None: ...
+    def rate(self) -> Rate | None:
+        """Its rate as the deck has it; None: that of the servos."""
+
     @property
-    def ticks(self) -> bool: ...
+    def ticks(self) -> bool:
+        """Whether it has a computer."""
+
     @property
-    def place(self) -> Place: ...
+    def place(self) -> Place:
+        """Where the deck has it."""
 
 
 def rate_of(scope: Scope, ticker: Ticking, shared: Rate | None) -> Rate | None:
