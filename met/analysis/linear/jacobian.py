@@ -38,30 +38,39 @@ class InputTick:
 
 
 @frozen
-class PeriodMap:
-    """The linearised period of one case: x+ = A x + B u of small changes, y = C x + D u at its begin.
+class PeriodMatrices:
+    """The linearised period of a case: x+ = A x + B u of small changes, y = C x + D u at its begin.
 
-    tick      of the base rate, at which the period begins;  seconds: its length
+    tick      of the base rate, at which the period begins
     states    names of x: cells, a body's turn by its coordinate
     ticks     names of u: each tick of each input by itself
-    outputs   names of y
     A, B      [state, state], [state, tick];  C, D: [output, state], [output, tick]
     Wx, Wu    what the inputs themselves come to at each of their ticks, by states and by what is added: [tick, ...]
-    held      names of what sticks, and of joints that are locked;  locked: these alone
-    at_limit  paths of the limits that it is at, all the time
     """
 
     tick: int
-    seconds: float
     states: tuple[str, ...]
     ticks: tuple[InputTick, ...]
-    outputs: tuple[str, ...]
     A: np.ndarray
     B: np.ndarray
     C: np.ndarray
     D: np.ndarray
     Wx: np.ndarray
     Wu: np.ndarray
+
+
+@frozen
+class PeriodMap(PeriodMatrices):
+    """The linearised period of one case, of which it is known what holds.
+
+    seconds   length of the period
+    outputs   names of y
+    held      names of what sticks, and of joints that are locked;  locked: these alone
+    at_limit  paths of the limits that it is at, all the time
+    """
+
+    seconds: float
+    outputs: tuple[str, ...]
     held: tuple[str, ...]
     at_limit: tuple[str, ...]
     locked: tuple[str, ...] = ()
@@ -187,22 +196,13 @@ def _held(start: Flow, after: Flow) -> _Held:
 
 
 @frozen
-class _Carried:
-    """A period carried out with tangents, named as in `PeriodMap`; of a `FlowAbreast`, each is [case, ...].
+class _Carried(PeriodMatrices):
+    """A period carried out with tangents; of a `FlowAbreast`, each matrix is [case, ...].
 
     numbers   states at its end, and what is recorded at its begin
     at_limit  paths of limits, with the number of steps that begin at them;  flow: at the end
     """
 
-    tick: int
-    states: tuple[str, ...]
-    ticks: tuple[InputTick, ...]
-    A: np.ndarray
-    B: np.ndarray
-    C: np.ndarray
-    D: np.ndarray
-    Wx: np.ndarray
-    Wu: np.ndarray
     numbers: np.ndarray
     at_limit: Mapping[str, Any]
     flow: Flow
@@ -228,7 +228,7 @@ class _Carried:
         A, B, C, Wx, Wu, D = own
         at_limit = tuple(path for path, steps in self.at_limit.items() if of_case(steps, place or 0))
         return PeriodMap(
-            self.tick, program.seconds, self.states, self.ticks, program.columns, A, B, C, D, Wx, Wu,
+            self.tick, self.states, self.ticks, A, B, C, D, Wx, Wu, program.seconds, program.columns,
             held.held, at_limit, held.locked,
         )  # fmt: skip
 
