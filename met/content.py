@@ -105,15 +105,13 @@ def humps_from_zero(points: Sequence[tuple[float, float]], until: float) -> Iter
             yield Hump(times[first : last + 1], np.abs(part))
 
 
-def _pulses(times: Sequence[float], values: Sequence[float]) -> list[tuple[float, float]]:
+def _pulses(times: Sequence[float], values: Sequence[float]) -> Iterator[tuple[float, float]]:
     """The pulses between turns of the lines: each from half of the smaller of rise and fall until the same height
     again."""
-    pulses = []
     for before, peak, after in _turned(values):
         height = min(abs(values[peak] - values[before]), abs(values[peak] - values[after]))
         half = values[peak] - math.copysign(0.5 * height, values[peak] - values[before])
-        pulses.append((_crossing(times, values, peak, -1, half), _crossing(times, values, peak, 1, half)))
-    return pulses
+        yield (_crossing(times, values, peak, -1, half), _crossing(times, values, peak, 1, half))
 
 
 def _turned(values: Sequence[float]) -> Iterator[tuple[int, int, int]]:

@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import field, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -189,7 +189,7 @@ def layout(experiment: Experiment, cases: int, recorded: int, single: bool = Fal
             Variable("recorded_case", "int64", ("recorded_case",), "dimension", "cases whose histories are kept"),
             Variable("time", "float64", ("time",), "dimension", "time", "s"),
         ]
-        repeated = _recorded(experiment, variables) if experiment.cases.coordinates else []
+        repeated = list(_recorded(experiment, variables)) if experiment.cases.coordinates else []
         attributes = {"coordinates": " ".join(v.name for v in repeated)}
         variables += [*repeated, *_signals(experiment, sizes, "float32" if single else "float64", attributes)]
     return Layout(sizes, tuple(variables), _attributes(experiment, variables))
@@ -388,31 +388,28 @@ def _coordinate(experiment: Experiment, coordinate: Coordinate, name: str) -> Va
     return Variable(name, "float64", ("case",), "coordinate", words, unit, written, coordinate.path)
 
 
-def _recorded(experiment: Experiment, variables: list[Variable]) -> list[Variable]:
+def _recorded(experiment: Experiment, variables: list[Variable]) -> Iterator[Variable]:
     """Variables along recorded_case that repeat those that identify a case; `source` is the variable along case."""
     taken = [variable.name for variable in variables] + [recorded.name for recorded in experiment.structure.record]
-    out = []
     for v in variables:
         if v.role == "coordinate" or v.name == "case_id":
             name = _apart(f"recorded.{v.name}", "recorded", taken, ())
             taken.append(name)
-            out.append(
-                Variable(name, v.kind, ("recorded_case",), "recorded", v.long_name, v.unit, v.attributes, v.name)
-            )
-    return out
+            yield Variable(name, v.kind, ("recorded_case",), "recorded", v.long_name, v.unit, v.attributes, v.name)
 
 
-def _signals(experiment: Experiment, sizes: dict[str, int], kind: Kind, common: Mapping[str, str]) -> list[Variable]:
+def _signals(
+    experiment: Experiment, sizes: dict[str, int], kind: Kind, common: Mapping[str, str]
+) -> Iterator[Variable]:
     """Variables of signals. common: attributes of every signal; empty ones are left out."""
     joint_dims, component_dims = joint_dimensions(experiment), component_dimensions(experiment)
-    out = []
     for joints, dim in joint_dims.items():
         if any(recorded.joints == joints for recorded in experiment.structure.record):
             sizes[dim] = len(joints)
-            out.append(Variable(dim, "str", (dim,), "dimension", "joint"))
+            yield Variable(dim, "str", (dim,), "dimension", "joint")
     for components, dim in component_dims.items():
         sizes[dim] = len(components)
-        out.append(Variable(dim, "str", (dim,), "dimension", "component"))
+        yield Variable(dim, "str", (dim,), "dimension", "component")
     known = channels(experiment.structure)
     for recorded in experiment.structure.record:
         dims = ["recorded_case", "time"]
@@ -422,8 +419,7 @@ def _signals(experiment: Experiment, sizes: dict[str, int], kind: Kind, common: 
         frame = known[recorded.channels[0]].frame
         inner = [joint for joint in recorded.joints if joint in experiment.structure.springs]
         attributes |= {name: value for name, value in {"frame": frame, "springs": inner, **common}.items() if value}
-        out.append(Variable(recorded.name, kind, tuple(dims), "signal", recorded.doc, unit, attributes))
-    return out
+        yield Variable(recorded.name, kind, tuple(dims), "signal", recorded.doc, unit, attributes)
 
 
 def _signal_unit(recorded: Recorded) -> tuple[str, dict[str, Any]]:

@@ -52,7 +52,7 @@ class ArchiveGroup:
             self.attributes: dict[str, Any] = {name: _plain(value) for name, value in node.attrs.items()}
             sound.check(self)
             self.verified = verified.read(node, self)
-            self.step_errors = step_errors.read(self)
+            self.step_errors = tuple(step_errors.read(self))
             self.summary = summarised.read(node, self)
         self.summed: summarised.CaseSummary | None = None
         """The summary of all cases, once computed from their rows (batch/queries/streamed.py)."""

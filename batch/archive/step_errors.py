@@ -4,7 +4,7 @@ if its deck has any."""
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from batch.archive.stored import StoredGroup, Unlike
 from met.host.files import parse_json
@@ -22,7 +22,7 @@ def written(limits: Iterable[StepErrorLimit], names: Mapping[str, str]) -> str:
     return json.dumps(plain, sort_keys=True, separators=(",", ":"))
 
 
-def read(group: StoredGroup) -> tuple[StepErrorLimit, ...]:
+def read(group: StoredGroup) -> Iterator[StepErrorLimit]:
     """The requirements of a group; their metrics are names of variables. Raises Unlike."""
     text = group.attributes.get(ATTRIBUTE, "[]")
     try:
@@ -32,7 +32,6 @@ def read(group: StoredGroup) -> tuple[StepErrorLimit, ...]:
     if not isinstance(plain, list):
         raise Unlike(f"attribute `{ATTRIBUTE}` is no list of requirements")
     metrics = {variable.name for variable in group.role("metric")}
-    out = []
     for entry in plain:
         good = isinstance(entry, dict) and all(type(entry.get(name)) is kind for name, kind in FIELDS.items())
         if (
@@ -42,5 +41,4 @@ def read(group: StoredGroup) -> tuple[StepErrorLimit, ...]:
             or not entry["limit"] > 0
         ):
             raise Unlike(f"attribute `{ATTRIBUTE}` is no list of requirements")
-        out.append(StepErrorLimit(**{name: entry[name] for name in FIELDS}))
-    return tuple(out)
+        yield StepErrorLimit(**{name: entry[name] for name in FIELDS})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -69,9 +69,8 @@ WORST = 0.01
 """Share of exchanges without an answer, and error of a bed's clock, above which there is a warning."""
 
 
-def timing_lines(executor: OnBeds) -> list[str]:
+def timing_lines(executor: OnBeds) -> Iterator[str]:
     """Lines about the loop's timing, with a warning where it was bad."""
-    lines = []
     for joint, times in timings(executor).items():
         late = times.woken + times.computed + times.waited
         parts = [
@@ -80,27 +79,26 @@ def timing_lines(executor: OnBeds) -> list[str]:
             ("computed in", times.computing),
         ]
         spreads = "; ".join(f"{what} {duration(spread.median)}, p99 {duration(spread.high)}" for what, spread in parts)
-        lines.append(f"{joint}: {times.exchanges:,} exchanges; {spreads}")
-        lines.append(
+        yield f"{joint}: {times.exchanges:,} exchanges; {spreads}"
+        yield (
             f"  a period late: {late:,} (woken too late {times.woken:,}, computing {times.computed:,}, waiting "
             f"{times.waited:,}); unanswered: {times.unanswered:,}; the bed's clock: {off(times.drift)}"
         )
         if abs(times.drift) > WORST:
             hz = executor.known.of(joint)[-1][0]
-            lines.append(
+            yield (
                 f"  warning: the bed says that it ticks at {hz:g} Hz, and ticks at {(1.0 + times.drift) * hz:.4g} Hz: "
                 "its deadman and slew limits are not what it says; mend its timer, or its configuration"
             )
         if times.unanswered > WORST * times.exchanges:
-            lines.append(
+            yield (
                 f"  warning: {100.0 * times.unanswered / times.exchanges:.3g} % of the exchanges had no answer, and "
                 "commands were held longer than was computed: `met bed jitter` and `met bed probe` say more of the line"
             )
     for joint in executor.ports if executor.lock_step else ():
         silent = sum(int(((rows["flags"] & ANSWERED) == 0).sum()) for _, rows in executor.known.of(joint))
         if silent:
-            lines.append(f"{joint}: unanswered: {silent:,}; such a run has not the bits of another")
-    return lines
+            yield f"{joint}: unanswered: {silent:,}; such a run has not the bits of another"
 
 
 def sidecar_entries(executor: OnBeds) -> Mapping[str, Any]:

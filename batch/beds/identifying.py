@@ -6,7 +6,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -247,23 +247,21 @@ def table_lines(fit: FitResult, estimates: Mapping[str, Estimate], sheet: DataSh
     return out
 
 
-def reasons(fit: FitResult) -> list[str]:
+def reasons(fit: FitResult) -> Iterator[str]:
     """The reasons, in words, why parameters were not found."""
     missing = [name for name, estimate in fit.parameters.items() if not estimate.is_fitted]
-    out = []
     if "kt_load" in missing:
-        out.append(
+        yield (
             "kt_load, by which torques are measured, for the bed does not measure its drive's current; kt, "
             "found as back-EMF, does not depend on it"
         )
     rest = [name for name in missing if name != "kt_load"]
     if rest:
-        out.append(
+        yield (
             f"{' and '.join(rest)}, which the moves do not tell: the drive was at its largest torque "
             f"{fit.limited:.0%} of the time (`--voltage` more); what is found holds for what is "
             "given"
         )
-    return out
 
 
 def digits(estimate: Estimate, value: float) -> str:

@@ -6,7 +6,7 @@ import json
 import math
 import statistics
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -73,7 +73,7 @@ def probe(chosen: ChosenBed, baud: int) -> ProbeResult:
     with opened(Port(chosen.port, baud), chosen.experiment, chosen.joint, 0, period) as bed:
         about = bed.connect()
         sample = bed.read()
-        trips = _trips(bed) if bed.has_line else ()
+        trips = tuple(_trips(bed)) if bed.has_line else ()
         lost = ASKED - len(trips) if bed.has_line else 0
         needed = bed.line_time(about)
         return ProbeResult(chosen.port, about, sample, bed.warnings, baud, needed, trips, bed.remarks, lost)
@@ -98,11 +98,11 @@ def probe_and_tell(
         say("\n".join(lines(result)))
 
 
-def lines(result: ProbeResult) -> list[str]:
+def lines(result: ProbeResult) -> Iterator[str]:
     """The result for people, line by line."""
     about, sample, limits = result.about, result.sample, result.about.limits
     unit, _ = DRIVES[about.drive]
-    out = [f"bed `{about.name}` at {result.port}"]
+    yield f"bed `{about.name}` at {result.port}"
     sensors = (f"{name.replace('_', ' ')} {quantity(value, unit)}" for name, value, unit in _read(sample))
     rows = [
         ["firmware", _firmware(about)],
@@ -120,17 +120,16 @@ def lines(result: ProbeResult) -> list[str]:
         *(list(row) for row in result.remarks),
         *_line(result),
     ]
-    out += columns(rows)
+    yield from columns(rows)
     for fault in Fault:
         if fault in sample.faults:
-            out.append(f"  fault: {refusals.words(fault)}")
-            out += [f"    = help: {remedy}" for remedy in refusals.remedies(fault)]
+            yield f"  fault: {refusals.words(fault)}"
+            yield from [f"    = help: {remedy}" for remedy in refusals.remedies(fault)]
     for what, remedy in refusals.interlocked(sample.interlock):
-        out += [f"  interlock: {what}", f"    = help: {remedy}"]
+        yield from [f"  interlock: {what}", f"    = help: {remedy}"]
     for warning in result.warnings:
-        out.append(f"  warning: {warning.message}")
-        out += [f"    = help: {help_}" for help_ in warning.help]
-    return out
+        yield f"  warning: {warning.message}"
+        yield from [f"    = help: {help_}" for help_ in warning.help]
 
 
 def data(result: ProbeResult) -> dict[str, Any]:
@@ -195,14 +194,12 @@ def _properties(about: About) -> list[str]:
     return [f"drive {about.drive}", "load current", "tachometer", *capabilities(about)]
 
 
-def _trips(bed: BedDriver) -> tuple[float, ...]:
+def _trips(bed: BedDriver) -> Iterator[float]:
     bed.patience = 0.1
-    trips = []
     for _ in range(ASKED):
         begun = time.perf_counter()
         if bed.look() is not None:
-            trips.append(time.perf_counter() - begun)
-    return tuple(trips)
+            yield time.perf_counter() - begun
 
 
 def _scales(about: About) -> list[tuple[float, str]]:

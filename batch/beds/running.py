@@ -154,7 +154,7 @@ def run_and_tell(
             say(f"nothing is missing: {campaign.output} has all of it (`--fresh` drives it again)")
         with ArchiveFile(campaign.output) as file:
             drawn = (None, "") if no_picture else first_picture(file)
-            result = RunResult(summarise(file), worst_cases(file), *drawn)
+            result = RunResult(summarise(file), tuple(worst_cases(file)), *drawn)
         for line in timing_lines(executor):
             say(line)
         say("\n".join(result_lines(campaign, result, None, performed)))

@@ -7,7 +7,7 @@ batch/campaigns/performing.py runs the missing cases, and merges them.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -211,7 +211,7 @@ def prepare(
         histories = _histories_of_a_summary(rows, histories, verify)
     wanted = keep(histories, named)
     words = tuple(as_list(histories))
-    parts = _parts(selected, wanted, float32, decided)
+    parts = tuple(_parts(selected, wanted, float32, decided))
     if not chosen_rows.all:
         parts = tuple(_summarised(part, chosen_rows) for part in parts)
     if history_rows is not None:
@@ -223,7 +223,7 @@ def prepare(
     if wanted.default and whole > KEPT_BYTES:
         wanted, words = Keep(), ("none",)
         take = "may take" if any(part.open_ended for part in parts) else "would take"
-        parts = _parts(selected, wanted, float32, decided)
+        parts = tuple(_parts(selected, wanted, float32, decided))
         notes.append(
             f"histories {take} {size_text(whole)}, over {size_text(KEPT_BYTES)}: metrics only are kept "
             f"(`--histories all` keeps them; any case can be run again alone: `--case '#0'`)"
@@ -274,7 +274,7 @@ def _summarised(part: CampaignPart, rows: KeptRows) -> CampaignPart:
 
 def _parts(
     selected: Sequence[tuple[Experiment, CaseValues]], wanted: Keep, single: bool, decided: Collection[str]
-) -> tuple[CampaignPart, ...]:
+) -> Iterator[CampaignPart]:
     """The experiments with their histories to keep. Raises Problem E311, E312 for unknown cases."""
     chosen = choosing.select_rows([experiment for experiment, _ in selected], wanted.cases) if wanted.cases else []
     named = {experiment.name: rows for experiment, rows in chosen}
@@ -287,7 +287,6 @@ def _parts(
     if strays - run:
         case = min(strays - run)
         raise Problem(error("E351", f"the history of case #{case} cannot be kept: it is not among those to run"))
-    parts = []
     for experiment, rows in selected:
         if experiment.structure.history_bytes:
             own = np.asarray(named.get(experiment.name, np.empty(0, np.int64)))
@@ -301,8 +300,7 @@ def _parts(
         if experiment.search is not None and not experiment.search.complete and whole:
             part = replace(part, searches=True, keeps_best=wanted.default and experiment.structure.history_bytes > 0)
             part = replace(part, history_places=part.history_places[:0] if wanted.default else part.history_places)
-        parts.append(part)
-    return tuple(parts)
+        yield part
 
 
 def values_sections(campaign: Campaign) -> list[CampaignSection]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -114,7 +114,7 @@ def _row(group: ArchiveGroup, position: int) -> int:
 def differences(before: str | Path, after: str | Path) -> list[str]:
     """The cases of the second archive with other results than in the first, a line each; none where all of their bits
     are the same. Cases that were lost or timed out do not count."""
-    out = []
+    out: list[str] = []
     with ArchiveFile(before) as old_file, ArchiveFile(after) as new_file:
         groups = {group.name: group for group in old_file.groups}
         for new in new_file.groups:
@@ -145,9 +145,8 @@ def in_both(before: str | Path, after: str | Path) -> tuple[int, int]:
     return sum(int(mask.sum()) for mask in in_old), sum(map(len, in_old))
 
 
-def _signals(old: ArchiveGroup, new: ArchiveGroup, places: np.ndarray, ran: np.ndarray) -> list[str]:
+def _signals(old: ArchiveGroup, new: ArchiveGroup, places: np.ndarray, ran: np.ndarray) -> Iterator[str]:
     """Lines about differing signals, in cases whose histories both archives have. places: of new's cases in old"""
-    out = []
     for variable in new.role("signal"):
         if variable.name not in old.variables or old.variables[variable.name].role != "signal":
             continue
@@ -159,8 +158,7 @@ def _signals(old: ArchiveGroup, new: ArchiveGroup, places: np.ndarray, ran: np.n
                 if a.shape == b.shape and not _alike(a, b).all():
                     row = int(np.argmin(_alike(a, b).reshape(len(a), -1).all(axis=1)))
                     case, time = new.values("case")[place], new.values("time")[row]
-                    out.append(f"#{case} of {new.name}: {variable.name} differs from {time:g} s on")
-    return out
+                    yield f"#{case} of {new.name}: {variable.name} differs from {time:g} s on"
 
 
 def _alike(before: np.ndarray, after: np.ndarray) -> np.ndarray:

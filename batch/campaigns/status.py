@@ -175,14 +175,14 @@ def report(folder: Folder, now: float) -> dict[str, Any]:
     }
 
 
-def lines(data: dict[str, Any]) -> list[str]:
+def lines(data: dict[str, Any]) -> Iterator[str]:
     """The progress of a campaign in lines, for people."""
     from ic.printing.columns import columns
 
     first = [section for section in data["sections"] if not section["again"]]
     cases, done = (sum(section[name] for section in first) for name in ("cases", "done"))
     early = any(section["stops_early"] for section in first)
-    out = [f"{data['folder']}: {done:,} of {'at most ' * early}{cases:,} cases are done"]
+    yield f"{data['folder']}: {done:,} of {'at most ' * early}{cases:,} cases are done"
     rows = [
         [
             section["name"] + (", again for histories" if section["again"] else ""),
@@ -191,23 +191,22 @@ def lines(data: dict[str, Any]) -> list[str]:
         ]
         for section in data["sections"]
     ]
-    out += columns(rows, right=(1, 2)) if len(rows) > 1 else []
+    yield from columns(rows, right=(1, 2)) if len(rows) > 1 else []
     working = [worker for worker in data["workers"] if worker["state"] in AT_WORK]
     rates = [worker["cases_per_s"] for worker in working if worker["cases_per_s"]]
     if rates and cases > done:
         rate = sum(rates)
         rate_text = f"{rate:,.3g}" if rate < 1000 else f"{rate:,.0f}"
-        out.append(f"  {rate_text} cases/s, {'at most ' * early}{duration((cases - done) / rate)} left")
+        yield f"  {rate_text} cases/s, {'at most ' * early}{duration((cases - done) / rate)} left"
     rows = []
     for worker in data["workers"]:
         failed = f"{worker['failed']:,} failed" if worker["failed"] else ""
         job, ago = f"job {worker['job']}" if worker["job"] else "", f"{duration(worker['seconds_ago'])} ago"
         where, process = f"on {worker['host']}", f"process {worker['pid']}"
         rows.append([job, worker["state"], where, process, worker["workers"], failed, worker["more"], ago])
-    out += columns(rows, right=())
+    yield from columns(rows, right=())
     if not working and done < cases:
-        out.append("  nobody is at work: the command that began it goes on")
-    return out
+        yield "  nobody is at work: the command that began it goes on"
 
 
 def finished_archive(archive: Path) -> dict[str, Any] | None:

@@ -144,7 +144,7 @@ def best(
         deck = None
         if (diff or write) and answer.best is not None and answer.advised:
             among = f"{designs.count:,} designs"
-            deck = chosen_deck(file, answer.values(answer.best), output, experiment=answer.name, among=among)
+            deck = chosen_deck(file, list(answer.values(answer.best)), output, experiment=answer.name, among=among)
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
         data = answer.as_data() if form == "json" else {}
         tell(form, data, answer.lines(width), deck, requested=diff or write, write=write)

@@ -89,24 +89,20 @@ def _unlike(a: ArchiveGroup, b: ArchiveGroup, name: str) -> bool:
     return value_a is not None and two is not None and value_a != two
 
 
-def _versions(a: ArchiveFile, b: ArchiveFile) -> list[str]:
+def _versions(a: ArchiveFile, b: ArchiveFile) -> Iterator[str]:
     """Lines about packages and commits of MET that differ between the two archives."""
     facts_a, facts_b = a.provenance, b.provenance
-    out = []
     for name in sorted({*facts_a, *facts_b}):
         if name.startswith("version_") and facts_a.get(name) != facts_b.get(name):
-            out.append(
-                f"{name.removeprefix('version_')} {facts_a.get(name, 'unknown')}, now {facts_b.get(name, 'unknown')}"
-            )
+            yield f"{name.removeprefix('version_')} {facts_a.get(name, 'unknown')}, now {facts_b.get(name, 'unknown')}"
     commits = [
         (str(versions.get("git_commit", "unknown")), str(versions.get("git_dirty", "unknown")))
         for versions in (facts_a, facts_b)
     ]
     if commits[0] != commits[1]:
-        out.append("MET's commit " + ", now ".join(f"{commit[:10]}{_dirty(dirty)}" for commit, dirty in commits))
+        yield "MET's commit " + ", now ".join(f"{commit[:10]}{_dirty(dirty)}" for commit, dirty in commits)
     elif commits[0][1] == "yes":
-        out.append(f"MET's commit {commits[0][0][:10]} in both,{_dirty('yes')}, which may be others")
-    return out
+        yield f"MET's commit {commits[0][0][:10]} in both,{_dirty('yes')}, which may be others"
 
 
 def _defines(a: ArchiveFile, b: ArchiveFile) -> Iterator[str]:

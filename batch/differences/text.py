@@ -101,18 +101,17 @@ def _around(line: str, other: str, most: int, head: int) -> tuple[str, str]:
     return pieces[0], pieces[1]
 
 
-def _experiment(difference: Diff, experiment: ExperimentDiff, cut: Shortening) -> list[str]:
-    out = [words.heading(experiment), *(f"  {line}" for line in words.unmatched_cases(difference, experiment))]
-    out += _ended(experiment, cut)
-    out += [f"  note: {note}" for note in experiment.notes]
-    out += [f"  {line}" for line in words.tolerance_lines(difference, experiment)]
-    out += [f"  {line}" for line in words.requirement_lines(experiment)]
-    out += _evidence(experiment, cut)
-    out += _signals(experiment.signals)
-    out += _paired(experiment)
-    out += _samples(experiment)
-    out += _worst(difference, experiment, cut)
-    return out
+def _experiment(difference: Diff, experiment: ExperimentDiff, cut: Shortening) -> Iterator[str]:
+    yield from [words.heading(experiment), *(f"  {line}" for line in words.unmatched_cases(difference, experiment))]
+    yield from _ended(experiment, cut)
+    yield from [f"  note: {note}" for note in experiment.notes]
+    yield from [f"  {line}" for line in words.tolerance_lines(difference, experiment)]
+    yield from [f"  {line}" for line in words.requirement_lines(experiment)]
+    yield from _evidence(experiment, cut)
+    yield from _signals(experiment.signals)
+    yield from _paired(experiment)
+    yield from _samples(experiment)
+    yield from _worst(difference, experiment, cut)
 
 
 def _evidence(experiment: ExperimentDiff, cut: Shortening) -> list[str]:

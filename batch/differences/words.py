@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -97,9 +97,8 @@ def requirement_lines(experiment: ExperimentDiff) -> list[str]:
     ]
 
 
-def evidence_pairs(experiment: ExperimentDiff) -> list[tuple[str, str]]:
+def evidence_pairs(experiment: ExperimentDiff) -> Iterator[tuple[str, str]]:
     """Requirements over a share of cases whose evidence has changed, and the change."""
-    lines = []
     for change in experiment.evidence:
         before, now = texts_of(change.before), texts_of(change.now)
         named = (("", "verdict"), ("of all cases ", "of_all"), ("margin ", "margin"), ("in sigmas ", "sigmas"))
@@ -111,8 +110,7 @@ def evidence_pairs(experiment: ExperimentDiff) -> list[tuple[str, str]]:
             for name, before_text, other in pairs
         ]
         condition = f", {change.now.at}" if change.now.at else ""
-        lines.append((f"{change.now.requirement}{condition}", "; ".join(texts)))
-    return lines
+        yield (f"{change.now.requirement}{condition}", "; ".join(texts))
 
 
 def pairs_text(requirement: RequirementDiff) -> str:
@@ -408,16 +406,14 @@ class WorstCase:
     commands: tuple[str, str]
 
 
-def worst_cases(difference: Diff, experiment: ExperimentDiff) -> list[WorstCase]:
+def worst_cases(difference: Diff, experiment: ExperimentDiff) -> Iterator[WorstCase]:
     """The cases that differ most, the first ones first."""
-    out = []
     for ranked in experiment.worst:
         where = f" of {ranked.place.label}" if ranked.place.label else ""
         when = f" at {ranked.place.time:g} s" if ranked.place.time == ranked.place.time else ""
         before, now = distinct_texts(ranked.place.before / ranked.deck_scale, ranked.place.after / ranked.deck_scale)
         what, commands = f"{ranked.signal}{where}{when}", replay_commands(difference, experiment, ranked)
-        out.append(WorstCase(ranked.case_b, ranked.case_id[:8], what, before, now, ranked.deck_unit, commands))
-    return out
+        yield WorstCase(ranked.case_b, ranked.case_id[:8], what, before, now, ranked.deck_unit, commands)
 
 
 def replay_commands(difference: Diff, experiment: ExperimentDiff, ranked: RankedCase) -> tuple[str, str]:

@@ -7,7 +7,7 @@ itself leaves a mark, a change of all of them together leaves none: the right si
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -88,14 +88,12 @@ def known(slopes: np.ndarray, size: np.ndarray, held: np.ndarray, wider: float |
 
 def correlated(
     covariance: np.ndarray, paths: Sequence[str], known: Known, least: float = 0.9
-) -> list[tuple[str, str, float]]:
+) -> Iterator[tuple[str, str, float]]:
     """Pairs of known parameters whose estimates are correlated by `least` or more, with the correlation."""
     deviation = np.sqrt(np.diag(covariance))
-    pairs = []
     for first_place in range(len(paths)):
         for other in range(first_place):
             with np.errstate(invalid="ignore", divide="ignore"):
                 share = float(covariance[first_place, other] / (deviation[first_place] * deviation[other]))
             if abs(share) >= least and known.verdict[first_place] == known.verdict[other] == "known":
-                pairs.append((paths[other], paths[first_place], share))
-    return pairs
+                yield (paths[other], paths[first_place], share)

@@ -7,7 +7,7 @@ clock that is late, early, fast or slow. Columns whose residuals are white are a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 from scipy import optimize
@@ -45,22 +45,20 @@ ANGLES = {
 """The same of columns with angles."""
 
 
-def column_doubts(pairs: Mapping[str, Pair], kinds: Mapping[str, tuple[str, str]], white: set[str]) -> list[str]:
+def column_doubts(pairs: Mapping[str, Pair], kinds: Mapping[str, tuple[str, str]], white: set[str]) -> Iterator[str]:
     """Columns that fit after a change, and not as they are. kinds: signal and unit of each; white: those that fit as
     they are but for noise"""
     pairs = {name: pair for name, pair in pairs.items() if len(pair.instants) >= FEWEST}
     residuals = {name: _mean_square(pair.residual) for name, pair in pairs.items()}
-    doubts = []
     for name, pair in pairs.items():
         unlike = residuals[name] > UNLIKE * _mean_square(pair.measured)
         if unlike and (doubt := _column_doubt(name, pair, kinds[name][1], residuals[name], name in white)):
-            doubts.append(doubt)
+            yield doubt
     names = [name for name in pairs if name not in white]
     for i, a in enumerate(names):
         for b in names[i + 1 :]:
             if kinds[a] == kinds[b]:
-                doubts += _exchanged(a, b, pairs, residuals)
-    return doubts
+                yield from _exchanged(a, b, pairs, residuals)
 
 
 def _column_doubt(name: str, pair: Pair, unit: str, now: float, white: bool) -> str:

@@ -10,7 +10,7 @@ explains nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 from scipy import stats
@@ -183,7 +183,7 @@ def _residual(
     correlation, white = _whiteness(usual.residual)
     spread = float(np.std(pair.measured))
     few = len(usual.instants) < FEWEST
-    explained = () if white is not False or few else _explained(usual, _features(name, courses, units, joint))
+    explained = () if white is not False or few else _explained(usual, list(_features(name, courses, units, joint)))
     return Residual(
         name,
         units[name],
@@ -229,13 +229,13 @@ class _Feature:
 
 def _features(
     name: str, courses: Mapping[str, ComputedChannel], units: Mapping[str, str], joint: str
-) -> list[_Feature]:
+) -> Iterator[_Feature]:
     """The quantities that a channel's residual may follow: itself, its rate, time, and those of its joint."""
     own, unit = courses[name], units[name]
     slope, middle = own.rate, float(own.times.mean())
     q, qd, tau = (f"{joint}.{signal}" for signal in ("q", "qd", "tau"))
     why = "a unit, a gain, masses or a payload" if name == tau else "a unit, a gain, a constant of the motor"
-    features = [
+    yield from [
         _Feature(f"{name} itself", why, "1", lambda t: own.at(t)[:, None]),
         _Feature(f"the rate of {name}", "a delay", "s", lambda t: -slope.at(t)[:, None]),
         _Feature("time", "a drift", f"{unit} per s", lambda t: t[:, None] - middle),
@@ -243,14 +243,14 @@ def _features(
     if tau in courses and name in (q, qd):
         load = courses[tau]
         words = "what yields under load"
-        features.append(_Feature(tau, words, f"{unit} per {units[tau]}", lambda t: load.at(t)[:, None]))
+        yield _Feature(tau, words, f"{unit} per {units[tau]}", lambda t: load.at(t)[:, None])
     if name in (q, qd):
-        return features
+        return
     if qd in courses:
         rate = courses[qd]
         faster = rate.rate
         still = STILL * float(np.abs(rate.values).max())
-        features += [
+        yield from [
             _Feature(f"the sign of {qd}", "dry friction", unit, lambda t: _sign(rate.at(t), still)[:, None]),
             _Feature(qd, "viscous friction", f"{unit} per {units[qd]}", lambda t: rate.at(t)[:, None]),
             _Feature(
@@ -259,8 +259,7 @@ def _features(
         ]
     if q in courses and units[q] == "rad":
         angle = courses[q]
-        features.append(_Feature(f"sine and cosine of {q}", "gravity, payload", unit, lambda t: _turned(angle.at(t))))
-    return features
+        yield _Feature(f"sine and cosine of {q}", "gravity, payload", unit, lambda t: _turned(angle.at(t)))
 
 
 def _sign(rates: np.ndarray, still: float) -> np.ndarray:

@@ -57,13 +57,13 @@ def arm_picture(
     floor = min(0.0, lowest) if not scene.moves else None
     if floor is not None:
         _floor(axes, scene, view, floor)
-        _shadow(axes, solids(scene, numbers[rows[-1]]), view, floor)
+        _shadow(axes, list(solids(scene, numbers[rows[-1]])), view, floor)
     tip = numbers[:, -3:] @ upright(scene).T
     path = view.see(tip)
     axes.plot(path[:, 0], path[:, 1], color=PATH, linewidth=1.3, zorder=25)
     for number, row in enumerate(rows):
         pale = PALE * (1.0 - number / (len(rows) - 1)) + 0.12 * (number < len(rows) - 1) if len(rows) > 1 else 0.0
-        _draw(axes, solids(scene, numbers[row]), view, pale, 3 + number)
+        _draw(axes, list(solids(scene, numbers[row])), view, pale, 3 + number)
         x, y = path[row, :2]
         axes.plot([x], [y], "o", color=PAPER, markeredgecolor=PATH, markersize=4, zorder=30)
     top = 0.9 * height if not sheet.paper else height

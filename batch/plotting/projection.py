@@ -4,7 +4,7 @@ renderer."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -36,12 +36,11 @@ def upright(scene: ArmScene) -> np.ndarray:
     return np.stack(_along(np.array(scene.up)), axis=0) if scene.up != (0.0, 0.0, 1.0) else np.eye(3)
 
 
-def solids(scene: ArmScene, numbers: np.ndarray) -> list[PicturedSolid]:
+def solids(scene: ArmScene, numbers: np.ndarray) -> Iterator[PicturedSolid]:
     """The arm at an instant. numbers: the outputs of the scene's formulas there."""
     up, limb = upright(scene), scene.limb
     count = POSE_NUMBERS * len(scene.bodies)
     poses, shape_numbers = numbers[:count].reshape(-1, POSE_NUMBERS), numbers[count:-3].reshape(-1, SHAPE_NUMBERS)
-    out = []
     for shape, (*middle_and_axis, x, y, z) in zip(scene.shapes, shape_numbers, strict=True):
         R, p = up @ poses[shape.body][:9].reshape(3, 3), up @ poses[shape.body][9:]
         middle, axis = p + R @ np.array(middle_and_axis[:3]), R @ np.array(middle_and_axis[3:])
@@ -64,11 +63,10 @@ def solids(scene: ArmScene, numbers: np.ndarray) -> list[PicturedSolid]:
                     radius, length = JOINT[0] * limb, JOINT[1] * limb
         radius = RAIL * limb if shape.role == "rail" else radius
         ends = np.stack([middle - way * length / 2.0, middle + way * length / 2.0])
-        out.append(PicturedSolid(kind, shape.role, shape.joint, ends, axes, radius))
+        yield PicturedSolid(kind, shape.role, shape.joint, ends, axes, radius)
     if not scene.moves:
         foot = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, FOOT[1] * limb]])
-        out.append(PicturedSolid("can", "base", -1, foot, np.zeros((3, 3)), FOOT[0] * limb))
-    return out
+        yield PicturedSolid("can", "base", -1, foot, np.zeros((3, 3)), FOOT[0] * limb)
 
 
 @frozen

@@ -7,7 +7,7 @@ one script, by its digest, and WebAssembly; module and numbers are in that scrip
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -174,7 +174,7 @@ def data_of(
     known = {name.removeprefix("metrics."): name for name in stored}
     visible_description: dict[str, Any] = visible_texts(description)
     metrics = [*description["metrics"], *description["not_computed"]]
-    columns = _in_deck_units(DeckUnits(archive, group), description["columns"])
+    columns = list(_in_deck_units(DeckUnits(archive, group), description["columns"]))
     lacking = [metric["name"] for metric in metrics if metric["name"] not in known]
     with reading(group.path):
         if lacking:
@@ -208,14 +208,12 @@ def data_of(
     }  # fmt: skip
 
 
-def _in_deck_units(units: DeckUnits, columns: Sequence[Mapping[str, str]]) -> list[tuple[float, str]]:
+def _in_deck_units(units: DeckUnits, columns: Sequence[Mapping[str, str]]) -> Iterator[tuple[float, str]]:
     """The divisor of each column's SI values, and the unit they are then in."""
-    out = []
     for column in columns:
         panel = Panel(column["signal"], "", column["unit"], column["signal"], (), ())
         in_unit = units.panel(panel)
-        out.append((in_unit.scale, in_unit.unit))
-    return out
+        yield (in_unit.scale, in_unit.unit)
 
 
 def _unit(unit: str) -> str:

@@ -128,7 +128,7 @@ class BestAnswer:
     # Text
 
     def lines(self, width: int) -> list[str]:
-        out = self._none(width) if self.best is None else self._use(self.best, width)
+        out = list(self._none(width)) if self.best is None else self._use(self.best, width)
         if self.front and self.best is not None:
             out += ["", *self._trade_off()]
         return out
@@ -217,21 +217,20 @@ class BestAnswer:
         so = f"So {'does' if good == 1 else 'do'} {good:,} of {designs.count:,} designs."
         return f"{what}{where}{steps}{room_said}. {so}"
 
-    def _none(self, width: int) -> list[str]:
+    def _none(self, width: int) -> Iterator[str]:
         """The text where no design is good: the nearest ones."""
         designs = self.designs
-        out = [self.headline]
+        yield self.headline
         for text, met in zip(designs.demands, designs.meets.T, strict=True):
-            out.append(
+            yield (
                 f"  require {text}  met by {count(int(met.sum()), 'design')}"
                 if designs.pool.requirements
                 else f"  {text}"
             )
-        out += ["", "those that come nearest:", *self.table(self.nearest())]
+        yield from ["", "those that come nearest:", *self.table(self.nearest())]
         if failed := int(designs.failing.sum()):
-            out += ["", f"{failed:,} of {count(designs.pool.count, 'case')} failed:"]
-            out += failure_lines(designs.pool.failures, width)
-        return out
+            yield from ["", f"{failed:,} of {count(designs.pool.count, 'case')} failed:"]
+            yield from failure_lines(designs.pool.failures, width)
 
     def nearest(self) -> list[BestRow]:
         """The designs that miss least, with their misses."""
@@ -304,27 +303,23 @@ class BestAnswer:
         variables = {variable.path: variable for variable in self.designs.pool.variables("metric")}
         return ((column, variables[column.label]) for column in self.designs.pool.metrics())
 
-    def settings(self, design: int) -> list[tuple[str, str]]:
+    def settings(self, design: int) -> Iterator[tuple[str, str]]:
         """The choices that make a design: each path, and its value as a deck would write it."""
-        out = []
         for column, si, unit in self._chosen(design):
             if column.role == "choice":
-                out.append((column.label, column.words[int(si)]))
+                yield (column.label, column.words[int(si)])
             else:
-                out.append((column.label, written(si, unit)))
-        return out
+                yield (column.label, written(si, unit))
 
-    def values(self, design: int) -> list[WrittenValue]:
+    def values(self, design: int) -> Iterator[WrittenValue]:
         """The choices that make a design, as texts for a deck. Raises Problem E397 for a choice among words."""
-        out = []
         for column, si, unit in self._chosen(design):
             if column.role == "choice":
                 path, word = column.label.removeprefix(MACRO), column.words[int(si)]
                 what = f"`#define {path} {word}`" if column.label.startswith(MACRO) else f"`{path} = {word};`"
                 message = f"`{path}` cannot be written into the deck: it is a choice among words, not a number"
                 raise Problem(error("E397", message, help=f"write it by hand: {what}"))
-            out.append(WrittenValue(column.label, si, unit))
-        return out
+            yield WrittenValue(column.label, si, unit)
 
     def _chosen(self, design: int) -> Iterator[tuple[CaseColumn, float, str]]:
         """The parameters and choices that make a design, with SI value (of a choice its word's place), and unit."""

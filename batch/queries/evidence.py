@@ -9,7 +9,7 @@ may be looked at after every case, and bounds that hold as well.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -109,7 +109,7 @@ def evidence_for(group: ArchiveGroup, judged_requirements: Sequence[GroupRequire
     if is_search(group):  # a part of its cases: an optimiser chose them, so that each is judged by every requirement
         judged_requirements = [replace(requirement, share=None, confidence=None) for requirement in judged_requirements]
     if (summed := summed_up(group)) is not None:
-        return _of_summary(group, summed, judged_requirements)
+        return list(_of_summary(group, summed, judged_requirements))
     outcomes = requirements.outcomes(group)
     points, why = _design_points(group)
     early = bool(group.attributes.get("until_shown"))
@@ -146,11 +146,10 @@ def _of_answer(answer: SearchAnswer) -> list[EvidenceRow]:
 
 def _of_summary(
     group: ArchiveGroup, summary: CaseSummary, judged_requirements: Sequence[GroupRequirement]
-) -> list[EvidenceRow]:
+) -> Iterator[EvidenceRow]:
     """The rows of requirements on all cases, from the summary that the archive keeps."""
     chosen = [group.variables[str(name)] for name in summary.values["chosen"]]
     why = _why_without_confidence(group, group.role("coordinate"))
-    out = []
     for requirement in judged_requirements:
         scale, unit = deck_unit(group.variables[requirement.metric])
         sign = 1.0 if requirement.comparison.startswith("<") else -1.0
@@ -174,12 +173,11 @@ def _of_summary(
             chosen_texts = {
                 variable.path: _value_text(variable, value) for variable, value in zip(chosen, values, strict=False)
             }
-            out.append(
+            yield (
                 EvidenceRow(
                     requirement=requirement, unit=unit, scale=scale, chosen=chosen_texts, worst=worst, **verdict_fields
                 )
             )
-    return out
 
 
 @frozen

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -61,23 +61,23 @@ def failures(status: np.ndarray, cause: np.ndarray, case: np.ndarray, case_id: n
     )
 
 
-def failure_lines(failure_groups: Sequence[FailureGroup], width: int) -> list[str]:
+def failure_lines(failure_groups: Sequence[FailureGroup], width: int) -> Iterator[str]:
     """Lines with each cause and its cases, wrapped."""
-    out = []
     width = max(width, 40)
     for failure in failure_groups:
         word = "" if failure.status == "failed" else f"{failure.status}: "
         cause = failure.cause.removeprefix(word)
         if failure.count == 1:
             head = f"  #{failure.row} {failure.case_id[:8]}  {word}"
-            out += textwrap.wrap(cause, width, initial_indent=head, subsequent_indent=" " * len(head))
+            yield from textwrap.wrap(cause, width, initial_indent=head, subsequent_indent=" " * len(head))
             continue
         head = f"  {failure.count:,} cases  {word}"
-        out += textwrap.wrap(f"{cause} (#{failure.row})", width, initial_indent=head, subsequent_indent=" " * len(head))
+        yield from textwrap.wrap(
+            f"{cause} (#{failure.row})", width, initial_indent=head, subsequent_indent=" " * len(head)
+        )
         if failure.of:
             continue
-        out += textwrap.wrap(ranges(failure.cases), width, initial_indent="    ", subsequent_indent="    ")
-    return out
+        yield from textwrap.wrap(ranges(failure.cases), width, initial_indent="    ", subsequent_indent="    ")
 
 
 def ranges(cases: Sequence[int]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from functools import cached_property
 from typing import Any
@@ -60,17 +60,14 @@ class SearchAnswer:
         return answer(self.search, *self._judged_cases)
 
     @cached_property
-    def _judged_cases(self) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], list[_Required]]:
+    def _judged_cases(self) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], list[GroupRequirement]]:
         """Coordinates of the cases, a truth for each that reached its end, their metrics, and the requirements on
         these."""
         group = self.group
         columns = [group.values(variable.name) for variable in group.role("coordinate")]
         metrics = {variable.path: group.values(variable.name) for variable in group.role("metric")}
         by_name = {variable.name: variable.path for variable in group.role("metric")}
-        required = [
-            _Required(requirement.text, by_name[requirement.metric], requirement.comparison, requirement.limit)
-            for requirement in self.required
-        ]
+        required = [replace(requirement, metric=by_name[requirement.metric]) for requirement in self.required]
         return np.stack(columns, axis=1), group.values("status") == DONE, metrics, required
 
     def progress(self, most: int) -> list[tuple[int, int, Answer]]:
@@ -116,15 +113,11 @@ class SearchAnswer:
             return self.best.serves and all(confirmation.withstood for confirmation in self.search.confirmation)
         return bool((self.group.values("status") == DONE).all() and (outcomes(self.group) == 1).all())
 
-    def values(self, case: int | None = None) -> list[WrittenValue]:
+    def values(self, case: int | None = None) -> Iterator[WrittenValue]:
         """The chosen values, for a deck's text or `--set`; those of another case, by its place, where one is given."""
-        written = []
         for parameter, variable in zip(self.search.parameters, self.group.role("coordinate"), strict=False):
             value = float(self.group.at(variable.name, [self.best.case if case is None else case])[0])
-            written.append(
-                WrittenValue(parameter.path, value, str(variable.attributes.get("deck_unit", variable.unit)))
-            )
-        return written
+            yield WrittenValue(parameter.path, value, str(variable.attributes.get("deck_unit", variable.unit)))
 
     @property
     def draws(self) -> bool:
@@ -374,13 +367,6 @@ class SearchAnswer:
 def cut(metrics: dict[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
     """The metrics of the first cases only."""
     return {name: values[:count] for name, values in metrics.items()}
-
-
-class _Required:
-    """A requirement of an archive by the name of its metric."""
-
-    def __init__(self, text: str, metric: str, comparison: str, limit: float) -> None:
-        self.text, self.metric, self.comparison, self.limit = text, metric, comparison, limit
 
 
 def goal_text(value: float, unit: str, scale: float) -> str:

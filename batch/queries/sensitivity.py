@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -245,30 +245,26 @@ def total_text(share: InputShare) -> str:
     return f"{math.floor(share.total_low * 100) / 100:.2f} .. {math.ceil(share.total_high * 100) / 100:.2f}"
 
 
-def notes_of(sensitivity: Sensitivity) -> list[str]:
+def notes_of(sensitivity: Sensitivity) -> Iterator[str]:
     """Sentences on the estimation of the shares, with its caveats."""
-    notes = []
     if sensitivity.design:
-        notes.append("by the estimators of `saltelli`; with others: with any number of them, and with noise")
+        yield "by the estimators of `saltelli`; with others: with any number of them, and with noise"
     if sensitivity.why:
-        notes.append(f"{sensitivity.why}: estimated as from any cases")
+        yield f"{sensitivity.why}: estimated as from any cases"
     if sensitivity.rest is not None and sensitivity.rest > UNCLEAR:
         many = "three inputs or more together, of " if len(sensitivity.inputs) > 2 else ""
-        notes.append(
+        yield (
             f"{sensitivity.rest:.2f} of the variance is of {many}noise, or of too few cases: "
             "any input may have part in it"
         )
     widest = max((share.first_by for share in sensitivity.shares if math.isfinite(share.first_by)), default=0.0)
     if widest > WIDE:
-        notes.append("these intervals say next to nothing: of few cases, or some make up most of the variance")
+        yield "these intervals say next to nothing: of few cases, or some make up most of the variance"
     elif widest > UNCLEAR and sensitivity.design:
-        notes.append("not enough cases for narrow intervals: four times as many halve them")
+        yield "not enough cases for narrow intervals: four times as many halve them"
     elif widest > UNCLEAR:
         cases = float(f"{sensitivity.cases * (widest / UNCLEAR) ** 2:.1g}")
-        notes.append(f"few cases: it takes about {cases:,.0f} for shares alone within ± {UNCLEAR}")
+        yield f"few cases: it takes about {cases:,.0f} for shares alone within ± {UNCLEAR}"
     for name_a, other, size in sensitivity.together:
         how = f"rank correlation {size:+.2f}" if abs(size) > UNCLEAR else "some values of one go with some of the other"
-        notes.append(
-            f"{name_a} and {other} do not vary independently ({how}): their shares overlap, and have no interval"
-        )
-    return notes
+        yield f"{name_a} and {other} do not vary independently ({how}): their shares overlap, and have no interval"

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -107,7 +107,7 @@ def _choices(group: ArchiveGroup, signals: dict[str, Stored]) -> dict[str, tuple
     return selections
 
 
-def _panels(group: ArchiveGroup, choice: SignalSelection) -> list[Panel]:
+def _panels(group: ArchiveGroup, choice: SignalSelection) -> Iterator[Panel]:
     """The panels of a choice: for several joints' vectors one a component, for several units one a unit."""
     variable = choice.variable
     joints, components = group.joints(variable), group.components(variable)
@@ -126,13 +126,11 @@ def _panels(group: ArchiveGroup, choice: SignalSelection) -> list[Panel]:
         label = component if component and not several else joint if joints else ""
         line = ("" if alone else label, joint, column)
         gathered.setdefault((name, units[column // width]), []).append(line)
-    out = []
     frame = str(variable.attributes.get("frame", "")) if components else ""  # a joint's own number is about its axis
     about = ", ".join(part for part in (variable.long_name, frame) if part)
     for (name, unit), lines in gathered.items():
         labels, owners, columns = zip(*lines, strict=True)
-        out.append(Panel(name, about, unit, variable.name, labels, columns, owners))
-    return out
+        yield Panel(name, about, unit, variable.name, labels, columns, owners)
 
 
 def history(group: ArchiveGroup, panel: Panel, position: int) -> np.ndarray:

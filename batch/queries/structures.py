@@ -20,17 +20,16 @@ def structures(archive: ArchiveFile) -> Iterator[list[str]]:
             yield [*_all_of(sweep, [summary_of(group) for group in groups]), *_table(groups)]
 
 
-def _all_of(sweep: str, summaries: Sequence[Summary]) -> list[str]:
+def _all_of(sweep: str, summaries: Sequence[Summary]) -> Iterator[str]:
     """Lines about the sweep as a whole: the number of cases that reached their end, and that met each requirement."""
     cases, failed = (sum(getattr(summary, name) for summary in summaries) for name in ("cases", "failed"))
-    out = [f"{sweep}: {cases - failed:,} of {cases:,} cases reached their end, of {len(summaries)} structures"]
+    yield f"{sweep}: {cases - failed:,} of {cases:,} cases reached their end, of {len(summaries)} structures"
     texts = list(dict.fromkeys(r.text for summary in summaries for r in summary.requirements))
     wide = max(map(len, texts), default=0)
     for text in texts:
         met_counts = [(summary.cases, r.met) for summary in summaries for r in summary.requirements if r.text == text]
         all_cases, met = map(sum, zip(*met_counts, strict=True))
-        out.append(f"  require {text:<{wide}}  met by {met:,} of {all_cases:,} ({100 * met / all_cases:.3g} %)")
-    return out
+        yield f"  require {text:<{wide}}  met by {met:,} of {all_cases:,} ({100 * met / all_cases:.3g} %)"
 
 
 def _table(groups: Sequence[ArchiveGroup]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from batch.queries.evidence import EvidenceRow, percent_above, percent_below
 from batch.queries.signals import number_text
@@ -11,21 +11,19 @@ MOST_POINTS = 12
 """Largest number of listed design points of a requirement; of more, unmet ones come first."""
 
 
-def evidence_lines(rows: Sequence[EvidenceRow]) -> list[str]:
+def evidence_lines(rows: Sequence[EvidenceRow]) -> Iterator[str]:
     """Lines for each design point: the verdict, its grounds, and the missing cases."""
     listed = list(rows) if len(rows) <= MOST_POINTS else sorted(rows, key=lambda row: row.ok)[:MOST_POINTS]
     wide = max((len(row.verdict) for row in listed), default=0)
     heads = [", ".join(f"{path} = {text}" for path, text in row.chosen.items()) for row in listed]
     widest = max(map(len, heads), default=0)
     widest += 2 * (widest > 0)
-    lines = []
     for head, row in zip(heads, listed, strict=True):
         first, *more = _grounds(row)
-        lines.append(f"{head:<{widest}}{row.verdict:<{wide}}  {first}")
-        lines += [" " * (widest + wide + 2) + text for text in more]
+        yield f"{head:<{widest}}{row.verdict:<{wide}}  {first}"
+        yield from [" " * (widest + wide + 2) + text for text in more]
     if len(rows) > len(listed):
-        lines.append(f"{len(rows):,} design points in all, at {sum(row.ok for row in rows):,} of which it is met")
-    return lines
+        yield f"{len(rows):,} design points in all, at {sum(row.ok for row in rows):,} of which it is met"
 
 
 def _grounds(row: EvidenceRow) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from batch.queries.evidence_table import EvidenceTexts, RequirementEvidence, notes_of, texts_of
 from ic.printing.columns import columns
@@ -25,7 +25,7 @@ def evidence_table_lines(rows: Sequence[RequirementEvidence], width: int) -> lis
     out = []
     for number, text in enumerate(required, start=1):
         out += textwrap.wrap(f"{number}  {text}", width, initial_indent="  ", subsequent_indent="     ")
-    numbers = _numbers(rows, required)
+    numbers = list(_numbers(rows, required))
     if any(row.at for row in rows):
         out += ["", *columns([[number, row.at] for number, row in zip(numbers, rows, strict=True) if row.at])]
     texts = list(map(texts_of, rows))
@@ -73,13 +73,11 @@ def _short(cell: str) -> str:
     return cell
 
 
-def _numbers(rows: Sequence[RequirementEvidence], required: Sequence[str]) -> list[str]:
+def _numbers(rows: Sequence[RequirementEvidence], required: Sequence[str]) -> Iterator[str]:
     """The numbers of the rows: those of their requirements, `1`; with the number of the design point where there are
     several, `2.1`, `2.2`."""
     many, seen = Counter(row.requirement for row in rows), Counter[str]()
-    out = []
     for row in rows:
         seen[row.requirement] += 1
         point = f".{seen[row.requirement]}" if many[row.requirement] > 1 else ""
-        out.append(f"{required.index(row.requirement) + 1}{point}")
-    return out
+        yield f"{required.index(row.requirement) + 1}{point}"

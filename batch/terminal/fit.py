@@ -177,7 +177,7 @@ def sweep_lines(question: FitQuestion, answer: FitAnswer, count: int = 200) -> I
     free = [place for place, path in enumerate(question.paths) if not (limited[place] or path.startswith(DELAY))]
     if not free:
         return
-    if pairs := correlated(answer.fit.covariance, question.paths, answer.known, DRAWN_APART):
+    if pairs := list(correlated(answer.fit.covariance, question.paths, answer.known, DRAWN_APART)):
         path_a, other, share = pairs[0]
         yield (
             f"no sweep: the errors of {path_a} and {other} are correlated by {share:.2f}, and a sweep draws them apart"

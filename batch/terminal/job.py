@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from batch.campaigns.drive import Count, Driver, Stopped
@@ -71,7 +71,7 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
     try:
         for section in sections.values():
             wanted = [task for task in mine if task.section == section.number]
-            left = _left(wanted, folder.named_tasks(section.number))
+            left = list(_left(wanted, folder.named_tasks(section.number)))
             own = sum(task.cases for task in wanted)
             driver.counts[section.number] = Count(own - sum(last - first for first, last in left))
             driver.run(section, left, own)
@@ -95,17 +95,15 @@ def cores() -> int:
     return max(1, int(setting)) if setting.isdecimal() else 1
 
 
-def _left(wanted: Sequence[Task], done: Sequence[Task]) -> list[tuple[int, int]]:
+def _left(wanted: Sequence[Task], done: Sequence[Task]) -> Iterator[tuple[int, int]]:
     """Stretches of the wanted tasks without a shard, judged by names: contents are checked when all is merged."""
-    out = []
     for task in wanted:
         inside = [
             Task(t.section, max(t.first, task.first) - task.first, min(t.last, task.last) - task.first)
             for t in done
             if t.first < task.last and t.last > task.first
         ]
-        out += [(task.first + first, task.first + last) for first, last in uncovered(inside, task.cases)]
-    return out
+        yield from [(task.first + first, task.first + last) for first, last in uncovered(inside, task.cases)]
 
 
 def merge_campaign(path: Path) -> int:

@@ -192,7 +192,7 @@ def _result(campaign: Campaign, performed: Performed, no_picture: bool, say: Cal
         return _counted_result(campaign, performed)
     with ArchiveFile(campaign.output) as file:
         summaries = summarise(file)
-        worst = worst_cases(file)
+        worst = tuple(worst_cases(file))
         answers = tuple(search_result(file, group) for group in file.groups)
         experiments = {part.experiment.name: part.experiment for part in campaign.parts}
         warned = [*performed.warned, *campaign_warnings(file.groups, experiments)]

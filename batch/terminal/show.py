@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -265,31 +265,29 @@ def _again(group: ArchiveGroup) -> str:
     return f"`met run {quoted(group.path)} --case '#{group.at('case', [0])[0]}'`"
 
 
-def verdict(summary: Summary, width: int) -> list[str]:
+def verdict(summary: Summary, width: int) -> Iterator[str]:
     """Lines about the outcome: cases, metrics, requirements."""
-    out = [_counts(summary)]
-    out += failure_lines((*summary.failures, *summary.doubts), width)
+    yield _counts(summary)
+    yield from failure_lines((*summary.failures, *summary.doubts), width)
     if summary.limited:
         cases_text = "" if summary.cases == 1 else f" in {summary.limited:,} of {summary.cases:,} cases"
-        out.append(
-            f"  note: the load motor of a bed was at its limit{cases_text}: the run is not what the joint would do"
-        )
-        out.append("  what gives it more: `i_max` and `kt_load` of the bed; what asks less: the arm, or its command")
-    out += [f"  {text}" for text in reached_texts(summary.limits, summary.cases)]
+        yield f"  note: the load motor of a bed was at its limit{cases_text}: the run is not what the joint would do"
+        yield "  what gives it more: `i_max` and `kt_load` of the bed; what asks less: the arm, or its command"
+    yield from [f"  {text}" for text in reached_texts(summary.limits, summary.cases)]
     if summary.metrics:
-        out += _metric_table(summary)
+        yield from _metric_table(summary)
     if summary.verified is not None:
-        out += textwrap.wrap(about(summary.verified), width, initial_indent="  ", subsequent_indent="    ")
+        yield from textwrap.wrap(about(summary.verified), width, initial_indent="  ", subsequent_indent="    ")
     texts = [requirement.text for requirement in summary.requirements if not requirement.evidence]
     wide = max(map(len, (*texts, *(step_error.text for step_error in summary.step_errors))), default=0)
     if summary.answer is not None:
-        out += textwrap.wrap(f"{summary.answer.headline}.", width, initial_indent="  ", subsequent_indent="    ")
+        yield from textwrap.wrap(f"{summary.answer.headline}.", width, initial_indent="  ", subsequent_indent="    ")
     for r in summary.requirements:
         if isinstance(r, AnsweredRequirement):
-            out.append(f"  require {r.text:<{wide}}  {r.said}")
+            yield f"  require {r.text:<{wide}}  {r.said}"
             continue
         if r.evidence:
-            out += [f"  require {r.text}", *(f"    {text}" for text in evidence_lines(r.evidence))]
+            yield from [f"  require {r.text}", *(f"    {text}" for text in evidence_lines(r.evidence))]
             continue
         if summary.cases == 1:
             why = "its metric has no value here" if r.no_value else "the case failed"
@@ -298,25 +296,22 @@ def verdict(summary: Summary, width: int) -> list[str]:
             outcome = f"met by {r.met:,} of {summary.cases:,} ({100 * r.met / summary.cases:.3g} %)"
             outcome += f", not known of {r.unknown:,}" if r.unknown else ""
             outcome += f" (its metric has no value in {r.no_value:,})" if r.no_value else ""
-        out.append(f"  require {r.text:<{wide}}  {outcome}")
+        yield f"  require {r.text:<{wide}}  {outcome}"
     for step_error in summary.step_errors:
-        out.append(f"  require {step_error.text:<{wide}}  {step_error.word}: {step_error.reason}")
+        yield f"  require {step_error.text:<{wide}}  {step_error.word}: {step_error.reason}"
     verdicts = [row for r in summary.requirements for row in r.evidence if row.lower is not None]
     if len(verdicts) > 1:
         tested = len({row.requirement.text for row in verdicts})
         where = f"{count(tested, 'requirement')} at {count(len(verdicts) // tested, 'design point')}"
-        out.append(f"  {len(verdicts):,} verdicts ({where}): the confidence is that of each by itself")
-    return out
+        yield f"  {len(verdicts):,} verdicts ({where}): the confidence is that of each by itself"
 
 
-def warning_lines(summary: Summary, width: int) -> list[str]:
+def warning_lines(summary: Summary, width: int) -> Iterator[str]:
     """Lines of the warnings due to errors by the step, with remedies."""
-    out = []
     for warning in summary.warnings:
         texts = [f"warning[{warning.code}]: {warning.message}", *(f"  help: {text}" for text in warning.help)]
         for text in texts:
-            out += textwrap.wrap(text, width, initial_indent="  ", subsequent_indent="      ")
-    return out
+            yield from textwrap.wrap(text, width, initial_indent="  ", subsequent_indent="      ")
 
 
 def _counts(summary: Summary) -> str:
@@ -328,7 +323,7 @@ def _counts(summary: Summary) -> str:
     )
 
 
-def _metric_table(summary: Summary) -> list[str]:
+def _metric_table(summary: Summary) -> Iterator[str]:
     """The table of metrics, with their spread over the cases and the error by the step where it is known."""
     single = summary.cases == 1
     columns = SUMMED_COLUMNS if isinstance(summary.metrics[0], SummedMetric) else SPREAD_COLUMNS
@@ -343,14 +338,12 @@ def _metric_table(summary: Summary) -> list[str]:
             numbers.append(error if not single else "" if error == NONE else f"± {error}")
         rows.append((metric.name, *numbers, unit, _metric_words(metric, single)))
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    out = []
     for row in rows[1:] if single else rows:
         cells = (" " if single else "  ").join(
             f"{text:{'<' if text.startswith('± ') else '>'}{wide}}"
             for text, wide in zip(row[1:-2], widths[1:-2], strict=True)
         )
-        out.append(f"  {row[0]:<{widths[0]}}  {cells} {row[-2]:<{widths[-2]}}  {row[-1]}".rstrip())
-    return out
+        yield f"  {row[0]:<{widths[0]}}  {cells} {row[-2]:<{widths[-2]}}  {row[-1]}".rstrip()
 
 
 def _metric_numbers(metric: MetricSummary, single: bool, columns: Sequence[SpreadColumn]) -> tuple[str, ...]:

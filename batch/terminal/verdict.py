@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json as json_module
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,19 +36,17 @@ MOST_GROUPS = 4
 # Before the run
 
 
-def announcement(campaign: Campaign, verbose: bool = False, *, notes: bool = False) -> list[str]:
+def announcement(campaign: Campaign, verbose: bool = False, *, notes: bool = False) -> Iterator[str]:
     """Lines that announce the cases and records. notes: also those of the plan, which `met plan` prints"""
-    out = []
     for part in campaign.parts:
-        out += _part_lines(part, verbose)
-        out += [f"  note: {note}" for note in part.experiment.notes] if notes else []
+        yield from _part_lines(part, verbose)
+        yield from [f"  note: {note}" for note in part.experiment.notes] if notes else []
     if campaign.keep.failed:
         bytes_of_case = max(
             part.experiment.structure.history_bytes // (2 if part.single else 1) for part in campaign.parts
         )
-        out.append(f"and those of cases that fail: {size_text(bytes_of_case)} a case more")
-    out += [f"note: {note}" for note in campaign.notes]
-    return out
+        yield f"and those of cases that fail: {size_text(bytes_of_case)} a case more"
+    yield from [f"note: {note}" for note in campaign.notes]
 
 
 def writing(campaign: Campaign) -> str:
@@ -58,7 +56,7 @@ def writing(campaign: Campaign) -> str:
     return f"writing {campaign.output}, {most}about {size_text(campaign.bytes)}{instead}"
 
 
-def _part_lines(part: CampaignPart, verbose: bool) -> list[str]:
+def _part_lines(part: CampaignPart, verbose: bool) -> Iterator[str]:
     """Lines about an experiment before it runs: its cases, and the histories to be kept."""
     experiment = part.experiment
     schedule = experiment.structure.schedule
@@ -73,28 +71,27 @@ def _part_lines(part: CampaignPart, verbose: bool) -> list[str]:
     if early:
         cases = f"at most {cases}"
     steps = schedule.ticks // schedule.dynamics
-    out = [
+    yield (
         f"{experiment.name}: {cases}, {schedule.duration:g} s in {steps:,} steps of {1e3 * schedule.step:g} ms, "
         f"{experiment.structure.integrator}"
-    ]
+    )
     if early:
-        out += [f"  {note.removeprefix(OF_CASES)}" for note in experiment.notes if note.startswith(OF_CASES)]
+        yield from [f"  {note.removeprefix(OF_CASES)}" for note in experiment.notes if note.startswith(OF_CASES)]
     recorded = ", ".join(recorded.name for recorded in experiment.structure.record)
     if part.searches and experiment.search is not None:
         paths = ", ".join(parameter.path for parameter in experiment.search.parameters)
         against = f", against {len(experiment.search.plants):,} cases of {experiment.search.against}"
-        out.append(f"  {experiment.search.goal} by {paths}{against * bool(experiment.search.against)}")
+        yield f"  {experiment.search.goal} by {paths}{against * bool(experiment.search.against)}"
     if part.searches and part.keeps_best:
-        out.append(f"  histories of its answer: {recorded}")
+        yield f"  histories of its answer: {recorded}"
     elif part.recorded:
         size = size_text(experiment.structure.history_bytes // (2 if part.single else 1))
         whole_text = "" if part.all_recorded else f" of {part.recorded:,} cases" + (" at most" if part.later else "")
-        out.append(f"  histories{whole_text}: {recorded}; {schedule.rows:,} rows, {size} a case")
+        yield f"  histories{whole_text}: {recorded}; {schedule.rows:,} rows, {size} a case"
     else:
-        out.append("  histories: none" + (f" (would be {recorded})" if recorded else ""))
+        yield "  histories: none" + (f" (would be {recorded})" if recorded else "")
     for coordinate in experiment.cases.coordinates if verbose else ():
-        out.append(f"  varied: {coordinate.path} ({', '.join(coordinate.sets)})")
-    return out
+        yield f"  varied: {coordinate.path} ({', '.join(coordinate.sets)})"
 
 
 # After the run
@@ -112,17 +109,15 @@ class WorstCaseLines:
         return f"#{self.rows[0]['row']}"
 
 
-def worst_cases(archive: ArchiveFile) -> tuple[WorstCaseLines, ...]:
+def worst_cases(archive: ArchiveFile) -> Iterator[WorstCaseLines]:
     """The worst cases of every experiment; none where there is one case, or no order among them."""
     from batch.queries import cases
 
-    out = []
     for group in archive.groups:
         rows = tuple(cases.rows_json(group, WORST))
         judged = any(row["met"] or row["status"] != "done" for row in rows)
         lines = (cases.title(group, WORST), *cases.table(group, WORST, hint=False)) if judged else ()
-        out.append(WorstCaseLines(lines, rows if judged else ()) if group.count > 1 else WorstCaseLines())
-    return tuple(out)
+        yield WorstCaseLines(lines, rows if judged else ()) if group.count > 1 else WorstCaseLines()
 
 
 @frozen
@@ -158,7 +153,7 @@ def result_lines(campaign: Campaign, result: RunResult, exported: Exported | Non
     out: list[str] = []
     many = {s.sweep for s in summaries if sum(s.sweep == other.sweep for other in summaries) > MOST_GROUPS} - {""}
     for summary, cases, answer in zip(summaries, worst, answers, strict=True):
-        lines = verdict(summary, 100)
+        lines = list(verdict(summary, 100))
         if summary.sweep in many:
             if of_cases := (*summary.failures, *summary.doubts):
                 out += ["", f"{summary.name}: {lines[0]}", *failure_lines(of_cases, 100)]
@@ -227,7 +222,7 @@ def short_result_lines(path: Path, summaries: tuple[Summary, ...]) -> list[str]:
     out: list[str] = []
     for summary in summaries:
         name = f"{summary.name}: " if len(summaries) > 1 else ""
-        lines = verdict(summary, 100)
+        lines = list(verdict(summary, 100))
         out += ["", f"{name}{lines[0]}", *lines[1:], *warning_lines(summary, 100)]
     out += ["", f"archive  {path}  ({size_text(path.stat().st_size)})"]
     return out if all(summary.ok for summary in summaries) else [*out, f"exit 1: {_why_not(summaries)}"]

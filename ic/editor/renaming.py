@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -179,15 +179,13 @@ def _refuse_outside(use: Token, path: str, roots: Iterable[str]) -> None:
         raise NotRenamed(f"`{use.text}` stands in {path}, which is outside of the folders that are open")
 
 
-def _uses(deck: _Deck, name: str, places: set[tuple[str, int]]) -> list[Token]:
+def _uses(deck: _Deck, name: str, places: set[tuple[str, int]]) -> Iterator[Token]:
     """The tokens of a deck's texts that mean one of the definitions."""
     texts = {text.source.name: text for text in deck.names.texts}
-    uses = []
     for use in deck.names.uses(name):
         meant = deck.names.meant_in(texts[use.source.name], use)
         if any((deck.path(definition.file), definition.token.offset) in places for definition in meant):
-            uses.append(use)
-    return uses
+            yield use
 
 
 def edited(text: str, edits: Iterable[tuple[int, int]], new: str) -> str:

@@ -8,7 +8,7 @@ for each value of a macro the deck is read again with `-D`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -328,14 +328,12 @@ def _both(earlier: ChoiceColumn, later: ChoiceColumn) -> Problem:
     )
 
 
-def _entries(tree: dict[str, Any]) -> list[Entry]:
-    all_entries: list[Entry] = []
+def _entries(tree: dict[str, Any]) -> Iterator[Entry]:
     for key, inner in tree.items():
         if isinstance(inner, dict):
             entries = tuple(_entries(inner))
             place = entries[0].place
-            all_entries.append(_group(key, entries, place))
+            yield _group(key, entries, place)
         else:
             column, option = inner
-            all_entries.append(nested_entry((key,), option.expression, column.place))
-    return all_entries
+            yield nested_entry((key,), option.expression, column.place)

@@ -15,7 +15,7 @@ so that a long sample is computed where it is used; the others are made as a who
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -117,22 +117,20 @@ class SampleDesign:
                         help=[f"values have {DIGITS} digits: draw it from a wider distribution", "or leave it out"],
                     )
                 )
-        return _saltelli(drawn) if self.design == "saltelli" else drawn
+        return list(_saltelli(drawn)) if self.design == "saltelli" else drawn
 
 
-def _saltelli(drawn: Sequence[CaseValues]) -> list[CaseValues]:
+def _saltelli(drawn: Sequence[CaseValues]) -> Iterator[CaseValues]:
     """The values of each part in the cases of Saltelli's scheme, from those at its points: all a, then all b.
 
     The cases of a pair of points stand together: a, then a with the value of the first part from b, of the second ...,
     then b.
     """
-    out: list[CaseValues] = []
     for place, values in enumerate(drawn):
         a, b = np.split(np.asarray(values), 2)
         cases = np.repeat(a[:, None], len(drawn) + 2, axis=1)
         cases[:, place + 1] = cases[:, -1] = b
-        out.append(cases.ravel())
-    return out
+        yield cases.ravel()
 
 
 def _points(design: str, count: int, parts: int, seed: int, number: int) -> np.ndarray:

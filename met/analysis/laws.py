@@ -7,7 +7,7 @@ tick, by the arm's state and by all memory. No particular model is assumed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -95,17 +95,15 @@ def linearised(
     )
 
 
-def gains(builder: Builder, actuator: Actuator, tape: LaneTape) -> tuple[Parameter, ...]:
+def gains(builder: Builder, actuator: Actuator, tape: LaneTape) -> Iterator[Parameter]:
     """The parameters of a servo on which its law's slopes depend, but the physics under its outputs does not."""
     linear_law = _Linearised(builder, actuator, tape, ())
     law_now, drive_now = linear_law.law({}), linear_law.drive({})
-    acting = []
     for parameter in actuator.parts.parameters:
         if parameter.shape == "number" and parameter.at_least == 0.0:
             scaled = {parameter.name: 0.5}
             if not np.array_equal(linear_law.law(scaled), law_now) and linear_law.drive(scaled) == drive_now:
-                acting.append(parameter)
-    return tuple(acting)
+                yield parameter
 
 
 class _Linearised:

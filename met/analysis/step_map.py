@@ -202,7 +202,7 @@ class Linearizer:
         """The parameters of a joint's servo that only its law uses."""
         (actuator,) = (law for law in self.laws if law.use.joint == joint)
         with np.errstate(all="ignore"):
-            return laws.gains(self.builder, actuator, self.tape.only(self.loose))
+            return tuple(laws.gains(self.builder, actuator, self.tape.only(self.loose)))
 
     def loads(self) -> np.ndarray:
         """Effective inertias of the joints whose motors are on beds, as the run has them, kg m^2 (prismatic: kg):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -134,10 +134,9 @@ def _figure(both: Sequence[tuple[Pool, EarlierCases]]) -> tuple[int, int, int] |
     return was, now, total
 
 
-def _flows(pool: Pool, before: EarlierCases, *, named: bool) -> list[RequirementFlow]:
+def _flows(pool: Pool, before: EarlierCases, *, named: bool) -> Iterator[RequirementFlow]:
     """For each common requirement, the cases that meet it now, and those that no longer do. named: True to name the
     run"""
-    out = []
     pairs = {
         requirement.now: requirement for _, _, experiment in before.pairs for requirement in experiment.requirements
     }
@@ -153,12 +152,11 @@ def _flows(pool: Pool, before: EarlierCases, *, named: bool) -> list[Requirement
         requirement_name = words.requirement_text(pairs[text])
         gained, lost = (ranges(pool.cases[which].tolist()) for which in (now & ~was, was & ~now))
         better, worse = metric_moves(pool, before, text)
-        out.append(
+        yield (
             RequirementFlow(
                 f"{pool.name}: {requirement_name}" if named else requirement_name, met, gained, lost, better, worse
             )
         )
-    return out
 
 
 def _ends(both: Sequence[tuple[Pool, EarlierCases]]) -> RequirementFlow | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePath
 from typing import Any
@@ -96,8 +96,8 @@ def gather(
         replay=replay(name, pools_[0].name if several else "", int(pools_[0].cases[0]) if pools_[0].count else 0),
         verdicts=tuple(verdicts),
         sections=sections,
-        sources=_sources(archive),
-        provenance=_provenance(archive, groups) + (() if against is None else _compared_with(against)),
+        sources=tuple(_sources(archive)),
+        provenance=(*_provenance(archive, groups), *(() if against is None else _compared_with(against))),
         changes=None if against is None else comparison.archive_changes(against.differences),
         again=tuple(
             f"met run {quoted(path)} --all"
@@ -163,7 +163,7 @@ def _section(
     return ReportSection(
         name=pool.name,
         lede=_lede(pool),
-        facts=_facts(pool, own),
+        facts=tuple(_facts(pool, own)),
         varied=varied(pool, own),
         metrics=metric_rows(pool, before, errors),
         structures=structures(pool, before),
@@ -220,10 +220,10 @@ def _lede(pool: Pool) -> str:
     )
 
 
-def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Fact, ...]:
+def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> Iterator[Fact]:
     """What was run: duration, integrator, rates, servos, beds, guides, sensors and environment, a fact each."""
     recorded = sum(group.recorded for group in pool.groups)
-    facts = [
+    yield from [
         Fact("arm", _all(pool, "arm")),
         Fact("duration", _all(pool, "duration_s", "{:g} s")),
         Fact("integrator", _all(pool, "integrator")),
@@ -231,7 +231,9 @@ def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Fact, ...
         Fact("rate of the record", _all(pool, "record_hz", "{:g} Hz")),
         Fact("velocity products", _all(pool, "velocity_products")),
     ]
-    facts += [Fact("allowed", line) for line in dict.fromkeys(line for group in pool.groups for line in group.allowed)]
+    yield from [
+        Fact("allowed", line) for line in dict.fromkeys(line for group in pool.groups for line in group.allowed)
+    ]
     servos: dict[str, dict[str, None]] = {}  # joints by their servo
     others: dict[str, dict[str, None]] = {}
     for experiment in experiments.values():
@@ -256,17 +258,15 @@ def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Fact, ...
     for text, joints in servos.items():
         names = list(joints)
         few = ", ".join(names) if len(names) <= 3 else f"{names[0]}, {names[1]} … {names[-1]}"
-        facts.append(Fact(f"servo of {few}", text))
-    facts += [Fact(name, "; ".join(texts)) for name, texts in others.items()]
-    facts.append(Fact("histories kept", f"{recorded:,} of {pool.count:,} cases"))
-    return tuple(facts)
+        yield Fact(f"servo of {few}", text)
+    yield from [Fact(name, "; ".join(texts)) for name, texts in others.items()]
+    yield Fact("histories kept", f"{recorded:,} of {pool.count:,} cases")
 
 
 # Where it comes from
 
 
-def _sources(archive: ArchiveFile) -> tuple[SourceListing, ...]:
-    out = []
+def _sources(archive: ArchiveFile) -> Iterator[SourceListing]:
     for name, text in archive.sources().items():
         lines = text.split("\n")
         if lines and not lines[-1]:
@@ -275,30 +275,28 @@ def _sources(archive: ArchiveFile) -> tuple[SourceListing, ...]:
         while sum(map(len, shown_lines)) > MOST_LETTERS and shown_lines:
             shown_lines = shown_lines[: len(shown_lines) // 2]
         digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
-        out.append(SourceListing(name, "\n".join(shown_lines), digest, len(lines) - len(shown_lines)))
-    return tuple(out)
+        yield SourceListing(name, "\n".join(shown_lines), digest, len(lines) - len(shown_lines))
 
 
-def _provenance(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> tuple[Fact, ...]:
+def _provenance(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> Iterator[Fact]:
     """Where the archive comes from: its file, deck, commit, versions and keys, a fact each."""
     provenance = archive.provenance
     size = archive.path.stat().st_size
     changed = {"yes": ", with changes that were not committed", "unknown": ""}.get(str(provenance.get("git_dirty")), "")
-    facts = [
+    yield from [
         Fact("archive", f"{archive.path.name} ({size_text(size)})"),
         Fact("SHA-256 of it", _digest(archive.path) if size <= MOST_HASHED else "not computed: it is large", True),
         Fact("deck", archive.deck),
         Fact("commit of MET", f"{provenance.get('git_commit', 'unknown')}{changed}", True),
     ]
     versions = {name[8:]: str(value) for name, value in provenance.items() if name.startswith("version_")}
-    facts += [Fact(f"version of {'MET' if name == 'met' else name}", versions[name]) for name in sorted(versions)]
-    facts.append(Fact("defines", str(provenance.get("defines") or "none"), True))
+    yield from [Fact(f"version of {'MET' if name == 'met' else name}", versions[name]) for name in sorted(versions)]
+    yield Fact("defines", str(provenance.get("defines") or "none"), True)
     for group in groups:
         of_group = f" of {group.name}" if len(groups) > 1 else ""
         for name, about in (("structure_key", "key of the structure"), ("code_key", "key of the program")):
             if name in group.attributes:
-                facts.append(Fact(f"{about}{of_group}", str(group.attributes[name]), True))
-    return tuple(facts)
+                yield Fact(f"{about}{of_group}", str(group.attributes[name]), True)
 
 
 def _compared_with(against: ComparedArchive) -> tuple[Fact, ...]:

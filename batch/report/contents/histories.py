@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -115,7 +115,9 @@ def signals(
         if before is not None:
             changed = before.most
             first_cases = [*changed, *first_cases][:1]
-    notes = _notes(groups, len(known), len(histories), len(names), points, before is not None, again=bool(computed))
+    notes = tuple(
+        _notes(groups, len(known), len(histories), len(names), points, before is not None, again=bool(computed))
+    )
     sources = tuple(group.sources(signal_panels) for group in groups)
     return Signals(
         signal_panels,
@@ -150,26 +152,22 @@ def _recorded_cases(pool: Pool, before: EarlierCases | None = None) -> list[tupl
 
 def _notes(
     groups: Sequence[_Group], known: int, in_page: int, plots: int, points: int, compared: bool, *, again: bool
-) -> tuple[str, ...]:
+) -> Iterator[str]:
     """A sentence about histories that are not in the page. known, in_page: the numbers of recorded cases, and of those
     in the page; again: whether others are run again there"""
-    out = []
     if again and in_page < known:
-        out.append(
-            f"{in_page:,} of {known:,} recorded cases are in this page; the others are run again where it is read."
-        )
+        yield f"{in_page:,} of {known:,} recorded cases are in this page; the others are run again where it is read."
     elif in_page < known:
         which = "those that changed most and of the worst" if compared else "the worst"
-        out.append(f"Signals of {which} of {known:,} recorded cases are in this page, {in_page:,} of them.")
+        yield f"Signals of {which} of {known:,} recorded cases are in this page, {in_page:,} of them."
     rows_per_point = max(stretch(group.rows, points) for group in groups)
     if rows_per_point > 1:
-        out.append(
+        yield (
             f"Lines have the smallest and the largest value of every {rows_per_point} rows, {points:,} points at most: "
             "no peak is lost, and its time is true to that stretch."
         )
     if plots > MOST_PANELS:
-        out.append(f"The first {MOST_PANELS} of {plots} plots are in this page.")
-    return tuple(out)
+        yield f"The first {MOST_PANELS} of {plots} plots are in this page."
 
 
 def no_signals(pool: Pool) -> str:

@@ -65,7 +65,7 @@ def _part(sensitivity: Sensitivity) -> InfluencePart:
                 rank=f"{share.rank:+.2f}",
             )
         )
-    notes = notes_of(sensitivity)
+    notes = list(notes_of(sensitivity))
     if len(sensitivity.order) > len(rows):
         notes.append(f"{len(sensitivity.order) - len(rows):,} parameters more explain less")
     return InfluencePart(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -48,7 +48,9 @@ def stability(
         _bed(joint, [_joint_margin(margins_of[place], joint) for place in places.tolist()], spans) for joint in joints
     )
     note = f"Computed for {len(places):,} of {len(places) + left:,} cases, spread over all." if left else ""
-    return Stability(pool.cases[places], tuple(columns), beds, _unstable(pool, places, margins_of, joints), spans, note)
+    return Stability(
+        pool.cases[places], tuple(columns), beds, tuple(_unstable(pool, places, margins_of, joints)), spans, note
+    )
 
 
 def _chosen(pool: Pool, experiment: Experiment, places: np.ndarray) -> np.ndarray:
@@ -110,12 +112,10 @@ def _words(texts: Iterable[str]) -> str:
 
 def _unstable(
     pool: Pool, places: np.ndarray, margins_of: Mapping[int, Sequence[Margin]], joints: Sequence[str]
-) -> tuple[str, ...]:
+) -> Iterator[str]:
     """The cases in which each joint is not stable, in words."""
-    out = []
     for joint in joints:
         margin_of_case = [(place, _joint_margin(margins_of[place], joint)) for place in places.tolist()]
         bad = [int(pool.cases[place]) for place, margin in margin_of_case if margin is not None and not margin.stable]
         if bad:
-            out.append(f"{joint}: not stable in {len(bad):,} of {len(margin_of_case):,} cases: {ranges(bad)}")
-    return tuple(out)
+            yield f"{joint}: not stable in {len(bad):,} of {len(margin_of_case):,} cases: {ranges(bad)}"

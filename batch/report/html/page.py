@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from batch.arms.scripts import arm_style
@@ -154,16 +154,15 @@ def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
     return out
 
 
-def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head: str) -> list[Child]:
+def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head: str) -> Iterator[Child]:
     """The parts of a run or sweep, in the order of the page. head: the element of their headings"""
 
     def part(key: str, name: str, *children: Child, about: str = "") -> Html:
         paragraph = el("p", about, cls="said") if about else None
         return el("section", el(head, name), paragraph, *children, id=f"s{number}-{key}", cls=key)
 
-    out: list[Child] = []
     if section.changes:
-        out.append(
+        yield (
             el(
                 "section",
                 [changes.run_changes(change) for change in section.changes],
@@ -172,7 +171,7 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
             )
         )
     if section.designs is not None:
-        out.append(_designs(number, section.designs, head))
+        yield _designs(number, section.designs, head)
     if section.signals is not None:
         run_again = section.simulation.notes if section.simulation is not None else ()
         notes = [el("p", note, cls="said") for note in (*section.signals.notes, *run_again)]
@@ -181,16 +180,16 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
         drawn = [part("signals", _signals_name(section), arm, plots, notes)]
     else:
         drawn = [part("signals", "Signals", about=section.no_signals)]
-    out += drawn if section.single else []
+    yield from drawn if section.single else []
     if section.evidence is not None:
-        out.append(part("evidence", "Evidence", tables.evidence(section.evidence)))
+        yield part("evidence", "Evidence", tables.evidence(section.evidence))
     if section.best is not None:
-        out.append(part("best", section.best.title, tables.cases(section.best), about=ABOUT_BEST))
+        yield part("best", section.best.title, tables.cases(section.best), about=ABOUT_BEST)
     if section.worst is not None:
-        out.append(part("worst", section.worst.title, tables.cases(section.worst)))
+        yield part("worst", section.worst.title, tables.cases(section.worst))
     table = blocks.metrics(section)
     if section.overview is not None:
-        out.append(
+        yield (
             part(
                 "overview",
                 "Cases at a glance",
@@ -202,16 +201,16 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
             )
         )
     elif table is not None:
-        out.append(part("overview", "Metrics", table))
-    out += [] if section.single else drawn
+        yield part("overview", "Metrics", table)
+    yield from [] if section.single else drawn
     if section.influences:
         influences = [tables.influence(influence) for influence in section.influences]
-        out.append(part("influence", "Which parameters matter", influences, about=ABOUT_INFLUENCE))
+        yield part("influence", "Which parameters matter", influences, about=ABOUT_INFLUENCE)
     if section.structures is not None:
-        out.append(part("structures", "Structures side by side", tables.table(section.structures, "Structures")))
+        yield part("structures", "Structures side by side", tables.table(section.structures, "Structures"))
     if section.stability is not None:
         stability = section.stability
-        out.append(
+        yield (
             part(
                 "stability",
                 "Stability of the beds",
@@ -222,7 +221,7 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
                 el("p", stability.note, cls="said") if stability.note else None,
             )
         )
-    out.append(
+    yield (
         part(
             "run",
             "What was run",
@@ -233,8 +232,7 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
     )
     if section.trouble:
         words = f"Parameters and stability are not shown, for the plan could not be read here: {section.trouble}."
-        out.append(el("p", words, cls="note"))
-    return out
+        yield el("p", words, cls="note")
 
 
 def _designs(number: int, answer: DesignAnswer, head: str) -> Html:

@@ -15,7 +15,7 @@ All that lasts of a case is in its struct, so any number of cases can run side b
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 
 from met.backends.c.functions import HEAD, functions
@@ -113,22 +113,21 @@ class _CEmitter:
         )
 
     def _end(self) -> str:
-        return _function("met_end(met_case *met)", self._steps(self.recording.end, 1))
+        return _function("met_end(met_case *met)", [*self._steps(self.recording.end, 1)])
 
     def _now(self, tick: str) -> list[str]:
         """Lines that give the tick's number, and its time where it is needed."""
         time = [f"    met->time = met->tick / {literal(self.program.base_hz)};"] if self.timed else []
         return [f"    met->tick = {tick};", *time]
 
-    def _steps(self, body: Sequence[RecordedControl], depth: int) -> list[str]:
+    def _steps(self, body: Sequence[RecordedControl], depth: int) -> Iterator[str]:
         pad = "    " * depth
-        lines: list[str] = []
         for node in body:
             match node:
                 case RunSection(section):
-                    lines.append(f"{pad}{self.names[section]}(met);")
+                    yield f"{pad}{self.names[section]}(met);"
                 case RecordSection(section, divisor):
-                    lines.append(f"{pad}if (k % {divisor} == 0) {self.names[section]}(met);")
+                    yield f"{pad}if (k % {divisor} == 0) {self.names[section]}(met);"
                 case Branch(condition, inner):
                     match condition:
                         case Every(divisor):
@@ -138,8 +137,7 @@ class _CEmitter:
                         case WhileAny(cell, at_most):
                             n = f"n{depth}"
                             head = f"for (int64_t {n} = 0; {n} < {at_most} && met->{self.cells[cell]} != 0.0; {n}++)"
-                    lines += [f"{pad}{head} {{", *self._steps(inner, depth + 1), f"{pad}}}"]
-        return lines
+                    yield from [f"{pad}{head} {{", *self._steps(inner, depth + 1), f"{pad}}}"]
 
     # One straight piece
 

@@ -179,7 +179,7 @@ def test_the_clock_of_a_bed_goes_on_from_case_to_case() -> None:
 def told(rows: np.ndarray, hz: float) -> list[str]:
     executor = OnBeds(Ports({"shoulder": "/dev/ttyUSB0"}, 921600))
     executor.known.cases[0, 0] = CaseRecords(hz, {"shoulder": rows})
-    return timing_lines(executor)
+    return list(timing_lines(executor))
 
 
 HEAD = "shoulder: 200 exchanges; late by 3 us, p99 3 us; answered in 100 us, p99 100 us; computed in "

@@ -58,4 +58,4 @@ def test_standard_errors_are_wider_where_residuals_are_correlated() -> None:
 def test_estimates_that_go_together_are_named_with_their_correlation() -> None:
     covariance = np.array([[4.0, -5.7, np.nan], [-5.7, 9.0, np.nan], [np.nan, np.nan, np.nan]])
     found = known(np.hstack([columns(2) * 100.0, np.zeros((50, 1))]), np.ones(3), np.zeros(3, dtype=bool))
-    assert correlated(covariance, ["a", "b", "c"], found) == [("a", "b", pytest.approx(-0.95))]
+    assert list(correlated(covariance, ["a", "b", "c"], found)) == [("a", "b", pytest.approx(-0.95))]

@@ -93,7 +93,7 @@ def test_no_sign_stands_beside_what_is_never_reached(tmp_path: Path) -> None:
     never = "#include <two_link.ic>\nrun brief like nominal { duration = 1 s; }\n"
     with ArchiveFile(made(tmp_path, "n", "some", never, "brief")) as file:
         [summary] = summarise(file)
-    lines = verdict(summary, 100)
+    lines = list(verdict(summary, 100))
     [settle] = [line for line in lines if line.startswith("  settle")]
     assert "inf" in settle and "±" not in settle
     assert any("of settle not known: infinite at every step" in line for line in lines)
