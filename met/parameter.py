@@ -100,23 +100,45 @@ def under(parameter: Parameter, command: str) -> Parameter:
 
 
 @frozen(kw_only=True)
-class Memory:
-    """A number that a model's computer holds from one of its ticks to the next; recorded under its name.
+class Declaration:
+    """The fields that declarations of models share.
 
-    limit  the parameter that its size never exceeds, by name; "": none
+    name        by which decks ask for the model;  doc: its description, a sentence
+    parameters  its numbers and words, under their names in decks
+    """
+
+    name: str
+    doc: str
+    parameters: tuple[Parameter, ...] = ()
+
+
+@frozen(kw_only=True)
+class DeclaredNumber:
+    """A number that a model holds or shows, recorded under its name.
+
+    unit  SI;  doc: its meaning in words;  only: the words of the model's parameters with which it is there; None: all
     """
 
     name: str
     unit: str
     doc: str
-    start: float = 0.0
     only: Only | None = None
+
+
+@frozen(kw_only=True)
+class Memory(DeclaredNumber):
+    """A number that a model's computer holds from one of its ticks to the next; recorded under its name.
+
+    limit  the parameter that its size never exceeds, by name; "": none
+    """
+
+    start: float = 0.0
     limit: str = ""
 
 
 @old_fields(between="in_transmission")
 @frozen(kw_only=True)
-class State:
+class State(DeclaredNumber):
     """A number of a model that is integrated with the motion of the arm; recorded under its name.
 
     in_transmission  of a servo: true of a state of what joins motor and joint, such as how far a gear is wound up.
@@ -124,26 +146,18 @@ class State:
                      Euler
     """
 
-    name: str
-    unit: str
-    doc: str
     start: float = 0.0
     in_transmission: bool = False
-    only: Only | None = None
 
 
 @frozen(kw_only=True)
-class Signal:
+class Signal(DeclaredNumber):
     """A number that a model shows at every instant, computed from the rest; recorded under its name.
 
     limit  the parameter that its size never exceeds, by name; "": none
     axes   of an environment's vector of three numbers: the axes that they are along, in words; "": it is one number
     """
 
-    name: str
-    unit: str
-    doc: str
-    only: Only | None = None
     limit: str = ""
     axes: str = ""
 

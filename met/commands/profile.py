@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from met.content import Content
 from met.frozen import frozen
-from met.parameter import Limit, Parameter
+from met.parameter import Declaration, Limit, Parameter
 from met.trace import Real
 
 FILE = Parameter(name="file", shape="text", doc="CSV file")
@@ -22,7 +22,7 @@ Jump = Literal["value", "rate", "none"]
 
 
 @frozen(kw_only=True)
-class Profile:
+class Profile(Declaration):
     """The declaration of a command profile; one a file.
 
     parameters  what `course` reads, and what a plan holds
@@ -38,9 +38,6 @@ class Profile:
     from_file   the lists `times` and `values` are columns of a CSV file: a deck writes `file` and `column` for them
     """
 
-    name: str
-    doc: str
-    parameters: tuple[Parameter, ...]
     course: Callable[[Any, Real], tuple[Real, Real]]
     jumps: Jump | Callable[[Any], Jump] = "rate"
     content: Callable[[Any, float], Content] | None = None

@@ -13,7 +13,7 @@ from typing import Any, Literal, Protocol
 from met.content import Content
 from met.frozen import frozen
 from met.messages.renamed import old_fields
-from met.parameter import Limit, Parameter, Signal
+from met.parameter import Declaration, Limit, Parameter, Signal
 from met.trace import Real
 from met.vectors import Matrix, Vector, cross, scale
 
@@ -167,7 +167,7 @@ FILE = Parameter(name="file", shape="text", default="none", doc="CSV file whose 
     turns="world_rate",
 )
 @frozen(kw_only=True)
-class Environment:
+class Environment(Declaration):
     """The declaration of an environment model; one a file.
 
     loads  (p, world) -> Loads. None: it is no load
@@ -221,9 +221,6 @@ class Environment:
            list that rises is the column `time`
     """
 
-    name: str
-    doc: str
-    parameters: tuple[Parameter, ...] = ()
     loads: Callable[[Any, World], Loads] | None = None
     at_rest: Literal["nothing", "weight", "force"] = "force"
     idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None

@@ -13,7 +13,7 @@ from dataclasses import field, replace
 from typing import Any, Protocol
 
 from met.frozen import frozen
-from met.parameter import Memory, Parameter
+from met.parameter import Declaration, Memory, Parameter
 from met.trace import Real
 from met.vectors import Matrix, Vector
 
@@ -75,7 +75,7 @@ Course = Callable[[Any, Sequence[Any], Sequence[Real], Real], Sequence[tuple[Rea
 
 
 @frozen(kw_only=True)
-class Guide:
+class Guide(Declaration):
     """The declaration of a guide; one a file, in met/guides or in a package of your own.
 
     parameters  read under their names from `p`. A guide with a path has `link`, a word, and `point`, a vector
@@ -94,9 +94,6 @@ class Guide:
     course      (p, joints, begins, t) -> position and rate of each joint at time t (s); begins: where each begins
     """
 
-    name: str
-    doc: str
-    parameters: tuple[Parameter, ...] = ()
     of_joint: tuple[Parameter, ...] = ()
     components: Callable[[Any], tuple[str, ...]] | None = None
     commands: tuple[str, ...]

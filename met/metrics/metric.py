@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from met.frozen import frozen
-from met.parameter import Memory, Parameter
+from met.parameter import Declaration, Memory
 from met.trace import Real
 
 
@@ -28,7 +28,7 @@ class OverJoints:
 
 
 @frozen(kw_only=True)
-class Metric:
+class Metric(Declaration):
     """The declaration of a metric; one a file.
 
     unit    of the result: "of" is the channel's, "s" a time, "1" a pure number
@@ -53,8 +53,6 @@ class Metric:
     result  (p, held, t) -> the metric, at the run's last sample, time t
     """
 
-    name: str
-    doc: str
     unit: str
     share: bool = False
     least: float = -math.inf
@@ -67,7 +65,6 @@ class Metric:
     over_joints: OverJoints | None = None
     between: Metric | None = None
     furthest: Metric | None = None
-    parameters: tuple[Parameter, ...] = ()
     memory: tuple[Memory, ...]
     update: Callable[[Any, Any, Real, Real, Real], Mapping[str, Real]]
     result: Callable[[Any, Any, Real], Real]

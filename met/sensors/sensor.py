@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 from met.environments.environment import World
 from met.frozen import frozen
-from met.parameter import Memory, Parameter, State
+from met.parameter import Declaration, Memory, Parameter, State
 from met.trace import Real
 from met.vectors import ZERO, Vector
 
@@ -67,7 +67,7 @@ class Reading:
 
 
 @frozen(kw_only=True)
-class Sensor:
+class Sensor(Declaration):
     """The declaration of a sensor; one a file.
 
     measures (p, felt) -> the quantity, of a link's sensor; felt is a `Felt`. None: it is a joint's, in a servo
@@ -81,9 +81,6 @@ class Sensor:
     clocked  whether it reads at ticks alone, as what has noise, steps or a delay does: no continuous law can see it
     """
 
-    name: str
-    doc: str
-    parameters: tuple[Parameter, ...] = ()
     states: tuple[State, ...] = ()
     memory: tuple[Memory, ...] = ()
     follow: Callable[[Any, Any, Real], Mapping[str, Real]] | None = None

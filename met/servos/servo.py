@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from met.frozen import frozen
 from met.messages.renamed import old_fields, old_names
-from met.parameter import Memory, Only, Parameter, Signal, State, is_present
+from met.parameter import Declaration, Memory, Only, Parameter, Signal, State, is_present
 from met.servos.motor import Motor, RateLoop
 from met.trace import Real, Truth
 
@@ -128,7 +128,7 @@ class Drive:
 
 
 @frozen(kw_only=True)
-class Servo:
+class Servo(Declaration):
     """The declaration of a servo model; one a file, in met/servos or in a package of your own.
 
     commands   kinds of command it understands, of "rate", "position", "torque", "acceleration"; empty: it takes none
@@ -163,9 +163,6 @@ class Servo:
     at_rest    (p) -> whether its joint must begin at rest: another initial rate is an error. None: it need not
     """
 
-    name: str
-    doc: str
-    parameters: tuple[Parameter, ...] = ()
     commands: tuple[str, ...] = ()
     outputs: tuple[Memory, ...] = ()
     integrals: tuple[State, ...] = ()

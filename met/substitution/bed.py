@@ -14,7 +14,7 @@ from dataclasses import field
 from typing import Any, Literal
 
 from met.frozen import frozen
-from met.parameter import Memory, Parameter
+from met.parameter import Declaration, Memory, Parameter
 from met.trace import Real, Truth
 
 
@@ -92,7 +92,7 @@ def of_bed(drive: DriveCommand) -> tuple[tuple[str, str, str], ...]:
 
 
 @frozen(kw_only=True)
-class BedModel:
+class BedModel(Declaration):
     """A bed that the engine simulates; one a file. `check` finds faults of a declaration.
 
     parameters  its numbers; `PARAMETERS` are among them
@@ -105,9 +105,6 @@ class BedModel:
     drive     what its drive is told, one of `DRIVES`
     """
 
-    name: str
-    doc: str
-    parameters: tuple[Parameter, ...] = ()
     memory: tuple[Memory, ...]
     begin: Callable[[Any, Real], Mapping[str, Real]]
     advance: Callable[[Any, Any, Wire, float, Draw], Mapping[str, Real]]

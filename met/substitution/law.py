@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from met.frozen import frozen
 from met.messages.renamed import old_names
-from met.parameter import Memory, Parameter
+from met.parameter import Declaration, Memory, Parameter
 from met.servos.motor import Motor
 from met.substitution.balance import Balanced
 from met.trace import Real
@@ -65,7 +65,7 @@ OF_OBSERVER = (
 
 
 @frozen(kw_only=True)
-class Law:
+class Law(Declaration):
     """The declaration of a law; one a file. All substituted joints of a run have the same.
 
     observer  whether it has one: parameters `torque_noise`, `drift`, `reading_noise`
@@ -75,9 +75,6 @@ class Law:
               inputs: one a joint;  load: joint accelerations -> Lambda qdd + b_0, N m (N)
     """
 
-    name: str
-    doc: str
-    parameters: tuple[Parameter, ...] = ()
     observer: bool = False
     balance: Literal["full", "bare", "none"] = "full"
     memory: tuple[Memory, ...] = ()
