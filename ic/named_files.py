@@ -20,7 +20,7 @@ class NamedFiles(Generic[T]):
 
     kind, ending  what messages call one, and how their names end;  most  bytes of one
     missing       the code of the message where there is none of a name
-    asked         whether a file was asked for, be it there or not
+    was_asked     whether a file was asked for, be it there or not
     """
 
     def __init__(

@@ -83,6 +83,6 @@ def _numbered(codes: Iterable[np.ndarray], count: int) -> np.ndarray:
 
 
 def _same(plants: np.ndarray, values: Iterable[np.ndarray]) -> bool:
-    """True where cases with the same number `of` have the same values, but for rounding."""
+    """True where cases with the same number in `plants` have the same values, but for rounding."""
     _, first, number = np.unique(plants, return_index=True, return_inverse=True)
     return all(np.isclose(value[first[number]], value, rtol=ROUNDING, atol=0.0).all() for value in values)

@@ -52,7 +52,7 @@ class DeckFiles:
         return tuple(self._stamps)
 
     def begin(self) -> float:
-        """Note all files, before they are read; returns the time, for `found`."""
+        """Note all files, before they are read; returns the time, for `watch_files`."""
         for path in self.paths:
             self._look(path)
         self._around = {folder: _stamp(folder) for folder in self._all_folders()}

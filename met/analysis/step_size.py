@@ -267,7 +267,7 @@ def remedy(
 ) -> Remedy:
     """The rate and the integrators that remove a fault, and the environment model that causes it.
 
-    found   the map that has the mode;  memory: of the case at its instant, one lane, as `Linearizer` takes it
+    step_map  has the mode;  memory: of the case at its instant, one lane, as `Linearizer` takes it
     """
     structure, mode = experiment.structure, fault.mode
     integrator, steps = models.find("integrator", structure.integrator), structure.schedule.ticks

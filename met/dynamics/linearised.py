@@ -354,7 +354,7 @@ MOVING = ("q", "qd", "tau", "qdd", "wrenches")
 def tell(tree: Tree, arguments: Mapping[str, Any], solved: Solved) -> None:
     """Give the graph in which `recursion.solve` was recorded the derivative of its results (`met.trace.known`).
 
-    given  what `solve` was given, by its words, `velocity_products` with them
+    arguments  those of `solve`, by name, `velocity_products` with them
     """
     moving = {name: arguments[name] for name in MOVING}
     scalars = _scalars(moving)

@@ -52,7 +52,7 @@ def derived(system: System) -> tuple[list[Channel], list[Channel]]:
 class Observed:
     """The arm at one instant. Quantities that no channel needs are not computed.
 
-    y      the state, and base, where it stands, at this time, s;  found  gives its derivative
+    y      the state, and base, where it stands, at this time, s;  derive  gives its derivative
     """
 
     def __init__(

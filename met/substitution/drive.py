@@ -83,8 +83,8 @@ def at_least(value: Real, least: Real) -> Real:
 def mean_torque(motor: Motor, begins: Real, balanced: Balanced | None, mean: float) -> Real:
     """Mean torque of the joint's own motor over the coming tick, N m, within its limit.
 
-    begins  its torque as the tick begins, N m
-    found   the joint's motion in the tick, None where no balance says it;  mean: half of the tick, s
+    begins    its torque as the tick begins, N m
+    balanced  the joint's motion in the tick, None where no balance says it;  mean: half of the tick, s
     """
     if balanced is None:
         return begins

@@ -59,7 +59,7 @@ def remark_unread(scope: Scope, uses: Iterable[Use], structure: Structure) -> No
 
 
 def _is_used(structure: Structure, servo: ServoUse, quantity: str) -> bool:
-    """Return True if this sensor's reading of `of` is recorded, watched by a metric or in an expression."""
+    """Return True if this sensor's reading of the quantity is recorded, watched by a metric or in an expression."""
     path = f"{servo.joint}.servo.sensor.{quantity}"
     channels = [channel for record in structure.record for channel in record.channels]
     channels += [channel for expression in structure.expressions for channel in expression.channels]

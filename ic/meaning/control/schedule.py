@@ -198,7 +198,7 @@ def check_stability(
     label  the servo in words; joints with the same servo and the same figure are reported once, and of several servos
            for which one rate is too slow the first that is checked
     path   of the servo
-    of     what lambda is
+    meaning  what lambda is
     """
     with scope.complaints.gather():
         limit, h = integrator.real_limit, schedule.step
