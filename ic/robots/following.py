@@ -22,6 +22,7 @@ def without_mimics(robot: Robot, treatment: Treatment) -> Robot:
     known = {joint.name.text: joint for joint in robot.joints}
 
     def changed(joint: Joint) -> Joint:
+        """A joint that imitates another, free or held where it is; others as they are."""
         if joint.mimic is None:
             return joint
         free = replace(joint, mimic=None, followed=joint.mimic)

@@ -270,6 +270,7 @@ class _SearchReader:
         self.metric, self.largest, self.goal_place = entry.value.text, GOALS[word], place_of(entry.value)
 
     def _choose(self, entry: Setting) -> None:
+        """Add a parameter that the search may choose, with its ends. Raises Problem where it is added twice."""
         path = _path(entry)
         if path in self.written:
             raise Problem(

@@ -241,6 +241,8 @@ class Lane:
         return self._fitting(count, min(without.count, own.count - 1))
 
     def _fitting(self, count: Callable[[float], float], aim: float) -> float | None:
+        """The share of gains at which at most `aim` modes grow (`fitting`), coarse for large arms; not a number for
+        those too large to try."""
         if self.size > LARGEST_FITTED:
             return math.nan
         return fitting(count, aim, *(COARSE if self.size > WHOLE else ()))
@@ -325,8 +327,8 @@ class Opened:
 
 
 def fitting(count: Callable[[float], float], aim: float, stride: float = STRIDE, exact: float = 1.001) -> float | None:
-    """The largest share below 1 at which at most `count` modes grow, to the factor `exact`; else the smallest above 1;
-    None where there is none."""
+    """The largest share below 1 at which at most `aim` modes grow, by `count`, to the factor `exact`; else the
+    smallest above 1; None where there is none."""
     for factor in (stride, 1.0 / stride):
         bad, good = 1.0, factor
         while count(good) > aim:

@@ -42,7 +42,7 @@ class StepMap:
     case     rows of the case table: [lane]
     loose    whether it is at rest there, without drive, and no dry friction holds anything; else as the run has it
     names    of what is changed: `shoulder.q`, `shoulder.qd`, states of servos and sensors
-    counts   of these, positions (and as many rates); the rest are states
+    positions  how many of these, at the front, are positions; as many rates follow, then states
     slope    A: [lane, name, name], 1/s
     step     M: [lane, name, name], of one step as the program's stages make it, where these were asked for; None: what
              the integrator makes of A (`linear_step`)

@@ -134,6 +134,7 @@ class RecipeReader:
         return np.array([_number(number) for number in data], dtype=float)
 
     def _rows(self, data: Mapping[str, Any]) -> SweptRows:
+        """The rows of a case table from a plan's data; of equal data the same object."""
         known = json.dumps(data, sort_keys=True)
         if known not in self._rows_read:
             self._rows_read[known] = self._new_rows(data)

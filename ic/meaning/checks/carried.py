@@ -65,6 +65,7 @@ def uncarried(
 def _judged(
     humps: Iterable[tuple[Hump, float]], interval: float, duration: float, integral: bool
 ) -> Iterator[Uncarried]:
+    """What instants at this interval, s, see of each hump of a course, beside its true height or integral."""
     for hump, truth in humps:
         begins, ends = float(hump.times[0]), float(hump.times[-1])
         if integral and ends - begins > FEW * interval:

@@ -227,6 +227,7 @@ class ChannelTable:
     # Conditions
 
     def _margin(self, expression: Expression, negated: bool = False) -> ConditionMargin:
+        """By how much a condition holds at an instant, below 0 where it does not. Raises Problem D353 or D355."""
         if isinstance(expression, Unary) and expression.operator == "not":
             return self._margin(expression.operand, not negated)
         if isinstance(expression, Binary) and expression.operator in ("and", "or"):
