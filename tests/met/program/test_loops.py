@@ -228,6 +228,7 @@ def test_a_pose_that_does_not_determine_the_motion_fails_the_case(
     assert " comes to be stretched or folded flat" in cause
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["modified_euler", "midpoint", "rk4", "semi_implicit_euler"])
 def test_no_step_jumps_over_a_dead_centre(tmp_path: Path, integrator: str) -> None:
     """A boom on an idle ram swings through the line of the ram, wherever it begins, with steps that are long and short

@@ -238,6 +238,6 @@ def test_pieces_hold_every_operation_once_and_pass_what_crosses():
             node = section.nodes[i]
             for ref in node[1 : 1 + OPERANDS[node[0]]]:
                 if ref >> 1 in body_of and ref >> 1 not in here:
-                    assert held[piece.kept[ref >> 1]] == ref >> 1
+                    assert held[piece.saved[ref >> 1]] == ref >> 1
         held.update({slot: i for i, slot in piece.keep.items()})
     assert len(set(held)) <= 12  # slots are used again: six values cross, and few more
