@@ -66,7 +66,7 @@ GUIDE = changed(
     ((ARM, SERVO, RUN), "dynamics =", "dynamic =", "D116", "no rate `dynamic`", (RATES,)),
     ((ARM, SERVO, RUN), "servos = 1", "servo = 1", "D116", "no rate `servo`", (RATES,)),
     ((ARM, SERVO, BED), "hinge = drive", "hing = drive", "D144", "no joint `hing` in arm `swing`", ("joints: hinge",)),
-    ((ARM, SERVO, METRIC), "of = hinge", "off = hinge", "D141", "metric `m` has no `off`", ("it has: of",)),
+    ((ARM, SERVO, METRIC), "of = hinge", "off = hinge", "D141", "metric `m` has no `off`", ("it has: of, after, within",)),
     ((ARM, SERVO, PAYLOAD), "on = bar", "onn = bar", "D141", "payload `box` has no `onn`", (OF_PAYLOAD,)),
     ((ARM, SERVO, PAYLOAD), "inertia =", "inerta =", "D141", "payload `box` has no `inerta`",
      (OF_PAYLOAD,)),
