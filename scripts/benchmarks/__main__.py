@@ -67,7 +67,7 @@ def main(words: Sequence[str] | None = None) -> int:
     then = report.read(options.against) if options.against is not None else None
     names = with_sources(options.names or list(known), known)
     slow = {name for name, benchmark in known.items() if getattr(benchmark, "slow", False)} if options.quick else set()
-    chosen = [known[name] for name in names if not slow & {name, *getattr(known[name], "of", ())}]
+    chosen = [known[name] for name in names if not slow & {name, *getattr(known[name], "sources", ())}]
     turns = options.repeats or (QUICK if options.quick else TURNS)
 
     this_machine = machine()
