@@ -191,6 +191,7 @@ def test_a_boom_without_damping_keeps_its_energy_and_momentum(tmp_path: Path) ->
         np.testing.assert_allclose(np.ptp(run.signals[f"momentum.{kind}"][0], axis=0), 0.0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_cases_with_other_stiffness_are_as_runs_alone(tmp_path: Path) -> None:
     begun = changed(BOOM, ("    rates", "    initial { jib_1y.q = 0.1 rad; }\n    rates"), LOADED)
     swept = "sweep several of hang { vary links.jib.EI = [1, 3] N*m^2;  vary links.jib.shape.length = [0.8, 1] m; }"
