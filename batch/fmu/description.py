@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from xml.sax.saxutils import quoteattr
 
-from batch.fmu.variables import Variable
+from batch.fmu.variables import FmuVariable
 from met.frozen import frozen
 from met.plan import Experiment
 from met.unit_parser import parse_unit
@@ -45,7 +45,7 @@ def unit_name(unit: str) -> str:
     return "" if unit == "1" else unit.replace("*", ".").replace("^", "")
 
 
-def model_description(experiment: Experiment, variables: Sequence[Variable], naming: Naming, version: int) -> str:
+def model_description(experiment: Experiment, variables: Sequence[FmuVariable], naming: Naming, version: int) -> str:
     """The text of modelDescription.xml. version: of FMI, 2 or 3"""
     schedule = experiment.structure.schedule
     numbered = list(enumerate(variables, start=1))
@@ -87,7 +87,7 @@ TIME = {"name": "time", "valueReference": 0, "causality": "independent", "variab
 
 
 def _co_simulation(naming: Naming, version: int, step: float) -> str:
-    """What the FMU can do. step: of the dynamics, s"""
+    """The XML element of the abilities of an FMU for co-simulation. step: of the dynamics, s"""
     state = "State" if version == 3 else "state"
     abilities = ("canHandleVariableCommunicationStepSize", f"canGetAndSetFMU{state}", f"canSerializeFMU{state}")
     attributes = {"modelIdentifier": naming.identifier, **dict.fromkeys(abilities, True)}
@@ -121,15 +121,15 @@ def _summary(base_hz: float) -> str:
     )
 
 
-def _variable(variable: Variable, reference: int) -> str:
+def _variable(variable: FmuVariable, reference: int) -> str:
     return element("Float64", {**_head(variable, reference), **_type(variable)})
 
 
-def _scalar_variable(variable: Variable, reference: int) -> str:
+def _scalar_variable(variable: FmuVariable, reference: int) -> str:
     return element("ScalarVariable", _head(variable, reference), [element("Real", _type(variable))])
 
 
-def _head(variable: Variable, reference: int) -> dict[str, object]:
+def _head(variable: FmuVariable, reference: int) -> dict[str, object]:
     return {
         "name": variable.name,
         "valueReference": reference,
@@ -140,7 +140,7 @@ def _head(variable: Variable, reference: int) -> dict[str, object]:
     }
 
 
-def _type(variable: Variable) -> dict[str, object]:
+def _type(variable: FmuVariable) -> dict[str, object]:
     bounds = {"min": variable.low, "max": variable.high}
     return {
         "unit": unit_name(variable.unit),
@@ -150,12 +150,12 @@ def _type(variable: Variable) -> dict[str, object]:
     }
 
 
-def has_display(variable: Variable) -> bool:
+def has_display(variable: FmuVariable) -> bool:
     """True where the deck writes a variable in a unit of its own."""
     return variable.start is not None and variable.scale != 1.0 and variable.unit != "1"
 
 
-def _units(variables: Sequence[Variable]) -> Iterator[str]:
+def _units(variables: Sequence[FmuVariable]) -> Iterator[str]:
     """Each unit, with those in which the deck writes its values."""
     displays: dict[str, dict[str, float]] = {"s": {}}
     for variable in variables:

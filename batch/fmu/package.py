@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from batch.fmu.description import TOOL, Naming, build_description, model_description
-from batch.fmu.variables import Variable, changing, variables
+from batch.fmu.variables import FmuVariable, changing, variables
 from met.backends.c.emit import CSource, emit, literal
 from met.backends.c.library import FLAGS
 from met.frozen import frozen
@@ -81,7 +81,7 @@ class Fmu:
     """
 
     data: bytes
-    variables: tuple[Variable, ...]
+    variables: tuple[FmuVariable, ...]
     platform: str
     why_none: str
 
@@ -131,7 +131,7 @@ def _recording(experiment: Experiment) -> Recording:
     return replace(recording, tick=tick, end=(*rows, *recording.end))
 
 
-def _model(source: CSource, listed: tuple[Variable, ...], base_hz: float) -> str:
+def _model(source: CSource, listed: tuple[FmuVariable, ...], base_hz: float) -> str:
     """The text of model.h but for its token: the program, and the table of variables."""
     members = {**source.outputs, **source.inputs}
     alarms = [members[name] for name in (FAILURE[0], plausible.FAILED_TICK, UNHELD) if name in source.outputs]

@@ -29,7 +29,7 @@ WRENCH = ("force", "moment")
 
 
 @frozen
-class Variable:
+class FmuVariable:
     """One variable of an FMU, a double.
 
     kind      parameter: set before the run;  input: may change at every step;  output: recorded;  local: a metric
@@ -74,9 +74,9 @@ def changing(experiment: Experiment) -> tuple[str, ...]:
     return tuple(coord.path for coord in coordinates if coord.sets and free.issuperset(coord.sets))
 
 
-def variables(experiment: Experiment) -> tuple[Variable, ...]:
+def variables(experiment: Experiment) -> tuple[FmuVariable, ...]:
     """All variables, in the order of their value references, which count from 1."""
-    listed: dict[str, Variable] = {}
+    listed: dict[str, FmuVariable] = {}
     for variable in (*_outputs(experiment), *_metrics(experiment), *_settable(experiment)):
         clashes = variable.name in listed or variable.name == "time"
         name = f"coordinates.{variable.name}" if clashes else variable.name
@@ -85,7 +85,7 @@ def variables(experiment: Experiment) -> tuple[Variable, ...]:
     return tuple(sorted(listed.values(), key=lambda variable: order.index(variable.kind)))
 
 
-def _settable(experiment: Experiment) -> Iterator[Variable]:
+def _settable(experiment: Experiment) -> Iterator[FmuVariable]:
     """The variables that are set from outside, in the order of the program's inputs."""
     cases = experiment.cases
     starts = inputs(experiment, np.zeros(1, dtype=np.int64))[0].tolist()
@@ -93,7 +93,7 @@ def _settable(experiment: Experiment) -> Iterator[Variable]:
     inputs_of_fmu = changing(experiment)
     for coordinate, start in zip(cases.coordinates, starts, strict=False):
         parameters = [declarations[path] for path in _equals(experiment, coordinate) if path in declarations]
-        yield Variable(
+        yield FmuVariable(
             coordinate.path,
             "input" if coordinate.path in inputs_of_fmu else "parameter",
             coordinate.path,
@@ -108,7 +108,7 @@ def _settable(experiment: Experiment) -> Iterator[Variable]:
         )
     for name, start in zip(cases.noise, starts[len(cases.coordinates) :], strict=True):
         what = "number of the repeat, which has noise of its own" if name == REPEAT else "seed of the noise"
-        yield Variable(name, "parameter", name, "1", what, start, 0.0, BELOW_SEED - 1.0, True)
+        yield FmuVariable(name, "parameter", name, "1", what, start, 0.0, BELOW_SEED - 1.0, True)
 
 
 def _equals(experiment: Experiment, coordinate: Coordinate) -> Iterator[str]:
@@ -132,14 +132,14 @@ def _high(parameter: Parameter) -> float:
     return most if parameter.below is None else min(most, math.nextafter(parameter.below, -math.inf))
 
 
-def _outputs(experiment: Experiment) -> Iterator[Variable]:
+def _outputs(experiment: Experiment) -> Iterator[FmuVariable]:
     docs = {recorded.name: recorded.doc for recorded in experiment.structure.record}
     for number, column in enumerate(described_columns(experiment)):
-        yield Variable(column["channel"], "output", number, column["unit"], docs[column["signal"]])
+        yield FmuVariable(column["channel"], "output", number, column["unit"], docs[column["signal"]])
 
 
-def _metrics(experiment: Experiment) -> Iterator[Variable]:
+def _metrics(experiment: Experiment) -> Iterator[FmuVariable]:
     units = metric_units(experiment.structure)
     for use in experiment.structure.metrics:
         what = f"metric {use.model} of {use.of}, as if the run ended here"
-        yield Variable(f"metrics.{use.name}", "local", METRIC + use.name, units[use.name], what)
+        yield FmuVariable(f"metrics.{use.name}", "local", METRIC + use.name, units[use.name], what)

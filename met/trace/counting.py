@@ -14,7 +14,7 @@ from met.trace.program import Control, Every, Phase, Program, RunPhase, Tape, Un
 
 
 @frozen
-class Loop:
+class CountedLoop:
     """A loop of a program: the cell that controls it, and the outputs that count it.
 
     entries   times that it was come to and ran at all
@@ -28,16 +28,16 @@ class Loop:
     outer: bool
 
 
-def counting(program: Program) -> tuple[Program, tuple[Loop, ...]]:
+def counting(program: Program) -> tuple[Program, tuple[CountedLoop, ...]]:
     """The program with two more outputs for each loop, and its loops in order of control (start, tick, end)."""
-    loops: list[Loop] = []
+    loops: list[CountedLoop] = []
 
     def counted(body: tuple[Control, ...], outer: bool) -> tuple[Control, ...]:
         steps: list[Control] = []
         for node in body:
             if isinstance(node, WhileAny):
                 number = len(loops)
-                loop = Loop(node.cell, f"loop.{number}.entries", f"loop.{number}.turns", outer)
+                loop = CountedLoop(node.cell, f"loop.{number}.entries", f"loop.{number}.turns", outer)
                 loops.append(loop)
                 inner = counted(node.body, False)
                 steps += [RunPhase(_come_to(loop)), WhileAny(node.cell, node.at_most, (RunPhase(_turn(loop)), *inner))]
@@ -53,14 +53,14 @@ def counting(program: Program) -> tuple[Program, tuple[Loop, ...]]:
     return replace(program, start=start, tick=tick, end=end, outputs=(*program.outputs, *names)), tuple(loops)
 
 
-def _come_to(loop: Loop) -> Phase:
+def _come_to(loop: CountedLoop) -> Phase:
     def body(tape: Tape) -> None:
         tape.write(f"{loop.entries}.fresh", 1.0)
 
     return Phase(f"come to {loop.cell}", body)
 
 
-def _turn(loop: Loop) -> Phase:
+def _turn(loop: CountedLoop) -> Phase:
     def body(tape: Tape) -> None:
         fresh: Real = tape.read(f"{loop.entries}.fresh")
         tape.write(loop.entries, tape.read(loop.entries) + fresh)
