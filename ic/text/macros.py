@@ -176,7 +176,7 @@ class Macros(Pcpp):
             out.append(following)
 
     def _predefined(self, token: Token) -> Token:
-        """What a predefined macro is replaced by at this use; those of the clock are refused."""
+        """The replacement of a predefined macro, such as `__LINE__`, at this use; those of the clock are refused."""
         outermost = token.expansions[-1].use if token.expansions else token.place
         replacement = token.__copy__()
         if token.text == "__LINE__":

@@ -33,7 +33,8 @@ class Felt(World, Protocol):
         """Second derivative of the world position of a point given in the link's frame, m: world axes, m/s^2."""
 
     def specific_force(self, link: str, point: Vector = ZERO) -> Vector:
-        """That acceleration less the one with which a body would fall freely there: link axes, m/s^2."""
+        """Acceleration of a point of the link less that of free fall there, which an accelerometer feels: link axes,
+        m/s^2."""
 
     def spin(self, link: str) -> Vector:
         """Angular velocity against directions that do not turn: link axes, rad/s."""

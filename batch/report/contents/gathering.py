@@ -221,7 +221,7 @@ def _lede(pool: Pool) -> str:
 
 
 def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> Iterator[Fact]:
-    """What was run: duration, integrator, rates, servos, beds, guides, sensors and environment, a fact each."""
+    """The facts of a run: duration, integrator, rates, servos, beds, guides, sensors and environment, a fact each."""
     recorded = sum(group.recorded for group in pool.groups)
     yield from [
         Fact("arm", _all(pool, "arm")),

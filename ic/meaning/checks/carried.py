@@ -65,7 +65,8 @@ def uncarried(
 def _judged(
     humps: Iterable[tuple[Hump, float]], interval: float, duration: float, integral: bool
 ) -> Iterator[Uncarried]:
-    """What instants at this interval, s, see of each hump of a course, beside its true height or integral."""
+    """Compare each hump of a course with its samples at this interval, s: height with height, or, with `integral`,
+    integral with integral."""
     for hump, truth in humps:
         begins, ends = float(hump.times[0]), float(hump.times[-1])
         if integral and ends - begins > FEW * interval:

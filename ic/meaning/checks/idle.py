@@ -24,7 +24,7 @@ ENDS = ("q_min", "q_max")
 
 
 def at_rest(use: EnvironmentUse) -> str:
-    """What a model in use may put on an arm that stands still (`Environment.at_rest`)."""
+    """`nothing`, `weight` or `force`: the largest load of a used model on an arm that stands still."""
     return str(models.find("environment", use.model, use.place).at_rest)
 
 

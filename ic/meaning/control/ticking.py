@@ -26,7 +26,7 @@ class Ticking(Protocol):
 
     @property
     def verb(self) -> str:
-        """What it does at its ticks: "ticks", "reads"."""
+        """The verb for a part at its ticks, as messages use it: "ticks" of a guide, "reads" of a sensor."""
 
     @property
     def code(self) -> str:
