@@ -81,7 +81,9 @@ class _Along:
             for rates in (self.qd, self.qdd)
         )
         self.q, self.qd, self.qdd = list(moving.q), list(moving.qd), list(turning.qd)  # type: ignore[arg-type]
-        self.qdd = [a + b for a, b in zip(self.qdd, self.system.bends(tape.read, moving), strict=True)]
+        self.bends = [bend + np.zeros(INSTANTS) for bend in self.system.bends(tape.read, moving)]
+        """Accelerations of joints in loops while their leaders go at constant rates, by joint."""
+        self.qdd = [a + b for a, b in zip(self.qdd, self.bends, strict=True)]
         self.ratios = self.system.ratios(tape.read, moving.q)
 
     @property
@@ -106,11 +108,12 @@ class _Along:
     def solved(self, *, gravity: Vector = ZERO, rates: bool = False, accelerations: bool = False) -> Solved:
         """Inverse dynamics with these of its parts, at all instants."""
         still, of_start = [np.zeros(INSTANTS)] * len(self.q), self.derivative.solved
+        uniform = self.bends if rates and self.system.structure.velocity_products else still
         solved = solve(
             self.tree,
             self.q,  # type: ignore[arg-type]
             self.qd if rates else still,  # type: ignore[arg-type]
-            qdd=self.qdd if accelerations else still,  # type: ignore[arg-type]
+            qdd=self.qdd if accelerations else uniform,  # type: ignore[arg-type]
             mode=False,
             rotor=of_start.rotor,
             spin=of_start.spin,
@@ -130,7 +133,7 @@ class _Along:
         """An assumption with the largest of these torques by joint, over all instants; one with forces besides."""
         sizes = [float(np.max(np.abs(torque))) for torque in torques]
         for unit in ("N*m", "N"):
-            indices = [i for i, joint in enumerate(self.system.joints) if _unit(joint) == unit]
+            indices = [i for i, joint in enumerate(self.system.joints) if _unit(joint) == unit and not joint.follows]
             if indices:
                 worst = max(indices, key=sizes.__getitem__)
                 yield Assumption(

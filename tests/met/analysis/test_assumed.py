@@ -125,6 +125,42 @@ def test_a_free_base_has_no_loads_that_hold_it() -> None:
     assert [each.subject for each in assumptions(experiment)] == []
 
 
+CRANE = """deck 2;
+arm crane {
+    link boom { mass = 100 kg;  shape = rod(length = 2 m, along = x); }
+    link tube { mass = 0 kg; }
+    link rod { mass = 0 kg; }
+    joint hinge revolute { parent = base;  child = boom;  at = [0, 0, 1.2] m;  axis = -y; }
+    joint swing revolute { parent = base;  child = tube;  axis = -y; }
+    joint stroke prismatic { parent = tube;  child = rod;  at = [0.6, 0, 0] m;  axis = x; }
+    loop lift { leader = stroke;  branch = right;  link = rod;  at = [0.5, 0, 0] m;
+        to = boom;  to_at = [0.9, 0, 0] m; }
+}
+servo push { model = ideal;  bandwidth = 100 1/s;  command = rate(0.1 m/s); }
+default run lift { arm = crane;  servos { stroke = push; }  initial { stroke.q = 0.4 m; }
+    rates { dynamics = 1 kHz;  servos = continuous;  record = 100 Hz; }
+    duration = 1 s;  record = [q];
+}
+"""
+
+
+def test_velocity_products_of_a_loop_are_half_the_slope_of_its_inertia_times_the_square_of_its_rate(
+    tmp_path: Path,
+) -> None:
+    """The boom at the ram, J = I (dtheta/ds)^2, from the law of cosines with sides 1.2 m, 0.9 m and the ram's s."""
+    path = tmp_path / "crane.ic"
+    path.write_text(CRANE)
+    products = [each for each in assumptions(ic.compile(path).experiments[0]) if each.subject == "velocity products"]
+
+    def inertia(s: complex) -> complex:
+        cosine = (1.2**2 + 0.9**2 - s * s) / (2.0 * 1.2 * 0.9)
+        return 100.0 * 2.0**2 / 3.0 * (s / (1.2 * 0.9)) ** 2 / (1.0 - cosine * cosine)
+
+    slopes = [inertia(complex(s, 1e-20)).imag / 1e-20 for s in np.linspace(1.5, 1.6, 200)]
+    assert [(each.at, each.unit) for each in products] == [("stroke", "N")]  # and none at joints that follow
+    assert products[0].size == pytest.approx(0.5 * max(slopes) * 0.1**2, rel=1e-6)
+
+
 def test_they_are_shown_and_given_to_programs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = f"{written(tmp_path, BOTH)}"
     assert main(["explain", path, "--assumptions"]) == 0
