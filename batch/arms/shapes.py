@@ -4,7 +4,7 @@ A rod, a box and a cylinder begin at the link frame's origin and extend along on
 (ic/meaning/mechanics/shapes.py). Where the deck writes a centre of mass and leaves the inertia to the shape, the
 simulated solid is centred on it, and it is drawn there. A link without a shape is a line to each joint that it carries,
 or to its centre of mass. Joints are drawn besides: a short cylinder about the axis of a revolute joint, and for a
-prismatic one a cube on a rail, which is as long as the case uses it.
+prismatic one a cube on a rail, which is as long as the case uses it; and a ball at the pin of a loop.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Literal
 from met.dynamics.spatial import IDENTITY, ZERO, Pose, Real, Vector, compose, constant, rotation_rpy, scale, sub
 from met.frozen import frozen
 from met.plan import BASE, Experiment, Joint, Link, Payload
+from met.plan.loops import of_joints
 
 SIZES = {
     "rod": ("length",),
@@ -70,22 +71,30 @@ def shapes(arm: ArmNumbers, bodies: Sequence[Link | Payload]) -> dict[str, list[
     """The solids of each of these bodies, and of the base where it is no link, by name."""
     structure = arm.experiment.structure
     carried: dict[str, list[Joint]] = {}
+    ends: dict[str, list[Vector]] = {}  # of lines, by the body from whose origin they are drawn
     for joint in structure.joints:
         carried.setdefault(joint.parent, []).append(joint)
+        ends.setdefault(joint.parent, []).append(numbers(arm, f"{joint.name}.at"))
+    pins: dict[str, list[ArmShape]] = {}
+    radius = MASS * arm.size
+    for loop in of_joints(structure.joints).values():
+        ends.setdefault(loop.to, []).append(numbers(arm, f"{loop.name}.to_at"))
+        ends.setdefault(loop.link, []).append(pin := numbers(arm, f"{loop.name}.at"))
+        ball = ArmShape("sphere", "joint", pin, (0.0, 0.0, 1.0), (radius, radius, radius))
+        pins.setdefault(loop.link, []).append(ball)
     carrier = {joint.child: joint for joint in structure.joints}
     out: dict[str, list[ArmShape]] = {}
     if all(link.name != BASE for link in structure.links):
-        joints = carried.get(BASE, [])
-        ends = [line("joint", ZERO, numbers(arm, f"{joint.name}.at")) for joint in joints]
-        out[BASE] = [*ends, *_rails(arm, joints)]
+        lines = [line("joint", ZERO, end) for end in ends.get(BASE, [])]
+        out[BASE] = [*lines, *_rails(arm, carried.get(BASE, []))]
     for body in bodies:
         role: Literal["link", "payload"] = "payload" if isinstance(body, Payload) else "link"
-        solids = [_solid(arm, body, role)] if drawn(body) else _bare(arm, body, carried.get(body.name, ()), role)
+        solids = [_solid(arm, body, role)] if drawn(body) else _bare(arm, body, ends.get(body.name, ()), role)
         if isinstance(body, Link) and body.root:
             solids = []  # it is drawn by its pieces
         if body.name in carrier and carrier[body.name].name not in structure.springs:
             solids += _joint(arm, carrier[body.name])
-        out[body.name] = [*solids, *_rails(arm, carried.get(body.name, ()))]
+        out[body.name] = [*solids, *pins.get(body.name, ()), *_rails(arm, carried.get(body.name, ()))]
     return {name: [shape for shape in solids if _is_visible(shape)] for name, solids in out.items()}
 
 
@@ -145,11 +154,12 @@ def _solid(arm: ArmNumbers, body: Link | Payload, role: Literal["link", "payload
 
 
 def _bare(
-    arm: ArmNumbers, body: Link | Payload, carried: Sequence[Joint], role: Literal["link", "payload"]
+    arm: ArmNumbers, body: Link | Payload, ends: Sequence[Vector], role: Literal["link", "payload"]
 ) -> list[ArmShape]:
-    """The shapes of a body without one of its own: lines to its joints, or to its centre of mass."""
-    if carried:
-        return [line(role, ZERO, numbers(arm, f"{joint.name}.at")) for joint in carried]
+    """The shapes of a body without one of its own: lines to these ends, its joints and pins, or to its centre of
+    mass."""
+    if ends:
+        return [line(role, ZERO, end) for end in ends]
     com, radius = numbers(arm, f"{head(body)}.com"), MASS * arm.size
     return [line(role, ZERO, com), ArmShape("sphere", role, com, (0.0, 0.0, 1.0), (radius, radius, radius))]
 

@@ -146,3 +146,41 @@ def test_what_is_not_recorded_is_named() -> None:
     assert lacking(arm_scene(experiment, recorded(experiment)), recorded(experiment)) == ("a.q",)
     experiment = compiled(BEAM.replace("RECORD", "qd"))
     assert lacking(arm_scene(experiment, recorded(experiment)), recorded(experiment)) == ("q",)
+
+
+CRANE = """\
+arm crane {
+    link boom { mass = 100 kg;  com = [1, 0, 0] m;  inertia = [1, 30, 30] kg*m^2; }
+    link tube { mass = 0 kg; }
+    link rod { mass = 0 kg; }
+    joint hinge revolute { parent = base;  child = boom;  at = [0, 0, 1.2] m;  axis = -y; }
+    joint swing revolute { parent = base;  child = tube;  axis = -y; }
+    joint stroke prismatic { parent = tube;  child = rod;  at = [0.6, 0, 0] m;  axis = x; }
+    loop lift { leader = stroke;  branch = right;  link = rod;  at = [0.5, 0, 0] m;
+        to = boom;  to_at = [0.9, 0, 0] m; }
+}
+run it {
+    arm = crane;  initial { stroke.q = 0.4 m; }
+    rates { dynamics = 100 Hz; record = 100 Hz; }  duration = 10 ms;  record = [q];
+}
+sweep sizes of it { vary links.boom.mass = [100, 120] kg; }
+"""
+
+
+def test_links_of_a_loop_are_drawn_to_its_pin_and_meet_there() -> None:
+    experiment = compiled(CRANE)
+    scene = arm_scene(experiment, recorded(experiment))
+    drawn_shapes = [(scene.bodies[shape.body].name, shape.kind, shape.role) for shape in scene.shapes]
+    assert drawn_shapes.count(("rod", "sphere", "joint")) == 1
+    swing, hinge = np.arctan2(1.2, 0.9), 0.0  # a right angle at the hinge: sides of 1.2 m, 0.9 m and 1.5 m
+    inputs = {"stroke.q": 0.4, "swing.q": swing, "hinge.q": hinge, "low:stroke": 0.0, "high:stroke": 0.4}
+    outputs = np.array(scene.formulas.replay(inputs))
+    poses = outputs[: 12 * len(scene.bodies)].reshape(-1, 12)
+    shapes = outputs[12 * len(scene.bodies) : -3].reshape(-1, 9)
+    ends = {}
+    for name in ("rod", "boom"):
+        (number,) = (n for n, shape in enumerate(drawn_shapes) if shape == (name, "line", "link"))
+        pose = poses[[body.name for body in scene.bodies].index(name)]
+        ends[name] = pose[:9].reshape(3, 3) @ (shapes[number][:3] + shapes[number][3:6]) + pose[9:]
+    assert ends["rod"] == pytest.approx([0.9, 0.0, 1.2], abs=1e-12)
+    assert ends["boom"] == pytest.approx([0.9, 0.0, 1.2], abs=1e-12)
