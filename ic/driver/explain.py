@@ -7,9 +7,8 @@ from dataclasses import replace
 from os import PathLike
 
 from ic.driver.compile import Compiled, Select, check
-from ic.grammar.places import place_of
 from ic.grammar.spell import spell
-from ic.grammar.syntax import Expression, Name, children
+from ic.grammar.syntax import Expression, Name, children, place_of
 from ic.meaning.expressions.command_line import written_origin
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.owner import Settled

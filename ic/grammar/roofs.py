@@ -10,8 +10,20 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import replace
 
-from ic.grammar.places import spanned
-from ic.grammar.syntax import Call, Entry, Expression, Group, Indexed, Let, Name, Setting, Statement, Word, mapped
+from ic.grammar.syntax import (
+    Call,
+    Entry,
+    Expression,
+    Group,
+    Indexed,
+    Let,
+    Name,
+    Setting,
+    Statement,
+    Word,
+    mapped,
+    spanned,
+)
 
 
 def full_words(path: tuple[Word, ...], roofs: Collection[str]) -> tuple[Word, ...]:

@@ -14,8 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Expression, Group, Name, Setting, Statement, String, Unit, Word
+from ic.grammar.syntax import Call, Expression, Group, Name, Setting, Statement, String, Unit, Word, place_of
 from ic.language.runs import SWEEP
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import VariedPath

@@ -12,9 +12,23 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ic.grammar.places import place_of, spanned
 from ic.grammar.spell import spell
-from ic.grammar.syntax import Call, Entry, Expression, Group, List, Name, Number, Setting, String, Unit, WithUnit, Word
+from ic.grammar.syntax import (
+    Call,
+    Entry,
+    Expression,
+    Group,
+    List,
+    Name,
+    Number,
+    Setting,
+    String,
+    Unit,
+    WithUnit,
+    Word,
+    place_of,
+    spanned,
+)
 from ic.language import BLOCKS, choices
 from ic.meaning.definitions.merge import MergedBlock
 from ic.meaning.definitions.resolve import Definition, Definitions

@@ -20,8 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Expression, Name, Setting, Statement, Unit, WithUnit
+from ic.grammar.syntax import Call, Expression, Name, Setting, Statement, Unit, WithUnit, place_of
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names

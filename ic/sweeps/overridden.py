@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from ic.grammar.places import place_of
 from ic.grammar.settings import path_of
-from ic.grammar.syntax import Call, Entry, Expression, Group, Setting, children
+from ic.grammar.syntax import Call, Entry, Expression, Group, Setting, children, place_of
 from ic.meaning.definitions.merge import WITH, MergedBlock
 from ic.meaning.definitions.resolve import Definition
 from ic.meaning.parameters.scope import Scope

@@ -17,9 +17,8 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
 
-from ic.grammar.places import place_of
 from ic.grammar.settings import path_of
-from ic.grammar.syntax import List, Name, Setting
+from ic.grammar.syntax import List, Name, Setting, place_of
 from ic.meaning.definitions.merge import WITH
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import VariedPath

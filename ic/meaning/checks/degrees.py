@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
-from ic.grammar.places import place_of
 from ic.grammar.spell import spell
-from ic.grammar.syntax import Call, Deck, Entry, Expression, Group, Number, children
+from ic.grammar.syntax import Call, Deck, Entry, Expression, Group, Number, children, place_of
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Entry, Indexed, Let, List, Name, Number, WithUnit
+from ic.grammar.syntax import Entry, Indexed, Let, List, Name, Number, WithUnit, place_of
 from ic.meaning.definitions.unused_params import parts
 from ic.meaning.expressions.evaluate import evaluate_number
 from ic.meaning.expressions.quantity import Value

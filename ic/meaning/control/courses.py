@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Expression, Name
+from ic.grammar.syntax import Call, Expression, Name, place_of
 from ic.meaning.control.trajectories import use_file, with_file_named
 from ic.meaning.control.wraps import warn_of_wraps
 from ic.meaning.definitions.merge import Item, MergedBlock, open_call

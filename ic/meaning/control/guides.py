@@ -10,8 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from ic.grammar.places import place_of
 from ic.grammar.spell import spell
+from ic.grammar.syntax import place_of
 from ic.meaning.control.courses import course_named, use_course
 from ic.meaning.control.schedule import Rate
 from ic.meaning.control.servos import Use, fixed_rate

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from ic.grammar.places import place_of
+from ic.grammar.syntax import place_of
 from ic.meaning.control.schedule import Rate
 from ic.meaning.control.servos import fixed_rate
 from ic.meaning.definitions.merge import Item, MergedBlock

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ic.grammar.places import place_of
+from ic.grammar.syntax import place_of
 from ic.language.unit_words import unit_here
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of, words_chosen

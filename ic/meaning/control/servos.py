@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, Word
+from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, Word, place_of
 from ic.meaning.control.courses import course_named, use_course
 from ic.meaning.control.other_joints import with_other_joints
 from ic.meaning.control.schedule import CONTINUOUS, Rate

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Expression
+from ic.grammar.syntax import Call, Expression, place_of
 from ic.language.runs import BED, LAW, SCALE, SCALE_OF_INERTIA
 from ic.meaning.control.schedule import Ticks
 from ic.meaning.control.servos import Use, moving_kind

@@ -7,8 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Name, String, Word
+from ic.grammar.syntax import Call, Name, String, Word, place_of
 from ic.meaning.control.wraps import warn_of_wraps
 from ic.meaning.definitions.csv_files import missing_column
 from ic.meaning.definitions.merge import Item, MergedBlock, refuse_block

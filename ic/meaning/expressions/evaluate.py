@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from ic.grammar.places import place_of, spanned
 from ic.grammar.spell import spell
 from ic.grammar.syntax import (
     Binary,
@@ -22,6 +21,8 @@ from ic.grammar.syntax import (
     Unary,
     WithUnit,
     children,
+    place_of,
+    spanned,
 )
 from ic.meaning.definitions.row_tables import CSV, is_row_table
 from ic.meaning.definitions.row_tables import USAGE as USAGE_OF_TABLES

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from ic.grammar.places import spanned
-from ic.grammar.syntax import Binary, Indexed, Name
+from ic.grammar.syntax import Binary, Indexed, Name, spanned
 from ic.meaning.expressions.quantity import Value, ValueList
 from ic.text.lexer import COMMAND_LINE
 from met import units

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import cast
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Range
+from ic.grammar.syntax import Call, Range, place_of
 from ic.meaning.expressions import series
 from ic.meaning.expressions.quantity import Value, ValueList, in_words, measure_of
 from met import units

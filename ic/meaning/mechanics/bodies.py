@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ic.grammar.places import place_of
+from ic.grammar.syntax import place_of
 from ic.meaning.definitions.merge import Item
 from ic.meaning.expressions.conditions import in_pieces
 from ic.meaning.mechanics.following import all_led_by

@@ -15,8 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Call
+from ic.grammar.syntax import Call, place_of
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, word_of

@@ -7,8 +7,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Expression, Name
+from ic.grammar.syntax import Call, Expression, Name, place_of
 from ic.meaning.definitions.merge import Item, MergedBlock, refuse_pending
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_relations

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Name
+from ic.grammar.syntax import Name, place_of
 from ic.meaning.definitions.merge import MergedBlock
 from ic.meaning.parameters.owner import XYZ, Owner
 from ic.meaning.parameters.scope import Scope

@@ -13,8 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Expression, Name, Setting, String
+from ic.grammar.syntax import Call, Expression, Name, Setting, String, place_of
 from ic.meaning.definitions.merge import Item, no_block, refuse_block
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.command_line import (

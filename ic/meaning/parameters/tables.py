@@ -6,8 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Name, String
+from ic.grammar.syntax import Name, String, place_of
 from ic.meaning.definitions.csv_files import CsvColumn, CsvTable, missing_column
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters import not_sweepable

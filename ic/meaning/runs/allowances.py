@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Entry, Name, Statement, String
+from ic.grammar.syntax import Entry, Name, Statement, String, place_of
 from ic.language import EXPERIMENTS, OF_A_RUN
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.text.complaints import Complaints

@@ -7,8 +7,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Expression
+from ic.grammar.syntax import Call, Expression, place_of
 from ic.language.runs import BASE_KINDS
 from ic.meaning.control.courses import course_named, use_course
 from ic.meaning.definitions.merge import Item, MergedBlock

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ic.grammar.places import place_of
+from ic.grammar.syntax import place_of
 from ic.language.runs import ENVIRONMENT
 from ic.meaning.checks.idle import remark_idle, remark_kinds
 from ic.meaning.definitions.merge import Item, MergedBlock

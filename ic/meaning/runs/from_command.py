@@ -10,8 +10,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType, SimpleNamespace
 from typing import Final
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Name
+from ic.grammar.syntax import Name, place_of
 from ic.meaning.control.servos import Use
 from ic.meaning.definitions.merge import Item
 from ic.meaning.expressions.quantity import Value

@@ -6,8 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Expression, List, Name
+from ic.grammar.syntax import Call, Expression, List, Name, place_of
 from ic.language.runs import LINEAR, LINEAR_AT
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.quantity import Value, ValueList

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Expression, Name
+from ic.grammar.syntax import Expression, Name, place_of
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
 from ic.meaning.parameters.owner import Owner

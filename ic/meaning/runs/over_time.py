@@ -6,9 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from ic.grammar.places import place_of
 from ic.grammar.spell import spell
-from ic.grammar.syntax import Call, Expression, Name, Statement, Word, mapped
+from ic.grammar.syntax import Call, Expression, Name, Statement, Word, mapped, place_of
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.expressions import is_over_time

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Name
+from ic.grammar.syntax import Name, place_of
 from ic.language.runs import RATES
 from ic.meaning.control.guides import Guiding, check_period
 from ic.meaning.control.schedule import CONTINUOUS, Rate, Ticks, base_rate, divisor, exact, make_schedule

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Binary, Call, Expression, List, Name, Unary, WithUnit
+from ic.grammar.syntax import Binary, Call, Expression, List, Name, Unary, WithUnit, place_of
 from ic.meaning.definitions.merge import Item
 from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner

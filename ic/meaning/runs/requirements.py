@@ -7,9 +7,8 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal
 
-from ic.grammar.places import place_of
 from ic.grammar.spell import spell
-from ic.grammar.syntax import Binary, Call, Expression, Name, OverCases, Statement, children
+from ic.grammar.syntax import Binary, Call, Expression, Name, OverCases, Statement, children, place_of
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import word_of
 from ic.meaning.parameters.owner import Owner

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Name, Word
+from ic.grammar.syntax import Call, Name, Word, place_of
 from ic.language.runs import DURATION, ENVIRONMENT, INITIAL, RATES, RUN, SEED, TOLERANCES
 from ic.meaning.control.guides import name_guides, resolve_guides
 from ic.meaning.control.link_sensors import resolve_link_sensors

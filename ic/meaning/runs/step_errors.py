@@ -5,9 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ic.grammar.places import place_of
 from ic.grammar.spell import spell
-from ic.grammar.syntax import Binary, Call, Expression, Name
+from ic.grammar.syntax import Binary, Call, Expression, Name, place_of
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.owner import Owner
