@@ -20,9 +20,8 @@ from met.program.control.substituted import Substituted
 from met.program.system import PARAMETER, System
 from met.trace import Real
 from met.trace.nodes import evaluate
-from met.trace.program import CallPhase, Phase, Program, Tape, Unless0
+from met.trace.program import CallPhase, Phase, Program, RunSection, Tape, Unless0
 from met.trace.recorder import record
-from met.trace.recording import RunSection
 
 _INPUTS = ("voltage", "current", "rate", "seed", "repeat")
 _OUTPUTS = ("rate", "shaft_rate", "shaft_angle")

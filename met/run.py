@@ -27,9 +27,8 @@ from met.program.control.substituted import LIMITED
 from met.program.step import EVENTS
 from met.program.system import FURTHEST
 from met.trace.identity import result_keys, state_key
-from met.trace.program import Program
+from met.trace.program import Program, Recording
 from met.trace.recorder import record
-from met.trace.recording import Recording
 
 DONE, FAILED, TIMED_OUT, LOST = range(4)
 """Status of a case: done; failed by its own numbers; stopped for taking too long; lost, each time with its worker."""

@@ -23,8 +23,8 @@ from met.plan import Experiment
 from met.program import plausible
 from met.program.build import UNHELD, build
 from met.program.step import FAILURE
+from met.trace.program import Recording, RecordSection, RunSection
 from met.trace.recorder import record
-from met.trace.recording import Recording, RecordSection, RunSection
 from met.version import VERSION
 
 DESCRIPTION = "modelDescription.xml"

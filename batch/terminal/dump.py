@@ -9,7 +9,7 @@ from ic.printing.dump import DumpRequest
 
 if TYPE_CHECKING:
     from met.plan import Experiment
-    from met.trace.recording import Recording
+    from met.trace.program import Recording
 
 
 def program(request: DumpRequest) -> Iterator[str]:

@@ -15,9 +15,8 @@ from met.analysis.memo import AnalysisMemo
 from met.plan import Experiment
 from met.program.build import COORDINATE, build
 from met.trace.nodes import live
-from met.trace.program import Program, Unless0, WhileAny, walk
+from met.trace.program import CodeSection, Program, Unless0, WhileAny, walk
 from met.trace.recorder import SectionRecorder, record
-from met.trace.recording import CodeSection
 
 
 def idle_inputs(experiment: Experiment, memo: AnalysisMemo | None = None) -> tuple[str, ...]:

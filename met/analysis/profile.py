@@ -31,9 +31,24 @@ from met.run import inputs
 from met.trace import fma
 from met.trace.counting import counting
 from met.trace.nodes import LEAVES, OPERANDS
-from met.trace.program import Every, Phase, Program, RecordPhase, RunPhase, Tape, Unless0, WhileAny, walk
+from met.trace.program import (
+    Branch,
+    CodeSection,
+    Every,
+    Phase,
+    Program,
+    RecordedControl,
+    Recording,
+    RecordPhase,
+    RecordSection,
+    RunPhase,
+    RunSection,
+    Tape,
+    Unless0,
+    WhileAny,
+    walk,
+)
 from met.trace.recorder import record
-from met.trace.recording import Branch, CodeSection, RecordedControl, Recording, RecordSection, RunSection
 
 FLOPS = {"add": 1, "sub": 1, "mul": 1, "div": 1, "sqrt": 1, "fma": 2}
 """Weights of the operations that count as arithmetic; comparing, choosing and moving do not count."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from met.backends.backend import Backend, Kernel
-    from met.trace.recording import Recording
+    from met.trace.program import Recording
 
 HOMES = {
     "llvm": "met.backends.llvm",

@@ -11,8 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from met.trace.program import Program
-from met.trace.recording import Recording
+from met.trace.program import Program, Recording
 
 
 class Block(Protocol):

@@ -9,8 +9,7 @@ import os
 from collections.abc import Sequence
 
 from met.trace.nodes import OPERANDS, TRUTHS, Node
-from met.trace.program import WhileAny
-from met.trace.recording import Branch, CodeSection, RecordedControl, Recording
+from met.trace.program import Branch, CodeSection, RecordedControl, Recording, WhileAny
 
 # operands that are truths, by operation and position; all others are numbers
 _TRUTH_OPERANDS = {("and", 1), ("and", 2), ("where", 1)}

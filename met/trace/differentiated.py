@@ -15,9 +15,8 @@ from met.frozen import frozen
 from met.trace import check
 from met.trace.fuse import fused_from
 from met.trace.nodes import OPERANDS
-from met.trace.program import WhileAny, walk
+from met.trace.program import CodeSection, Recording, WhileAny, walk
 from met.trace.recorder import used_cells, without_dead_stores
-from met.trace.recording import CodeSection, Recording
 from met.trace.tangents import HEAD, Straight, moved_by, moving_nodes, with_tangents
 
 

@@ -17,8 +17,7 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 from met.trace.nodes import OPERANDS, live
-from met.trace.program import WhileAny
-from met.trace.recording import Branch, CodeSection, RecordedControl, Recording, RecordSection
+from met.trace.program import Branch, CodeSection, RecordedControl, Recording, RecordSection, WhileAny
 from met.trace.slicing import cells_behind, slice_roots
 
 

@@ -9,8 +9,24 @@ from dataclasses import replace
 from met.trace import check
 from met.trace.fuse import fused
 from met.trace.graph import Graph, Real, Truth
-from met.trace.program import CallPhase, Control, Every, Phase, Program, RecordPhase, RunPhase, Unless0, WhileAny, walk
-from met.trace.recording import Branch, CodeSection, RecordedControl, Recording, RecordSection, RunSection
+from met.trace.program import (
+    Branch,
+    CallPhase,
+    CodeSection,
+    Control,
+    Every,
+    Phase,
+    Program,
+    RecordedControl,
+    Recording,
+    RecordPhase,
+    RecordSection,
+    RunPhase,
+    RunSection,
+    Unless0,
+    WhileAny,
+    walk,
+)
 from met.trace.scalar import Mask, Scalar
 from met.trace.slicing import cells_behind, slice_roots
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator
 
 from met.trace.nodes import live
-from met.trace.program import WhileAny
-from met.trace.recording import Branch, CodeSection, RecordedControl
+from met.trace.program import Branch, CodeSection, RecordedControl, WhileAny
 
 
 def sections_in(body: Iterable[RecordedControl]) -> Iterator[int]:

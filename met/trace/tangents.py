@@ -17,7 +17,7 @@ from met.trace.derivative import STEPS, rounds, sign_of, slopes
 from met.trace.known import KnownTangents
 from met.trace.nodes import OPERANDS, TRUTHS, ZERO, Node, Nodes, live
 from met.trace.primitives import PLAIN
-from met.trace.recording import CodeSection
+from met.trace.program import CodeSection
 
 HEAD = "d:"
 """Prefix of the name of a cell: the cell of its tangent."""

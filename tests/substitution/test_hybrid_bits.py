@@ -15,8 +15,8 @@ from met.backends.llvm import kernel
 from met.backends.reference.plain import execute
 from met.plan import Cases, Experiment
 from met.program import build
+from met.trace.program import Recording
 from met.trace.recorder import record
-from met.trace.recording import Recording
 from tests.substitution.hybrid import compiled, deck
 
 slow = pytest.mark.slow

@@ -15,7 +15,7 @@ from met.analysis.linear.flow import HANDS_OVER, Flow
 from met.analysis.linear.period import PeriodProgram
 from met.trace.nodes import OPERANDS, TRUTHS, Node
 from met.trace.primitives import ARRAYS
-from met.trace.recording import Branch
+from met.trace.program import Branch
 from met.trace.tangents import PRODUCTS, TangentSection
 
 Key = TypeVar("Key")

@@ -17,8 +17,7 @@ from met.program.system import Actuator
 from met.program.values import NamedValues, answer
 from met.servos.servo import JointMotion
 from met.trace.nodes import Node, live
-from met.trace.program import Every, Unless0
-from met.trace.recording import Branch, RecordedControl, RecordSection
+from met.trace.program import Branch, Every, RecordedControl, RecordSection, Unless0
 from met.trace.tangents import HEAD, Kink, TangentSection, values
 
 HANDS_OVER = {"grappling": "grappled", "releasing": "released"}

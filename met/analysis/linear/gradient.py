@@ -27,8 +27,8 @@ from met.program.build import METRIC, Builder
 from met.program.step import FAILURE
 from met.program.system import System
 from met.trace.differentiated import Dependence, dependence, differentiated
+from met.trace.program import Recording
 from met.trace.recorder import record
-from met.trace.recording import Recording
 
 NEAR = (1e-6, 1e-5)
 """Shares of a number, to each side, over which its gradients are compared with the change that they predict; for 0,

@@ -22,9 +22,8 @@ from met.program.control import guiding
 from met.program.control.sensing import READING
 from met.program.motion import bodies
 from met.program.system import System
-from met.trace.program import Unless0, WhileAny
+from met.trace.program import Branch, CodeSection, RecordedControl, RecordSection, Unless0, WhileAny
 from met.trace.recorder import record
-from met.trace.recording import Branch, CodeSection, RecordedControl, RecordSection
 from met.trace.slicing import sections_in
 from met.trace.tangents import TangentSection, moved_by, with_tangents
 

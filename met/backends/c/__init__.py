@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from met.backends.backend import Kernel
 from met.frozen import frozen
-from met.trace.recording import Recording
+from met.trace.program import Recording
 
 
 @frozen

@@ -22,8 +22,17 @@ from met.backends.c.functions import HEAD, functions
 from met.frozen import frozen
 from met.trace.nodes import OPERANDS, TRUTHS, Node
 from met.trace.primitives import bits_of
-from met.trace.program import Every, Unless0, WhileAny
-from met.trace.recording import Branch, CodeSection, RecordedControl, Recording, RecordSection, RunSection
+from met.trace.program import (
+    Branch,
+    CodeSection,
+    Every,
+    RecordedControl,
+    Recording,
+    RecordSection,
+    RunSection,
+    Unless0,
+    WhileAny,
+)
 
 _INFIX = {"mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "and": "&&"}
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from met.backends.backend import checked_inputs
 from met.backends.c.emit import emit
-from met.trace.program import Program
-from met.trace.recording import Recording
+from met.trace.program import Program, Recording
 
 FLAGS = ("-std=c11", "-O1", "-ffp-contract=off", "-fPIC", "-shared")
 

@@ -17,7 +17,7 @@ from met.backends.llvm.pieces import CUT_ABOVE, LONGEST, SHORTEST, Piece, cut
 from met.backends.llvm.pieces import check as check_pieces
 from met.trace import check
 from met.trace.nodes import OPERANDS, TRUTHS, Node
-from met.trace.recording import CodeSection, Recording
+from met.trace.program import CodeSection, Recording
 
 _CALLS = {"sqrt": "llvm.sqrt", "floor": "llvm.floor", "rint": "llvm.roundeven", "abs": "llvm.fabs", "fma": "llvm.fma"}
 _ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}

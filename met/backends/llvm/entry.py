@@ -13,8 +13,7 @@ import struct
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
-from met.trace.program import Every, Unless0, WhileAny
-from met.trace.recording import Branch, RecordedControl, Recording, RecordSection, RunSection
+from met.trace.program import Branch, Every, RecordedControl, Recording, RecordSection, RunSection, Unless0, WhileAny
 
 ENTRY = "met_run"
 

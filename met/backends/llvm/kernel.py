@@ -24,9 +24,8 @@ from met.backends.llvm.pieces import cut, operations
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host import cache
-from met.trace.program import Program
+from met.trace.program import Program, Recording
 from met.trace.recorder import record
-from met.trace.recording import Recording
 
 if TYPE_CHECKING:
     from met.backends.llvm.machine import Machine

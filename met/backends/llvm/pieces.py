@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 from met.trace.nodes import LEAVES, OPERANDS
-from met.trace.recording import CodeSection
+from met.trace.program import CodeSection
 
 # operations above which a section is cut, and the bounds of a piece
 CUT_ABOVE = 500

@@ -9,8 +9,7 @@ import numpy as np
 from met.backends.backend import checked_inputs
 from met.frozen import frozen
 from met.trace.nodes import Node, evaluate
-from met.trace.program import Every, Program, Unless0
-from met.trace.recording import Branch, RecordedControl, Recording, RecordSection
+from met.trace.program import Branch, Every, Program, RecordedControl, Recording, RecordSection, Unless0
 
 
 @frozen

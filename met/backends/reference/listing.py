@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from met.trace.nodes import show
-from met.trace.program import Every, WhileAny
-from met.trace.recording import Branch, RecordedControl, Recording, RecordSection
+from met.trace.program import Branch, Every, RecordedControl, Recording, RecordSection, WhileAny
 
 
 def lines(recording: Recording) -> Iterator[str]:

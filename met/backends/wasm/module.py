@@ -19,7 +19,7 @@ from met.backends.llvm.entry import ENTRY
 from met.backends.wasm import fma, link
 from met.frozen import frozen
 from met.host import cache
-from met.trace.recording import Recording
+from met.trace.program import Recording
 
 LANES = 2
 

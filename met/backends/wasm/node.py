@@ -14,8 +14,7 @@ import numpy as np
 from met.backends.backend import checked_inputs
 from met.backends.wasm.module import LANES, WasmModule
 from met.frozen import frozen
-from met.trace.program import Program
-from met.trace.recording import Recording
+from met.trace.program import Program, Recording
 
 _SCRIPT = Path(__file__).with_name("node.js")
 # largest number of row values that one process writes

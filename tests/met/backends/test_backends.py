@@ -12,7 +12,7 @@ import ic
 from met import backends
 from met.backends.backend import Kernel
 from met.run import inputs, prepare
-from met.trace.recording import Recording
+from met.trace.program import Recording
 from tests.ic.small_decks import experiment
 from tests.met.backends.marked import NAMES
 from tests.met.program.test_followers import GROUPS

@@ -12,9 +12,19 @@ from met import backends
 from met.backends.llvm.emit import emit, numbered
 from met.trace import floor, gather, sqrt, where
 from met.trace.noise import Stream, normal
-from met.trace.program import CallPhase, Every, Phase, Program, RecordPhase, RunPhase, Tape, Unless0, WhileAny
+from met.trace.program import (
+    CallPhase,
+    Every,
+    Phase,
+    Program,
+    Recording,
+    RecordPhase,
+    RunPhase,
+    Tape,
+    Unless0,
+    WhileAny,
+)
 from met.trace.recorder import record
-from met.trace.recording import Recording
 
 EMITTED = {
     "llvm": (1, "a1e7cd38e71183e9b15efb2e0a95dafe57424dc2492546e32ec024a3afda4b88"),

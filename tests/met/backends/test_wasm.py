@@ -14,9 +14,8 @@ from met.backends.llvm import machine
 from met.backends.wasm import link, module, node
 from met.trace import fma
 from met.trace.primitives import fused
-from met.trace.program import Phase, Program, RecordPhase, RunPhase, Tape
+from met.trace.program import Phase, Program, Recording, RecordPhase, RunPhase, Tape
 from met.trace.recorder import record
-from met.trace.recording import Recording
 from tests.ic.small_decks import experiment
 from tests.met.backends import whole_runs
 from tests.met.backends.whole_runs import WholeRun, differing, whole_run

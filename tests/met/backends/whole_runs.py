@@ -15,8 +15,8 @@ from met.frozen import frozen
 from met.plan import Experiment
 from met.program.build import build
 from met.run import inputs
+from met.trace.program import Recording
 from met.trace.recorder import record
-from met.trace.recording import Recording
 
 PUBLISHED = (
     ("two_link", "gains"),

@@ -17,8 +17,8 @@ from met import run as engine
 from met.backends.llvm import kernel
 from met.plan import Experiment
 from met.program import build
+from met.trace.program import Recording
 from met.trace.recorder import record
-from met.trace.recording import Recording
 from tests.instruction_sets import ARM, RUNNABLE, WIDE
 from tests.oracles.friction_deck import friction_deck
 

@@ -12,9 +12,8 @@ from met.backends.llvm.pieces import check as check_pieces
 from met.backends.llvm.pieces import cut
 from met.trace import where
 from met.trace.check import check
-from met.trace.program import Phase, Program, RunPhase, Tape, WhileAny
+from met.trace.program import CodeSection, Phase, Program, Recording, RunPhase, Tape, WhileAny
 from met.trace.recorder import record
-from met.trace.recording import CodeSection, Recording
 
 
 def recording() -> Recording:

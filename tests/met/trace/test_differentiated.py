@@ -12,9 +12,8 @@ from met import backends
 from met import run as engine
 from met.trace import Real, floor, sin, where
 from met.trace.differentiated import dependence, differentiated
-from met.trace.program import Every, Phase, Program, RunPhase, Tape, WhileAny
+from met.trace.program import CodeSection, Every, Phase, Program, RunPhase, Tape, WhileAny
 from met.trace.recorder import record
-from met.trace.recording import CodeSection
 from met.trace.tangents import HEAD
 from tests.met.backends.marked import NAMES
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from met.trace.graph import Graph
 from met.trace.known import KnownDerivative, Tangent
 from met.trace.nodes import Nodes
-from met.trace.recording import CodeSection
+from met.trace.program import CodeSection
 from met.trace.scalar import Scalar
 from met.trace.tangents import HEAD, values, with_tangents
 

@@ -12,7 +12,7 @@ import pytest
 from met.trace import Scalar, absolute, clip, cos, exp, maximum, sin, sqrt, where
 from met.trace.graph import Graph
 from met.trace.nodes import Nodes
-from met.trace.recording import CodeSection
+from met.trace.program import CodeSection
 from met.trace.tangents import HEAD, moved_by, values, with_tangents
 
 

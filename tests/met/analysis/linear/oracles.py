@@ -21,8 +21,7 @@ from met.plan import Experiment
 from met.trace.derivative import STEPS
 from met.trace.nodes import OPERANDS, TRUTHS
 from met.trace.primitives import PLAIN
-from met.trace.program import Every, Unless0
-from met.trace.recording import Branch, RecordedControl, RecordSection
+from met.trace.program import Branch, Every, RecordedControl, RecordSection, Unless0
 
 DECKS = Path(ic.__file__).parent / "decks"
 
