@@ -26,8 +26,7 @@ from met.distinct import distinct
 from met.host.files import open_regular
 from met.host.sources import ARCHIVES
 from met.plan import Plan
-from met.plan.columns import are_among
-from met.plan.swept import blocks
+from met.plan.columns import are_among, blocks
 
 
 @contextmanager

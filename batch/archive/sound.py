@@ -14,7 +14,7 @@ import numpy as np
 from batch.archive import searched
 from batch.archive.stored import Stored, StoredGroup, Unlike
 from met.messages.visible import line
-from met.plan.swept import blocks
+from met.plan.columns import blocks
 from met.run import DONE, LOST
 from met.statistics.confidence import can_be_shown
 

@@ -26,8 +26,7 @@ from met import backends
 from met.frozen import frozen
 from met.plan import Experiment, Plan, recipes
 from met.plan import file as plan_file
-from met.plan.columns import LISTED_ROWS, CaseValues
-from met.plan.swept import blocks
+from met.plan.columns import LISTED_ROWS, CaseValues, blocks
 from met.plan.uses import packages
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ from batch.archive.rows import row_of
 from met.diagnostic import Problem, error
 from met.outputs import quoted
 from met.plan import Experiment, Plan, keys
-from met.plan.columns import CaseValues, all_rows, row_at
-from met.plan.swept import blocks
+from met.plan.columns import CaseValues, all_rows, blocks, row_at
 from met.settings import varied_run, varies
 
 

@@ -18,8 +18,7 @@ from met.diagnostic import Problem, error
 from met.distinct import distinct
 from met.frozen import frozen
 from met.plan import Experiment
-from met.plan.columns import CaseValues, are_among, places_among
-from met.plan.swept import blocks
+from met.plan.columns import CaseValues, are_among, blocks, places_among
 
 SINGLE = ("default", "all", "none", "every", "failed", "worst")
 WORDS = "default, all, none, every:N, failed, worst:N, worst:N:METRIC, or cases by '#7' or id"

@@ -11,7 +11,7 @@ import numpy as np
 
 from met.frozen import frozen
 from met.plan import Experiment
-from met.plan.swept import RowBits
+from met.plan.columns import RowBits
 from met.run import DONE, Run
 
 FEW = 1 << 17

@@ -24,8 +24,8 @@ from met.diagnostic import Problem, error
 from met.host.files import open_regular, read_json
 from met.plan import file as plan_file
 from met.plan.codec import encode
+from met.plan.columns import blocks
 from met.plan.searches import Search
-from met.plan.swept import blocks
 
 WHOLE, DAMAGED = "whole", "damaged"
 

@@ -18,8 +18,7 @@ from met.diagnostic import Problem, error
 from met.distinct import distinct
 from met.frozen import frozen
 from met.plan import Coordinate, Experiment
-from met.plan.columns import CaseValues, span
-from met.plan.swept import blocks
+from met.plan.columns import CaseValues, blocks, span
 from met.run import DONE, Run
 
 

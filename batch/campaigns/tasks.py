@@ -18,8 +18,7 @@ from met import run as engine
 from met.analysis.linear import metrics as linear_metrics
 from met.frozen import frozen
 from met.passing import Memories
-from met.plan.columns import CaseValues
-from met.plan.swept import BLOCK
+from met.plan.columns import BLOCK, CaseValues
 from met.run import Prepared
 
 GRANULE = 32

@@ -10,7 +10,7 @@ from batch.queries.requirements import beyond, group_requirements
 from batch.queries.signals import deck_unit, number_text
 from met.diagnostic import Diagnostic, Label, Place
 from met.frozen import frozen
-from met.plan.swept import blocks
+from met.plan.columns import blocks
 
 if TYPE_CHECKING:
     from batch.archive.read import ArchiveGroup

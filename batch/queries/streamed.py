@@ -10,7 +10,7 @@ from batch.archive.stored import Stored
 from batch.archive.summarised import CaseSummary
 from batch.queries.requirements import group_requirements, requirement_texts
 from batch.queries.tallies import MOST_POINTS, CaseBlock, CaseTallies, PointNumbers, TooManyPoints
-from met.plan.swept import blocks
+from met.plan.columns import blocks
 
 MANY = 4_000_000
 """Number of rows of a run or sweep from which they are processed in blocks: with fewer, medians and an order of all are

@@ -25,7 +25,7 @@ from batch.queries.streamed import summed_up
 from batch.queries.warnings import warnings
 from met.diagnostic import Diagnostic
 from met.frozen import frozen
-from met.plan.swept import blocks
+from met.plan.columns import blocks
 
 
 @frozen

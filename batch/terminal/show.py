@@ -45,7 +45,7 @@ from ic.printing.columns import size as size_text
 from met.distinct import distinct
 from met.messages.visible import line
 from met.outputs import quoted
-from met.plan.swept import blocks
+from met.plan.columns import blocks
 
 MOST_GROUPS = 4
 """Largest number of structures of a sweep that are shown in full unless they are named; with more, only their table is

@@ -13,9 +13,8 @@ from ic.sweeps.reach import without_effect
 from ic.text.complaints import Complaints
 from met.diagnostic import Label
 from met.plan import SEED, Experiment
-from met.plan.columns import AxisColumn
+from met.plan.columns import AxisColumn, blocks
 from met.plan.judged import Requirement
-from met.plan.swept import blocks
 from met.statistics import confidence, sequential
 from met.statistics.design_points import design_points
 

@@ -31,8 +31,7 @@ from met.analysis.memo import AnalysisMemo
 from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error, leave_out, write
 from met.frozen import frozen
 from met.plan import Allowance, Cases, Choice, Experiment, keys
-from met.plan.columns import PositionColumn, ShiftedColumn, listed
-from met.plan.swept import RowBits, SweptRows, blocks
+from met.plan.columns import PositionColumn, RowBits, ShiftedColumn, SweptRows, blocks, listed
 from met.trace import Formulas, Graph, Scalar
 
 ScopedExperiment = tuple[Experiment, Scope]

@@ -29,10 +29,9 @@ from ic.text.complaints import Complaints, known_words
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
-from met.plan.columns import AxisColumn, CaseValues
+from met.plan.columns import AxisColumn, CaseValues, SweptRows
 from met.plan.judged import MetricUse, Requirement
 from met.plan.searches import LEAST_MARGIN, MOST_PLANTS, MOST_SEARCHED, SHORTEST, Search, SearchedParameter
-from met.plan.swept import SweptRows
 from met.trace import Graph, Scalar
 
 RANGES = {"between": False, "logbetween": True}

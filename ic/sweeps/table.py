@@ -19,8 +19,7 @@ from ic.sweeps.choices import OF_JOINT, OF_RUN, ChoiceColumn, Choices
 from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error, write_either
 from met.plan import Structure
 from met.plan.channel import channels
-from met.plan.columns import AxisColumn, CaseValues, CountedRows, listed
-from met.plan.swept import RowBits, SweptRows, blocks
+from met.plan.columns import AxisColumn, CaseValues, CountedRows, RowBits, SweptRows, blocks, listed
 from met.trace import Scalar
 from met.unit_parser import parse_unit
 

@@ -25,11 +25,10 @@ from met.plan import structure as plan_structure
 from met.plan.checked_linear import check_linear
 from met.plan.checked_searches import check_search
 from met.plan.codec import Damaged
-from met.plan.columns import CaseValues
+from met.plan.columns import CaseValues, blocks
 from met.plan.defaults import INERTIA, declared, heads_of_models, related
 from met.plan.judged import Requirement
 from met.plan.outputs import tolerable
-from met.plan.swept import blocks
 from met.plan.uses import ModelUse, model_uses
 from met.statistics.confidence import can_be_shown
 from met.trace.graph import Formulas

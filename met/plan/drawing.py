@@ -15,8 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from met import units
-from met.plan.columns import ComputedColumn
-from met.plan.swept import BLOCK, blocks
+from met.plan.columns import BLOCK, ComputedColumn, blocks
 from met.unit_parser import parse_unit
 
 DIGITS = 12

@@ -34,8 +34,7 @@ from met.host.files import open_regular, read_regular, whole_file
 from met.outputs import check_regular, not_overwritten
 from met.plan import Experiment, Formula, Plan, recipes
 from met.plan.codec import Damaged, decode, encode
-from met.plan.columns import LISTED_ROWS, CaseValues
-from met.plan.swept import blocks
+from met.plan.columns import LISTED_ROWS, CaseValues, blocks
 
 SCHEMA = "met.plan"
 VERSION = 2

@@ -25,7 +25,7 @@ import numpy as np
 
 from met.frozen import IN_KEY
 from met.plan import Experiment, Formula, Structure
-from met.plan.swept import blocks
+from met.plan.columns import blocks
 
 DIGEST_BYTES = 8
 

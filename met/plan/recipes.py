@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from met.plan import columns, drawing
-from met.plan.columns import MOST_SWEPT, CaseValues, ComputedColumn
-from met.plan.swept import RowBits, SweptRows
+from met.plan.columns import MOST_SWEPT, CaseValues, ComputedColumn, RowBits, SweptRows
 
 Keep = Callable[[np.ndarray], Any]
 """A function that stores an array elsewhere, and returns its place as JSON data."""

@@ -13,8 +13,7 @@ from ic.meaning.expressions.quantity import Value, measure_of
 from ic.text.complaints import PROVISIONAL, Complaints
 from met.diagnostic import Diagnostic, Label, Place
 from met.frozen import frozen
-from met.plan.columns import AxisColumn, CaseValues, ends
-from met.plan.swept import blocks
+from met.plan.columns import AxisColumn, CaseValues, blocks, ends
 from met.trace import Formulas, Graph, Real, Scalar
 from met.units import ONE
 

@@ -15,7 +15,7 @@ from batch.queries import streamed, tallies
 from batch.queries.evidence_table import requirement_evidence
 from batch.queries.summary import SummedMetric, summarise
 from batch.terminal.show import show, show_evidence
-from met.plan import swept
+from met.plan import columns
 from met.plan.judged import Requirement
 from met.run import DONE
 from met.statistics.confidence import percentile_rank
@@ -177,7 +177,7 @@ def test_no_column_of_them_is_read_whole(archive: Path, many: None, monkeypatch:
         assert last - first <= 64, name
         return stretch(group, name, first, last)
 
-    monkeypatch.setattr(swept, "BLOCK", 64)
+    monkeypatch.setattr(columns, "BLOCK", 64)
     monkeypatch.setattr(ArchiveGroup, "values", some)
     monkeypatch.setattr(ArchiveGroup, "stretch", short)
     with ArchiveFile(archive) as file:

@@ -11,7 +11,7 @@ from ic.meaning.expressions import conditions
 from ic.sweeps import table
 from met.diagnostic import Problem
 from met.messages.render import render
-from met.plan import swept
+from met.plan import columns
 
 DECK = """
 #include <two_link.ic>
@@ -56,7 +56,7 @@ def test_what_is_said_in_pieces_is_what_is_said_of_all(
     whole = said(tmp_path, low, more)
     monkeypatch.setattr(conditions, "WHOLE", 1000)
     monkeypatch.setattr(table, "PIECE", 512)
-    monkeypatch.setattr(swept, "BLOCK", 1024)
+    monkeypatch.setattr(columns, "BLOCK", 1024)
     assert said(tmp_path, low, more) == whole
 
 

@@ -13,7 +13,7 @@ import ic
 from met.diagnostic import Problem
 from met.plan import Plan, columns, drawing, keys, recipes
 from met.plan import file as plan_file
-from met.plan.swept import RowBits, SweptRows
+from met.plan.columns import RowBits, SweptRows
 from met.unit_parser import parse_unit
 
 DECK = """
