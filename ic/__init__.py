@@ -34,7 +34,7 @@ def check(
     Parameters as of `compile`.
     """
     from ic.driver.compile import check as lowered
-    from met.settings import VARY, to_set
+    from met.outputs import VARY, to_set
 
     if (path is None) == (text is None):
         raise TypeError("a deck is given by its path or by its text")

@@ -25,7 +25,7 @@ from met.diagnostic import Diagnostic, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.host.streams import kept
 from met.messages.visible import say
-from met.settings import settings_of
+from met.outputs import settings_of
 
 if TYPE_CHECKING:
     from ic.driver.compile import Compiled

@@ -26,8 +26,7 @@ from met.host.entry_points import EntryPoint, offered
 from met.host.sources import names_archive, names_plan
 from met.host.streams import OutputLost, standard_streams
 from met.messages.visible import say
-from met.outputs import refusal_text
-from met.settings import VARY, setting_option, to_set, varies
+from met.outputs import VARY, refusal_text, setting_option, to_set, varies
 from met.version import VERSION
 from met_arm import REMEDY, find_own_packages, hiding
 

@@ -9,10 +9,9 @@ import numpy as np
 
 from batch.archive.rows import row_of
 from met.diagnostic import Problem, error
-from met.outputs import quoted
+from met.outputs import quoted, varied_run, varies
 from met.plan import Experiment, Plan, keys
 from met.plan.columns import CaseValues, all_rows, blocks, row_at
-from met.settings import varied_run, varies
 
 
 def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experiment, ...]:

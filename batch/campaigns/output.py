@@ -19,10 +19,9 @@ from ic.printing.columns import size as size_text
 from met import outputs
 from met.diagnostic import Problem, error
 from met.host.files import new_file
-from met.outputs import check_overwrite, check_place, quoted
+from met.outputs import check_overwrite, check_place, quoted, varies
 from met.plan import Experiment, Plan
 from met.plan.columns import CaseValues
-from met.settings import varies
 
 
 def default_output(

@@ -7,8 +7,8 @@ from typing import Any
 
 from met.diagnostic import Problem
 from met.host.sources import names_plan
+from met.outputs import settings_of
 from met.plan import Plan
-from met.settings import settings_of
 
 
 def read_plan(

@@ -10,7 +10,7 @@ from batch.cli.best import tell
 from batch.cli.instant import Instant
 from batch.cli.residuals import column_option
 from met.cli import NO, YES, deck_options, format_option
-from met.settings import varies
+from met.outputs import varies
 
 
 class LogInstant(Instant):

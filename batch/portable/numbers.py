@@ -21,8 +21,8 @@ from ic.text.lexer import COMMAND_LINE
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.messages.visible import visible
+from met.outputs import varied_run, varies
 from met.plan import Experiment, Plan
-from met.settings import varied_run, varies
 from met.units import Measure
 
 MOST = 200

@@ -21,9 +21,8 @@ from ic.driver.written_value import WrittenValue
 from ic.printing.columns import columns, count
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.outputs import quoted
+from met.outputs import quoted, setting_option, setting_path, varied_run, varies
 from met.plan.searches import JudgedDesign
-from met.settings import setting_option, setting_path, varied_run, varies
 from met.unit_parser import written
 from met.units import text as unit_text
 
@@ -53,7 +52,7 @@ class BestAnswer:
 
     deck       of the archive;  name: of the sweep;  seed: the campaign's
     defines    what `-D` defined for it, `NAME=VALUE`;  remarks: what else is to be known of it
-    overrides  what `--set` and `--vary` set and varied for it (`met.settings`)
+    overrides  what `--set` and `--vary` set and varied for it (`met.outputs`)
     front      goals that are traded off against each other
     judged     the stability of designs, by their numbers, the best by the goals first, until one keeps `least_margin`
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from batch.archive.read import ArchiveFile
 from ic.text.lexer import COMMAND_LINE
-from met.settings import setting_path, varies
+from met.outputs import setting_path, varies
 
 
 def settings_lines(archive: ArchiveFile) -> list[str]:

@@ -12,8 +12,7 @@ from batch.queries.pool import Pool
 from batch.queries.search_answers import SearchAnswer
 from ic.driver.written_value import WrittenValue
 from met.frozen import frozen
-from met.outputs import quoted
-from met.settings import setting_option, setting_path
+from met.outputs import quoted, setting_option, setting_path
 
 
 @frozen

@@ -15,8 +15,7 @@ from ic.text.limits import MOST_BYTES
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import read_regular, whole_file
-from met.outputs import quoted, refusal_text
-from met.settings import setting_option
+from met.outputs import quoted, refusal_text, setting_option
 
 
 @frozen

@@ -21,8 +21,7 @@ from batch.terminal.chosen_deck import FittedValue
 from batch.terminal.residuals import doubt_lines, note_lines
 from ic.driver.written_value import WrittenValue
 from ic.printing.columns import columns
-from met.outputs import quoted
-from met.settings import setting_option
+from met.outputs import quoted, setting_option
 from met.unit_parser import decimals
 
 WORDS: Mapping[str, str] = MappingProxyType({

@@ -12,8 +12,8 @@ from ic.text.limits import Findings, GiveUp
 from ic.text.source import SourceFile
 from ic.text.strays import complain_of_stray
 from met.diagnostic import Problem, error
-from met.settings import VARY
-from met.settings import varies as is_varied
+from met.outputs import VARY
+from met.outputs import varies as is_varied
 from met.units import Measure
 
 EXAMPLE = "write `PATH=VALUE`, such as `gearbox.kp=0.02 V*s/rad`"

@@ -9,7 +9,7 @@ from ic.language import EXPERIMENTS
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.text.complaints import known_words, with_article
 from met.diagnostic import Label, Problem, error, write
-from met.settings import varied_name
+from met.outputs import varied_name
 
 
 def command_line_sweep(
