@@ -1,6 +1,6 @@
 """Loads on an arm as formulas of a run's recorded signals: those of its environment, gas of thrusters, and payloads.
 
-The environment models are asked as the simulation asks them (`met.program.motion.world`), once, over inputs instead of
+The environment models are asked as the simulation asks them (`met.program.motion.base`), once, over inputs instead of
 numbers; a page (`assets/acting.js`) replays the formulas at each instant that it shows. Every ghost replays the scene's
 formulas, so these are separate. Gravitation is left out: it acts on every part of the arm, so no arrow can show it.
 """
@@ -20,8 +20,7 @@ from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import BASE, INSTANT, Experiment, Joint, Payload
 from met.program.courses import TIME
-from met.program.motion.base import BaseMotion, prescribed
-from met.program.motion.world import ArmWorld, environment_values
+from met.program.motion.base import ArmWorld, BaseMotion, environment_values, prescribed
 from met.program.system import PARAMETER, ReadCell, System
 from met.program.values import answer
 from met.trace import Formulas, Graph, Real, Scalar, both, floor, where

@@ -12,9 +12,8 @@ from met.plan.limits import LimitUse, extremes, limits
 from met.program import cell_names, cells
 from met.program.control.setpoints import course_values
 from met.program.joint_limits import excess
-from met.program.motion.base import base_of
+from met.program.motion.base import ArmWorld, base_of, environment_values
 from met.program.motion.payloads import tree_with_payloads
-from met.program.motion.world import ArmWorld, environment_values
 from met.program.step import StepPhases
 from met.program.system import System
 from met.program.values import answer

@@ -23,8 +23,7 @@ from met.plan.channel import XYZ, Channel
 from met.program.evaluation import Derivative
 from met.program.joint_limits import excess
 from met.program.motion import payloads
-from met.program.motion.base import BaseMotion, motions
-from met.program.motion.world import ArmWorld, environment_values
+from met.program.motion.base import ArmWorld, BaseMotion, environment_values, motions
 from met.program.system import ReadCell, System
 from met.program.values import answer, returned
 from met.trace import Real, minimum, sqrt

@@ -20,8 +20,7 @@ from met.plan import BASE
 from met.program import cells
 from met.program.control import sensing
 from met.program.motion import bodies, payloads
-from met.program.motion.base import BaseMotion, base_of
-from met.program.motion.world import ArmWorld, environment_values
+from met.program.motion.base import ArmWorld, BaseMotion, base_of, environment_values
 from met.program.system import Fitted, ReadCell, System
 from met.program.values import answer
 from met.trace import Real

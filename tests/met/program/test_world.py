@@ -10,8 +10,7 @@ import pytest
 from met.diagnostic import Problem
 from met.integrators.integrator import Motion
 from met.parameter import WORLD
-from met.program.motion.base import BaseMotion
-from met.program.motion.world import ArmWorld
+from met.program.motion.base import ArmWorld, BaseMotion
 from met.program.system import System
 from tests.ic.small_decks import changed, experiment
 from tests.met.tree_deck import TREE
