@@ -17,7 +17,7 @@ from met.plan import Experiment
 from met.program import cell_names
 from met.program.build import Builder
 from met.program.motion.base import ArmWorld, base_of, environment_values
-from met.program.motion.payloads import tree_with_payloads
+from met.program.motion.bodies import tree_with_payloads
 from met.program.system import System
 from met.run import inputs
 from met.vectors import scale

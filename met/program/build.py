@@ -18,7 +18,7 @@ from met.program.control import failing, guiding, link_sensors, sensing, setpoin
 from met.program.control.substituted import LIMITED
 from met.program.evaluation import gravity, law
 from met.program.limits import LimitPhases
-from met.program.motion import base, bodies, payloads
+from met.program.motion import base, bodies
 from met.program.observe import derived
 from met.program.step import EVENTS, FAILURE, StepPhases
 from met.program.system import FURTHEST, PARAMETER, Actuator, System
@@ -167,7 +167,7 @@ class Builder:
             for name in ("q", "qd"):
                 tape.write(f"{joint}.{name}", self.system.value(f"initial.{joint}.{name}", tape.read))
         base.start(self.system, tape)
-        payloads.start(self.system, tape)
+        bodies.start(self.system, tape)
         self.step.keep_followers(tape)
         guiding.start(self.system, tape)
         begun = {actuator.use.joint: self._begin_servo(tape, actuator) for actuator in self.system.working}

@@ -19,8 +19,7 @@ from met.integrators.integrator import Motion, Slope
 from met.program import rotors
 from met.program.control import failing, link_sensors, sensing, setpoints
 from met.program.motion.base import ArmWorld, BaseMotion, base_of, environment_values, free_base
-from met.program.motion.bodies import slopes
-from met.program.motion.payloads import slopes_of_payloads, split_wrenches, tree_with_payloads
+from met.program.motion.bodies import slopes, slopes_of_payloads, split_wrenches, tree_with_payloads
 from met.program.system import Actuator, ReadCell, System
 from met.program.values import NamedValues, answer, returned
 from met.servos.servo import Control, Drive, JointMotion, Seen, Setpoint

@@ -20,10 +20,9 @@ from met.plan import INSTANT
 from met.program import cell_names, cells, rotors
 from met.program.evaluation import servo_response
 from met.program.grappled import GrappleWatch
-from met.program.motion import payloads
+from met.program.motion import bodies
 from met.program.motion.base import base_of, free_base, motions
-from met.program.motion.bodies import place
-from met.program.motion.payloads import CARRIED, FLYING
+from met.program.motion.bodies import CARRIED, FLYING, place
 from met.program.system import Actuator, System
 from met.program.values import NamedValues
 from met.servos.servo import Drive
@@ -94,16 +93,16 @@ class Grapple:
             if not payload.grappled:
                 continue
             caught = tape.read_mask(cell_names.GRAPPLING(payload.name))
-            own, link = payloads.flying_motion(system, payload, tape.read, y), links[payload.link]
-            body, pose = payloads.body_of(system, payload, tape.read), compose(inverse(link.pose), own.pose)
+            own, link = bodies.flying_motion(system, payload, tape.read, y), links[payload.link]
+            body, pose = bodies.body_of(system, payload, tape.read), compose(inverse(link.pose), own.pose)
             blow = raised(momentum(body, twist_against(own, link)), pose)
             before = blows.get(payload.link, (ZERO, ZERO))
             blows[payload.link] = tuple(  # type: ignore[assignment]
                 add(a, tuple(choose(caught, x, 0.0) for x in b))  # type: ignore[arg-type]
                 for a, b in zip(before, blow, strict=True)
             )
-            payloads.attach(system, tape, caught, payload, pose)
-            for name in payloads.free_body(system, payload).coordinates:
+            bodies.attach(system, tape, caught, payload, pose)
+            for name in bodies.free_body(system, payload).coordinates:
                 cells.keep(tape, caught, f"{name}.qd", 0.0)
         self._jump(tape, y, blows)
 
@@ -115,10 +114,10 @@ class Grapple:
         for payload in system.flying:
             if payload.released:
                 gone = tape.read_mask(cell_names.RELEASING(payload.name))
-                motion = payloads.carried_motion(payload, tape.read, links)
-                body, v = payloads.free_body(system, payload), turn_vector(motion.pose.R, motion.v)
+                motion = bodies.carried_motion(payload, tape.read, links)
+                body, v = bodies.free_body(system, payload), turn_vector(motion.pose.R, motion.v)
                 place(body, tape, gone, quaternion(motion.pose.R), motion.pose.p, v, motion.w)
-                payloads.detach(tape, gone, payload)
+                bodies.detach(tape, gone, payload)
 
     def _jump(self, tape: Tape, y: Motion, blows: dict[str, Wrench]) -> None:
         """Rates after the impact; by link, the momentum transferred to it, about its origin and in its axes."""
@@ -127,7 +126,7 @@ class Grapple:
         on_beds = {actuator.index for actuator, _, _ in system.mounted}
         body = free_base(system)
         turning = None if body is None else rotors.of(system, drives, y, (0.0,) * len(system.states), {}, on_beds)
-        ratios, tree = system.ratios(tape.read, y.q), payloads.tree_with_payloads(system, tape.read)
+        ratios, tree = system.ratios(tape.read, y.q), bodies.tree_with_payloads(system, tape.read)
         solver = partial(solve_coupled, tree, ratios) if any(ratios) else partial(solve, tree)
         solved = solver(
             q=y.q[:n],

@@ -20,7 +20,7 @@ from met.integrators.integrator import Motion
 from met.plan import BASE, Payload
 from met.plan.outputs import GRAPPLE_FIGURES
 from met.program import cell_names, cells
-from met.program.motion import payloads
+from met.program.motion import bodies
 from met.program.motion.base import base_of, motions
 from met.program.system import System
 from met.trace import Real, maximum, sqrt, where
@@ -52,8 +52,8 @@ class GrappleWatch:
         """Keep the poses and velocities of payloads that are grappled at this instant."""
         links, y = self._links(tape), self._state(tape)
         for payload in self.payloads:
-            own, link = payloads.flying_motion(self.system, payload, tape.read, y), links[payload.link]
-            away = payloads.gap(self.system, payload, tape.read, own, link)
+            own, link = bodies.flying_motion(self.system, payload, tape.read, y), links[payload.link]
+            away = bodies.gap(self.system, payload, tape.read, own, link)
             w, v = against = twist_against(own, link)
             of_centre = add(v, cross(w, self.system.com(payload.name, tape.read)))
             rate, size = sqrt(dot(w, w)), self._size(payload.name, tape)
@@ -75,10 +75,10 @@ class GrappleWatch:
         for payload in self.payloads:
             x = [tape.read(cell_names.AGAINST(payload.name, i)) for i in range(12)]
             w, v = (x[0], x[1], x[2]), (x[3], x[4], x[5])
-            pose = payloads.pose_in_link(payload, tape.read)
+            pose = bodies.pose_in_link(payload, tape.read)
             w_now, v_now = fixed_motion((links[payload.link].w, links[payload.link].v), pose)
             left = sub(w, sub(w_now, (x[6], x[7], x[8]))), sub(v, sub(v_now, (x[9], x[10], x[11])))
-            spin, linear = momentum(payloads.body_of(self.system, payload, tape.read), left)
+            spin, linear = momentum(bodies.body_of(self.system, payload, tape.read), left)
             caught = tape.read_mask(cell_names.GRAPPLING(payload.name))
             lost = 0.5 * (dot(w, spin) + dot(v, linear))
             cells.keep(tape, caught, cell_names.GRAPPLED(payload.name, "energy"), lost)

@@ -13,7 +13,7 @@ from met.program import cell_names, cells
 from met.program.control.setpoints import course_values
 from met.program.joint_limits import excess
 from met.program.motion.base import ArmWorld, base_of, environment_values
-from met.program.motion.payloads import tree_with_payloads
+from met.program.motion.bodies import tree_with_payloads
 from met.program.step import StepPhases
 from met.program.system import System
 from met.program.values import answer

@@ -22,7 +22,7 @@ from met.plan.chains import chains
 from met.plan.channel import XYZ, Channel
 from met.program.evaluation import Derivative
 from met.program.joint_limits import excess
-from met.program.motion import payloads
+from met.program.motion import bodies
 from met.program.motion.base import ArmWorld, BaseMotion, environment_values, motions
 from met.program.system import ReadCell, System
 from met.program.values import answer, returned
@@ -141,9 +141,9 @@ class Observed:
         name, kind, *rest = parts
         payload, motion = next(other for other in self.system.structure.payloads if other.name == name), self.seen[name]
         if kind == "carried":
-            return choose(payloads.carried(payload, self.read), 1.0, 0.0) if payload.flies else 1.0
+            return choose(bodies.carried(payload, self.read), 1.0, 0.0) if payload.flies else 1.0
         if kind == "distance":
-            way = payloads.gap(self.system, payload, self.read, motion, self.motions[payload.link])
+            way = bodies.gap(self.system, payload, self.read, motion, self.motions[payload.link])
             return sqrt(dot(way, way))
         return _of_frame(motion, kind, rest[0])
 
@@ -151,7 +151,7 @@ class Observed:
         model = dict(self.system.environment)[name]
         assert model.show is not None
         owner, p = environment_values(self.system, name, model, self.read)
-        tree = payloads.tree_with_payloads(self.system, self.read)
+        tree = bodies.tree_with_payloads(self.system, self.read)
         world = ArmWorld(self.system, self.read, tree, self.y, self.base, self.time, self.time)
         signals: Mapping[str, Any] = returned(
             owner, "signals", answer(owner, model.show, p, world), (declared.name for declared in model.signals)
@@ -206,7 +206,7 @@ class Observed:
 
     @cached_property
     def reactions(self) -> tuple[Wrench, ...]:
-        return reactions(payloads.tree_with_payloads(self.system, self.read), self.derivative.solved)
+        return reactions(bodies.tree_with_payloads(self.system, self.read), self.derivative.solved)
 
     @cached_property
     def motions(self) -> dict[str, LinkMotion]:
@@ -216,7 +216,7 @@ class Observed:
     def seen(self) -> dict[str, LinkMotion]:
         """Every payload in the world, by name."""
         return {
-            payload.name: payloads.payload_motion(self.system, payload, self.read, self.y, self.motions)
+            payload.name: bodies.payload_motion(self.system, payload, self.read, self.y, self.motions)
             if payload.flies
             else self.motions[payload.name]
             for payload in self.system.structure.payloads
@@ -237,7 +237,7 @@ class Observed:
             base_velocity=(base.w, base.v),
         )
         for payload in self.system.flying:
-            body = payloads.body_of(self.system, payload, self.read)
+            body = bodies.body_of(self.system, payload, self.read)
             own = energy_of(body, self.seen[payload.name], derivative.gravity)
             total = Energy(
                 total.kinetic + own.kinetic,

@@ -30,7 +30,7 @@ from met.plan import COMPONENTS, GuideUse
 from met.program import cell_names, cells
 from met.program.control.setpoints import own, owner
 from met.program.courses import rate_of_rpy, values_and_rates
-from met.program.motion import base, bodies, payloads
+from met.program.motion import base, bodies
 from met.program.motion.base import BaseMotion
 from met.program.system import ReadCell, System
 from met.program.values import answer, returned
@@ -102,7 +102,7 @@ class _ArmAt:
         n = len(system.joints)
         tree, self._base = system.tree(read), stands
         self._free = system.structure.free
-        self._loaded_tree = payloads.tree_with_payloads(system, read)
+        self._loaded_tree = bodies.tree_with_payloads(system, read)
         self._q, self._qd = y.q[:n], y.qd[:n]
         names = [joint.name for joint in system.joints]
         self._own = [names.index(joint) for joint in use.joints]

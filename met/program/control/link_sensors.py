@@ -19,7 +19,7 @@ from met.integrators.integrator import Motion
 from met.plan import BASE
 from met.program import cells
 from met.program.control import sensing
-from met.program.motion import bodies, payloads
+from met.program.motion import bodies
 from met.program.motion.base import ArmWorld, BaseMotion, base_of, environment_values
 from met.program.system import Fitted, ReadCell, System
 from met.program.values import answer
@@ -104,13 +104,13 @@ class Aboard(ArmWorld):
 
     def _of_payload(self, name: str, moved: Accelerations) -> tuple[Vector, Vector]:
         payload, read = self._flying[name], self._read
-        body = payloads.free_body(self._system, payload)
+        body = bodies.free_body(self._system, payload)
         own = body.qdd(moved.qdd)
-        flown = payloads.flying_motion(self._system, payload, read, self._y)
+        flown = bodies.flying_motion(self._system, payload, read, self._y)
         free = own[3:], turn_vector_back(flown.pose.R, own[:3])  # type: ignore[arg-type]
         carrier = self.link(payload.link)
-        held = fixed_acceleration(carrier.w, self._of_frame(payload.link), payloads.pose_in_link(payload, read))
-        on = payloads.carried(payload, read)
+        held = fixed_acceleration(carrier.w, self._of_frame(payload.link), bodies.pose_in_link(payload, read))
+        on = bodies.carried(payload, read)
         wd, a = (
             (choose(on, x[0], y[0]), choose(on, x[1], y[1]), choose(on, x[2], y[2]))
             for x, y in zip(held, free, strict=True)

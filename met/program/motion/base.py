@@ -20,8 +20,7 @@ from met.integrators.integrator import Motion
 from met.parameter import WORLD
 from met.plan import BASE
 from met.program.courses import TIME
-from met.program.motion.bodies import FreeBody, bodies, flight, place
-from met.program.motion.payloads import payload_motion
+from met.program.motion.bodies import FreeBody, bodies, flight, payload_motion, place
 from met.program.system import PARAMETER, ReadCell, System
 from met.program.values import NamedValues, parameters
 from met.trace import Real, Scalar
