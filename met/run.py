@@ -21,7 +21,7 @@ from met.plan import REPEAT, Cases, Experiment, keys
 from met.plan.limits import LimitUse, extremes, limits
 from met.plan.linear_uses import ANSWERED, NOT_ASKED, WHY_ANSWER, WHY_NONE
 from met.plan.outputs import GRAPPLE_FIGURES, grappled_payloads
-from met.program import cell_names, plausible
+from met.program import cells, plausible
 from met.program.build import COORDINATE, METRIC, build
 from met.program.control.substituted import LIMITED
 from met.program.step import EVENTS
@@ -381,10 +381,10 @@ def results(
         coordinates={c.path: out[COORDINATE + c.path] for c in experiment.cases.coordinates},
         events={name.split(".")[1]: out[name].astype(np.int64) for name in EVENTS},
         limited=out[LIMITED].astype(np.int64),
-        at_limit={use.path: np.where(failed, math.nan, out[cell_names.AT_LIMIT(use.path)] / steps) for use in watched},
-        excess={use.path: np.where(failed, math.nan, out[cell_names.EXCESS(use.path)]) for use in watched if use.bound},
+        at_limit={use.path: np.where(failed, math.nan, out[cells.AT_LIMIT(use.path)] / steps) for use in watched},
+        excess={use.path: np.where(failed, math.nan, out[cells.EXCESS(use.path)]) for use in watched if use.bound},
         extreme_at={
-            name: np.where(failed, 0, out[cell_names.EXTREME_AT(name)]).astype(np.int64) for name in prepared.extremes
+            name: np.where(failed, 0, out[cells.EXTREME_AT(name)]).astype(np.int64) for name in prepared.extremes
         },
         grapples=_grapples(experiment, out, failed),
         warning=warnings,
@@ -395,9 +395,9 @@ def _grapples(experiment: Experiment, out: Mapping[str, np.ndarray], failed: np.
     """The figures of grapples for `Run`."""
     figures = {}
     for payload in grappled_payloads(experiment.structure):
-        never = failed | (out[cell_names.GRAPPLED(payload, "near")] == 0.0)
+        never = failed | (out[cells.GRAPPLED(payload, "near")] == 0.0)
         for name in GRAPPLE_FIGURES:
-            figures[f"{payload}.{name}"] = np.where(never, math.nan, out[cell_names.GRAPPLED(payload, name)])
+            figures[f"{payload}.{name}"] = np.where(never, math.nan, out[cells.GRAPPLED(payload, name)])
     return figures
 
 

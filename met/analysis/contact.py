@@ -14,7 +14,7 @@ from met.environments.environment import Environment, Loads
 from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import Experiment
-from met.program import cell_names
+from met.program import cells
 from met.program.build import Builder
 from met.program.motion.base import ArmWorld, base_of, environment_values
 from met.program.motion.bodies import tree_with_payloads
@@ -108,7 +108,7 @@ def _meeting(builder: Builder, tape: PlainTape, name: str, model: Environment, p
         return float(touch(builder.step.observed(tape).derivative.slope.qdd).rate)
 
     for sticking in builder.step.sticking:
-        tape.write(cell_names.FRICTION_MODE(sticking.name), 1.0)
+        tape.write(cells.FRICTION_MODE(sticking.name), 1.0)
     every = system.environment
     parts = approach(0.0) - approach(1.0)
     vars(system)["environment"] = every

@@ -17,7 +17,7 @@ from met.analysis.lanes import LaneTape
 from met.frozen import frozen
 from met.plan import Experiment
 from met.plan.limits import limits
-from met.program import cell_names
+from met.program.cells import AT_LIMIT
 from met.program.control import guiding, setpoints
 from met.program.system import PARAMETER, System
 
@@ -184,4 +184,4 @@ def _limit(experiment: Experiment, joint: str, counted: Mapping[str, float], ste
         if limit.joint == joint and limit.machine and limit.channels
     ]
     half = 0.5 * steps
-    return next((path for path in reversed(servo) if counted.get(cell_names.AT_LIMIT(path), 0.0) > half), "")
+    return next((path for path in reversed(servo) if counted.get(AT_LIMIT(path), 0.0) > half), "")

@@ -20,7 +20,7 @@ from met.analysis.linear.margins import STABLE
 from met.backends.reference.plain import PlainTape, follow
 from met.frozen import frozen
 from met.plan import Experiment
-from met.program import cell_names
+from met.program import cells
 from met.program.build import Builder
 from met.program.system import System
 from met.servos.motor import Motor
@@ -214,7 +214,7 @@ def _margins(on_beds: BedExperiment, case: int, span: tuple[float, float] | None
     experiment, builder, beds, known = on_beds.experiment, on_beds.builder, on_beds.beds, on_beds.known
     tape = on_beds.begun(case)
     names = [mounted.joint for mounted in beds.mounted]
-    Lambda = np.array([[float(tape.read(cell_names.ARM_INERTIA(a, b))) for b in names] for a in names])
+    Lambda = np.array([[float(tape.read(cells.ARM_INERTIA(a, b))) for b in names] for a in names])
     motors = on_beds.motors(tape)
     rotors = np.array([_rotor(motor) for motor in motors])
     least, together = ends_of_motion(Lambda, rotors) if span is None else span

@@ -23,8 +23,8 @@ from met.frozen import frozen
 from met.integrators.integrator import Integrator, Motion, Slope
 from met.parameter import Parameter
 from met.plan import Experiment
-from met.program import cell_names
 from met.program.build import Builder
+from met.program.cells import FIRST, FRICTION_MODE, HOLDING, SLOPE
 from met.program.evaluation import brake_levels
 from met.program.motion import bodies
 from met.program.step import STAGE
@@ -150,7 +150,7 @@ class Linearizer:
             wide, moved, sizes = self._moved((*self.cells, *own), block)
             with np.errstate(all="ignore"):
                 wide.cells.update({name: moved[name] for name in own})
-                wide.cells.update({cell_names.FIRST(name): moved[name] for name in own})
+                wide.cells.update({FIRST(name): moved[name] for name in own})
                 self.slope[:, :, places[block]] = self._slopes(wide, moved, sizes)
 
     def map(self, *, stages: bool = False) -> StepMap:
@@ -237,7 +237,7 @@ class Linearizer:
         slopes: dict[str, Any] = {f"{name}.qd": wide.read(f"{STAGE}{name}.qdd") for name in step.coordinates}
         slopes |= {f"{name}.q": moved[f"{name}.qd"] for name in step.coordinates}
         slopes |= {f"{name}.q": wide.read(f"{STAGE}{name}.qd") for name in self._turned}
-        slopes |= {name: wide.read(STAGE + cell_names.SLOPE(name)) for name in step.states}
+        slopes |= {name: wide.read(STAGE + SLOPE(name)) for name in step.states}
         return differences(slopes, self.cells, sizes)
 
     def _braked(self, tape: LaneTape) -> dict[str, np.ndarray]:
@@ -253,7 +253,7 @@ class Linearizer:
             first, last = (brake_levels(system, begun.read, y, time, time) for time in (0.0, end))
         return {
             joint: np.broadcast_to(
-                (np.abs(begun.lane(cell_names.HOLDING(joint))) <= first[joint]) & (first[joint] <= last[joint]),
+                (np.abs(begun.lane(HOLDING(joint))) <= first[joint]) & (first[joint] <= last[joint]),
                 tape.lanes,
             )
             for joint in first
@@ -264,12 +264,12 @@ class Linearizer:
         joints held by brakes."""
         tape, step, loose = self.tape, self.builder.step, self.loose
         memory = [f"{actuator.path}.{part.name}" for actuator in self.system.working for part in actuator.parts.memory]
-        first = [cell_names.FIRST(name) for name in memory]
+        first = [FIRST(name) for name in memory]
         for name in (*(f"{coordinate}.qd" for coordinate in step.coordinates), *memory, *first):
             if name in tape.cells:
                 tape.cells[name] = np.where(loose, 0.0, tape.lane(name))
         for sticking in step.sticking:
-            name = cell_names.FRICTION_MODE(sticking.name)
+            name = FRICTION_MODE(sticking.name)
             lets_go = loose & (tape.lane(name) == 0.0)
             if sticking.name in held:
                 lets_go &= ~np.repeat(held[sticking.name], 2)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from met.plan import Experiment
 from met.plan.channel import Channel
 from met.plan.judged import CHANNEL_INPUT
-from met.program import balancing, cell_names, holding, orientations, plausible
+from met.program import balancing, cells, holding, orientations, plausible
 from met.program.control import failing, guiding, link_sensors, sensing, setpoints
 from met.program.control.substituted import LIMITED
 from met.program.evaluation import gravity, law
@@ -208,7 +208,7 @@ class Builder:
         seen = Seen(*sensing.measured(actuator, p, *state, states), Setpoint("none", 0.0, 0.0), 0.0, 0.0, states)
         sensing.start(self.system, tape, actuator, seen)
         for quantity in failing.quantities(actuator) if actuator.use.joint in self.system.failing else ():
-            tape.write(cell_names.SEEN(actuator.use.joint, quantity), sensing.true_value(seen, quantity))
+            tape.write(cells.SEEN(actuator.use.joint, quantity), sensing.true_value(seen, quantity))
 
     def end(self, tape: Tape) -> None:
         self.limits.keep_excess(tape)
@@ -265,9 +265,9 @@ class Builder:
         seen = self.seen(actuator, q, qd, setpoint, tape.time, states)
         seen = sensing.seen_at_tick(self.system, tape, actuator, seen, state)
         if joint in self.system.failing:
-            seen = failing.seen(self.system, actuator, tape.read, seen, cell_names.SEEN(joint, ""))
+            seen = failing.seen(self.system, actuator, tape.read, seen, cells.SEEN(joint, ""))
             for quantity in failing.quantities(actuator):
-                tape.write(cell_names.SEEN(joint, quantity), sensing.true_value(seen, quantity))
+                tape.write(cells.SEEN(joint, quantity), sensing.true_value(seen, quantity))
         for fitted in actuator.sensors:
             tape.write(fitted.path, sensing.true_value(seen, sensing.quantity(fitted)))
         if on_bed is not None:
@@ -309,7 +309,7 @@ class Builder:
         """Joint position and rate between instants, extrapolated with the acceleration of the step just done."""
         joint = self.joints[actuator.index]
         q, qd = self._state_of(tape, joint)
-        a, s = tape.read(cell_names.CARRY(joint)), self._since(tape)
+        a, s = tape.read(cells.CARRY(joint)), self._since(tape)
         rate = qd + s * a
         rate = where(both(self.step.has_dry_friction(tape, joint), qd * rate < 0.0), 0.0, rate)
         return q + s * qd + 0.5 * s * s * a, rate
@@ -317,7 +317,7 @@ class Builder:
     def _carried_state(self, tape: Tape, state: str) -> Real:
         """A servo's state between instants, extrapolated by its change over the step just done."""
         x = tape.read(state)
-        carried = x + self._since(tape) * tape.read(cell_names.CARRY(state))
+        carried = x + self._since(tape) * tape.read(cells.CARRY(state))
         return where(both(self.step.has_dry_friction(tape, state), x * carried < 0.0), 0.0, carried)
 
     def _since(self, tape: Tape) -> Real:

@@ -17,7 +17,7 @@ from met.dynamics.recursion import Wrench, solve
 from met.dynamics.spatial import ZERO, add, choose, compose, inverse, turn_vector
 from met.integrators.integrator import Motion
 from met.plan import INSTANT
-from met.program import cell_names, cells, rotors
+from met.program import cells, rotors
 from met.program.evaluation import servo_response
 from met.program.grappled import GrappleWatch
 from met.program.motion import bodies
@@ -69,16 +69,16 @@ class Grapple:
         grappling: list[Truth] = []
         releasing: list[Truth] = []
         for payload in self.system.flying:
-            stage: Real = tape.read(cell_names.PAYLOAD_STAGE(payload.name))
+            stage: Real = tape.read(cells.PAYLOAD_STAGE(payload.name))
             on = stage == CARRIED
             if payload.grappled:
                 caught = both(stage == FLYING, self._is_time(tape, payload.name, "grapple"))
-                tape.write_mask(cell_names.GRAPPLING(payload.name), caught)
+                tape.write_mask(cells.GRAPPLING(payload.name), caught)
                 grappling.append(caught)
                 on = either(on, caught)
             if payload.released:
                 gone = both(on, self._is_time(tape, payload.name, "release"))
-                tape.write_mask(cell_names.RELEASING(payload.name), gone)
+                tape.write_mask(cells.RELEASING(payload.name), gone)
                 releasing.append(gone)
         tape.write_mask("grappling", any_of(grappling))
         tape.write_mask("releasing", any_of(releasing))
@@ -92,7 +92,7 @@ class Grapple:
         for payload in system.flying:
             if not payload.grappled:
                 continue
-            caught = tape.read_mask(cell_names.GRAPPLING(payload.name))
+            caught = tape.read_mask(cells.GRAPPLING(payload.name))
             own, link = bodies.flying_motion(system, payload, tape.read, y), links[payload.link]
             body, pose = bodies.body_of(system, payload, tape.read), compose(inverse(link.pose), own.pose)
             blow = raised(momentum(body, twist_against(own, link)), pose)
@@ -113,7 +113,7 @@ class Grapple:
         links = motions(system.tree(tape.read), y.q[:n], y.qd[:n], base)
         for payload in system.flying:
             if payload.released:
-                gone = tape.read_mask(cell_names.RELEASING(payload.name))
+                gone = tape.read_mask(cells.RELEASING(payload.name))
                 motion = bodies.carried_motion(payload, tape.read, links)
                 body, v = bodies.free_body(system, payload), turn_vector(motion.pose.R, motion.v)
                 place(body, tape, gone, quaternion(motion.pose.R), motion.pose.p, v, motion.w)

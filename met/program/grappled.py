@@ -19,7 +19,7 @@ from met.dynamics.spatial import Vector, add, compose, cross, dot, inverse, sub
 from met.integrators.integrator import Motion
 from met.plan import BASE, Payload
 from met.plan.outputs import GRAPPLE_FIGURES
-from met.program import cell_names, cells
+from met.program import cells
 from met.program.motion import bodies
 from met.program.motion.base import base_of, motions
 from met.program.system import System
@@ -46,7 +46,7 @@ class GrappleWatch:
     @property
     def outputs(self) -> tuple[str, ...]:
         """Outputs: the figures of each payload's grapple, 0 where it never came."""
-        return tuple(cell_names.GRAPPLED(payload.name, name) for payload in self.payloads for name in GRAPPLE_FIGURES)
+        return tuple(cells.GRAPPLED(payload.name, name) for payload in self.payloads for name in GRAPPLE_FIGURES)
 
     def before(self, tape: Tape) -> None:
         """Keep the poses and velocities of payloads that are grappled at this instant."""
@@ -63,25 +63,25 @@ class GrappleWatch:
                 "speed": sqrt(dot(of_centre, of_centre)) + rate * size,
                 "rate": rate,
             }
-            caught = tape.read_mask(cell_names.GRAPPLING(payload.name))
+            caught = tape.read_mask(cells.GRAPPLING(payload.name))
             for name, value in figures.items():
-                cells.keep(tape, caught, cell_names.GRAPPLED(payload.name, name), value)
+                cells.keep(tape, caught, cells.GRAPPLED(payload.name, name), value)
             for i, x in enumerate((*against[0], *against[1], *_flat(self._carrying(payload, own, link)))):
-                cells.keep(tape, caught, cell_names.AGAINST(payload.name, i), x)
+                cells.keep(tape, caught, cells.AGAINST(payload.name, i), x)
 
     def after(self, tape: Tape) -> None:
         """Keep the energy that the impact at this instant has lost."""
         links = self._links(tape)
         for payload in self.payloads:
-            x = [tape.read(cell_names.AGAINST(payload.name, i)) for i in range(12)]
+            x = [tape.read(cells.AGAINST(payload.name, i)) for i in range(12)]
             w, v = (x[0], x[1], x[2]), (x[3], x[4], x[5])
             pose = bodies.pose_in_link(payload, tape.read)
             w_now, v_now = fixed_motion((links[payload.link].w, links[payload.link].v), pose)
             left = sub(w, sub(w_now, (x[6], x[7], x[8]))), sub(v, sub(v_now, (x[9], x[10], x[11])))
             spin, linear = momentum(bodies.body_of(self.system, payload, tape.read), left)
-            caught = tape.read_mask(cell_names.GRAPPLING(payload.name))
+            caught = tape.read_mask(cells.GRAPPLING(payload.name))
             lost = 0.5 * (dot(w, spin) + dot(v, linear))
-            cells.keep(tape, caught, cell_names.GRAPPLED(payload.name, "energy"), lost)
+            cells.keep(tape, caught, cells.GRAPPLED(payload.name, "energy"), lost)
 
     def _links(self, tape: Tape) -> Mapping[str, LinkMotion]:
         system, y, n = self.system, self._state(tape), len(self.system.joints)

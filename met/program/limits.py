@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from met import models
 from met.plan.limits import LimitUse, extremes, limits
-from met.program import cell_names, cells
+from met.program import cells
 from met.program.control.setpoints import course_values
 from met.program.joint_limits import excess
 from met.program.motion.base import ArmWorld, base_of, environment_values
@@ -36,9 +36,9 @@ class LimitPhases:
     def outputs(self) -> tuple[str, ...]:
         """Outputs: steps that began at each limit; largest excesses over joints' own; for each judged metric, the limit
         at its extreme."""
-        counts = (cell_names.AT_LIMIT(use.path) for use in self.uses)
-        most = (cell_names.EXCESS(use.path) for use in self.uses if use.bound)
-        return (*counts, *most, *(cell_names.EXTREME_AT(name) for name in self.extremes))
+        counts = (cells.AT_LIMIT(use.path) for use in self.uses)
+        most = (cells.EXCESS(use.path) for use in self.uses if use.bound)
+        return (*counts, *most, *(cells.EXTREME_AT(name) for name in self.extremes))
 
     def counting(self) -> tuple[Control, ...]:
         """Phases that count the limits at which the step that ends now began; run before that step is finished."""
@@ -54,14 +54,14 @@ class LimitPhases:
 
     def _count(self, tape: Tape) -> None:
         for path, reached in self._at_begin(tape):
-            cells.count(tape, reached, cell_names.AT_LIMIT(path))
+            cells.count(tape, reached, cells.AT_LIMIT(path))
         self.keep_excess(tape)
 
     def keep_excess(self, tape: Tape) -> None:
         """Keep the largest excess over each limit of a joint, including this instant."""
         for use in self.uses:
             if use.bound:
-                cell = cell_names.EXCESS(use.path)
+                cell = cells.EXCESS(use.path)
                 tape.write(cell, maximum(tape.read(cell), self._excess(tape, use)))
 
     def _excess(self, tape: Tape, use: LimitUse) -> Real:
@@ -78,7 +78,7 @@ class LimitPhases:
         last: Real = 0.0
         for number, use in enumerate(self.extremes[name], 1):
             last = where(self._reached(tape, use, tape.time), float(number), last)
-        cells.keep(tape, is_new, cell_names.EXTREME_AT(name), last)
+        cells.keep(tape, is_new, cells.EXTREME_AT(name), last)
 
     def _reached(self, tape: Tape, use: LimitUse, time: Real) -> Truth:
         """True where a limit is reached at this time, s."""

@@ -18,7 +18,7 @@ from operator import add
 
 from met.dynamics.spatial import choose
 from met.integrators.integrator import Motion, Slope
-from met.program import cell_names, cells, friction
+from met.program import cells, friction
 from met.program.asking import Question, advance_with, changed_count, question_count
 from met.program.control.substituted import Substituted
 from met.program.evaluation import Derivative, brake_levels, derivative, followers_level, servo_response
@@ -124,9 +124,9 @@ class StepPhases:
         for actuator in self.system.ticking_between:
             for memory in actuator.parts.memory:
                 channel = f"{actuator.path}.{memory.name}"
-                tape.write(cell_names.FIRST(channel), tape.read(channel))
+                tape.write(cells.FIRST(channel), tape.read(channel))
             for name, cell in self._carried(actuator):
-                tape.write(cell_names.BEFORE(name), tape.read(cell))
+                tape.write(cells.BEFORE(name), tape.read(cell))
         tape.write("instant", tape.time)
         tape.write("fraction", 0.0)
         tape.write("splits", 0.0)
@@ -142,12 +142,12 @@ class StepPhases:
             rate = tape.read(part.cell)
             has_friction = level > 0.0
             if part.level is None:
-                cells.keep(tape, active, cell_names.HAS_FRICTION(part.name), choose(has_friction, 1.0, 0.0))
+                cells.keep(tape, active, cells.HAS_FRICTION(part.name), choose(has_friction, 1.0, 0.0))
             # without friction at rest it moves freely; a level that rises later in the step opposes the motion at once
             cells.keep(
                 tape,
                 active,
-                cell_names.FRICTION_MODE(part.name),
+                cells.FRICTION_MODE(part.name),
                 where(either(has_friction, rate != 0.0), sign(rate), 1.0),
             )
             any_at_rest = either(any_at_rest, both(has_friction, rate == 0.0))
@@ -178,7 +178,7 @@ class StepPhases:
         part = next((other for other in self.sticking if other.name == name), None)
         if part is None:
             return False
-        return True if part.level is not None else tape.read_mask(cell_names.HAS_FRICTION(name))
+        return True if part.level is not None else tape.read_mask(cells.HAS_FRICTION(name))
 
     def decide(self, tape: Tape) -> None:
         """Decide modes at rest once, from the derivative just taken: breaking away, and turning back."""
@@ -192,13 +192,13 @@ class StepPhases:
         active, y = tape.read_mask("undecided"), self.state(tape)
         changed: Truth = False
         for part, level in zip(self.sticking, self._levels(tape), strict=True):
-            s = tape.read(cell_names.FRICTION_MODE(part.name))
-            slope = tape.read(cell_names.SLOPE(part.name) if part.state else f"{part.name}.qdd")
+            s = tape.read(cells.FRICTION_MODE(part.name))
+            slope = tape.read(cells.SLOPE(part.name) if part.state else f"{part.name}.qdd")
             at_rest = both(self.has_dry_friction(tape, part.name), part.rate(y) == 0.0)
-            s_new = friction.decide(s, at_rest, tape.read(cell_names.HOLDING(part.name)), level, slope)
+            s_new = friction.decide(s, at_rest, tape.read(cells.HOLDING(part.name)), level, slope)
             s_new = where(changed, s, s_new) if single else s_new
             changed = either(changed, s_new != s)
-            cells.keep(tape, active, cell_names.FRICTION_MODE(part.name), s_new)
+            cells.keep(tape, active, cells.FRICTION_MODE(part.name), s_new)
         tape.write_mask("undecided", both(active, changed))
 
     def left_open(self, tape: Tape) -> None:
@@ -216,9 +216,9 @@ class StepPhases:
             if name in self.joints:
                 tape.write(f"{name}.tau", answer.tau[i])
         for name in self._needs:
-            tape.write(cell_names.HOLDING(name), answer.need[name])
+            tape.write(cells.HOLDING(name), answer.need[name])
         for name, slope in zip(self.states, answer.slope.xd, strict=True):
-            tape.write(cell_names.SLOPE(name), slope)
+            tape.write(cells.SLOPE(name), slope)
         for channel, value in answer.signals.items():
             tape.write(channel, value)
         singular: Real = where(answer.solved.base_singular, float(len(self.joints) + 1), 0.0)
@@ -245,7 +245,7 @@ class StepPhases:
         for joint, qd in zip(self.coordinates[len(self.joints) :], answer.slope.qd[len(self.joints) :], strict=True):
             tape.write(f"{STAGE}{joint}.qd", qd)  # a turn's rate is not a rate of the state
         for name, slope in zip(self.states, answer.slope.xd, strict=True):
-            tape.write(STAGE + cell_names.SLOPE(name), slope)
+            tape.write(STAGE + cells.SLOPE(name), slope)
 
     def judge(self, tape: Tape) -> None:
         self._judge(tape, True)
@@ -263,7 +263,7 @@ class StepPhases:
         number: Real = where(out_of_range != 0.0, out_of_range - 1.0, 0.0)
         of_bodies = list(enumerate(bodies.bodies(self.system), len(self.joints)))
         for i, fitted in reversed(list(enumerate(self.system.sensors, len(self.joints) + len(of_bodies)))):
-            watched = [part for name in fitted.channels for part in (name, cell_names.SLOPE(name))]
+            watched = [part for name in fitted.channels for part in (name, cells.SLOPE(name))]
             bad = not_(isfinite(sum((tape.read(name) for name in watched), 0.0)))
             cause, number = where(bad, NOT_FINITE, cause), where(bad, float(i), number)
         for i, body in reversed(of_bodies):
@@ -277,9 +277,9 @@ class StepPhases:
             watched = [f"{joint}.qdd", f"{joint}.q", f"{joint}.qd"]
             moves = isfinite(sum((tape.read(name) for name in watched), 0.0))
             watched += [
-                cell_names.HOLDING(name) for name in self._needs if name == joint or name.startswith(f"{joint}.servo.")
+                cells.HOLDING(name) for name in self._needs if name == joint or name.startswith(f"{joint}.servo.")
             ]
-            watched += [cell_names.SLOPE(name) for name in self.states if name.startswith(f"{joint}.servo.")]
+            watched += [cells.SLOPE(name) for name in self.states if name.startswith(f"{joint}.servo.")]
             bad = not_(isfinite(sum((tape.read(name) for name in watched), 0.0)))
             if bodies.bodies(self.system):  # a sound joint that only bears a body's load is not named
                 bad = both(bad, either(not_(moves), not_(elsewhere)))
@@ -341,7 +341,7 @@ class StepPhases:
             channel = f"{actuator.path}.{memory.name}"
             now = tape.read(channel)
             if actuator in self.system.ticking_between:
-                first = tape.read(cell_names.FIRST(channel))
+                first = tape.read(cells.FIRST(channel))
                 now = first + fraction * (now - first)
             numbers[memory.name] = now
         return NamedValues(actuator.owner, numbers)
@@ -395,14 +395,14 @@ class StepPhases:
         if settled:
             for joint in self.coordinates:
                 for part in ("qd", "qdd"):
-                    tape.write(cell_names.STAGE_SLOPE(settled, f"{joint}.{part}"), tape.read(f"{STAGE}{joint}.{part}"))
+                    tape.write(cells.STAGE_SLOPE(settled, f"{joint}.{part}"), tape.read(f"{STAGE}{joint}.{part}"))
             for name in self.states:
-                tape.write(cell_names.STAGE_SLOPE(settled, name), tape.read(STAGE + cell_names.SLOPE(name)))
+                tape.write(cells.STAGE_SLOPE(settled, name), tape.read(STAGE + cells.SLOPE(name)))
         answers = [
             Slope(
-                tuple(tape.read(cell_names.STAGE_SLOPE(n, f"{joint}.qd")) for joint in self.coordinates),
-                tuple(tape.read(cell_names.STAGE_SLOPE(n, f"{joint}.qdd")) for joint in self.coordinates),
-                tuple(tape.read(cell_names.STAGE_SLOPE(n, name)) for name in self.states),
+                tuple(tape.read(cells.STAGE_SLOPE(n, f"{joint}.qd")) for joint in self.coordinates),
+                tuple(tape.read(cells.STAGE_SLOPE(n, f"{joint}.qdd")) for joint in self.coordinates),
+                tuple(tape.read(cells.STAGE_SLOPE(n, name)) for name in self.states),
             )
             for n in range(1, settled + 1)
         ]
@@ -414,7 +414,7 @@ class StepPhases:
         return Slope(
             qd,
             tuple(tape.read(f"{joint}.qdd") for joint in self.coordinates),
-            tuple(tape.read(cell_names.SLOPE(name)) for name in self.states),
+            tuple(tape.read(cells.SLOPE(name)) for name in self.states),
         )
 
     def split(self, tape: Tape) -> None:
@@ -447,10 +447,8 @@ class StepPhases:
         for actuator in self.system.ticking_between:
             for name, cell in self._carried(actuator):
                 now = tape.read(cell)
-                slope = (now - tape.read(cell_names.BEFORE(name))) / self.schedule.step
-                tape.write(
-                    cell_names.CARRY(name), where(both(self.has_dry_friction(tape, name), now == 0.0), 0.0, slope)
-                )
+                slope = (now - tape.read(cells.BEFORE(name))) / self.schedule.step
+                tape.write(cells.CARRY(name), where(both(self.has_dry_friction(tape, name), now == 0.0), 0.0, slope))
 
     def _carried(self, actuator: Actuator) -> list[tuple[str, str]]:
         """Rates that are extrapolated between instants, and their cells: the joint's rate, the servo's states."""
@@ -466,13 +464,13 @@ class StepPhases:
         return y if copy == STAGE else bodies.with_zero_turn(self.system, y)
 
     def _friction(self, tape: Tape) -> dict[str, Real]:
-        return {part.name: tape.read(cell_names.FRICTION_MODE(part.name)) for part in self.sticking}
+        return {part.name: tape.read(cells.FRICTION_MODE(part.name)) for part in self.sticking}
 
     def _sliding(self, tape: Tape) -> list[Real | None]:
         """Friction modes for crossings: zero, so that it never crosses, where a case has no friction."""
         modes: list[Real | None] = [None] * (len(self.coordinates) + len(self.states))
         for part in self.sticking:
-            mode = tape.read(cell_names.FRICTION_MODE(part.name))
+            mode = tape.read(cells.FRICTION_MODE(part.name))
             number = part.number + (len(self.coordinates) if part.state else 0)
             modes[number] = where(self.has_dry_friction(tape, part.name), mode, 0.0)
         return modes

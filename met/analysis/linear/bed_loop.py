@@ -20,7 +20,7 @@ from met.analysis.linear.jacobian import seeds
 from met.analysis.linear.period import PeriodProgram
 from met.frozen import frozen
 from met.plan import Command, Coordinate, Experiment, Formula, Joint, Link, Origin, Quantity, Schedule
-from met.program import cell_names
+from met.program.cells import REFERENCE_RATE
 from met.servos.motor import Motor
 from met.trace.graph import Formulas
 
@@ -58,7 +58,7 @@ class BedLoop:
         begun = FlowAbreast(self.program, inputs, {}, 0, 1)
         begun.begin_settled()
         rotor, joint = float(motor.ratio * motor.ratio * motor.inertia), self.joint
-        turning = frozenset({f"{joint}.bed.shaft_rate", cell_names.REFERENCE_RATE(joint)})
+        turning = frozenset({f"{joint}.bed.shaft_rate", REFERENCE_RATE(joint)})
         return CaseLoop(self.program, inputs, begun.cells, rotor, turning)
 
 

@@ -13,7 +13,7 @@ from met.analysis.linear.abreast import together
 from met.analysis.linear.flow import Flow, derive
 from met.frozen import frozen
 from met.plan.channel import joint_unit
-from met.program import cell_names
+from met.program import cells
 from met.program.sticking import Sticking
 
 
@@ -50,8 +50,8 @@ def _slopes(flows: Sequence[Flow], sticking: Sticking, modes: Sequence[float]) -
     """d(rate)/dt with these modes of its friction, where flows stand."""
     tried = [flow.copy(tangents=False) for flow in flows]
     for flow, mode in zip(tried, modes, strict=True):
-        flow.cells[cell_names.FRICTION_MODE(sticking.name)] = mode
-    cell = cell_names.SLOPE(sticking.name) if sticking.state else f"{sticking.name}.qdd"
+        flow.cells[cells.FRICTION_MODE(sticking.name)] = mode
+    cell = cells.SLOPE(sticking.name) if sticking.state else f"{sticking.name}.qdd"
     return [flow.cells[cell] for flow in together(tried, derive)]
 
 

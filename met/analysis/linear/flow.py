@@ -11,7 +11,7 @@ from met.analysis.linear.injected import ADDED
 from met.analysis.linear.period import PeriodProgram
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.program import cell_names
+from met.program.cells import AT_LIMIT, FRICTION_MODE, HAS_FRICTION
 from met.program.sticking import Sticking
 from met.program.system import Actuator
 from met.program.values import NamedValues, answer
@@ -201,11 +201,11 @@ class Flow:
     def rubs(self, sticking: Sticking) -> float:
         """A number other than 0 where a joint or a servo's state, whose friction is a parameter, has dry friction in
         this case."""
-        return self.cells.get(cell_names.HAS_FRICTION(sticking.name), 0.0)
+        return self.cells.get(HAS_FRICTION(sticking.name), 0.0)
 
     def mode(self, sticking: Sticking) -> float:
         """The friction mode of a joint or a servo's state: 0 sticks."""
-        return self.cells.get(cell_names.FRICTION_MODE(sticking.name), 0.0)
+        return self.cells.get(FRICTION_MODE(sticking.name), 0.0)
 
     def _rate(self, name: str) -> float:
         return next(
@@ -220,7 +220,7 @@ class Flow:
         """Steps that began at each limit so far, by its path: limits of motors and of loads on the arm. Limits of a
         joint have no effect, and a command reaches its own by time alone."""
         uses = [use for use in self.program.builder.limits.uses if use.channels or use.owner]
-        return {use.path: self.cells.get(cell_names.AT_LIMIT(use.path), 0.0) for use in uses}
+        return {use.path: self.cells.get(AT_LIMIT(use.path), 0.0) for use in uses}
 
     def refuse(self, truth: Any, what: Callable[[], str]) -> None:
         """Raise the Problem of an event where this is true. what: gives the event, in words"""

@@ -13,7 +13,7 @@ from met.analysis.linear.flow import Flow, derive
 from met.analysis.linear.jacobian import seeds, tangent_rows
 from met.analysis.linear.period import PeriodProgram
 from met.frozen import frozen
-from met.program import cell_names
+from met.program import cells
 
 
 @frozen
@@ -85,7 +85,7 @@ def _slopes(now: Flow, states: tuple[str, ...], inputs: tuple[str, ...]) -> tupl
     now.tangents = {name: move for name, move in seeds(program, now, states, width).items() if name not in inputs}
     unit = np.eye(width)
     for place, path in enumerate(inputs):
-        now.tangents[path] = now.tangents[cell_names.FIRST(path)] = unit[n + place]
+        now.tangents[path] = now.tangents[cells.FIRST(path)] = unit[n + place]
     moves: dict[str, Any] = dict(now.tangents)
     derive(now)
     slopes: dict[str, Any] = {}
@@ -93,7 +93,7 @@ def _slopes(now: Flow, states: tuple[str, ...], inputs: tuple[str, ...]) -> tupl
         slopes[f"{name}.q"] = moves.get(f"{name}.qd", 0.0)
         slopes[f"{name}.qd"] = now.tangent(f"{name}.qdd")
     for name in step.states:
-        slopes[name] = now.tangent(cell_names.SLOPE(name))
+        slopes[name] = now.tangent(cells.SLOPE(name))
     for body in program.bodies:  # a small rotation theta changes by d(theta)/dt = dw + theta x w
         w = [now.cells[f"{name}.qd"] for name in body.coordinates[3:]]
         theta, dw = ([unit[states.index(f"{name}.{part}")] for name in body.coordinates[3:]] for part in ("q", "qd"))

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from met.analysis.linear.flow import Flow
-from met.program import cell_names
+from met.program.cells import REFERENCE_RATE
 
 SMALL = 1e-9
 """Rate of a shaft, rad/s, that friction undoes within a period where it holds the shaft at all."""
@@ -47,7 +47,7 @@ def _rates(flow: Flow) -> Iterator[tuple[str, str]]:
     """The cells of such rates with their owners by name. A law without a reference rate has none."""
     for actuator, _, _ in flow.program.system.mounted:
         joint = actuator.use.joint
-        cells = {f"{joint}.bed.shaft_rate": f"{joint}.bed", cell_names.REFERENCE_RATE(joint): f"{joint}.law"}
+        cells = {f"{joint}.bed.shaft_rate": f"{joint}.bed", REFERENCE_RATE(joint): f"{joint}.law"}
         yield from ((cell, name) for cell, name in cells.items() if cell in flow.cells)
 
 

@@ -20,7 +20,7 @@ from met.analysis.linear.period import PeriodProgram
 from met.analysis.linear.shafts import bring_to_rest, loose_beds
 from met.diagnostic import Problem, error
 from met.plan import Command, Experiment, Origin, Quantity, Structure
-from met.program import cell_names
+from met.program import cells
 from met.program.control.substituted import LIMITED, QUEUE
 from met.program.unheld import Unheld, holding_torques, unheld
 
@@ -179,9 +179,7 @@ def _under_way(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow]:
     copies = [flow.copy(tangents=False) for flow in flows]
     heads = tuple(f"{actuator.use.joint}{part}" for actuator, _, _ in program.system.mounted for part in HOLD)
     rates = {
-        cell_names.REFERENCE_RATE(actuator.use.joint): 0.0
-        for actuator, _, law in program.system.mounted
-        if law.observer
+        cells.REFERENCE_RATE(actuator.use.joint): 0.0 for actuator, _, law in program.system.mounted if law.observer
     }
     for _ in range(QUEUE + 1 if heads else 0):
         for flow, later in zip(copies, together(copies, Flow.period), strict=True):
@@ -193,7 +191,7 @@ def _places(program: PeriodProgram) -> tuple[str, ...]:
     """Cells of the positions of joints and of shafts of beds."""
     return (
         *program.positions,
-        *(cell_names.SHAFT_ANGLE(actuator.use.joint) for actuator, _, _ in program.system.mounted),
+        *(cells.SHAFT_ANGLE(actuator.use.joint) for actuator, _, _ in program.system.mounted),
     )
 
 

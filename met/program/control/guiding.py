@@ -27,7 +27,7 @@ from met.dynamics.spatial import (
 from met.guides.guide import Sight, Stance
 from met.integrators.integrator import Motion
 from met.plan import COMPONENTS, GuideUse
-from met.program import cell_names, cells
+from met.program import cells
 from met.program.control.setpoints import own, owner
 from met.program.courses import rate_of_rpy, values_and_rates
 from met.program.motion import base, bodies
@@ -46,10 +46,10 @@ def ticking(system: System) -> Iterator[GuideUse]:
 def start(system: System, tape: Tape) -> None:
     """Write the start of guides: their joints' positions, rates of 0, and the guided frames where paths begin."""
     for use in ticking(system):
-        tape.write(cell_names.GUIDE_TIME(use.name), 0.0)
+        tape.write(cells.GUIDE_TIME(use.name), 0.0)
         for joint in use.joints:
-            tape.write(cell_names.GUIDE_POSITION(joint), tape.read(f"{joint}.q"))
-            tape.write(cell_names.GUIDE_RATE(joint), 0.0)
+            tape.write(cells.GUIDE_POSITION(joint), tape.read(f"{joint}.q"))
+            tape.write(cells.GUIDE_RATE(joint), 0.0)
         guide = models.find("guide", use.model, use.place)
         for memory in guide.memory:
             tape.write(f"guides.{use.name}.{memory.name}", memory.start)
@@ -64,10 +64,8 @@ def tick(system: System, tape: Tape, use: GuideUse) -> None:
     guide = models.find("guide", use.model, use.place)
     assert guide.steer is not None
     period = use.divisor / system.structure.schedule.base_hz
-    begun = {joint: tape.read(cell_names.GUIDE_POSITION(joint)) for joint in use.joints}
-    positions = {
-        joint: position + period * tape.read(cell_names.GUIDE_RATE(joint)) for joint, position in begun.items()
-    }
+    begun = {joint: tape.read(cells.GUIDE_POSITION(joint)) for joint in use.joints}
+    positions = {joint: position + period * tape.read(cells.GUIDE_RATE(joint)) for joint, position in begun.items()}
     y, stands = _state(system, tape, tape.time)
     number = {joint.name: i for i, joint in enumerate(system.joints)}
     q = [positions.get(joint.name, y.q[i]) for i, joint in enumerate(system.joints)]
@@ -84,9 +82,9 @@ def tick(system: System, tape: Tape, use: GuideUse) -> None:
     for name, value in new_memory.items():
         tape.write(f"guides.{use.name}.{name}", value)
     for joint, rate in zip(use.joints, steered.rates, strict=True):
-        tape.write(cell_names.GUIDE_POSITION(joint), positions[joint])
-        tape.write(cell_names.GUIDE_RATE(joint), rate)
-    tape.write(cell_names.GUIDE_TIME(use.name), tape.time)
+        tape.write(cells.GUIDE_POSITION(joint), positions[joint])
+        tape.write(cells.GUIDE_RATE(joint), rate)
+    tape.write(cells.GUIDE_TIME(use.name), tape.time)
 
 
 def way_along(system: System, tape: Tape, use: GuideUse) -> Real:
@@ -152,9 +150,7 @@ def _state(system: System, tape: Tape, time: Real) -> tuple[Motion, BaseMotion]:
 
 def _begun(use: GuideUse) -> list[str]:
     """The cells of the initial guided frame: the rows of its axes, and its origin."""
-    return [
-        cell_names.GUIDE_FRAME(use.name, name) for name in (*(f"R{i}{j}" for i in range(3) for j in range(3)), *"xyz")
-    ]
+    return [cells.GUIDE_FRAME(use.name, name) for name in (*(f"R{i}{j}" for i in range(3) for j in range(3)), *"xyz")]
 
 
 def _wanted(system: System, tape: Tape, use: GuideUse) -> Stance:

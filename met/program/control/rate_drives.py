@@ -8,7 +8,7 @@ loop, with the law's estimate of the shaft's rate and an integral of its own, se
 from __future__ import annotations
 
 from met.frozen import frozen
-from met.program import cell_names
+from met.program import cells
 from met.program.system import Actuator, System
 from met.program.values import answer
 from met.servos.motor import Motor, RateLoop
@@ -50,22 +50,22 @@ class RateDrives:
 
     def begin(self, tape: Tape, joint: Mounted) -> None:
         """Start the loop of an armed drive with an integral of 0."""
-        tape.write(cell_names.LOOP_INTEGRAL(joint.joint), 0.0)
+        tape.write(cells.LOOP_INTEGRAL(joint.joint), 0.0)
 
     def integral(self, tape: Tape, joint: Mounted) -> Real:
         """The integral of the drive's loop at this tick, rad; 0 where it has no loop."""
-        return tape.read(cell_names.LOOP_INTEGRAL(joint.joint)) if joint.closes_rate_loop else 0.0
+        return tape.read(cells.LOOP_INTEGRAL(joint.joint)) if joint.closes_rate_loop else 0.0
 
     def want(self, tape: Tape, joint: Mounted, seen: Seen) -> None:
         """Keep the joint rate that the servo's law gives its rate loop at this tick, rad/s (m/s)."""
         assert joint.actuator.servo.rate_wanted is not None
         p = self.system.servo_values(joint.actuator, tape.read)
         wanted = answer(joint.actuator.owner, joint.actuator.servo.rate_wanted, p, seen.q, seen.setpoint)
-        tape.write(cell_names.RATE_WANTED(joint.joint), wanted)
+        tape.write(cells.RATE_WANTED(joint.joint), wanted)
 
     def commanded_rate(self, tape: Tape, joint: Mounted, motor: Motor) -> Real:
         """The rate of the shaft that the drive is commanded at this tick, rad/s."""
-        return motor.ratio * tape.read(cell_names.RATE_WANTED(joint.joint))
+        return motor.ratio * tape.read(cells.RATE_WANTED(joint.joint))
 
     def torque(
         self, tape: Tape, joint: Mounted, motor: Motor, commanded: Real, integral: Real, w: Real
@@ -81,7 +81,7 @@ class RateDrives:
     def wind(self, tape: Tape, joint: Mounted, commanded: Real, w: Real, after: Real) -> None:
         """Advance the kept integral to the next tick, as `wound` does."""
         wound = self.wound(tape, joint, commanded, self.integral(tape, joint), w, after)
-        tape.write(cell_names.LOOP_INTEGRAL(joint.joint), wound)
+        tape.write(cells.LOOP_INTEGRAL(joint.joint), wound)
 
     def loop(self, tape: Tape, joint: Mounted) -> RateLoop:
         """The rate loop of the joint's servo."""

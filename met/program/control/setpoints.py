@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from met import models
 from met.parameter import Parameter
 from met.plan import GuideUse
-from met.program import cell_names
+from met.program import cells
 from met.program.system import Actuator, ReadCell, System
 from met.program.values import NamedValues, answer, parameters
 from met.servos.servo import Setpoint
@@ -57,11 +57,11 @@ def _of_guide(system: System, joint: str, kind: str, use: GuideUse, read: ReadCe
     leads."""
     guide = models.find("guide", use.model, use.place)
     if guide.course is None:
-        rate = read(cell_names.GUIDE_RATE(joint))
+        rate = read(cells.GUIDE_RATE(joint))
         if kind == "rate":
             return Setpoint(kind, rate, 0.0)
         return Setpoint(
-            kind, read(cell_names.GUIDE_POSITION(joint)) + rate * (time - read(cell_names.GUIDE_TIME(use.name))), rate
+            kind, read(cells.GUIDE_POSITION(joint)) + rate * (time - read(cells.GUIDE_TIME(use.name))), rate
         )
     p, joints = own(system, use, read)
     begins = [system.value(f"initial.{guided}.q", read) for guided in use.joints]

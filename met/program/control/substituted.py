@@ -21,7 +21,7 @@ from typing import Any
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import REPEAT, SEED
-from met.program import cell_names, cells
+from met.program import cells
 from met.program.control.rate_drives import Mounted, RateDrives
 from met.program.control.sensing import READING
 from met.program.system import Actuator, System
@@ -99,7 +99,7 @@ class Substituted:
         """Names of the outputs that go over the wires, by the cells that hold them."""
         return (
             {
-                f"wire:{joint.joint}.{name}": cell_names.SENT(joint.joint, name)
+                f"wire:{joint.joint}.{name}": cells.SENT(joint.joint, name)
                 for joint in self.mounted
                 for name in (joint.bed.drive, "current")
             }
@@ -157,16 +157,16 @@ class Substituted:
             if self.wire:  # the inner state of a real bed is unknown
                 for memory in joint.bed.memory:
                     tape.write(f"{joint.joint}.bed.{memory.name}", math.nan)
-            for cell in (cell_names.READ, cell_names.READ_BEFORE, cell_names.SHAFT_RATE, cell_names.REFERENCE_RATE):
+            for cell in (cells.READ, cells.READ_BEFORE, cells.SHAFT_RATE, cells.REFERENCE_RATE):
                 tape.write(cell(joint.joint), w)
             for part in "wy":
-                tape.write(cell_names.OBSERVED(joint.joint, part), w)
-            tape.write(cell_names.SHAFT_ANGLE(joint.joint), motor.ratio * tape.read(f"{joint.joint}.q"))
+                tape.write(cells.OBSERVED(joint.joint, part), w)
+            tape.write(cells.SHAFT_ANGLE(joint.joint), motor.ratio * tape.read(f"{joint.joint}.q"))
             if joint.closes_rate_loop:
                 self.rate_drives.begin(tape, joint)
             for i in range(4):
                 for j in range(i + 1):
-                    tape.write(cell_names.COVARIANCE(joint.joint, i, j), _UNKNOWN[i] if i == j else 0.0)
+                    tape.write(cells.COVARIANCE(joint.joint, i, j), _UNKNOWN[i] if i == j else 0.0)
 
     def begin_bed(self, tape: Tape, joint: Mounted, w: Real) -> None:
         """Start the emulated bed of a shaft, its own, which has turned at w rad/s for long."""
@@ -182,13 +182,13 @@ class Substituted:
             P = observer.next_covariance(model, P, noise)
             for i in range(4):
                 for j in range(i + 1):
-                    tape.write(cell_names.COVARIANCE(joint.joint, i, j), P[i][j])
+                    tape.write(cells.COVARIANCE(joint.joint, i, j), P[i][j])
 
     def gain(self, tape: Tape) -> None:
         for joint in self.mounted:
             gains = observer.gain_of(self._covariance(tape, joint), self._noise(tape, joint))
             for i, value in enumerate(gains):
-                tape.write(cell_names.OBSERVER_GAIN(joint.joint, i), value)
+                tape.write(cells.OBSERVER_GAIN(joint.joint, i), value)
 
     # A tick.
 
@@ -230,27 +230,27 @@ class Substituted:
             rate = read * self.scale(tape, joint).rate
             w: Real = rate
             if joint.law.observer:
-                gain = tuple(tape.read(cell_names.OBSERVER_GAIN(name, i)) for i in range(4))
+                gain = tuple(tape.read(cells.OBSERVER_GAIN(name, i)) for i in range(4))
                 x = observer.corrected(self._observed(tape, joint), gain, rate)  # type: ignore[arg-type]
                 self._observe(tape, joint, x)
                 w = x[0]
                 tape.write(f"{name}.law.unknown_torque", x[3])
-            turned = 0.5 * self.period * (w + tape.read(cell_names.SHAFT_RATE(name)))
+            turned = 0.5 * self.period * (w + tape.read(cells.SHAFT_RATE(name)))
             tape.write(
-                cell_names.SHAFT_ANGLE(name),
-                tape.read(cell_names.SHAFT_ANGLE(name)) + where(tape.tick == 0.0, 0.0, turned),
+                cells.SHAFT_ANGLE(name),
+                tape.read(cells.SHAFT_ANGLE(name)) + where(tape.tick == 0.0, 0.0, turned),
             )
-            tape.write(cell_names.READ_BEFORE(name), tape.read(cell_names.READ(name)))
-            tape.write(cell_names.READ(name), rate)
-            tape.write(cell_names.SHAFT_RATE(name), w)
+            tape.write(cells.READ_BEFORE(name), tape.read(cells.READ(name)))
+            tape.write(cells.READ(name), rate)
+            tape.write(cells.SHAFT_RATE(name), w)
             tape.write(f"{name}.law.rate", w)
 
     def follow(self, tape: Tape) -> None:
         """Set the arm's joints to the shafts' positions and rates."""
         for joint in self.mounted:
             ratio = self.motor(tape, joint).ratio
-            tape.write(f"{joint.joint}.q", tape.read(cell_names.SHAFT_ANGLE(joint.joint)) / ratio)
-            tape.write(f"{joint.joint}.qd", tape.read(cell_names.SHAFT_RATE(joint.joint)) / ratio)
+            tape.write(f"{joint.joint}.q", tape.read(cells.SHAFT_ANGLE(joint.joint)) / ratio)
+            tape.write(f"{joint.joint}.qd", tape.read(cells.SHAFT_RATE(joint.joint)) / ratio)
 
     def seen(self, tape: Tape, actuator: Actuator) -> tuple[Real, Real] | None:
         """Position and filtered rate of a substituted joint, as its servo's computer sees them; None for others. Where
@@ -258,8 +258,8 @@ class Substituted:
         for joint in self.mounted:
             if joint.actuator is actuator:
                 ratio = self.motor(tape, joint).ratio
-                q = tape.read(cell_names.SHAFT_ANGLE(joint.joint)) / ratio
-                rate = cell_names.SHAFT_RATE if joint.closes_rate_loop else cell_names.READ
+                q = tape.read(cells.SHAFT_ANGLE(joint.joint)) / ratio
+                rate = cells.SHAFT_RATE if joint.closes_rate_loop else cells.READ
                 return q, tape.read(rate(joint.joint)) / ratio
         return None
 
@@ -273,15 +273,15 @@ class Substituted:
         """Write Lambda and b_0 at this instant: the load of the arm on the substituted joints."""
         Lambda, b_0 = self.loads(tape)
         for joint, row, b in zip(self.mounted, Lambda, b_0, strict=True):
-            tape.write(cell_names.ARM_TORQUE(joint.joint), b)
+            tape.write(cells.ARM_TORQUE(joint.joint), b)
             for other, entry in zip(self.mounted, row, strict=True):
-                tape.write(cell_names.ARM_INERTIA(joint.joint, other.joint), entry)
+                tape.write(cells.ARM_INERTIA(joint.joint, other.joint), entry)
 
     def act(self, tape: Tape) -> None:
         """Run the law: load torque, commands over the wire, the joint's acceleration; the observer looks ahead."""
         assert self.law is not None
-        Lambda = [[tape.read(cell_names.ARM_INERTIA(a.joint, b.joint)) for b in self.mounted] for a in self.mounted]
-        b_0 = [tape.read(cell_names.ARM_TORQUE(joint.joint)) for joint in self.mounted]
+        Lambda = [[tape.read(cells.ARM_INERTIA(a.joint, b.joint)) for b in self.mounted] for a in self.mounted]
+        b_0 = [tape.read(cells.ARM_TORQUE(joint.joint)) for joint in self.mounted]
         ahead = [self._ahead(tape, joint) for joint in self.mounted]
         motions: Sequence[balance.Balanced | None] = [None] * len(self.mounted)
         if self.law.balance != "none":
@@ -308,7 +308,7 @@ class Substituted:
             for name, value in memory.items():
                 tape.write(f"{joint.joint}.law.{name}", value)
             applied.append(self._send(tape, joint, command, output))
-            tape.write(cell_names.GIVEN(joint.joint), output.qdd)
+            tape.write(cells.GIVEN(joint.joint), output.qdd)
             tape.write(f"{joint.joint}.law.torque", output.torque)
         if self.law.observer:
             self._look_ahead(tape, Lambda, b_0, applied)
@@ -319,15 +319,15 @@ class Substituted:
     def first(self, tape: Tape) -> None:
         """The acceleration with which the step begins; a servo faster than the dynamics changes it during the step."""
         for joint in self.mounted:
-            tape.write(cell_names.GIVEN_FIRST(joint.joint), tape.read(cell_names.GIVEN(joint.joint)))
+            tape.write(cells.GIVEN_FIRST(joint.joint), tape.read(cells.GIVEN(joint.joint)))
 
     def accelerations(self, tape: Tape, fraction: Real) -> dict[int, Real]:
         """Accelerations of the substituted joints at a share of the step, by number."""
         qdd = {}
         for joint in self.mounted:
-            now = tape.read(cell_names.GIVEN(joint.joint))
+            now = tape.read(cells.GIVEN(joint.joint))
             if self.divisor % self.dynamics:
-                first = tape.read(cell_names.GIVEN_FIRST(joint.joint))
+                first = tape.read(cells.GIVEN_FIRST(joint.joint))
                 now = first + fraction * (now - first)
             qdd[joint.index] = now
         return qdd
@@ -338,7 +338,7 @@ class Substituted:
         """The shaft when the present output acts: the observer's, over the delay; else the one just read."""
         integral = self.rate_drives.integral(tape, joint)
         if not joint.law.observer:
-            return _Ahead(tape.read(cell_names.READ(joint.joint)), integral)
+            return _Ahead(tape.read(cells.READ(joint.joint)), integral)
         delay, x = self._delay(tape, joint), self._observed(tape, joint)
         for turn in range(QUEUE):
             wire = self._queued(tape, joint, delay - float(turn))
@@ -357,8 +357,8 @@ class Substituted:
         current: Real = 0.0
         for i in range(QUEUE):
             due = ago == float(i + 1)
-            commanded = where(due, tape.read(cell_names.QUEUED(joint.joint, i, joint.bed.drive)), commanded)
-            current = where(due, tape.read(cell_names.QUEUED(joint.joint, i, "current")), current)
+            commanded = where(due, tape.read(cells.QUEUED(joint.joint, i, joint.bed.drive)), commanded)
+            current = where(due, tape.read(cells.QUEUED(joint.joint, i, "current")), current)
         return Wire(commanded, current)
 
     def _own_torque(self, tape: Tape, joint: Mounted, w: Real) -> Real:
@@ -393,7 +393,7 @@ class Substituted:
 
     def _wind(self, tape: Tape, joint: Mounted, wire: Wire, motion: balance.Balanced | None) -> None:
         """Advance the modelled integral of the drive's rate loop to the next tick."""
-        w: Real = tape.read(cell_names.SHAFT_RATE(joint.joint))
+        w: Real = tape.read(cells.SHAFT_RATE(joint.joint))
         after = w if motion is None else w + self.period * self.motor(tape, joint).ratio * motion.qdd
         if joint.law.observer:
             after = self._observed(tape, joint)[0]
@@ -427,13 +427,13 @@ class Substituted:
         if self.wire:
             early = self._queued(tape, joint, delay - float(self.late))
             now = delay <= float(self.late)
-            tape.write(cell_names.SENT(name, tells), where(now, wanted.drive, early.drive))
-            tape.write(cell_names.SENT(name, "current"), where(now, wanted.current, early.current))
+            tape.write(cells.SENT(name, tells), where(now, wanted.drive, early.drive))
+            tape.write(cells.SENT(name, "current"), where(now, wanted.current, early.current))
         for i in reversed(range(1, QUEUE)):
-            tape.write(cell_names.QUEUED(name, i, tells), tape.read(cell_names.QUEUED(name, i - 1, tells)))
-            tape.write(cell_names.QUEUED(name, i, "current"), tape.read(cell_names.QUEUED(name, i - 1, "current")))
-        tape.write(cell_names.QUEUED(name, 0, tells), wanted.drive)
-        tape.write(cell_names.QUEUED(name, 0, "current"), wanted.current)
+            tape.write(cells.QUEUED(name, i, tells), tape.read(cells.QUEUED(name, i - 1, tells)))
+            tape.write(cells.QUEUED(name, i, "current"), tape.read(cells.QUEUED(name, i - 1, "current")))
+        tape.write(cells.QUEUED(name, 0, tells), wanted.drive)
+        tape.write(cells.QUEUED(name, 0, "current"), wanted.current)
         tape.write(f"{name}.bed.drive_{tells}", applied.drive)
         tape.write(f"{name}.bed.load_current", applied.current)
         return applied
@@ -442,7 +442,7 @@ class Substituted:
         """The observer's state at the next tick, and the rate that the joint's own motor would have then."""
         sides = []
         for joint, wire in zip(self.mounted, applied, strict=True):
-            w_ref = tape.read(cell_names.REFERENCE_RATE(joint.joint))
+            w_ref = tape.read(cells.REFERENCE_RATE(joint.joint))
             integral = self.rate_drives.integral(tape, joint)
             driving, falls = self._bed_torque(tape, joint, wire, w_ref, integral)
             sides.append(self._side(tape, joint, w_ref, driving, 0.0, falls=falls))
@@ -450,7 +450,7 @@ class Substituted:
         for joint, side, motion in zip(self.mounted, sides, balance.balanced(sides, Lambda, b_0), strict=True):
             after = side.w + self.period * side.ratio * motion.qdd
             after = where(motion.s * after < 0.0, 0.0, after)
-            tape.write(cell_names.REFERENCE_RATE(joint.joint), after)
+            tape.write(cells.REFERENCE_RATE(joint.joint), after)
             tape.write(f"{joint.joint}.law.reference_rate", side.w)
 
     def _bed_torque(self, tape: Tape, joint: Mounted, wire: Wire, w: Real, integral: Real) -> tuple[Real, Real | None]:
@@ -495,11 +495,11 @@ class Substituted:
         return LawInput(
             motor=motor,
             inertia=inertia,
-            rate=tape.read(cell_names.READ(name)),
-            before=tape.read(cell_names.READ_BEFORE(name)),
-            w=tape.read(cell_names.SHAFT_RATE(name)),
+            rate=tape.read(cells.READ(name)),
+            before=tape.read(cells.READ_BEFORE(name)),
+            w=tape.read(cells.SHAFT_RATE(name)),
             d=self._observed(tape, joint)[3] if joint.law.observer else 0.0,
-            w_ref=tape.read(cell_names.REFERENCE_RATE(name)) if joint.law.observer else 0.0,
+            w_ref=tape.read(cells.REFERENCE_RATE(name)) if joint.law.observer else 0.0,
             period=self.period,
             balance=motion,
             extra=extra,
@@ -556,18 +556,16 @@ class Substituted:
         return observer.Noise(torque=p.torque_noise / T, drift=p.drift * T, reading=p.reading_noise / T)
 
     def _covariance(self, tape: Tape, joint: Mounted) -> observer.Square:
-        entries = [
-            [tape.read(cell_names.COVARIANCE(joint.joint, max(i, j), min(i, j))) for j in range(4)] for i in range(4)
-        ]
+        entries = [[tape.read(cells.COVARIANCE(joint.joint, max(i, j), min(i, j))) for j in range(4)] for i in range(4)]
         return tuple(tuple(row) for row in entries)  # type: ignore[return-value]
 
     def _observed(self, tape: Tape, joint: Mounted) -> observer.Four:
-        w, y, z, d = (tape.read(cell_names.OBSERVED(joint.joint, name)) for name in "wyzd")
+        w, y, z, d = (tape.read(cells.OBSERVED(joint.joint, name)) for name in "wyzd")
         return w, y, z, d
 
     def _observe(self, tape: Tape, joint: Mounted, x: observer.Four) -> None:
         for name, value in zip("wyzd", x, strict=True):
-            tape.write(cell_names.OBSERVED(joint.joint, name), value)
+            tape.write(cells.OBSERVED(joint.joint, name), value)
 
     def _voltage(self, tape: Tape, joint: Mounted) -> Real:
         return tape.read(f"{joint.actuator.path}.voltage")

@@ -49,7 +49,7 @@ from met.dynamics.tree import Tree
 from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import BASE, Payload
-from met.program import cell_names, cells
+from met.program import cells
 from met.program.system import ReadCell, System
 from met.trace import Truth, cos, sin, sqrt, where
 from met.trace.program import Tape
@@ -79,7 +79,7 @@ class FreeBody:
     @property
     def orientation(self) -> tuple[str, ...]:
         """The cells of the body's quaternion."""
-        return tuple(cell_names.BODY_ORIENTATION(self.name, part) for part in "wxyz")
+        return tuple(cells.BODY_ORIENTATION(self.name, part) for part in "wxyz")
 
     def q(self, y: Motion) -> tuple[Real, ...]:
         return y.q[self.first : self.first + SIX]
@@ -237,12 +237,12 @@ def free_body(system: System, payload: Payload) -> FreeBody:
 
 def carried(payload: Payload, read: ReadCell) -> Truth:
     """True where a link carries the payload."""
-    return read(cell_names.PAYLOAD_STAGE(payload.name)) == CARRIED
+    return read(cells.PAYLOAD_STAGE(payload.name)) == CARRIED
 
 
 def pose_in_link(payload: Payload, read: ReadCell) -> Pose:
     """The payload's pose in the link's frame, while the link carries it."""
-    x = [read(cell_names.PAYLOAD_POSE(payload.name, i)) for i in range(12)]
+    x = [read(cells.PAYLOAD_POSE(payload.name, i)) for i in range(12)]
     return Pose(((x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8])), (x[9], x[10], x[11]))
 
 
@@ -250,7 +250,7 @@ def tree_with_payloads(system: System, read: ReadCell) -> Tree:
     """The arm with the payloads that its links carry."""
     tree = system.tree(read)
     for payload in system.flying:
-        x = [read(cell_names.PAYLOAD_BODY(payload.name, i)) for i in range(10)]
+        x = [read(cells.PAYLOAD_BODY(payload.name, i)) for i in range(10)]
         body = Rigid(x[0], (x[1], x[2], x[3]), (x[4], x[5], x[6], x[7], x[8], x[9]))
         tree = loaded(tree, payload.link, body)
     return tree
@@ -338,7 +338,7 @@ def start(system: System, tape: Tape) -> None:
             turn = quaternion_rpy(*parameter("attitude"))
             w = turn_vector_back(rotation_quaternion(*turn), parameter("rate"))
             place(body, tape, True, turn, parameter("position"), parameter("velocity"), w)
-            tape.write(cell_names.PAYLOAD_STAGE(payload.name), FLYING)
+            tape.write(cells.PAYLOAD_STAGE(payload.name), FLYING)
         else:
             place(body, tape, True, (1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO)
             attach(system, tape, True, payload, Pose(rotation_rpy(*parameter("rpy")), parameter("at")))
@@ -347,16 +347,16 @@ def start(system: System, tape: Tape) -> None:
 def attach(system: System, tape: Tape, active: Truth, payload: Payload, pose: Pose) -> None:
     """Attach a payload to its link, at this pose in its frame, where active."""
     for i, x in enumerate((*pose.R[0], *pose.R[1], *pose.R[2], *pose.p)):
-        cells.keep(tape, active, cell_names.PAYLOAD_POSE(payload.name, i), x)
+        cells.keep(tape, active, cells.PAYLOAD_POSE(payload.name, i), x)
     body = in_tree(system.tree(tape.read), payload.link, body_of(system, payload, tape.read), pose)
     _keep_body(tape, active, payload, body)
-    cells.keep(tape, active, cell_names.PAYLOAD_STAGE(payload.name), CARRIED)
+    cells.keep(tape, active, cells.PAYLOAD_STAGE(payload.name), CARRIED)
 
 
 def detach(tape: Tape, active: Truth, payload: Payload) -> None:
     """Detach a payload from its link, where active."""
     _keep_body(tape, active, payload, NO_INERTIA)
-    cells.keep(tape, active, cell_names.PAYLOAD_STAGE(payload.name), RELEASED)
+    cells.keep(tape, active, cells.PAYLOAD_STAGE(payload.name), RELEASED)
 
 
 def gap(system: System, payload: Payload, read: ReadCell, motion: LinkMotion, link: LinkMotion) -> Vector:
@@ -368,4 +368,4 @@ def gap(system: System, payload: Payload, read: ReadCell, motion: LinkMotion, li
 
 def _keep_body(tape: Tape, active: Truth, payload: Payload, body: Rigid) -> None:
     for i, x in enumerate((body.mass, *body.h, *body.I)):
-        cells.keep(tape, active, cell_names.PAYLOAD_BODY(payload.name, i), x)
+        cells.keep(tape, active, cells.PAYLOAD_BODY(payload.name, i), x)

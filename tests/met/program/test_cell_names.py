@@ -9,9 +9,9 @@ import pytest
 
 import ic
 from met.plan import Experiment
-from met.program import System, build, cell_names
+from met.program import System, build, cells
 from met.program.build import METRIC
-from met.program.cell_names import GUIDE_FRAME, GUIDE_TIME, SHAFT_RATE, CellFamily
+from met.program.cells import GUIDE_FRAME, GUIDE_TIME, SHAFT_RATE, CellFamily
 from met.program.motion.bodies import bodies
 from met.program.orientations import INSTANT, ROW
 from met.program.step import FROM, STAGE
@@ -22,7 +22,7 @@ from tests.met.program.free_flyers import ARM
 from tests.met.program.payload_decks import RUN
 from tests.substitution.hybrid import compiled, deck, loads
 
-FAMILIES = tuple(each for each in vars(cell_names).values() if isinstance(each, CellFamily))
+FAMILIES = tuple(each for each in vars(cells).values() if isinstance(each, CellFamily))
 
 
 def matches(family: CellFamily, name: str) -> bool:
