@@ -11,8 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from met.metrics.metric import Metric, as_channel
-from met.metrics.window import EVERY_JOINT, WINDOW, inside
+from met.metrics.metric import EVERY_JOINT, WINDOW, Metric, as_channel, inside
 from met.parameter import Memory
 from met.trace import Real, maximum, where
 

@@ -12,8 +12,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from met.metrics.metric import Metric
-from met.metrics.window import EVERY_JOINT, ROUNDING, WINDOW, inside
+from met.metrics.metric import EVERY_JOINT, ROUNDING, WINDOW, Metric, inside
 from met.parameter import Memory, Parameter
 from met.trace import Real, both, maximum, where
 

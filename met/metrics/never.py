@@ -10,8 +10,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from met.metrics.metric import Metric
-from met.metrics.window import ANY_JOINT, WINDOW, inside
+from met.metrics.metric import ANY_JOINT, WINDOW, Metric, inside
 from met.parameter import Memory
 from met.trace import Real, maximum, where
 

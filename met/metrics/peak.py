@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from functools import reduce
 from typing import Any
 
-from met.metrics.metric import Metric, OverJoints, as_size
-from met.metrics.window import PART, after_sample, extreme_seen
+from met.metrics.metric import PART, Metric, OverJoints, after_sample, as_size, extreme_seen
 from met.parameter import Memory
 from met.trace import Real, absolute, maximum
 

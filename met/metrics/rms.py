@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from met.metrics.metric import Metric, OverJoints, as_size
-from met.metrics.window import PART, after_sample
+from met.metrics.metric import PART, Metric, OverJoints, after_sample, as_size
 from met.parameter import Memory
 from met.trace import Real, sqrt
 

@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from met.metrics.metric import Metric
-from met.metrics.window import EVERY_JOINT, WINDOW, inside
+from met.metrics.metric import EVERY_JOINT, WINDOW, Metric, inside
 from met.parameter import Memory
 from met.trace import Real, both, where
 

@@ -10,8 +10,7 @@ from ic.meaning.checks.constants import constant_values
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.diagnostic import Label, Place, leave_out
-from met.metrics.metric import Metric
-from met.metrics.window import ROUNDING
+from met.metrics.metric import ROUNDING, Metric
 from met.plan import Structure
 from met.plan.judged import MetricUse, Requirement
 from met.plan.linear_uses import FIGURES
