@@ -14,8 +14,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from met.environments.environment import Environment, Loads, World
-from met.environments.window import WINDOW, never, share
+from met.environments.environment import WINDOW, Environment, Loads, World, never, share
 from met.parameter import Parameter
 
 

@@ -31,8 +31,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from met.environments.environment import Environment, Force, Loads, World
-from met.environments.window import WINDOW, never, passed, share
+from met.environments.environment import WINDOW, Environment, Force, Loads, World, never, passed, share
 from met.parameter import WORLD, ZEROS, Parameter, Signal
 from met.trace import Real, clip, cos, sin, sqrt, where
 from met.vectors import (

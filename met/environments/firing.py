@@ -10,8 +10,7 @@ import itertools
 import math
 from typing import Any
 
-from met.environments.environment import World
-from met.environments.window import WINDOW, never, passed
+from met.environments.environment import WINDOW, World, never, passed
 from met.parameter import Parameter
 from met.trace import Real, floor, maximum, minimum, where
 

@@ -13,8 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from met.environments.environment import Environment
-from met.environments.window import WINDOW, never, open_at
+from met.environments.environment import WINDOW, Environment, never, open_at
 from met.parameter import Parameter
 from met.trace import Real, where
 

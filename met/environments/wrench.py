@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from met.environments.environment import Environment, Force, Loads, World
-from met.environments.window import WINDOW, never, share
+from met.environments.environment import WINDOW, Environment, Force, Loads, World, never, share
 from met.parameter import ZEROS, Parameter
 from met.vectors import Vector, scale
 

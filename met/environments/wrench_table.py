@@ -18,8 +18,7 @@ import math
 from typing import Any
 
 from met.commands.points import ends, linear, segment
-from met.environments.environment import Environment, Force, Loads, World
-from met.environments.window import never
+from met.environments.environment import Environment, Force, Loads, World, never
 from met.parameter import ZEROS, Parameter
 from met.trace import Real, Scalar, gather, where
 from met.vectors import Vector

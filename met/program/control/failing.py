@@ -18,7 +18,7 @@ from met.trace import Real
 
 @frozen
 class StepTimes:
-    """The begin of a step of the dynamics, and its length, s: a `met.environments.window.Step`."""
+    """The begin of a step of the dynamics, and its length, s: a `met.environments.environment.Step`."""
 
     begin: Real
     step: float
