@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from met import run as engine
-from met.environments.gauss import gauss
-from met.environments.plume import ENVIRONMENT, loads, on_plate
+from met.environments.plume import ENVIRONMENT, gauss, loads, on_plate
 from met.trace import Formulas, Graph
 from tests.ic.small_decks import check, experiment, messages
 from tests.met.environments.worlds import Given, Link, given, turned
