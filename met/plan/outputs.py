@@ -20,7 +20,7 @@ GRAPPLE_FIGURES: Mapping[str, tuple[str, str]] = {
     "rate": ("rad/s", "how fast it turned against the link then"),
     "energy": ("J", "kinetic energy that its grapple cost"),
 }
-"""Figures that are recorded of each grapple (`met.program.grappled`): units, and their meanings in words."""
+"""Figures that are recorded of each grapple (`met.program.grapple`): units, and their meanings in words."""
 
 
 def grappled_payloads(structure: Structure) -> tuple[str, ...]:
