@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from met.plan import Experiment
 from met.plan.channel import Channel
 from met.plan.judged import CHANNEL_INPUT
-from met.program import balancing, cells, holding, orientations, plausible
+from met.program import balancing, cells, orientations, plausible
 from met.program.control import failing, guiding, link_sensors, sensing, setpoints
 from met.program.control.substituted import LIMITED
 from met.program.evaluation import gravity, law
@@ -147,7 +147,7 @@ class Builder:
             y = self.step.state(tape)
             demands = balancing.balance(self.system, tape, y, begun)
             if UNHELD in self.watched:
-                first = holding.first_unheld(self.system, tape, y, demands)
+                first = balancing.first_unheld(self.system, tape, y, demands)
                 if self.system.structure.springs:
                     first = where(first == 0.0, balancing.first_unsettled(self.system, tape, y, begun), first)
                 tape.write(UNHELD, first)

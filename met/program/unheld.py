@@ -13,10 +13,9 @@ from met.backends.reference.plain import PlainTape
 from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import Experiment, Joint, ServoUse
-from met.program.balancing import Demand, demands
+from met.program.balancing import Demand, demands, holds
 from met.program.build import Builder
 from met.program.evaluation import brake_levels
-from met.program.holding import holds
 from met.program.system import System
 from met.program.values import parameters
 from met.trace import Real
