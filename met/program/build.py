@@ -14,7 +14,7 @@ from met.plan import Experiment
 from met.plan.channel import Channel
 from met.plan.judged import CHANNEL_INPUT
 from met.program import balancing, cells, orientations, plausible
-from met.program.control import failing, guiding, link_sensors, sensing, setpoints
+from met.program.control import guiding, link_sensors, sensing, setpoints
 from met.program.control.substituted import LIMITED
 from met.program.evaluation import gravity, law
 from met.program.limits import LimitPhases
@@ -207,7 +207,7 @@ class Builder:
         p, state = self.system.servo_values(actuator, tape.read), self._state_of(tape, self.joints[actuator.index])
         seen = Seen(*sensing.measured(actuator, p, *state, states), Setpoint("none", 0.0, 0.0), 0.0, 0.0, states)
         sensing.start(self.system, tape, actuator, seen)
-        for quantity in failing.quantities(actuator) if actuator.use.joint in self.system.failing else ():
+        for quantity in sensing.quantities(actuator) if actuator.use.joint in self.system.failing else ():
             tape.write(cells.SEEN(actuator.use.joint, quantity), sensing.true_value(seen, quantity))
 
     def end(self, tape: Tape) -> None:
@@ -265,8 +265,8 @@ class Builder:
         seen = self.seen(actuator, q, qd, setpoint, tape.time, states)
         seen = sensing.seen_at_tick(self.system, tape, actuator, seen, state)
         if joint in self.system.failing:
-            seen = failing.seen(self.system, actuator, tape.read, seen, cells.SEEN(joint, ""))
-            for quantity in failing.quantities(actuator):
+            seen = sensing.seen(self.system, actuator, tape.read, seen, cells.SEEN(joint, ""))
+            for quantity in sensing.quantities(actuator):
                 tape.write(cells.SEEN(joint, quantity), sensing.true_value(seen, quantity))
         for fitted in actuator.sensors:
             tape.write(fitted.path, sensing.true_value(seen, sensing.quantity(fitted)))
@@ -298,7 +298,7 @@ class Builder:
             actuator.owner, {part.name: tape.read(f"{actuator.path}.{part.name}") for part in parts.memory}
         )
         p = self.system.servo_values(actuator, tape.read)
-        control = failing.law_outputs(self.system, actuator, tape.read, p, seen.time, law(actuator, p, held, seen))
+        control = sensing.law_outputs(self.system, actuator, tape.read, p, seen.time, law(actuator, p, held, seen))
         for name, slope in control.slopes.items():
             path = f"{actuator.path}.{name}"
             tape.write(path, tape.read(path) + period * slope)

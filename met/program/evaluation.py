@@ -17,7 +17,7 @@ from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
 from met.program import rotors
-from met.program.control import failing, link_sensors, sensing, setpoints
+from met.program.control import link_sensors, sensing, setpoints
 from met.program.motion.base import ArmWorld, BaseMotion, base_of, environment_values, free_base
 from met.program.motion.bodies import slopes, slopes_of_payloads, split_wrenches, tree_with_payloads
 from met.program.system import Actuator, ReadCell, System
@@ -214,16 +214,16 @@ def servo_response(
     if parts.continuous:
         with_setpoint = replace(seen, setpoint=setpoints.setpoint(system, actuator, read, time))
         seen = sensing.seen_at_stage(system, actuator, read, with_setpoint, own)
-        seen = failing.seen(system, actuator, read, seen, None)
+        seen = sensing.seen(system, actuator, read, seen, None)
         integrals = {state.name: own[f"{actuator.path}.{state.name}"] for state in parts.integrals}
         control = law(actuator, p, NamedValues(owner, integrals), seen)
-        control = failing.law_outputs(system, actuator, read, p, seen.time, control)
+        control = sensing.law_outputs(system, actuator, read, p, seen.time, control)
         held = NamedValues(owner, {**control.outputs, **integrals})
         slopes.update(control.slopes)
         signals.update({"command": seen.setpoint.value} if actuator.use.command is not None else {}, **control.outputs)
         for quantity in map(sensing.quantity, actuator.sensors):
             signals[f"sensor.{quantity}"] = sensing.true_value(seen, quantity)
-    coupled = failing.coupled(system, actuator, read, begin)
+    coupled = sensing.coupled(system, actuator, read, begin)
     motion = JointMotion(q, qd, time, begin, actuator.command_kind, 1.0 if coupled is None else coupled)
     drive = answer(owner, servo.drive, p, held, natural, motion)
     if coupled is not None:
