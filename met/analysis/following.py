@@ -18,7 +18,7 @@ from met.frozen import frozen
 from met.plan import Experiment
 from met.plan.limits import limits
 from met.program.cells import AT_LIMIT
-from met.program.control import guiding, setpoints
+from met.program.control import guiding
 from met.program.system import PARAMETER, System
 
 SHARE = 0.2
@@ -92,7 +92,7 @@ def unfollowed(
     with np.errstate(all="ignore"):
         for actuator in judged:
             joint, kind = actuator.use.joint, actuator.command_kind
-            setpoint = by_case(setpoints.setpoint(system, actuator, tape.read, tape.time).value)
+            setpoint = by_case(guiding.setpoint(system, actuator, tape.read, tape.time).value)
             begun = by_case(tape.lane(f"{joint}.q"))[:, :1] if kind == "position" else 0.0
             is_at = by_case(tape.lane(f"{joint}.{'q' if kind == 'position' else 'qd'}"))
             for finding in _not_followed(joint, kind, whole, times, setpoint - begun, np.abs(setpoint - is_at)):

@@ -14,7 +14,7 @@ from met.plan import Experiment
 from met.plan.channel import Channel
 from met.plan.judged import CHANNEL_INPUT
 from met.program import balancing, cells, orientations, plausible
-from met.program.control import guiding, link_sensors, sensing, setpoints
+from met.program.control import guiding, link_sensors, sensing
 from met.program.control.substituted import LIMITED
 from met.program.evaluation import gravity, law
 from met.program.limits import LimitPhases
@@ -276,7 +276,7 @@ class Builder:
 
     def setpoint(self, tape: Tape, actuator: Actuator) -> Setpoint:
         """The setpoint of a servo's joint at this tick."""
-        return setpoints.setpoint(self.system, actuator, tape.read, tape.time)
+        return guiding.setpoint(self.system, actuator, tape.read, tape.time)
 
     def seen(
         self,

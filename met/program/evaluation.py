@@ -17,7 +17,7 @@ from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
 from met.program import rotors
-from met.program.control import link_sensors, sensing, setpoints
+from met.program.control import guiding, link_sensors, sensing
 from met.program.motion.base import ArmWorld, BaseMotion, base_of, environment_values, free_base
 from met.program.motion.bodies import slopes, slopes_of_payloads, split_wrenches, tree_with_payloads
 from met.program.system import Actuator, ReadCell, System
@@ -212,7 +212,7 @@ def servo_response(
     seen = Seen(*sensing.measured(actuator, p, q, qd, natural), Setpoint("none", 0.0, 0.0), 0.0, time, natural)
     of_sensors = sensing.slopes(system, actuator, read, seen, own)
     if parts.continuous:
-        with_setpoint = replace(seen, setpoint=setpoints.setpoint(system, actuator, read, time))
+        with_setpoint = replace(seen, setpoint=guiding.setpoint(system, actuator, read, time))
         seen = sensing.seen_at_stage(system, actuator, read, with_setpoint, own)
         seen = sensing.seen(system, actuator, read, seen, None)
         integrals = {state.name: own[f"{actuator.path}.{state.name}"] for state in parts.integrals}

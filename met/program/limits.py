@@ -10,7 +10,7 @@ from __future__ import annotations
 from met import models
 from met.plan.limits import LimitUse, extremes, limits
 from met.program import cells
-from met.program.control.setpoints import course_values
+from met.program.control.guiding import course_values
 from met.program.joint_limits import excess
 from met.program.motion.base import ArmWorld, base_of, environment_values
 from met.program.motion.bodies import tree_with_payloads
