@@ -13,8 +13,7 @@ import numpy as np
 
 from met import optimisers
 from met.plan.searches import SHORTEST, Search
-from met.searches.slope_steps import SlopeSteps
-from met.searches.slopes import SlopeSource
+from met.searches.slopes import SlopeSource, SlopeSteps
 from met.searches.values import MET
 
 SHARE = 4
