@@ -22,9 +22,8 @@ from typing import Any
 
 from met.parameter import ZEROS, Parameter
 from met.sensors import butterworth
-from met.sensors.digital import DELAY, NOISE, PAST, RESOLUTION, filled
 from met.sensors.on_link import ALONG, BIAS, LINK, SCALE, at_rest, component, reading
-from met.sensors.sensor import Felt, Reading, Sensed, Sensor
+from met.sensors.sensor import DELAY, NOISE, PAST, RESOLUTION, Felt, Reading, Sensed, Sensor, filled
 from met.trace import Real
 
 

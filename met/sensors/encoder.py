@@ -12,8 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from met.parameter import Parameter
-from met.sensors.digital import DELAY, PAST, delayed, filled
-from met.sensors.sensor import Reading, Sensed, Sensor
+from met.sensors.sensor import DELAY, PAST, Reading, Sensed, Sensor, delayed, filled
 from met.trace import Real, floor
 
 

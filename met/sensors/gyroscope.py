@@ -15,10 +15,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from met.sensors.digital import DELAY, NOISE, PAST, RESOLUTION, filled
 from met.sensors.on_link import ALONG, BIAS, LINK, SCALE, at_rest, component, reading
 from met.sensors.optional_filter import CUTOFF, FILTER, STATES, behind, fastest, follow, settled, swing
-from met.sensors.sensor import Felt, Reading, Sensed, Sensor
+from met.sensors.sensor import DELAY, NOISE, PAST, RESOLUTION, Felt, Reading, Sensed, Sensor, filled
 from met.trace import Real
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from met.parameter import BASE, Parameter
-from met.sensors.digital import converted, delayed, noisy
-from met.sensors.sensor import Reading, Sensed
+from met.sensors.sensor import Reading, Sensed, converted, delayed, noisy
 from met.trace import Real, sqrt
 from met.vectors import Vector, dot, scale
 

@@ -1,4 +1,4 @@
-"""The declaration of a sensor: it reads a quantity, of a joint or of a link.
+"""The declaration of a sensor: it reads a quantity, of a joint or of a link; and the steps of a number into a computer.
 
 A sensor of a joint stands in a servo, between a quantity and the control law that sees it, and reads at the servo's
 ticks. A sensor of a link (`measures`) stands in a run under a name of its own, and reads at ticks of its own.
@@ -17,7 +17,7 @@ from typing import Any, Protocol
 from met.environments.environment import World
 from met.frozen import frozen
 from met.parameter import Declaration, Memory, Parameter, State
-from met.trace import Real
+from met.trace import Real, rint, where
 from met.vectors import ZERO, Vector
 
 
@@ -97,3 +97,50 @@ class Sensor(Declaration):
     def written(self) -> tuple[Parameter, ...]:
         """The parameters as a deck writes them; those of a link's sensor in its own unit."""
         return tuple(replace(p, unit=self.unit) if self.unit and p.unit == "of" else p for p in self.parameters)
+
+
+MOST = 3
+"""Largest delay in ticks."""
+
+NOISE = Parameter(name="noise", unit="of", default=0.0, at_least=0.0, doc="white noise that is added at each tick, rms")
+RESOLUTION = Parameter(
+    name="resolution",
+    unit="of",
+    default=0.0,
+    at_least=0.0,
+    doc="step of the converter, which rounds to the nearest one; 0: no rounding",
+)
+DELAY = Parameter(
+    name="delay",
+    default=0.0,
+    at_least=0.0,
+    at_most=float(MOST),
+    whole=True,
+    doc="ticks by which the reading is late",
+)
+PAST = tuple(Memory(name=f"past_{n}", unit="of", doc=f"reading {n} ticks before the last") for n in range(MOST))
+
+
+def noisy(p: Any, value: Real, sensed: Sensed) -> Real:
+    """The value with the noise of this tick."""
+    return value + where(p.noise > 0.0, p.noise * sensed.draw(), 0.0)
+
+
+def converted(x: Real, resolution: Real) -> Real:
+    """The value rounded to the nearest of a converter's steps; unchanged where the resolution is 0."""
+    step = where(resolution > 0.0, resolution, 1.0)
+    return where(resolution > 0.0, step * rint(x / step), x)
+
+
+def delayed(p: Any, held: Any, value: Real) -> Reading:
+    """The reading of `delay` ticks ago, and the queue one tick on."""
+    queue = [value, *(getattr(held, memory.name) for memory in PAST)]
+    seen = value
+    for ago in range(1, MOST + 1):
+        seen = where(p.delay == float(ago), queue[ago], seen)
+    return Reading(seen, {memory.name: queue[n] for n, memory in enumerate(PAST)})
+
+
+def filled(value: Real) -> Mapping[str, Real]:
+    """The queue at the start of a run."""
+    return {memory.name: value for memory in PAST}

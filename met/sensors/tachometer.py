@@ -14,9 +14,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from met.sensors.digital import DELAY, NOISE, PAST, RESOLUTION, converted, delayed, filled, noisy
 from met.sensors.optional_filter import CUTOFF, FILTER, STATES, behind, fastest, follow, settled, swing
-from met.sensors.sensor import Reading, Sensed, Sensor
+from met.sensors.sensor import (
+    DELAY,
+    NOISE,
+    PAST,
+    RESOLUTION,
+    Reading,
+    Sensed,
+    Sensor,
+    converted,
+    delayed,
+    filled,
+    noisy,
+)
 from met.trace import Real
 
 

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from met.parameter import Parameter
-from met.sensors.digital import converted
+from met.sensors.sensor import converted
 from met.servos.motor import damping, torque
 from met.substitution import emulated_shaft
 from met.substitution.bed import BedModel, Draw, Wire

@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from met.parameter import Memory, Parameter
-from met.sensors.digital import converted
+from met.sensors.sensor import converted
 from met.servos.motor import TABLE_1
 from met.substitution import butterworth, shaft
 from met.substitution.bed import Draw

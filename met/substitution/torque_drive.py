@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from met.parameter import Parameter
-from met.sensors.digital import converted
+from met.sensors.sensor import converted
 from met.substitution import emulated_shaft
 from met.substitution.bed import TORQUE, BedModel, Draw, Wire
 from met.substitution.drive import LEAST, at_least
