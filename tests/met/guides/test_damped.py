@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from met.guides.damped import damped, gram, least_singular_value
+from met.guides.resolved_rate import damped, gram, least_singular_value
 from met.trace import Formulas, Graph
 
 SHAPES = [(2, 2), (2, 5), (3, 3), (3, 7), (6, 6), (6, 7), (6, 9)]
