@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from met.analysis.linear.injected import ADDED
-from met.analysis.linear.period import PeriodProgram
+from met.analysis.linear.period import ADDED, PeriodProgram
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.program.cells import AT_LIMIT, FRICTION_MODE, HAS_FRICTION

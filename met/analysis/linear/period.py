@@ -15,20 +15,44 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from met.analysis.linear.injected import ADDED, InjectedBuilder
 from met.plan import Experiment, Recorded
 from met.plan.linear_signals import InputSignal
+from met.program.build import Builder
 from met.program.control import guiding
 from met.program.control.sensing import READING
 from met.program.motion import bodies
-from met.program.system import System
-from met.trace.program import Branch, CodeSection, RecordedControl, RecordSection, Unless0, WhileAny
+from met.program.system import Actuator, System
+from met.servos.servo import Seen, Setpoint
+from met.trace.program import Branch, CodeSection, RecordedControl, RecordSection, Tape, Unless0, WhileAny
 from met.trace.recorder import record
 from met.trace.slicing import sections_in
 from met.trace.tangents import TangentSection, moved_by, with_tangents
 
 if TYPE_CHECKING:
     from met import run as engine
+
+
+ADDED = "added:"
+"""Prefix of an input's path: the cell of the number added to it, normally 0."""
+
+
+class InjectedBuilder(Builder):
+    """Builder of a program's phases that adds the inputs where commands and outputs are made."""
+
+    def __init__(self, system: System, inputs: Sequence[InputSignal]) -> None:
+        super().__init__(system)
+        self._added = frozenset(signal.path for signal in inputs)
+
+    def setpoint(self, tape: Tape, actuator: Actuator) -> Setpoint:
+        setpoint, path = super().setpoint(tape, actuator), f"{actuator.path}.command"
+        return replace(setpoint, value=setpoint.value + tape.read(ADDED + path)) if path in self._added else setpoint
+
+    def compute(self, tape: Tape, actuator: Actuator, seen: Seen) -> None:
+        super().compute(tape, actuator, seen)
+        for output in actuator.parts.outputs:
+            path = f"{actuator.path}.{output.name}"
+            if path in self._added:
+                tape.write(path, tape.read(path) + tape.read(ADDED + path))
 
 
 class PeriodProgram:

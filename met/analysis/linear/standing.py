@@ -14,9 +14,8 @@ import numpy as np
 
 from met.analysis.linear.abreast import together
 from met.analysis.linear.flow import Flow
-from met.analysis.linear.injected import ADDED
 from met.analysis.linear.jacobian import PeriodMap, period_map, period_maps
-from met.analysis.linear.period import PeriodProgram
+from met.analysis.linear.period import ADDED, PeriodProgram
 from met.analysis.linear.shafts import bring_to_rest, loose_beds
 from met.diagnostic import Problem, error
 from met.plan import Command, Experiment, Origin, Quantity, Structure
