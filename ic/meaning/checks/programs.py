@@ -6,8 +6,7 @@ import math
 from dataclasses import replace
 
 from ic.meaning.checks.beds import check_beds
-from ic.meaning.checks.steps import check_steps
-from ic.meaning.checks.usual import usual_number
+from ic.meaning.checks.steps import check_steps, usual_number
 from ic.meaning.control.schedule import slowest_that_fits
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import Complaints
