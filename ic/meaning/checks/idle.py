@@ -1,22 +1,27 @@
-"""Environment models that do nothing in a run, or that act from its beginning where that is seldom meant: remarks."""
+"""Environment models that do nothing in a run or act from its beginning, and models that contradict each other."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from ic.meaning.control.servos import differ_beyond_rounding, unit_written
+from ic.meaning.checks.constants import constant_value, constant_values
+from ic.meaning.control.servos import Use, differ_beyond_rounding, unit_written
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters.models import value_place
 from ic.meaning.parameters.owner import Settled
 from ic.meaning.parameters.scope import Scope
 from met import models
+from met.analysis.probe import accelerates
 from met.diagnostic import Label, Place, leave_out
-from met.plan import EnvironmentUse, Joint
+from met.environments.environment import Environment
+from met.parameter import WORLD
+from met.plan import EnvironmentUse, Joint, Structure
 from met.trace import Real, Scalar
 
 ENDS = ("q_min", "q_max")
@@ -120,3 +125,141 @@ def _observe_beginning(
 
     values: tuple[Real, ...] = tuple(settled.value for settled in known)  # type: ignore[misc]  # they are numbers
     scope.checks.observe(values, warn, place, needs=(f"initial.{joint}.q", needs))
+
+
+INSTANTS = 1000
+"""Number of instants of a run at which a command is examined."""
+
+
+def check_together(scope: Scope, uses: Iterable[Use], structure: Structure) -> None:
+    """Warn of environment models that the servos, or each other, contradict."""
+    servos = {use.joint: use for use in uses}
+    for load in structure.environment:
+        _remark_stop(scope, load, servos, structure.schedule.duration)
+        _remark_hold(scope, load, servos, structure)
+    _remark_alone(scope, structure.environment)
+
+
+def _remark_stop(scope: Scope, load: EnvironmentUse, servos: dict[str, Use], duration: float) -> None:
+    """Report a model that would keep a joint between two ends, where the servo moves on against any torque; not where
+    its positions, during the run, are all between them."""
+    model = models.find("environment", load.model, load.place)
+    named = next((parameter.name for parameter in model.parameters if parameter.names == "joint"), None)
+    settled = scope.parameters.get(f"environment.{load.name}.{named}") if model.initial_range and named else None
+    servo = servos.get(str(settled.value)) if settled is not None else None
+    place = (settled.origin.place if settled is not None else None) or load.place
+    if servo is None or servo.parameters is None or servo.servo.at_rest is not None or place is None:
+        return
+    if accelerates(servo.bare, servo.parameters) and not _stays_between(scope, load, model, servo, duration):
+        scope.complaints.remark(
+            "D337",
+            f"`{load.name}` cannot stop joint `{servo.joint}`: servo `{servo.definition}` ({servo.servo.name}) tells "
+            "it its acceleration, and goes on through an end",
+            place,
+            also=[Label(servo.place, "its servo")],
+            help=[
+                "give the joint a servo that has a torque, or leave the stop out",
+                f"or watch the joint, and require that it stays within: "
+                f"`metric most = max {{ of = {servo.joint}.q; }}`",
+            ],
+        )
+
+
+def _stays_between(scope: Scope, load: EnvironmentUse, model: Environment, servo: Use, duration: float) -> bool:
+    """True where a joint begins at rest between the ends, and its position command never leaves them."""
+    command = servo.command
+    if command is None or command.kind != "position" or command.guide:
+        return False
+    profile = models.find("command", command.model)
+    course = constant_values(scope, f"{servo.joint}.servo.command", profile.parameters)
+    lower, upper = (constant_value(scope, f"environment.{load.name}.{name}") for name in model.initial_range)
+    begins, moves = (constant_value(scope, f"initial.{servo.joint}.{part}") for part in ("q", "qd"))
+    if course is None or None in (lower, upper, begins) or moves != 0.0:
+        return False
+    with np.errstate(all="ignore"):
+        commanded = np.append(profile.course(course, np.linspace(0.0, duration, INSTANTS))[0], begins)
+    return bool(np.all((commanded > lower) & (commanded < upper)))
+
+
+def _remark_hold(scope: Scope, load: EnvironmentUse, servos: Mapping[str, Use], structure: Structure) -> None:
+    """Report a model that would hold two bodies, where servos prescribe the motion of all joints between them: then it
+    has no effect."""
+    model = models.find("environment", load.model, load.place)
+    if model.holds is None or load.place is None:
+        return
+    if model.may_be_load and any(_is_of_torques(use.of) for use in structure.metrics):
+        return
+    p = constant_values(scope, f"environment.{load.name}", model.parameters)
+    if p is None:
+        return
+    bodies = [str(getattr(p, name)) for name in model.holds(p)]
+    between = _joints_between(structure, bodies) if bodies else None
+    if not between or any(joint not in servos for joint in between):
+        return
+    prescribed = [servos[joint] for joint in between]
+    if any(use.parameters is None or not accelerates(use.bare, use.parameters) for use in prescribed):
+        return
+    using = next((use for use in prescribed if use.servo.at_rest is None), None)
+    if using is not None:
+        scope.complaints.remark(
+            "D296",
+            f"`{load.name}` holds nothing: servo `{using.definition}` ({using.servo.name}) tells joint `{using.joint}` "
+            f"its acceleration{_and_others(len(prescribed) - 1)}, and what holds `{bodies[0]}` gives way to it",
+            load.place,
+            also=[Label(using.place, "its servo")],
+            help=[
+                "give the joint a servo that has a torque, or leave this out",
+                'if what it takes is what the run is about, `allow D296 because "...";`',
+            ],
+        )
+
+
+def _and_others(count: int) -> str:
+    if not count:
+        return ""
+    return f", as {count} other joint{'s are' if count > 1 else ' is'} told"
+
+
+def _is_of_torques(channel: str) -> bool:
+    """True for a channel, or an expression, of the torque of a joint or its motor."""
+    return not {"tau", "torque", "reaction", "current", "power"}.isdisjoint(re.split(r"\W+", channel))
+
+
+def _joints_between(structure: Structure, bodies: list[str]) -> list[str] | None:
+    """The moving joints between two bodies, or between one and the ground; None where a free base or a payload is
+    involved."""
+    carrying = {joint.child: joint for joint in structure.joints}
+    ways = []
+    for body in [*bodies, WORLD][:2]:
+        if any(payload.name == body for payload in structure.payloads):
+            return None
+        way = []
+        while body in carrying:
+            way.append(carrying[body])
+            body = carrying[body].parent
+        ways.append(way)
+    if structure.free and WORLD in [*bodies, WORLD][:2]:
+        return None
+    first, second = ways
+    apart = [joint for joint in (*first, *second) if (joint in first) != (joint in second)]
+    return [joint.name for joint in apart if joint.kind != "fixed"]
+
+
+def _remark_alone(scope: Scope, environment: Iterable[EnvironmentUse]) -> None:
+    """Report two models that give a quantity of which only one is allowed (`Environment.alone`)."""
+    first: dict[str, EnvironmentUse] = {}
+    for load in environment:
+        model = models.find("environment", load.model, load.place)
+        p = constant_values(scope, f"environment.{load.name}", model.parameters)
+        if model.alone is None or load.place is None or p is None:
+            continue
+        what = model.alone(p)
+        before = first.setdefault(what, load)
+        if what and before is not load:
+            scope.complaints.remark(
+                "D338",
+                f"`{before.name}` and `{load.name}` both give {what}: what they do adds up",
+                load.place,
+                also=[Label(before.place, "this one")] if before.place is not None else [],
+                help="leave one of them out",
+            )

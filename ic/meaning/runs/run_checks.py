@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ic.meaning.checks.failures import check_failures, check_friction
-from ic.meaning.checks.idle import remark_beginnings
+from ic.meaning.checks.idle import check_together, remark_beginnings
 from ic.meaning.checks.magnitudes import check_magnitudes
 from ic.meaning.checks.reach import check_reach
 from ic.meaning.checks.reading import remark_unread
@@ -15,7 +15,6 @@ from ic.meaning.checks.sampling import check_sampling
 from ic.meaning.checks.scales import check_scales
 from ic.meaning.checks.spin import check_spins
 from ic.meaning.checks.swings import check_circuits, check_sensor
-from ic.meaning.checks.together import check_together
 from ic.meaning.control.guides import Guiding, check_guides
 from ic.meaning.control.link_sensors import Sensing
 from ic.meaning.control.schedule import Rate, Ticks, check_stability, fastest_rate
