@@ -16,8 +16,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
-from ic.meaning.checks.asked import grapples, spreads, targets
-from ic.meaning.checks.bodies import booms, centres, forgotten, held, masses, shared_lines
+from ic.meaning.checks.bodies import booms, centres, forgotten, grapples, held, masses, shared_lines, spreads, targets
 from ic.meaning.checks.idle import at_rest
 from ic.meaning.checks.magnitudes import LENGTHS, MASSES, MEANT, SMALLEST_GYRATION
 from ic.meaning.checks.run_numbers import RunNumbers
