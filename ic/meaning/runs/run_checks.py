@@ -13,8 +13,7 @@ from ic.meaning.checks.reading import remark_unread
 from ic.meaning.checks.requirements import check_requirements
 from ic.meaning.checks.sampling import check_sampling
 from ic.meaning.checks.scales import check_scales
-from ic.meaning.checks.spin import check_spins
-from ic.meaning.checks.swings import check_circuits, check_sensor
+from ic.meaning.checks.swings import check_circuits, check_sensor, check_spins
 from ic.meaning.control.guides import Guiding, check_guides
 from ic.meaning.control.link_sensors import Sensing
 from ic.meaning.control.schedule import Rate, Ticks, check_stability, fastest_rate

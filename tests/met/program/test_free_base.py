@@ -238,7 +238,7 @@ def test_a_base_that_runs_away_fails_and_says_so(tmp_path: Path) -> None:
 def test_below_the_spin_that_is_warned_of_a_turn_keeps_the_energy_to_a_hundredth(
     integrator: str, limit: float, tmp_path: Path
 ) -> None:
-    """Of three bodies, about 24 axes: what D300 says (ic/meaning/checks/spin.py), and well above it no more."""
+    """Of three bodies, about 24 axes: what D300 says (ic/meaning/checks/swings.py), and well above it no more."""
     axes = np.random.default_rng(0).normal(size=(24, 3))
     axes /= np.linalg.norm(axes, axis=1)[:, None]
     lost = []
