@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ic.meaning.checks.failures import check_failures, check_friction
+from ic.meaning.checks.failures import check_failures, check_friction, remark_unread
 from ic.meaning.checks.idle import check_together, remark_beginnings
 from ic.meaning.checks.magnitudes import check_magnitudes
 from ic.meaning.checks.reach import check_reach
-from ic.meaning.checks.reading import remark_unread
 from ic.meaning.checks.requirements import check_requirements
 from ic.meaning.checks.sampling import check_sampling
 from ic.meaning.checks.scales import check_scales
