@@ -1,26 +1,200 @@
-"""A value or a course in time, where a deck allows either: a command, a base's motion, a guide's path."""
+"""Values and courses in time, where a deck allows either; commands whose course is a column of a CSV file.
+
+A command follows its rows as they are, so it asks a joint to turn back by almost a turn in one row. A wrap is told from
+a real motion by what surrounds it: with a turn added the rows go on as fast as they went before, and without it the
+row is far faster than all others.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+from statistics import median
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from ic.grammar.syntax import Call, Expression, Name, place_of
-from ic.meaning.control.trajectories import use_file, with_file_named
-from ic.meaning.control.wraps import warn_of_wraps
-from ic.meaning.definitions.merge import Item, MergedBlock, open_call
+from ic.grammar.syntax import Call, Expression, Name, String, Word, place_of
+from ic.meaning.definitions.csv_files import missing_column
+from ic.meaning.definitions.merge import Item, MergedBlock, open_call, refuse_block
 from ic.meaning.expressions.remedies import components
-from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of
+from ic.meaning.parameters import not_sweepable
+from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
+from ic.meaning.parameters.tables import TIME, keep_column, named_file
 from met import models
-from met.commands.profile import Profile
-from met.diagnostic import Place
+from met.commands.profile import COLUMN, FILE, Profile
+from met.diagnostic import Label, Place, Problem, error
 from met.instants import ROUNDING
+from met.models import parameter
+
+LISTS = ("times", "values")
+FEWEST = 2  # rows: a curve goes from one to the next
+
+
+def with_file_named(call: Call) -> Call:
+    """The call with its file named: `trajectory("moves.csv")` is short for `trajectory(file = "moves.csv")`, and a name
+    is a file without its quotes."""
+    if len(call.positional) != 1 or not isinstance(call.positional[0], String | Name):
+        return call
+    named = call.positional[0]
+    return replace(call, positional=(), named=((Word(FILE.name, named.place), named), *call.named))
+
+
+def use_file(
+    scope: Scope, owner: Owner, profile: Profile, body: MergedBlock, name: str, kind: str = "joint"
+) -> dict[str, Any] | None:
+    """Every parameter of a profile that reads a file, entered in the scope; None where one is missing or wrong.
+
+    name  of the column, unless another is named: that of the joint, or of what `kind` says
+    """
+    others = [declared for declared in profile.parameters if declared.name not in LISTS]
+    check_keys(scope, body, [declared.name for declared in profile.written], owner)
+    values = use_model(
+        scope,
+        owner,
+        others,
+        MergedBlock({key: item for key, item in body.items.items() if key in [other.name for other in others]}),
+    )
+    for entry in (FILE.name, COLUMN.name, *LISTS):
+        scope.not_sweepable[owner.join(entry)] = not_sweepable.FILE
+    columns: dict[str, tuple[float, ...]] | None = None
+    file = body.get(FILE.name)
+    if file is None:
+        scope.complaints.missing(
+            owner.place, (FILE.name,), "D075", f"{owner.label} has no `{FILE.name}`", help='write `file = "NAME.csv"`'
+        )
+    else:
+        with scope.complaints.gather():
+            columns = _columns(scope, owner, profile, body, file, name, kind)
+    if columns is None:
+        for entry in LISTS:
+            scope.checks.fail(owner.join(entry))
+    return None if values is None or columns is None else {**values, **columns}
+
+
+def _columns(
+    scope: Scope, owner: Owner, profile: Profile, body: MergedBlock, file: Item, own: str, kind: str
+) -> dict[str, tuple[float, ...]]:
+    """The two lists. Raises Problem."""
+    named = named_file(owner, file)
+    wanted, place = _column_name(owner, body.get(COLUMN.name), own), named.place
+    if body.get(COLUMN.name) is not None:
+        place = place_of(body.items[COLUMN.name].value or named)
+    table = scope.definitions.csv_files.get(named)
+    label_of_file = Label(
+        named.place, "read here"
+    )  # the same for all joints, so that the file's own faults are reported once
+    columns = {}
+    angle = None
+    for name, column_name, where in zip(LISTS, (TIME, wanted), (named.place, place), strict=True):
+        declared = parameter(profile, name)
+        column = table.column(column_name)
+        assert declared is not None  # by the declaration of `from_file`
+        if column is None:
+            why = "the times of the rows stand in a column `time [s]`" if column_name == TIME else ""
+            if where is named.place and not why:
+                why = f'that of the {kind}\'s name is taken, unless `column = "NAME"` names another'
+            raise missing_column(table, column_name, where, why)
+        label = label_of_file if column_name == TIME else Label(named.place, f"read here for {kind} `{own}`")
+        columns[name] = keep_column(scope, owner, declared, table, column, label)
+        if owner.unit(declared)[0] == "rad":
+            angle = column
+    if len(table.rows) < FEWEST:
+        raise Problem(
+            error(
+                "D196",
+                f"`{table.file}` has {len(table.rows) or 'no'} row{'s' if not table.rows else ''}",
+                table.columns[0].place,
+                also=[label_of_file],
+                help=f"a trajectory has {FEWEST} at least; `table` takes a single point",
+            )
+        )
+    if angle is not None:
+        cell, (times, angles) = partial(table.cell, angle), columns.values()
+        warn_of_wraps(scope, f"column `{angle.name}`", times, angles, lambda n: cell(n).place)
+    scope.keep_setting(owner.join(FILE.name), table.file, item=file)
+    scope.keep_setting(owner.join(COLUMN.name), wanted, item=body.get(COLUMN.name), note=f"the {kind}'s name")
+    return columns
+
+
+def _column_name(owner: Owner, item: Item | None, joint: str) -> str:
+    """The name of a joint's column in a file: the written one, else the joint's. Raises Problem D076."""
+    if item is None:
+        return joint
+    refuse_block(item)
+    if isinstance(item.value, String):
+        return item.value.value
+    if isinstance(item.value, Name) and len(item.value.path) == 1:
+        return item.value.text
+    raise Problem(
+        error(
+            "D076",
+            f"`column` of {owner.label} is the name of a column, in quotes",
+            place_of(item.value) if item.value is not None else item.place,
+            help='write `column = "NAME"`',
+        )
+    )
+
+
+TURN = 2.0 * math.pi
+_LEAST = 0.75 * TURN  # a smaller jump is not that of a log whose rows are dense enough for its motion
+_SLACK = 0.01  # rad by which rounding may take a wrapped log beyond one turn
+_FEWEST = 2  # other rows that say how fast the joint is
+_FASTER = 4.0  # times the fastest other row: a jump of less may be a motion
+_GOES_ON = 2.0  # times the fastest other row: with a turn added, a wrapped row is no faster
+_LONGER = 2.0  # times the usual time between rows: a longer one is a move between points, not a row of a log
+
+
+def wrapped_rows(times: Sequence[float], values: Sequence[float]) -> list[int]:
+    """The rows of a column, in rad, before which a log has wrapped the angle; empty where that is not plain."""
+    steps = [
+        (after - before, late - early) for (early, before), (late, after) in pairwise(zip(times, values, strict=True))
+    ]
+    others = [abs(step / time) for step, time in steps if abs(step) <= _LEAST]
+    if (
+        not max(_FEWEST, len(steps) - len(others)) <= len(others) < len(steps)
+        or max(values) - min(values) > TURN + _SLACK
+    ):
+        return []
+    fastest, usual = max(others), median(time for _, time in steps)
+
+    def is_wrap(step: float, time: float) -> bool:
+        rest = TURN - abs(step)
+        fast = abs(step) >= _FASTER * fastest * time and abs(rest) <= _GOES_ON * fastest * time
+        return abs(step) > _LEAST and fast and time <= _LONGER * usual
+
+    return [n for n, (step, time) in enumerate(steps, 1) if is_wrap(step, time)]
+
+
+def warn_of_wraps(
+    scope: Scope, what: str, times: Sequence[float], values: Sequence[float], place: Callable[[int], Place]
+) -> None:
+    """Warn where an angle over time is wrapped. what: the angle, in words; place: of the value in a row, from 0"""
+    rows = wrapped_rows(times, values)
+    if not rows:
+        return
+    n = rows[0]
+    step, time = values[n] - values[n - 1], times[n] - times[n - 1]
+    more = f", and so in {len(rows) - 1:,} more row{'s' * (len(rows) > 2)}" * (len(rows) > 1)
+    scope.complaints.remark(
+        "D387",
+        f"{what} jumps by {step:.4g} rad from one row to the next, almost a turn{more}: such is a log whose angle is "
+        "wrapped",
+        Label(place(n), f"it is followed as a motion of {abs(step / time):.3g} rad/s"),
+        also=[Label(place(n - 1), "the row before")],
+        help=[
+            f"{'add' if step < 0.0 else 'subtract'} a turn, 360 deg, {'to' if step < 0.0 else 'from'} this row and all "
+            "after it",
+            "`numpy.unwrap` does that for a column in rad; for one in deg with `period=360`",
+            'if it is meant so, `allow D387 because "...";`',
+        ],
+    )
 
 
 def use_course(

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ic.meaning.control.wraps import wrapped_rows
+from ic.meaning.control.courses import wrapped_rows
 from tests.ic.meaning.control.trajectories import shown
 
 WRAPPED = (0.0, 1.0, 2.0, 3.1, -3.1, -3.0, -2.0)
