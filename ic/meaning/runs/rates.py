@@ -7,9 +7,20 @@ from collections.abc import Sequence
 from ic.grammar.syntax import Name, place_of
 from ic.language.runs import RATES
 from ic.meaning.control.guides import Guiding, check_period
-from ic.meaning.control.schedule import CONTINUOUS, Rate, Ticks, base_rate, divisor, exact, make_schedule
+from ic.meaning.control.schedule import (
+    CONTINUOUS,
+    Rate,
+    Ticking,
+    Ticks,
+    base_rate,
+    check_instants,
+    divisor,
+    exact,
+    make_schedule,
+    rate_of,
+    report_between_steps,
+)
 from ic.meaning.control.servos import Use, fixed_rate
-from ic.meaning.control.ticking import Ticking, check_instants, rate_of, report_between_steps
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import body_of
 from ic.meaning.parameters.owner import Owner
