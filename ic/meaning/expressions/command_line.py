@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from ic.grammar.syntax import Expression, Setting
-from ic.meaning.expressions.lists import no_single_number
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Value
+from ic.meaning.expressions.quantity import Value, no_single_number
 from ic.text.lexer import COMMAND_LINE
 from met.diagnostic import Place
 from met.frozen import frozen

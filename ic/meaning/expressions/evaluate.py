@@ -26,15 +26,17 @@ from ic.grammar.syntax import (
 )
 from ic.meaning.definitions.row_tables import CSV, is_row_table
 from ic.meaning.definitions.row_tables import USAGE as USAGE_OF_TABLES
-from ic.meaning.expressions.lists import indexed, list_arithmetic, signed
 from ic.meaning.expressions.quantity import (
     Value,
     ValueList,
     as_float,
     in_unit,
     in_words,
+    indexed,
+    list_arithmetic,
     measure_of,
     representable,
+    signed,
     too_large,
 )
 from ic.meaning.expressions.ranges import range_of, spaced

@@ -9,8 +9,7 @@ from ic.meaning.definitions.csv_files import CsvCell
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.definitions.row_tables import RowTable, is_row_table
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, RESERVED, evaluate
-from ic.meaning.expressions.lists import COMPONENTS, component
-from ic.meaning.expressions.quantity import Value, ValueList
+from ic.meaning.expressions.quantity import COMPONENTS, Value, ValueList, component
 from ic.text.complaints import MOST_DIAGNOSTICS, known_words
 from ic.text.lexer import COMMAND_LINE
 from met import units

@@ -1,16 +1,22 @@
 """A quantity, or a list of them: SI numbers with their dimension, each knowing where it was written.
 
 A number may be a recorded scalar, where a sweep varies what it depends on; then what comes of it is recorded too.
+
+Each number of the result is that of the same arithmetic on single numbers, so it has the same bits, and is recorded
+where it depends on a varied value.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 from typing import cast
 
-from ic.grammar.syntax import Unit
+from ic.grammar.syntax import Binary, Indexed, Name, Unit, spanned
+from ic.text.lexer import COMMAND_LINE
 from met import units
-from met.diagnostic import Place, Problem, error
+from met.diagnostic import Label, Place, Problem, error
 from met.frozen import frozen
 from met.messages import other_units
 from met.trace import Real, Scalar
@@ -100,3 +106,106 @@ def representable(number: Real, place: Place, *factors: Real) -> Real:
 
 def too_large(place: Place) -> Problem:
     return Problem(error("D067", "this number is too large: the largest is 1.8e308", place))
+
+
+COMPONENTS = ("x", "y", "z")
+
+Arithmetic = Callable[[Binary, Value, Value], Value]
+
+
+def no_single_number(what: str, listed: ValueList) -> Problem:
+    """The error where a list stands in the place of one number. what: it is given, in words"""
+    count = len(listed.items)
+    help = "leave the brackets out" if count == 1 else f"write one number: these are {count}"
+    if count > 1 and listed.place.file == COMMAND_LINE:
+        help = f"`--set` takes one number, and these are {count}; `--vary`, in its place, runs each of them"
+    return Problem(error("D071", f"{what} is one number, and this is a list", listed.place, help=help))
+
+
+def list_arithmetic(
+    node: Binary, left: Value | ValueList, right: Value | ValueList, of_numbers: Arithmetic
+) -> ValueList:
+    """The operator between lists, or a list and a number. Raises Problem D071 where that has no meaning."""
+    operator, place = node.operator, spanned(left.place, right.place)
+    if isinstance(left, ValueList) and isinstance(right, ValueList):
+        if operator not in ("+", "-"):
+            helps = "write what is meant number by number: `[a.x * b.x, a.y * b.y, a.z * b.z]`, or their sum"
+            raise Problem(
+                error("D071", f"`{operator}` of two lists", node.place, also=_labels(left, right), help=helps)
+            )
+        if len(left.items) != len(right.items):
+            message = f"`{operator}` of {len(left.items)} numbers and {len(right.items)}"
+            helps = "lists are added and subtracted number by number, so both have as many"
+            raise Problem(error("D071", message, node.place, also=_labels(left, right), help=helps))
+        pairs = [(a, b) for a, b in zip(_numbers(left), _numbers(right), strict=True)]
+        return _list_of([of_numbers(node, a, b) for a, b in pairs], place)
+    if isinstance(left, ValueList) and isinstance(right, Value) and operator in ("*", "/"):
+        unit = left.unit if right.dimension == PURE else None
+        return replace(_list_of([of_numbers(node, number, right) for number in _numbers(left)], place), unit=unit)
+    if isinstance(left, Value) and isinstance(right, ValueList) and operator == "*":
+        unit = right.unit if left.dimension == PURE else None
+        return replace(_list_of([of_numbers(node, left, number) for number in _numbers(right)], place), unit=unit)
+    message = f"`{operator}` of {_what(left)} and {_what(right)}"
+    helps = "a list is multiplied with a number and divided by one; lists of as many numbers are added and subtracted"
+    raise Problem(error("D071", message, node.place, also=_labels(left, right), help=helps))
+
+
+def signed(operator: str, written: ValueList, place: Place) -> ValueList:
+    """A list behind a sign."""
+    if operator == "+":
+        return replace(written, place=place)
+    items = [replace(number, number=-number.number, decimal="") for number in _numbers(written)]
+    return replace(_list_of(items, place), unit=written.unit)
+
+
+def component(name: Name, vector: Value | ValueList) -> Value:
+    """The component `v.x` of a vector. Raises Problem D071 where the value is not a list of three numbers."""
+    head, axis = name.path
+    if not isinstance(vector, ValueList) or len(vector.items) != len(COMPONENTS):
+        has = "is one number" if isinstance(vector, Value) else f"has {len(vector.items)}"
+        helps = "`.x`, `.y` and `.z` are of a list of three"
+        raise Problem(error("D071", f"`{head.text}` {has}, and `.{axis.text}` is one of three", name.place, help=helps))
+    return replace(_numbers(vector)[COMPONENTS.index(axis.text)], place=name.place)
+
+
+def indexed(node: Indexed, written: Value | ValueList, index: Value) -> Value | ValueList:
+    """The element `lengths[i]` of a list, the first of which has the index 0. Raises Problem D286."""
+    name, number = node.name.text, index.number
+    if not isinstance(written, ValueList):
+        helps = f"write it without brackets, or a list: `let {name} = [..., ...];`"
+        raise Problem(error("D286", f"`{name}` is one number, and no list", node.place, help=helps))
+    if isinstance(number, Scalar):
+        helps = "vary the values of the list, or a value of its own"
+        raise Problem(error("D286", "which value of a list is taken cannot vary", index.place, help=helps))
+    count = len(written.items)
+    if index.dimension != PURE or number != int(number) or not 0 <= number < count:
+        index_words = f"{number:g}" if index.dimension == PURE else f"a quantity in {units.text(index.dimension)}"
+        helps = (
+            f"`{name}` has {count} values, `{name}[0]` to `{name}[{count - 1}]`"
+            if count != 1
+            else (f"`{name}` has one value, `{name}[0]`")
+        )
+        raise Problem(error("D286", f"`{name}` has no value with the index {index_words}", index.place, help=helps))
+    return replace(written.items[int(number)], place=node.place)
+
+
+def _list_of(items: list[Value], place: Place) -> ValueList:
+    """The list of computed numbers, each at the place of the whole, where its unit would be corrected."""
+    bare = len(items) > 1 and all(item.bare for item in items)
+    return ValueList(tuple(replace(item, place=place, bare=bare) for item in items), place)
+
+
+def _numbers(written: ValueList) -> list[Value]:
+    numbers = [item for item in written.items if isinstance(item, Value)]
+    inner = next((item for item in written.items if isinstance(item, ValueList)), None)
+    if inner is not None:
+        raise Problem(error("D071", "a list inside a list", inner.place))
+    return numbers
+
+
+def _what(value: Value | ValueList) -> str:
+    return "a list" if isinstance(value, ValueList) else "a number"
+
+
+def _labels(left: Value | ValueList, right: Value | ValueList) -> list[Label]:
+    return [Label(side.place, _what(side)) for side in (left, right)]
