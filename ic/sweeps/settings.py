@@ -22,10 +22,10 @@ from ic.grammar.syntax import List, Name, Setting, place_of
 from ic.meaning.definitions.merge import WITH
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import VariedPath
+from ic.meaning.expressions.cycles import unit_remedy
 from ic.meaning.expressions.evaluate import PURE
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, ValueList
-from ic.meaning.expressions.remedies import unit_remedy
 from ic.meaning.parameters.models import word_of
 from ic.meaning.parameters.scope import VARIES
 from ic.sweeps.axes import Column, Sweep, SweepAxis

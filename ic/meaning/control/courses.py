@@ -21,7 +21,7 @@ import numpy as np
 from ic.grammar.syntax import Call, Expression, Name, String, Word, place_of
 from ic.meaning.definitions.csv_files import missing_column
 from ic.meaning.definitions.merge import Item, MergedBlock, open_call, refuse_block
-from ic.meaning.expressions.remedies import components
+from ic.meaning.expressions.cycles import components
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
 from ic.meaning.parameters.owner import Owner

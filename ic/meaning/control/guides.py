@@ -16,7 +16,7 @@ from ic.meaning.control.courses import course_named, use_course
 from ic.meaning.control.schedule import Rate
 from ic.meaning.control.servos import Use, fixed_rate
 from ic.meaning.definitions.merge import Item, MergedBlock
-from ic.meaning.expressions.remedies import components
+from ic.meaning.expressions.cycles import components
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, value_place, word_of

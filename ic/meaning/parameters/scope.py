@@ -24,9 +24,9 @@ from ic.meaning.expressions.command_line import (
     written_origin,
 )
 from ic.meaning.expressions.conditions import Checks, VariedPath
+from ic.meaning.expressions.cycles import components
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, ValueList, no_single_number
-from ic.meaning.expressions.remedies import components
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import XYZ, Owner, Settled

@@ -11,10 +11,9 @@ import numpy as np
 from ic.language.unit_words import either, in_degrees, measure_here, unit_here
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.conditions import Checks
-from ic.meaning.expressions.cycles import ambiguous_unit
+from ic.meaning.expressions.cycles import ambiguous_unit, unit_remedy
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, ValueList
-from ic.meaning.expressions.remedies import unit_remedy
 from ic.meaning.parameters.owner import Owner
 from ic.text.complaints import Complaints
 from met import models, units
