@@ -31,10 +31,9 @@ from ic.meaning.runs.initial import resolve_initial
 from ic.meaning.runs.keys import resolve_run_keys
 from ic.meaning.runs.linear import resolve_linear, resolve_linear_metrics
 from ic.meaning.runs.metrics import resolve_metrics
-from ic.meaning.runs.over_time import metrics_over_time
 from ic.meaning.runs.rates import resolve_rates, resolve_schedule
 from ic.meaning.runs.record import names_in_record, resolve_record
-from ic.meaning.runs.requirements import read_requirements, resolve_requirements
+from ic.meaning.runs.requirements import metrics_over_time, read_requirements, resolve_requirements
 from ic.meaning.runs.run_checks import RunParts, check_run
 from ic.meaning.runs.step_errors import resolve_step_errors
 from ic.meaning.runs.tolerances import resolve_tolerances
