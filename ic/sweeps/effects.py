@@ -19,8 +19,7 @@ from ic.meaning.definitions.row_tables import is_row_table
 from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.scope import Scope
-from ic.meaning.runs.experiment import experiment
-from ic.meaning.runs.run import BLOCKS, Resolved, resolve_run
+from ic.meaning.runs.run import BLOCKS, Resolved, experiment, resolve_run
 from ic.sweeps.choices import OF_RUN, OF_SERVO
 from ic.sweeps.reach import first_words, no_scale, parameters_nearby, paths_ending_in, without_effect
 from ic.sweeps.settings import SEED as SEED_PATH

@@ -15,8 +15,7 @@ from ic.meaning.checks.programs import check_program
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import allowances_of, places_of
-from ic.meaning.runs.experiment import experiment
-from ic.meaning.runs.run import resolve_run
+from ic.meaning.runs.run import experiment, resolve_run
 from ic.sweeps.axes import Sweep, read_sweep, varied_paths, whole_number
 from ic.sweeps.choices import Choices, with_choices
 from ic.sweeps.confidences import check_confidences

@@ -1,5 +1,6 @@
 """Resolution of a run: arm, servos, environment, initial state, schedule, metrics and record, in SI, ready for a
-plan."""
+plan.
+"""
 
 from __future__ import annotations
 
@@ -41,9 +42,10 @@ from ic.text.complaints import known_words, where_it_belongs
 from met.diagnostic import Place, did_you_mean, write
 from met.frozen import frozen
 from met.integrators import DEFAULT_INTEGRATOR
-from met.plan import Experiment, Schedule, ServoUse, Structure
+from met.plan import Allowance, Cases, Experiment, Schedule, ServoUse, Structure
 from met.plan.judged import MetricUse, Requirement, StepErrorLimit, Tolerance
 from met.plan.linear_uses import LinearUse
+from met.trace import Formulas
 
 BLOCKS = ("servos", *(block.name for block in (INITIAL, ENVIRONMENT, RATES, TOLERANCES)))
 """Keys of a run that have a block."""
@@ -306,3 +308,27 @@ def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
 
 
 # Environment and initial state
+
+
+def experiment(
+    scope: Scope, name: str, place: Place, resolved: Resolved, cases: Cases, allowances: tuple[Allowance, ...] = ()
+) -> Experiment:
+    """The experiment of this name; `scope` holds the parameters of the run that was resolved."""
+    parameters, outputs = scope.quantities()
+    formulas = Formulas.of(scope.graph, outputs) if outputs else Formulas()
+    return Experiment(
+        name,
+        resolved.structure,
+        parameters,
+        formulas,
+        cases,
+        resolved.requirements,
+        place,
+        tuple(scope.notes),
+        tolerances=resolved.tolerances,
+        allowances=allowances,
+        step_errors=resolved.step_errors,
+        linear=resolved.linear,
+        linear_metrics=resolved.linear_metrics,
+        **resolved.settings,
+    )
