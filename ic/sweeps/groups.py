@@ -20,10 +20,9 @@ from ic.sweeps.axes import Sweep, read_sweep, varied_paths, whole_number
 from ic.sweeps.choices import Choices, with_choices
 from ic.sweeps.confidences import check_confidences
 from ic.sweeps.effects import Effects
-from ic.sweeps.overridden import check_overridden
 from ic.sweeps.reach import check_coordinates, check_effects, plan_coordinates
 from ic.sweeps.searches import check_goal, each_case, read_search, with_corners
-from ic.sweeps.settings import Settings
+from ic.sweeps.settings import Settings, check_overridden
 from ic.sweeps.table import columns, kept_rows, repeats, structures
 from ic.text.complaints import PROVISIONAL, Complaints, known_words
 from met.analysis.memo import AnalysisMemo
