@@ -18,7 +18,7 @@ from batch.archive.searched import search_of
 from batch.queries.requirements import GroupRequirement, group_requirements, outcomes
 from batch.queries.signals import number_text, pretty_unit
 from batch.queries.stability_words import KEPT, WIDTH, margin_words, stability_data, stability_texts, wrapped
-from ic.driver.written_value import WrittenValue
+from ic.driver.write_values import WrittenValue
 from met.plan import Experiment
 from met.plan.outputs import metric_units
 from met.plan.searches import SHORTEST, Confirmation, Search

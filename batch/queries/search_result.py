@@ -10,7 +10,7 @@ from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.best_answer import context
 from batch.queries.pool import Pool
 from batch.queries.search_answers import SearchAnswer
-from ic.driver.written_value import WrittenValue
+from ic.driver.write_values import WrittenValue
 from met.frozen import frozen
 from met.outputs import quoted, setting_option, setting_path
 
