@@ -13,8 +13,7 @@ from batch.differences.words import distinct_texts
 from batch.queries import requirements
 from batch.queries.evidence_table import requirement_evidence
 from batch.queries.signals import deck_unit
-from batch.queries.step_errors.figures import figures
-from batch.queries.step_errors.limits import verdicts
+from batch.queries.step_errors.figures import figures, verdicts
 
 
 def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: ExperimentDiff) -> None:

@@ -16,9 +16,7 @@ from batch.archive.read import ArchiveGroup
 from batch.queries.evidence import EvidenceRow, Verdict, evidence_for, percent_above, percent_below
 from batch.queries.requirements import group_requirements
 from batch.queries.signals import deck_unit, number_text, pretty_unit
-from batch.queries.step_errors.figures import figures
-from batch.queries.step_errors.limits import StepErrorVerdict, verdicts
-from batch.queries.step_errors.words import rounded
+from batch.queries.step_errors.figures import StepErrorVerdict, figures, rounded, verdicts
 from batch.queries.streamed import summed_up
 from met.frozen import frozen
 from met.outputs import quoted

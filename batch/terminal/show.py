@@ -25,7 +25,7 @@ from batch.queries.search_answers import SearchAnswer
 from batch.queries.search_result import search_result
 from batch.queries.selection import CaseSelection
 from batch.queries.signals import case_text, history, number_text, number_texts, panels, pretty_unit
-from batch.queries.step_errors.words import NONE, about, error_text
+from batch.queries.step_errors.figures import NONE, about, error_text
 from batch.queries.streamed import is_streamed
 from batch.queries.structures import structures
 from batch.queries.summary import (

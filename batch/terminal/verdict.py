@@ -14,7 +14,7 @@ from batch.campaigns.performing import Performed
 from batch.campaigns.status import duration
 from batch.queries.failures import failure_lines
 from batch.queries.search_result import SearchResult
-from batch.queries.step_errors.words import HINT
+from batch.queries.step_errors.figures import HINT
 from batch.queries.summary import Summary, as_json, finite
 from batch.terminal.show import verdict, warning_lines
 from ic.printing.columns import size as size_text

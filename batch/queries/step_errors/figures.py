@@ -1,16 +1,18 @@
-"""Errors due to the step, from a metric's values at the step, half and a quarter of it."""
+"""Errors due to the step, from a metric's values at the step, half and a quarter of it; their limits; their words."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from batch.queries.signals import deck_unit, number_text
 from met.analysis.step_error import StepError, instant_error, step_error
 from met.frozen import frozen
+from met.plan.judged import StepErrorLimit
 
 if TYPE_CHECKING:
     from batch.archive.read import ArchiveGroup
@@ -180,3 +182,127 @@ def as_json(verification: Verification | None) -> dict[str, Any] | None:
         for name, metric_error in verification.metrics.items()
     }
     return {"cases": verification.cases, "order": verification.order, "step": verification.step, "metrics": metrics}
+
+
+@frozen
+class StepErrorVerdict:
+    """The verdict of all verified cases on a requirement on an error due to the step; None where it is not known.
+
+    reason  the worst of them, or why it is not known
+    limit   that is required
+    cases   verified ones that have a value;  missed: of these
+    worst   position in the case table of the worst, -1 where none is verified;  size: its error, SI or a share of its
+            value; infinite where it is not known
+    """
+
+    text: str
+    met: bool | None
+    reason: str
+    limit: StepErrorLimit
+    cases: int = 0
+    missed: int = 0
+    worst: int = -1
+    size: float = math.nan
+
+    @property
+    def word(self) -> str:
+        """The verdict in a word or two."""
+        return {True: "met", False: "missed", None: "not known"}[self.met]
+
+
+def verdicts(group: ArchiveGroup, verification: Verification | None) -> tuple[StepErrorVerdict, ...]:
+    """The verdicts on an experiment's requirements on errors due to the step."""
+    return tuple(_verdict(group, step_error, verification) for step_error in group.step_errors)
+
+
+def _verdict(group: ArchiveGroup, limit: StepErrorLimit, verification: Verification | None) -> StepErrorVerdict:
+    """The verdict on one limit of an error by the step: on the largest error of the verified cases."""
+    if verification is None:
+        return StepErrorVerdict(limit.text, None, "nothing is verified: `met run --verify some`", limit)
+    metric = verification.metrics.get(limit.metric)
+    cases = [case for case in metric.cases if not _has_none(case)] if metric is not None else []
+    if not cases:
+        return StepErrorVerdict(limit.text, None, "no verified case has a finite value", limit)
+    worst = max(cases, key=lambda case_error: _size(case_error, limit.share))
+    size = _size(worst, limit.share)
+    missed = sum(not _is_within(_size(case, limit.share), limit) for case in cases)
+    if worst.error is None:
+        text = worst.why
+    elif limit.share:
+        text = f"{rounded(100 * size)} %" if size < math.inf else "an error, and a value of 0"
+    else:
+        scale, unit = deck_unit(group.variables[limit.metric])
+        text = f"{rounded(size / abs(scale))} {unit}".removesuffix(" 1")
+    among = f", the worst of {len(cases):,} verified cases" if len(cases) > 1 else ""
+    text = f"{text} in case #{worst.case}{among}"
+    return StepErrorVerdict(limit.text, not missed, text, limit, len(cases), missed, worst.case, size)
+
+
+def _is_within(size: float, limit: StepErrorLimit) -> bool:
+    return size <= limit.limit if limit.comparison == "<=" else size < limit.limit
+
+
+def _has_none(case: CaseError) -> bool:
+    """True where the step cannot cause an error: no value, or the same infinite one for all steps."""
+    return math.isnan(case.value) or (math.isinf(case.value) and case.value == case.half == case.quarter)
+
+
+def _size(case: CaseError, share: bool) -> float:
+    """The size of an error: SI, or as a share of the value; infinite where it is not known."""
+    if case.error is None or not math.isfinite(case.error.error):
+        return math.inf
+    if not share or not case.error.error:
+        return case.error.error
+    return case.error.error / abs(case.value) if case.value else math.inf
+
+
+HINT = "not verified: `--verify some` runs some cases at half and a quarter of the step"
+
+NONE = "-"
+"""Text in place of an unknown error."""
+
+
+def error_text(metric_error: MetricError | None, scale: float = 1.0) -> str:
+    """An error in two digits, in the unit of size `scale`; NONE where it is not known."""
+    if metric_error is None or not math.isfinite(metric_error.error):
+        return NONE
+    return rounded(metric_error.error / abs(scale))
+
+
+def rounded(error: float) -> str:
+    """An error rounded to two digits."""
+    return number_text(float(f"{error:.2g}"))
+
+
+def about(verification: Verification) -> str:
+    """A line about the verification, `± by the step: 5 cases at half and a quarter of the step, order 2.0`, with
+    remarks."""
+    cases = "1 case" if verification.cases == 1 else f"{verification.cases:,} cases"
+    text = f"± by the step: {cases} at half and a quarter of the step"
+    orders = sorted(
+        {
+            f"{metric.order:.1f}"
+            for metric in verification.metrics.values()
+            if metric.clear and math.isfinite(metric.order)
+        }
+    )
+    if orders:
+        text += f", order {_between(orders)}"
+    if unclear := [name for name, metric_error in verification.metrics.items() if not metric_error.clear]:
+        known = [
+            case_error.error
+            for metric in verification.metrics.values()
+            for case_error in metric.cases
+            if case_error.error is not None
+        ]
+        unclear_text = f"{sum(not error.clear for error in known):,} of {len(known):,} numbers"
+        text += f"; order unclear in {unclear_text}, where it is a rough bound: {', '.join(unclear)}"
+    for name, metric in verification.metrics.items():
+        if metric.unknown:
+            where = "" if verification.cases == 1 else f" in {metric.unknown:,}"
+            text += f"; of {name} not known{where}: {metric.why}"
+    return text
+
+
+def _between(orders: Sequence[str]) -> str:
+    return orders[0] if len(orders) == 1 else f"{orders[0]} to {orders[-1]}"

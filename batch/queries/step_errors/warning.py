@@ -11,8 +11,7 @@ import numpy as np
 
 from batch.queries.requirements import GroupRequirement, group_requirements
 from batch.queries.signals import deck_unit, number_text
-from batch.queries.step_errors.figures import CaseError, Verification, figures
-from batch.queries.step_errors.words import rounded
+from batch.queries.step_errors.figures import CaseError, Verification, figures, rounded
 from met.analysis.step_error import NEAR, StepError
 from met.diagnostic import Diagnostic, Label, Place
 

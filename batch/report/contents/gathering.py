@@ -12,8 +12,8 @@ from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.deck_units import DeckUnits, written_plan
 from batch.queries.groups import by_run, groups_named
 from batch.queries.pool import Pool, pools
+from batch.queries.step_errors.figures import about as about_errors
 from batch.queries.step_errors.figures import figures, together
-from batch.queries.step_errors.words import about as about_errors
 from batch.report.contents import comparison
 from batch.report.contents.against import ComparedArchive, EarlierCases, of_groups
 from batch.report.contents.designs import design_answer

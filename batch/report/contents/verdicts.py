@@ -14,9 +14,7 @@ from batch.queries.failures import failures, ranges
 from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
 from batch.queries.search_answers import SearchAnswer
 from batch.queries.signals import deck_unit
-from batch.queries.step_errors.figures import Verification, figures
-from batch.queries.step_errors.limits import StepErrorVerdict, verdicts
-from batch.queries.step_errors.words import NONE, error_text
+from batch.queries.step_errors.figures import NONE, StepErrorVerdict, Verification, error_text, figures, verdicts
 from batch.queries.summary import spread, summary_of
 from batch.queries.warnings import campaign_warnings
 from batch.report.contents.against import EarlierCases

@@ -14,15 +14,17 @@ from batch.archive.read import ArchiveFile
 from batch.differences.data import as_data
 from batch.differences.text import diff_lines
 from batch.queries.step_errors.figures import (
+    NONE,
     CaseError,
     MetricError,
     Verification,
+    about,
     case_error,
+    error_text,
     figures,
     of_difference,
     together,
 )
-from batch.queries.step_errors.words import NONE, about, error_text
 from batch.queries.summary import as_json, summarise
 from batch.report.contents.gathering import gather
 from batch.report.html.page import page
