@@ -17,7 +17,7 @@ from batch.beds.size_table import size_lines
 from batch.beds.sizing import Extreme, MotorFigures, PartVerdict
 from batch.campaigns.choosing import experiments_named
 from batch.campaigns.plans import read_plan
-from batch.queries.groups import groups_named
+from batch.queries.pool import groups_named
 from batch.terminal.progress import Bar
 from hw.motor_parts import parts_list
 from met.diagnostic import Problem, error

@@ -9,7 +9,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.campaigns import choosing
-from batch.queries.groups import cases_named, groups_named
+from batch.queries.pool import cases_named, groups_named
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Experiment, Plan

@@ -91,8 +91,7 @@ def best(
     from batch.campaigns.judging_best import judged_best
     from batch.queries.best import Designs
     from batch.queries.best_answer import BestAnswer, context
-    from batch.queries.groups import groups_named
-    from batch.queries.pool import pools
+    from batch.queries.pool import groups_named, pools
     from batch.queries.search_result import search_result
     from batch.queries.summary import finite
     from batch.terminal.chosen_deck import chosen_deck

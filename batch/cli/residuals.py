@@ -69,7 +69,7 @@ def residuals(
     from batch.modules.description import described_columns
     from batch.plotting import logs as pictures
     from batch.plotting import output as places
-    from batch.queries.groups import groups_named
+    from batch.queries.pool import groups_named
     from batch.queries.signals import case_text
     from batch.terminal.residuals import as_data, residual_lines
     from met.diagnostic import Problem, error

@@ -29,7 +29,7 @@ def sensitivity(
 
     from batch.archive.read import ArchiveFile
     from batch.differences.matching import match_cases, match_experiments
-    from batch.queries.groups import groups_named
+    from batch.queries.pool import groups_named
     from batch.queries.sensitivity import sensitivities
     from batch.terminal.sensitivity import as_data, sensitivity_lines
     from met.diagnostic import Problem, error

@@ -111,7 +111,7 @@ def export(
 
 def _row(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: Sequence[str]) -> Rows:
     """The rows of a table by default: cases if there are several, else instants."""
-    from batch.queries.groups import groups_named
+    from batch.queries.pool import groups_named
 
     groups = groups_named(file, tuple(runs) or (file.groups[0].sweep or file.groups[0].name,))
     several = sum(group.count for group in groups) > 1

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from batch.archive.read import ArchiveFile
 from batch.export.case_table import NumberOfUnit, TableColumn
 from batch.queries.evidence_table import RequirementEvidence, requirement_evidence
-from batch.queries.groups import by_run, groups_named
+from batch.queries.pool import by_run, groups_named
 from met.frozen import frozen
 from met.unit_parser import decimals
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.archive.stored import Stored
-from batch.queries.groups import cases_named, groups_named
+from batch.queries.pool import cases_named, groups_named
 from batch.queries.signals import panels
 from met.diagnostic import Problem
 from met.frozen import frozen

@@ -12,7 +12,7 @@ import xarray
 from batch.notebook.source import archive
 from batch.notebook.table import cases_of, name_of
 from batch.queries.evidence_table import FIELDS, as_data, requirement_evidence
-from batch.queries.groups import by_run
+from batch.queries.pool import by_run
 from met.diagnostic import Problem, error
 
 

@@ -87,8 +87,7 @@ def draw(
     from batch.plotting.against import beside
     from batch.plotting.requests import plot_request
     from batch.plotting.sheet import PictureSheet
-    from batch.queries.groups import groups_named
-    from batch.queries.pool import pools
+    from batch.queries.pool import groups_named, pools
 
     target, sheet = path_of(output), sheet or PictureSheet()
     groups = groups_named(archive, (run,) if run else ())
@@ -124,7 +123,7 @@ def draw_arm(
     from batch.plotting import output as place
     from batch.plotting.arm import arm_picture
     from batch.plotting.sheet import PictureSheet
-    from batch.queries.groups import groups_named
+    from batch.queries.pool import groups_named
 
     target, sheet = path_of(output), sheet or PictureSheet()
     archive.need_every_row("a picture of an arm")

@@ -10,7 +10,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.differences import matching
-from batch.queries.groups import by_run
+from batch.queries.pool import by_run
 from batch.queries.signals import Panel, pretty_unit
 from met.diagnostic import Problem, error
 from met.messages.visible import line

@@ -41,7 +41,7 @@ def report(
     from contextlib import ExitStack
 
     from batch.archive.read import ArchiveFile
-    from batch.queries.groups import groups_named
+    from batch.queries.pool import groups_named
     from batch.report.contents.against import ComparedArchive, display_names, rename_archives
     from batch.report.contents.gathering import gather
     from batch.report.html.page import page

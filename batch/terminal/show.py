@@ -18,9 +18,8 @@ from batch.queries.evidence_table import RequirementEvidence, requirement_eviden
 from batch.queries.evidence_table import as_data as evidence_data
 from batch.queries.failures import failure_lines
 from batch.queries.given import settings_lines
-from batch.queries.groups import by_run, cases_named, groups_named
 from batch.queries.ordering import CaseOrder
-from batch.queries.pool import Pool, pools
+from batch.queries.pool import Pool, by_run, cases_named, groups_named, pools
 from batch.queries.search_answers import SearchAnswer
 from batch.queries.search_result import search_result
 from batch.queries.selection import CaseSelection

@@ -10,8 +10,7 @@ from typing import Any
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.deck_units import DeckUnits, written_plan
-from batch.queries.groups import by_run, groups_named
-from batch.queries.pool import Pool, pools
+from batch.queries.pool import Pool, by_run, groups_named, pools
 from batch.queries.step_errors.figures import about as about_errors
 from batch.queries.step_errors.figures import figures, together
 from batch.report.contents import comparison
