@@ -17,9 +17,8 @@ from batch.plotting import held, layout
 from batch.plotting.against import OtherGroup, not_in_other
 from batch.plotting.sheet import COLOURS, FAINT, INK, PictureSheet, sequence
 from batch.queries.arrange import Cell, CommandCurve, command_curves, fan_cases, joints_of, panel_grid
-from batch.queries.deck_units import DeckUnits
 from batch.queries.limits import LimitMark, limits_of
-from batch.queries.signals import Panel, case_text, deck_unit, history, number_text, panels
+from batch.queries.signals import DeckUnits, Panel, case_text, deck_unit, history, number_text, panels
 from met.diagnostic import Problem, error
 from met.distinct import distinct
 from met.outputs import quoted

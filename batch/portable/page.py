@@ -21,9 +21,8 @@ from batch.arms.scripts import arm_scripts, arm_style
 from batch.modules.description import MOST_CASES, described, described_columns
 from batch.portable import beside
 from batch.portable.numbers import OtherNumbers, deck_of, limits
-from batch.queries.deck_units import DeckUnits
 from batch.queries.pool import groups_named, pools
-from batch.queries.signals import Panel, deck_unit, pretty_unit
+from batch.queries.signals import DeckUnits, Panel, deck_unit, pretty_unit
 from batch.report.contents.designs import design_answer
 from batch.report.html import inlined
 from batch.report.html.head import page_head

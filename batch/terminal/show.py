@@ -13,7 +13,6 @@ import numpy as np
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries import cases, ordering
 from batch.queries.at_limits import reached_texts
-from batch.queries.deck_units import DeckUnits
 from batch.queries.evidence_table import RequirementEvidence, requirement_evidence
 from batch.queries.evidence_table import as_data as evidence_data
 from batch.queries.failures import failure_lines
@@ -23,7 +22,7 @@ from batch.queries.pool import Pool, by_run, cases_named, groups_named, pools
 from batch.queries.search_answers import SearchAnswer
 from batch.queries.search_result import search_result
 from batch.queries.selection import CaseSelection
-from batch.queries.signals import case_text, history, number_text, number_texts, panels, pretty_unit
+from batch.queries.signals import DeckUnits, case_text, history, number_text, number_texts, panels, pretty_unit
 from batch.queries.step_errors.figures import NONE, about, error_text
 from batch.queries.streamed import is_streamed
 from batch.queries.structures import structures

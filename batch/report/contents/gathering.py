@@ -9,8 +9,8 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
-from batch.queries.deck_units import DeckUnits, written_plan
 from batch.queries.pool import Pool, by_run, groups_named, pools
+from batch.queries.signals import DeckUnits, written_plan
 from batch.queries.step_errors.figures import about as about_errors
 from batch.queries.step_errors.figures import figures, together
 from batch.report.contents import comparison

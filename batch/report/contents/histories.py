@@ -10,9 +10,8 @@ import numpy as np
 
 from batch.archive.read import ArchiveGroup
 from batch.queries.arrange import CommandCurve, command_curves, joints_of
-from batch.queries.deck_units import DeckUnits
 from batch.queries.pool import Pool
-from batch.queries.signals import Panel, history, panels
+from batch.queries.signals import DeckUnits, Panel, history, panels
 from batch.report.contents.against import EarlierCases
 from batch.report.contents.earlier import EarlierHistories
 from batch.report.contents.parts import History, PanelLine, SignalPanel, Signals

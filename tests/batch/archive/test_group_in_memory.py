@@ -12,9 +12,8 @@ import ic
 from batch.archive.in_memory import GroupInMemory
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries import requirements
-from batch.queries.deck_units import DeckUnits
 from batch.queries.pool import Pool
-from batch.queries.signals import Panel
+from batch.queries.signals import DeckUnits, Panel
 from batch.report.contents.overview import overview
 from batch.report.html.payload import overview_data
 from met.plan import Experiment, Plan

@@ -15,9 +15,8 @@ import ic
 from batch.archive.read import ArchiveFile
 from batch.plotting import draw
 from batch.plotting.held import DOTS
-from batch.queries.deck_units import DeckUnits
 from batch.queries.limits import limits_of
-from batch.queries.signals import history, panels
+from batch.queries.signals import DeckUnits, history, panels
 from batch.terminal.show import show
 from tests.batch.plotting.pictures import shown
 
