@@ -17,7 +17,7 @@ from batch.queries.evidence_table import RequirementEvidence, requirement_eviden
 from batch.queries.evidence_table import as_data as evidence_data
 from batch.queries.failures import failure_lines
 from batch.queries.given import settings_lines
-from batch.queries.ordering import CaseOrder
+from batch.queries.ordering import CaseOrder, structures
 from batch.queries.pool import Pool, by_run, cases_named, groups_named, pools
 from batch.queries.search_answers import SearchAnswer
 from batch.queries.search_result import search_result
@@ -25,7 +25,6 @@ from batch.queries.selection import CaseSelection
 from batch.queries.signals import DeckUnits, case_text, history, number_text, number_texts, panels, pretty_unit
 from batch.queries.step_errors.figures import NONE, about, error_text
 from batch.queries.streamed import is_streamed
-from batch.queries.structures import structures
 from batch.queries.summary import (
     SPREAD_COLUMNS,
     SUMMED_COLUMNS,
