@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
 import xarray
 
-from batch.notebook import grid, quantities, selection, source
-from batch.notebook.table import CASE, cases_of, name_of, unknown_name
+from batch.notebook import grid, quantities, selection
+from batch.notebook.table import CASE, archive, cases_of, file_of, name_of, unknown_name
 from met.diagnostic import Problem, error
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ class Accessor(Generic[Data]):
         """
         from batch.notebook.frames import frames
 
-        path = source.file_of(self._data)
+        path = file_of(self._data)
         parts = self._parts() if case is None else selection.selected(self._parts(), {CASE: case})
         return self._whole(frames(path, parts, links, whole=case is not None))
 
@@ -127,7 +127,7 @@ class Accessor(Generic[Data]):
         and where. case: as `sel` takes it; None where there is only one."""
         from batch.notebook.parameters import table
 
-        path = source.file_of(self._data)
+        path = file_of(self._data)
         parts = self._parts() if case is None else selection.selected(self._parts(), {CASE: case})
         cases = [(data, int(row)) for data in parts.values() for row in cases_of(data)]
         if len(cases) != 1:
@@ -141,20 +141,20 @@ class Accessor(Generic[Data]):
         the table of `met show --evidence`, numbers in SI. It is about all cases, so ask before selecting any."""
         from batch.notebook.evidence import table
 
-        return table(source.file_of(self._data), self._parts())
+        return table(file_of(self._data), self._parts())
 
     @property
     @without_internals
     def plan(self) -> Plan:
         """The whole plan that was run."""
-        with source.archive(source.file_of(self._data), self._parts()) as file:
+        with archive(file_of(self._data), self._parts()) as file:
             return file.plan()
 
     @property
     @without_internals
     def sources(self) -> dict[str, str]:
         """The deck's files as they were read, by name; the deck itself first."""
-        with source.archive(source.file_of(self._data), self._parts()) as file:
+        with archive(file_of(self._data), self._parts()) as file:
             return file.sources()
 
     def __repr__(self) -> str:

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from batch.notebook.source import archive
-from batch.notebook.table import cases_of, name_of
+from batch.notebook.table import archive, cases_of, name_of
 from batch.queries.evidence_table import FIELDS, as_data, requirement_evidence
 from batch.queries.pool import by_run
 from met.diagnostic import Problem, error

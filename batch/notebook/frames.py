@@ -13,8 +13,7 @@ from batch.archive.read import ArchiveGroup
 from batch.arms.placing import OF_FREE_BASE, POSITION, free_pose, parameters, prescribed_pose, world_poses
 from batch.export.poses import lacking_help, pose_variables
 from batch.notebook.quantities import number
-from batch.notebook.source import experiment, places
-from batch.notebook.table import CASE, NO_HISTORIES, RECORDED, path_of, run_name, unknown_name
+from batch.notebook.table import CASE, NO_HISTORIES, RECORDED, experiment, path_of, places, run_name, unknown_name
 from met.diagnostic import Problem, error
 from met.dynamics.spatial import HERE, Pose
 from met.plan import Experiment

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from batch.notebook.source import experiment, places
+from batch.notebook.table import experiment, places
 from batch.queries import cases
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import xarray
 
 from batch.notebook.quantities import in_deck_unit
-from batch.notebook.source import experiment, file_of
-from batch.notebook.table import CASE, RECORDED, name_of, varied
+from batch.notebook.table import CASE, RECORDED, experiment, file_of, name_of, varied
 from batch.queries.answer_outcome import answer_outcome
 from batch.queries.failures import STATUS
 from batch.queries.search_answers import SearchAnswer
