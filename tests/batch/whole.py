@@ -39,11 +39,11 @@ for name, value in json.loads(sys.argv[1]).items():
 from met.cli import main
 sys.exit(main(sys.argv[2:]))
 """
-"""`met` with names of modules set: `{"batch.campaigns.cutting.WORK_SECONDS": 0.1}`."""
+"""`met` with names of modules set: `{"batch.campaigns.drive.WORK_SECONDS": 0.1}`."""
 
 SHORT_TASKS: Mapping[str, float] = {
-    "batch.campaigns.cutting.WORK_SECONDS": 0.1,
-    "batch.campaigns.cutting.FIRST_SECONDS": 0.01,
+    "batch.campaigns.drive.WORK_SECONDS": 0.1,
+    "batch.campaigns.drive.FIRST_SECONDS": 0.01,
     "batch.campaigns.performing.WORTH_SECONDS": 0.1,
 }
 """Settings of campaigns that are cut as long ones are, and kept when a tenth of a second of work is done."""

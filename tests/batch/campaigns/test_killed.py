@@ -138,7 +138,7 @@ def test_a_signal_keeps_what_is_done_and_says_how_to_go_on(
 def test_an_end_before_a_second_of_work_leaves_nothing(
     archive: Path, way: tuple[str, str], name: str, status: int, last: str
 ) -> None:
-    settings = {"batch.campaigns.cutting.FIRST_SECONDS": 0.01, "batch.campaigns.cutting.WORK_SECONDS": 60.0}
+    settings = {"batch.campaigns.drive.FIRST_SECONDS": 0.01, "batch.campaigns.drive.WORK_SECONDS": 60.0}
     with whole.started(words(archive, *way), archive.parent, settings) as process:
         whole.until(lambda: whole.done(archive, CASES), process)  # the first shard is there, of a hundredth of a second
         process.send_signal(signal.Signals[f"SIG{name}"])

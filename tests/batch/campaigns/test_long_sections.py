@@ -10,7 +10,7 @@ import pytest
 
 import batch
 from batch.campaigns import tasks
-from batch.campaigns.cutting import TASKS_A_SECOND, Cutter
+from batch.campaigns.drive import TASKS_A_SECOND, Cutter
 from batch.campaigns.folder import Folder, beside
 from batch.campaigns.outcomes import CaseOutcomes
 from met import run as engine

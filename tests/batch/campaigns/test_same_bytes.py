@@ -14,7 +14,7 @@ import pytest
 import batch
 import ic
 from batch.archive.read import ArchiveFile, ArchiveGroup
-from batch.campaigns import cutting, performing, tasks
+from batch.campaigns import drive, performing, tasks
 from met import cli
 from met.plan import Experiment, Plan
 from met.plan import file as plan_file
@@ -62,7 +62,7 @@ def small_tasks(patch: pytest.MonkeyPatch, cases: int) -> None:
     """Tasks of so many cases at most, whatever suits a kernel."""
     patch.setattr(tasks, "MOST_CASES", cases)
     patch.setattr(tasks, "GRANULE", 1)
-    patch.setattr(cutting, "GRANULE", 1)
+    patch.setattr(drive, "GRANULE", 1)
 
 
 # However it is run

@@ -15,7 +15,7 @@ import batch
 import ic
 from batch.archive.read import ArchiveFile
 from batch.archive.summarised import NAME
-from batch.campaigns import cutting, merge, performing, summarising, tasks
+from batch.campaigns import drive, merge, performing, summarising, tasks
 from batch.queries import tallies
 from batch.queries.evidence import EvidenceRow, evidence_for
 from batch.queries.requirements import group_requirements
@@ -163,7 +163,7 @@ def test_its_bytes_are_the_same_whoever_ran_it(
 ) -> None:
     monkeypatch.setattr(tasks, "MOST_CASES", 17)
     monkeypatch.setattr(tasks, "GRANULE", 1)
-    monkeypatch.setattr(cutting, "GRANULE", 1)
+    monkeypatch.setattr(drive, "GRANULE", 1)
     batch.run(plan_of("many"), output="again.h5", rows="summary", verify="some", fresh=True, **more)
     assert Path("again.h5").read_bytes() == Path("many.summary.h5").read_bytes()
 

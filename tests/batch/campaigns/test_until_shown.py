@@ -14,7 +14,7 @@ import pytest
 import batch
 import ic
 from batch.archive.read import ArchiveFile
-from batch.campaigns import cutting, performing, tasks, until_shown
+from batch.campaigns import drive, performing, tasks, until_shown
 from batch.campaigns.campaign import prepare, values_sections
 from batch.campaigns.changes import changes
 from batch.campaigns.folder import Folder
@@ -264,7 +264,7 @@ def test_batches_and_tasks_of_any_size_give_the_same_bytes(
     monkeypatch.setattr(until_shown, "GROWTH", growth)
     monkeypatch.setattr(tasks, "MOST_CASES", task)
     if task < 32:
-        for module in (tasks, cutting, until_shown):
+        for module in (tasks, drive, until_shown):
             monkeypatch.setattr(module, "GRANULE", 1)
     executor = whole.Watched()
     assert batch.run(plan, output="a.h5", executor=executor).path.read_bytes() == undisturbed

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 import batch
 import ic
-from batch.campaigns import cutting, tasks
+from batch.campaigns import drive, tasks
 from batch.cli.linear import linear
 from met.diagnostic import Problem
 from met.plan import Plan
@@ -69,7 +69,7 @@ def test_threads_and_processes_make_the_same_archive(
 ) -> None:
     monkeypatch.setattr(tasks, "MOST_CASES", 5)
     monkeypatch.setattr(tasks, "GRANULE", 1)
-    monkeypatch.setattr(cutting, "GRANULE", 1)
+    monkeypatch.setattr(drive, "GRANULE", 1)
     made = batch.run(plan_of(folder), output=tmp_path / "b.h5", **how).path
     assert made.read_bytes() == (folder / "a.h5").read_bytes()
 
