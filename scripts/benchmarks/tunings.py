@@ -21,7 +21,7 @@ import numpy as np
 
 import ic
 from batch.campaigns.points import with_cases
-from batch.campaigns.slopes import TuningSlopes
+from batch.campaigns.searching import TuningSlopes
 from batch.queries.search_answers import NEAR_BEST
 from met import run as engine
 from met.plan import Experiment
