@@ -1,5 +1,4 @@
-"""The stability of the designs that a tuning has found, judged when it has run: the best by its goal first, until one
-keeps the least margin.
+"""The stability of designs: of those that a tuning has found, judged when it has run, and of a sweep's, when asked.
 
 Cases of a design are run again, to know the poses that they pass. All that is computed depends on the tuning's cases
 alone.
@@ -8,9 +7,12 @@ alone.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 
+from batch.archive.read import ArchiveFile
+from batch.queries.best import Designs
 from met import run as engine
 from met.analysis.passed import Passed
 from met.analysis.stability import least_margins
@@ -103,3 +105,34 @@ def telling_cases(cases: np.ndarray, coordinates: Sequence[Coordinate]) -> np.nd
         wanted += [int(ordered[values.argmin()]), int(ordered[values.argmax()])]
     wanted += ordered[np.linspace(0, len(ordered) - 1, MOST_CASES).astype(int)].tolist()
     return np.sort(np.array(list(dict.fromkeys(wanted))[:MOST_CASES]))
+
+
+def judged_best(file: ArchiveFile, designs: Designs, order: np.ndarray, least_margin: float) -> dict[int, JudgedDesign]:
+    """The stability of designs, by their numbers, in this order, until one keeps the least margin. A design whose cases
+    are of several structures is judged by the least margin of them."""
+    if not least_margin or not len(order):
+        return {}
+    try:
+        experiments = {experiment.name: experiment for experiment in file.plan().experiments}
+    except Problem as problem:  # for instance, a model of the plan is not installed here
+        first = int(order[0])
+        case = int(designs.pool.cases[designs.first[first]])
+        return {first: JudgedDesign(case, None, problem.diagnostics[0].message)}
+
+    @cache
+    def prepared(name: str) -> engine.Prepared:
+        return engine.prepare(experiments[name])
+
+    def judge(place: int) -> JudgedDesign:
+        pool, judgements = designs.pool, list[JudgedDesign]()
+        cases = np.flatnonzero(designs.of_case == order[place])
+        for number in np.unique(pool.group_of[cases]).tolist():
+            group = pool.groups[number]
+            own = pool.position_of[cases[pool.group_of[cases] == number]]
+            rows = np.searchsorted(experiments[group.name].cases.table, group.values("case")[own])
+            judgements.append(judged_design(prepared(group.name), rows))
+        known = [judgement for judgement in judgements if judgement.margins is not None]
+        return min(known, key=lambda judgement: judgement.margins.disk) if known else judgements[0]  # type: ignore[union-attr]
+
+    judged = judged_until_kept(len(order), judge, least_margin)
+    return {int(order[place]): design for place, design in judged.items()}

@@ -88,7 +88,7 @@ def best(
 
     from batch.archive.read import ArchiveFile
     from batch.archive.searched import search_of
-    from batch.campaigns.judging_best import judged_best
+    from batch.campaigns.judging import judged_best
     from batch.queries.best import Designs
     from batch.queries.best_answer import BestAnswer, context
     from batch.queries.pool import groups_named, pools

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from batch.archive.read import ArchiveFile
-from batch.campaigns.judging_best import judged_best
+from batch.campaigns.judging import judged_best
 from batch.queries.best import DesignAxis, Designs
 from batch.queries.best_answer import BestAnswer, context
 from batch.queries.pool import CaseColumn, Pool
