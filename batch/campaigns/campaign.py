@@ -17,11 +17,10 @@ import numpy as np
 from batch.archive import layout as archive_layout
 from batch.campaigns import choosing
 from batch.campaigns.folder import Folder, beside
-from batch.campaigns.keep import Keep, KeptRows, as_list, keep, kept_before, kept_by_outcome, kept_rows
+from batch.campaigns.keep import Keep, KeptRows, as_list, keep, kept_before, kept_by_outcome, kept_rows, point_sizes
 from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.output import check_output, check_room, default_output
 from batch.campaigns.searching import check_first_generation
-from batch.campaigns.summarising import point_sizes
 from batch.campaigns.tasks import CampaignSection
 from batch.campaigns.verification.when import WORDS as VERIFY_WORDS
 from batch.campaigns.verification.when import Verify

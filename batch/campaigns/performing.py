@@ -21,12 +21,11 @@ from batch.campaigns.campaign import Campaign, histories_section, values_section
 from batch.campaigns.drive import Count, Driver, Progress, Stopped, TooManyFailures
 from batch.campaigns.executor import Executor
 from batch.campaigns.folder import Folder, FolderBusy, beside, uncovered
-from batch.campaigns.keep import worst_wanted
+from batch.campaigns.keep import Summarised, summarise, worst_wanted
 from batch.campaigns.outcomes import CaseOutcomes, CountedCases
 from batch.campaigns.output import busy, cannot_write, check_room, publish
 from batch.campaigns.searching import CampaignSearch, run_search
 from batch.campaigns.status import Reporter, died_lines
-from batch.campaigns.summarising import Summarised, summarise
 from batch.campaigns.tasks import CampaignSection
 from batch.campaigns.until_shown import StoppingPoints, run_until_shown, without_dropped
 from batch.campaigns.verification import when

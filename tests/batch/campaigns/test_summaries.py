@@ -15,7 +15,7 @@ import batch
 import ic
 from batch.archive.read import ArchiveFile
 from batch.archive.summarised import NAME
-from batch.campaigns import drive, merge, performing, summarising, tasks
+from batch.campaigns import drive, keep, merge, performing, tasks
 from batch.queries import tallies
 from batch.queries.evidence import EvidenceRow, evidence_for
 from batch.queries.requirements import group_requirements
@@ -339,7 +339,7 @@ def test_histories_all_verified_and_stopping_early_do_not_go_with_it(here: Path)
 
 
 def test_too_many_design_points_are_refused_beforehand(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (tallies, summarising):
+    for module in (tallies, keep):
         monkeypatch.setattr(module, "MOST_POINTS", 3)
     said = met("run", "d.ic", "many", "-o", "none.h5", "--rows", "summary")
     assert "error[E351]: a summary has 3 design points at most, and this sweep has more" in said.text
