@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-from batch.campaigns.choosing import experiments_named
-from batch.campaigns.plans import read_plan
+from batch.campaigns.choosing import experiments_named, read_plan
 from hw.drivers import check_model, kind_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen

@@ -12,9 +12,9 @@ from batch.beds.bed_progress import BedProgress, sidecar_entries, timing_lines
 from batch.beds.chosen_bed import on_beds, on_none, split
 from batch.beds.executor import OnBeds, Ports
 from batch.campaigns.campaign import Campaign, Wires, prepare
+from batch.campaigns.choosing import read_plan
 from batch.campaigns.output import sidecar_path
 from batch.campaigns.performing import perform
-from batch.campaigns.plans import read_plan
 from batch.queries.bed_margins import in_words
 from batch.queries.summary import summarise
 from batch.terminal.running import first_picture

@@ -15,8 +15,7 @@ from batch.beds.bed_size import BedSize, bed_size, joint_of
 from batch.beds.chosen_bed import on_beds
 from batch.beds.size_table import size_lines
 from batch.beds.sizing import Extreme, MotorFigures, PartVerdict
-from batch.campaigns.choosing import experiments_named
-from batch.campaigns.plans import read_plan
+from batch.campaigns.choosing import experiments_named, read_plan
 from batch.queries.pool import groups_named
 from batch.terminal.progress import Bar
 from hw.motor_parts import parts_list

@@ -1,17 +1,51 @@
-"""The user's choice among a plan's runs and sweeps, and among their cases."""
+"""The plan that a command is given, and the user's choice among its runs and sweeps, and among their cases."""
 
 from __future__ import annotations
 
 import difflib
+import sys
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from batch.archive.rows import row_of
 from met.diagnostic import Problem, error
-from met.outputs import quoted, varied_run, varies
+from met.host.sources import names_plan
+from met.outputs import quoted, settings_of, varied_run, varies
 from met.plan import Experiment, Plan, keys
 from met.plan.columns import CaseValues, all_rows, blocks, row_at
+
+
+def read_plan(
+    source: str,
+    names: tuple[str, ...] = (),
+    *,
+    everything: bool = False,
+    defines: tuple[str, ...] = (),
+    include_dirs: tuple[str, ...] = (),
+    settings: tuple[str, ...] = (),
+    quiet: bool = False,
+) -> Plan:
+    """The plan of a deck, or in a plan file. Warnings go to stderr; errors are a Problem."""
+    if names_plan(source):
+        from met.plan import file as plan_file
+
+        return plan_file.read(source)
+    import ic
+    from ic.find import find
+
+    select: Any = "all" if everything else names or None
+    find(source, include_dirs)  # a misspelt name is reported with the one that was probably meant
+    compiled = ic.check(source, include_dirs=include_dirs, defines=defines, **settings_of(settings), select=select)
+    if compiled.plan is None:
+        raise Problem(compiled.diagnostics, compiled.sources)
+    if compiled.diagnostics and not quiet:
+        from met.messages import render
+
+        colour = render.wants_colour(sys.stderr)
+        print(render.render(compiled.diagnostics, compiled.sources, colour=colour), file=sys.stderr)
+    return compiled.plan
 
 
 def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experiment, ...]:

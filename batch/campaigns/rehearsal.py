@@ -45,7 +45,7 @@ def rehearse(timeout: float | None, **question: Any) -> None:
     """Have all models of a deck or plan recorded in another process. Raises Problem E217 where that does not end well.
 
     timeout   s of a case without any progress; None: it may take for ever
-    question  as `batch.campaigns.plans.read_plan` takes it
+    question  as `batch.campaigns.choosing.read_plan` takes it
     """
     if all(point.package == PACKAGE for group in models.GROUPS.values() for point in offered(group.entry_points)):
         return
@@ -128,7 +128,7 @@ def _is_a_models(file: str) -> bool:
 def main(lines: Sequence[str]) -> None:
     """Record all models of the question, and report progress."""
     from batch.archive.read import ArchiveFile
-    from batch.campaigns.plans import read_plan
+    from batch.campaigns.choosing import read_plan
     from hw import realtime
     from met.host.sources import names_archive
     from met.run import prepare

@@ -62,8 +62,7 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
     """
     import json
 
-    from batch.campaigns.choosing import experiments_named, select_rows
-    from batch.campaigns.plans import read_plan
+    from batch.campaigns.choosing import experiments_named, read_plan, select_rows
     from batch.linearized import files, locus, picture
     from batch.plotting import output as places
     from batch.terminal.linear import as_data, linear_lines

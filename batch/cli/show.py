@@ -174,8 +174,7 @@ def _asked_for(
     form: str,
 ) -> Sequence[Experiment]:
     """The runs and sweeps of a deck or plan for a command; the compiler's messages go to people."""
-    from batch.campaigns.choosing import experiments_named
-    from batch.campaigns.plans import read_plan
+    from batch.campaigns.choosing import experiments_named, read_plan
 
     check_options(source, names, defines=defines, include_dirs=include_dirs, settings=settings)
     plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=form == "json")

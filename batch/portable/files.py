@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from batch.archive.read import ArchiveFile
-from batch.campaigns.choosing import experiments_named
-from batch.campaigns.plans import read_plan
+from batch.campaigns.choosing import experiments_named, read_plan
 from batch.fmu.package import Fmu, fmu_of, is_fmu
 from batch.modules.description import FORMAT, described
 from batch.portable.page import GENERATOR
@@ -36,7 +35,7 @@ class ModuleFiles:
 
 def experiment_of(source: str, names: tuple[str, ...], *, quiet: bool, **options: Any) -> Experiment:
     """The experiment of a deck, a plan file or an archive. options: how a deck is read, as for
-    `batch.campaigns.plans.read_plan`. Raises Problem."""
+    `batch.campaigns.choosing.read_plan`. Raises Problem."""
     if names_archive(source):
         with ArchiveFile(source) as file:
             plan = file.plan()

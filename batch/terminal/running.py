@@ -10,10 +10,10 @@ from pathlib import Path
 
 from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, prepare
+from batch.campaigns.choosing import read_plan
 from batch.campaigns.drive import Progress
 from batch.campaigns.executor import Executor
 from batch.campaigns.performing import Performed, TooMany, perform
-from batch.campaigns.plans import read_plan
 from batch.campaigns.rehearsal import rehearse
 from batch.campaigns.replaying import Replay, differences, in_both, replay
 from batch.campaigns.verification.when import Verify
@@ -47,7 +47,7 @@ from met.outputs import quoted
 @frozen
 class RunRequest:
     """Runs of a deck, a plan or an archive, with the options for reading a deck, as for
-    `batch.campaigns.plans.read_plan`."""
+    `batch.campaigns.choosing.read_plan`."""
 
     source: str
     names: tuple[str, ...]
