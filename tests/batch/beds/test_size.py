@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from batch.beds.filter_range import filter_range
+from batch.beds.bed_size import filter_range
 from batch.beds.sizing import Candidate, MotorFigures, PartVerdict, corners, gather, hottest, judge_part
 from hw.motor_parts import MotorPart
 from met import cli
