@@ -11,11 +11,10 @@ import pytest
 
 import batch
 import ic
-from batch.beds.bed_progress import BedProgress, timing_lines, timings
-from batch.beds.bed_progress import sidecar_entries as written_beside
 from batch.beds.campaign_records import CaseRecords
 from batch.beds.executor import Driving, OnBeds, Ports
-from batch.beds.running import beds_before
+from batch.beds.running import BedProgress, beds_before, timing_lines, timings
+from batch.beds.running import sidecar_entries as written_beside
 from batch.campaigns.folder import Folder
 from batch.campaigns.output import sidecar_path
 from batch.terminal.progress import Bar

@@ -21,8 +21,8 @@ import numpy as np
 import pytest
 
 import batch
-from batch.beds.bed_progress import timing_lines, timings
 from batch.beds.executor import OnBeds, Ports
+from batch.beds.running import timing_lines, timings
 from hw.bed import BedSample, BedState, Fault
 from hw.lines import transcript
 from hw.protocol import messages
