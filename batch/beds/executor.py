@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.beds.campaign_records import CampaignRecords
-from batch.beds.case_result import CaseResult, case_result
+from batch.beds.case_result import CampaignRecords, CaseResult, case_result
 from batch.campaigns import shard, tasks
 from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder

@@ -11,7 +11,7 @@ import pytest
 
 import batch
 import ic
-from batch.beds.campaign_records import CaseRecords
+from batch.beds.case_result import CaseRecords
 from batch.beds.executor import Driving, OnBeds, Ports
 from batch.beds.running import BedProgress, beds_before, timing_lines, timings
 from batch.beds.running import sidecar_entries as written_beside
