@@ -13,12 +13,13 @@ from typing import Any
 from batch.beds.chosen_bed import ChosenBed, chosen_bed
 from hw import refusals
 from hw.bed import About, BedDriver, BedSample, Capability, Fault
+from hw.beds import latch
 from hw.beds.serial_line import LONGEST_SHARE, exchanged
-from hw.drivers import opened
+from hw.drivers import kind_of, opened
 from hw.driving.case import pace_of
 from hw.ports import Port
 from ic.printing.columns import columns, number, quantity
-from met.diagnostic import Diagnostic
+from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 from met.messages.visible import say
 from met.substitution.bed import DRIVES
@@ -242,3 +243,31 @@ def _line(result: ProbeResult) -> list[Sequence[str]]:
         f"{', '.join(words)}; up to {result.fastest:.3g} Hz, where an exchange takes {LONGEST_SHARE:.0%} of a period"
     )
     return [["line", "; ".join(parts)], ["rates", rates]]
+
+
+def clear_and_tell(word: str, *, baud: int, form: str, quiet: bool = False, verbose: bool = False) -> None:
+    """Run `met bed clear`. Raises Problem."""
+    about, faults = clear(word, baud)
+    if form == "json":
+        names = [str(fault.name).lower() for fault in Fault if fault in faults]
+        say(json.dumps({"name": about.name, "cleared": names}))
+    elif not quiet:
+        say(f"bed `{about.name}` at {word}: {cleared_line(faults)}")
+        for remedy in refusals.remedies(faults):
+            say(f"  = help: {remedy}")
+
+
+def clear(word: str, baud: int) -> tuple[About, Fault]:
+    """Clear the faults of the bed at a port, without arming it. Returns its description and the faults. Raises
+    Problem."""
+    if kind_of(word).simulated:
+        helps = "each run begins with one in which nothing is latched"
+        raise Problem(error("E425", f"port `{word}` simulates a bed, anew for each command", help=helps))
+    with opened(Port(chosen_bed(word, None, ()).port, baud), None, "", 0, math.inf) as bed:
+        about = bed.connect()
+        return about, latch.cleared(bed, about)
+
+
+def cleared_line(faults: Fault) -> str:
+    """The line that says which latched faults were cleared."""
+    return f"cleared: {refusals.words(faults)}" if faults else "nothing was latched"

@@ -107,7 +107,7 @@ def clear(word: str, **options: Any) -> int:
 
     Exit status: 0 no fault is latched any more; 2 the bed does not answer, or its shaft does not stop.
     """
-    from batch.beds.clearing import clear_and_tell
+    from batch.beds.probe import clear_and_tell
 
     clear_and_tell(word, **options)
     return YES
