@@ -13,7 +13,7 @@ from typing import Any
 from batch.export import scene, topics
 from batch.export.output import whole
 from batch.export.poses import PosedArm
-from batch.plotting.sheet import COLOURS
+from batch.plotting.layout import COLOURS
 from batch.queries.signals import pretty_unit
 
 ENDING = ".layout.json"

@@ -11,7 +11,7 @@ import numpy as np
 from batch.arms.shapes import ArmNumbers, ArmShape, drawn, head, shape_of, shapes
 from batch.export.poses import PosedArm
 from batch.export.wire import plain
-from batch.plotting.sheet import COLOURS
+from batch.plotting.layout import COLOURS
 from met.dynamics.spatial import Real
 from met.plan import BASE, Link, Payload
 

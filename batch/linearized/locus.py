@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from batch.plotting import output as places
-from batch.plotting.sheet import FAINT, INK, STYLE
+from batch.plotting.layout import FAINT, INK, STYLE
 from ic.printing.columns import count
 from met.analysis.linear.answers import Linearized, LinearQuestion
 from met.diagnostic import Problem, error

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from batch.plotting import output as places
-from batch.plotting.sheet import COLOURS, FAINT, INK, STYLE
+from batch.plotting.layout import COLOURS, FAINT, INK, STYLE
 from met.analysis.linear.answers import Linearized, OpenLoop
 from met.diagnostic import Problem, error
 

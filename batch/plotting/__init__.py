@@ -19,7 +19,7 @@ from met.outputs import path_of
 
 if TYPE_CHECKING:
     from batch.archive.read import ArchiveFile, ArchiveGroup
-    from batch.plotting.sheet import PictureSheet
+    from batch.plotting.layout import PictureSheet
 
 
 def plot(
@@ -54,7 +54,7 @@ def plot(
     Raises met.diagnostic.Problem for mistakes that a user can correct.
     """
     from batch.archive.read import ArchiveFile
-    from batch.plotting.sheet import sheet
+    from batch.plotting.layout import sheet
 
     names, cases, over = ([words] if isinstance(words, str) else words for words in (names, cases, over))
     on = sheet(size, dpi)
@@ -85,8 +85,8 @@ def draw(
     for open_archive in (archive, *([against] if against is not None else [])):
         open_archive.need_every_row("a picture of all cases")
     from batch.plotting.against import beside
+    from batch.plotting.layout import PictureSheet
     from batch.plotting.requests import plot_request
-    from batch.plotting.sheet import PictureSheet
     from batch.queries.pool import groups_named, pools
 
     target, sheet = path_of(output), sheet or PictureSheet()
@@ -122,7 +122,7 @@ def draw_arm(
     """Draw the arm of a case of an open archive, as `plot` does."""
     from batch.plotting import output as place
     from batch.plotting.arm import arm_picture
-    from batch.plotting.sheet import PictureSheet
+    from batch.plotting.layout import PictureSheet
     from batch.queries.pool import groups_named
 
     target, sheet = path_of(output), sheet or PictureSheet()

@@ -12,8 +12,8 @@ from batch.archive.read import ArchiveFile, ArchiveGroup, reading
 from batch.arms.look import BASE, FIELD, LINK, PAYLOAD
 from batch.arms.scene import ArmScene, arm_scene, lacking
 from batch.plotting import layout
+from batch.plotting.layout import COLOURS, LIGHT, PictureSheet
 from batch.plotting.projection import PicturedSolid, Viewpoint, facets, solids, upright, viewpoint
-from batch.plotting.sheet import COLOURS, LIGHT, PictureSheet
 from batch.queries.signals import case_text, number_text, panels
 from met.diagnostic import Problem, error
 from met.plan.channel import channel_paths

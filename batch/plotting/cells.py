@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from batch.plotting.layout import INK, PictureSheet
 from batch.plotting.measured import MapMetric
-from batch.plotting.sheet import INK, PictureSheet
 from batch.plotting.sides import MapSide
 from batch.queries.grids import cell_cases
 from met.frozen import frozen

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.plotting.layout import BESIDE, LETTER, letters
-from batch.plotting.sheet import PictureSheet
+from batch.plotting.layout import BESIDE, LETTER, PictureSheet, letters
 from batch.queries.limits import LimitMark
 
 TONE = "#a33a0a"

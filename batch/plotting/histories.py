@@ -15,7 +15,7 @@ from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.archive.stored import Stored
 from batch.plotting import held, layout
 from batch.plotting.against import OtherGroup, not_in_other
-from batch.plotting.sheet import COLOURS, FAINT, INK, PictureSheet, sequence
+from batch.plotting.layout import COLOURS, FAINT, INK, PictureSheet, sequence
 from batch.queries.arrange import Cell, CommandCurve, command_curves, fan_cases, joints_of, panel_grid
 from batch.queries.limits import LimitMark, limits_of
 from batch.queries.signals import DeckUnits, Panel, case_text, deck_unit, history, number_text, panels

@@ -11,7 +11,7 @@ import numpy as np
 from batch.measured.mcap_log import MeasuredSignals
 from batch.measured.paired import ComputedChannel, Pair
 from batch.plotting import output as places
-from batch.plotting.sheet import COLOURS, FAINT, STYLE
+from batch.plotting.layout import COLOURS, FAINT, STYLE
 from met.frozen import frozen
 
 MOST_CHANNELS = 16

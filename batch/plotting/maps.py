@@ -16,9 +16,9 @@ import numpy as np
 
 from batch.plotting import cells, layout, sides
 from batch.plotting.cells import DOTTED, STRIPES, infinity
+from batch.plotting.layout import FAINT, INK, PictureSheet
 from batch.plotting.measured import MapMetric
 from batch.plotting.points import RASTERED
-from batch.plotting.sheet import FAINT, INK, PictureSheet
 from batch.plotting.sides import MapSide
 from batch.queries.colours import Reach, reach
 from batch.queries.grids import FULL, cells_of, column_levels

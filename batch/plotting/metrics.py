@@ -10,9 +10,9 @@ import numpy as np
 from batch.archive.read import ArchiveFile
 from batch.plotting import layout, maps, points
 from batch.plotting.against import OtherGroup, file_names
+from batch.plotting.layout import PictureSheet
 from batch.plotting.measured import MapMetric, map_metrics
 from batch.plotting.requests import colour_column, is_independent, map_axes
-from batch.plotting.sheet import PictureSheet
 from batch.queries.pool import CaseColumn, Pool
 from met.diagnostic import Problem, error
 from met.outputs import quoted

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from batch.plotting import layout
+from batch.plotting.layout import COLOURS, FAINT, INK, PictureSheet, sequence
 from batch.plotting.measured import MapMetric
-from batch.plotting.sheet import COLOURS, FAINT, INK, PictureSheet, sequence
 from batch.plotting.sides import is_log, line, write_log
 from batch.queries.grids import MOST_LEVELS, column_levels, is_grid, levels
 from batch.queries.pool import CaseColumn

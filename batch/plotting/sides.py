@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.plotting.layout import LETTER
-from batch.plotting.sheet import PictureSheet
+from batch.plotting.layout import LETTER, PictureSheet
 from batch.queries import grids
 from batch.queries.grids import ROUND, Levels, Scale, column_levels, edges_of, levels, round_numbers
 from batch.queries.pool import CaseColumn

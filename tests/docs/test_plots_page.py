@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from batch.plotting import histories, output, points, requests, sheet, sides
+from batch.plotting import histories, layout, output, points, requests, sides
 from batch.queries import grids
 from met import cli
 from tests.batch.plotting import figures
@@ -36,6 +36,6 @@ def test_the_limits_are_those_of_the_code() -> None:
     for said in (
         f"than {sides.MOST_CELLS} values", f"than {grids.MOST_LEVELS} values",
         f"up to {requests.MOST_BESIDE} values", f"than {points.RASTERED:,} points",
-        f"{sheet.SCREEN_DPI}, with `--size` {sheet.PAPER_DPI}",
+        f"{layout.SCREEN_DPI}, with `--size` {layout.PAPER_DPI}",
     ):  # fmt: skip
         assert said in PAGE

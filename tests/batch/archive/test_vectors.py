@@ -14,7 +14,7 @@ import batch
 import ic
 from batch.archive.read import ArchiveFile
 from batch.plotting import draw
-from batch.plotting.sheet import COLOURS
+from batch.plotting.layout import COLOURS
 from batch.queries.signals import Panel, history, panels
 from batch.terminal.show import show
 from met import run as engine

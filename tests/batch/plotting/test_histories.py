@@ -9,8 +9,7 @@ import pytest
 import batch
 from batch.archive.read import ArchiveFile
 from batch.plotting import draw
-from batch.plotting.layout import FLAT
-from batch.plotting.sheet import COLOURS, PictureSheet
+from batch.plotting.layout import COLOURS, FLAT, PictureSheet
 from tests.batch import plans
 from tests.batch.plotting.pictures import archive, shown
 

@@ -15,9 +15,9 @@ from matplotlib.colors import to_hex
 from batch.archive.read import ArchiveFile
 from batch.plotting import draw, plot
 from batch.plotting.cells import FAILED, INFINITE, STRIPES
+from batch.plotting.layout import COLOURS
 from batch.plotting.maps import ABOVE
 from batch.plotting.points import NAMED
-from batch.plotting.sheet import COLOURS
 from batch.plotting.sides import MOST_CELLS
 from met import run as engine
 from tests.batch import plans

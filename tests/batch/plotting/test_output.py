@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from batch.plotting import draw, plot
-from batch.plotting.sheet import sheet
+from batch.plotting.layout import sheet
 from met.diagnostic import Problem
 from met.messages.render import render
 from tests.batch.plotting.pictures import archive
