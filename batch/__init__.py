@@ -207,7 +207,7 @@ def gradient(
     Raises Problem D379 where no number varies, or a name is no metric's.
     """
     from batch.campaigns.choosing import experiments_named, select_rows
-    from batch.linearized.gradients import to_dataset
+    from batch.linearized.data import to_dataset
     from met.analysis.linear.gradient import GradientProgram
 
     names = None if experiment is None else (experiment,)

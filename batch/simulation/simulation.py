@@ -132,7 +132,7 @@ class Simulation:
         The Dataset has `value` (case, metric) and `slope` (case, metric, number) in SI, and `why_not`: where there is
         no slope, the reason (docs/linear.md).
         """
-        from batch.linearized.gradients import to_dataset
+        from batch.linearized.data import to_dataset
         from met.analysis.linear.gradient import GradientProgram
 
         threads = None if threads is None else whole(threads, "threads", least=1)
