@@ -10,8 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from batch.archive.in_memory import DatasetMaker
-from batch.simulation.arguments import PATHS, settings, short_repr, text_or_none, texts, whole
-from batch.simulation.given import check_room, columns, values_in_si
+from batch.simulation.given import (
+    PATHS,
+    check_room,
+    columns,
+    settings,
+    short_repr,
+    text_or_none,
+    texts,
+    values_in_si,
+    whole,
+)
 from ic.driver.given_values import VariedRun, given_run
 from ic.printing.columns import size as size_text
 from ic.text.complaints import known_words

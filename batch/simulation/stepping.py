@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.simulation.arguments import short_repr
-from batch.simulation.given import measured, real
+from batch.simulation.given import measured, real, short_repr
 from ic.driver.given_values import GivenRun, VariedRun
 from ic.text.complaints import known_words
 from met import run as engine
