@@ -35,8 +35,7 @@ from batch.queries.summary import (
     SummedMetric,
     summary_of,
 )
-from batch.terminal.evidence import evidence_lines
-from batch.terminal.evidence_table import evidence_table_lines
+from batch.terminal.evidence import evidence_lines, evidence_table_lines
 from ic.printing.columns import columns, count
 from ic.printing.columns import size as size_text
 from met.distinct import distinct

@@ -16,7 +16,7 @@ import pytest
 import batch
 from batch.archive.read import ArchiveFile
 from batch.queries.evidence_table import RequirementEvidence, as_data, notes_of, requirement_evidence, texts_of
-from batch.terminal.evidence_table import evidence_table_lines
+from batch.terminal.evidence import evidence_table_lines
 from met.cli import main
 from met.diagnostic import Problem
 from met.statistics.confidence import cases_needed, lower_bound, percentile_rank, upper_bound
