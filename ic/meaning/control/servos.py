@@ -18,7 +18,7 @@ from ic.meaning.control.shared_servos import use_shared
 from ic.meaning.definitions.merge import Item, MergedBlock, no_block, overlay, refuse_block
 from ic.meaning.expressions.quantity import measure_of
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.mechanics.following import leaders_in_words
+from ic.meaning.mechanics.loops import leaders_in_words
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import (
     check_keys,

@@ -17,9 +17,8 @@ from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.booms import KEYS, check_names, resolve_boom
 from ic.meaning.mechanics.dh import use_dh
-from ic.meaning.mechanics.following import check_followers, use_follows
 from ic.meaning.mechanics.foreign import how_to_close, refuse_foreign_joint
-from ic.meaning.mechanics.loops import close_loops, resolve_loop
+from ic.meaning.mechanics.loops import check_followers, close_loops, resolve_loop, use_follows
 from ic.meaning.mechanics.matter import use_matter
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.addresses import in_arm

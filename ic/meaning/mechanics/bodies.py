@@ -15,7 +15,7 @@ import numpy as np
 from ic.grammar.syntax import place_of
 from ic.meaning.definitions.merge import Item
 from ic.meaning.expressions.conditions import in_pieces
-from ic.meaning.mechanics.following import all_led_by
+from ic.meaning.mechanics.loops import all_led_by
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from met.plan import BASE, Joint, Link, Payload

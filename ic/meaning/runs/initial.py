@@ -17,7 +17,7 @@ from ic.meaning.control.servos import Use
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.quantity import Value, ValueList
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.mechanics.following import begin_followers, leaders_in_words
+from ic.meaning.mechanics.loops import begin_followers, leaders_in_words
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.base import INITIAL_OF_BASE
