@@ -24,7 +24,7 @@ from ic.language.runs import BASE_KINDS
 from ic.meaning.definitions.row_tables import CSV
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
 from ic.meaning.mechanics import dh
-from ic.meaning.mechanics.shapes import SHAPES
+from ic.meaning.mechanics.matter import SHAPES
 from ic.text.edition import EDITION_WORD
 from ic.text.preprocess import DIRECTIVES
 from met import models, units

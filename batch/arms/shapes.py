@@ -1,7 +1,7 @@
 """The looks of the links: the deck's shapes as simple solids and lines, each fixed to its link's frame.
 
 A rod, a box and a cylinder begin at the link frame's origin and extend along one of its axes; a sphere is centred there
-(ic/meaning/mechanics/shapes.py). Where the deck writes a centre of mass and leaves the inertia to the shape, the
+(ic/meaning/mechanics/matter.py). Where the deck writes a centre of mass and leaves the inertia to the shape, the
 simulated solid is centred on it, and it is drawn there. A link without a shape is a line to each joint that it carries,
 or to its centre of mass. Joints are drawn besides: a short cylinder about the axis of a revolute joint, and for a
 prismatic one a cube on a rail, which is as long as the case uses it; and a ball at the pin of a loop.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ic.meaning.mechanics.shapes import SHAPES
+from ic.meaning.mechanics.matter import SHAPES
 from met import models
 from met.frozen import frozen
 from met.parameter import Parameter

@@ -19,7 +19,7 @@ from ic.language.unit_words import units_of
 from ic.meaning.definitions.row_tables import ALL as ALL_ROWS
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, USAGE
 from ic.meaning.mechanics.arm import AXES
-from ic.meaning.mechanics.shapes import SHAPES
+from ic.meaning.mechanics.matter import SHAPES
 from ic.meaning.runs.linear import EQUILIBRIUM
 from ic.meaning.runs.requirements import PERCENTILE
 from ic.meaning.runs.step_errors import STEP_ERROR

@@ -11,7 +11,7 @@ from typing import Any
 
 from ic.language import BLOCKS
 from ic.meaning.control.substitution import DEFAULTS
-from ic.meaning.mechanics import dh, shapes
+from ic.meaning.mechanics import dh, matter
 from ic.printing import sweeps
 from ic.printing.language import block_page
 from ic.printing.models import (
@@ -125,12 +125,12 @@ def shapes_page() -> Page:
         subject="shapes",
         title="Shapes of links",
         summary="uniform solids, which give a link its inertia and its centre of mass",
-        prose=(shapes.__doc__ or "").strip().split("\n\n", 1)[1],
+        prose=(matter.__doc__ or "").strip().split("\n\n", 1)[1],
         usage="link NAME { mass = 2 kg;  shape = rod(length = 1 m, along = x); }",
-        parts=[parameter_table(shape.parameters, caption=name) for name, shape in shapes.SHAPES.items()],
+        parts=[parameter_table(shape.parameters, caption=name) for name, shape in matter.SHAPES.items()],
         records=[
             {"name": name, "parameters": [parameter_record(parameter) for parameter in shape.parameters]}
-            for name, shape in shapes.SHAPES.items()
+            for name, shape in matter.SHAPES.items()
         ],
     )
 

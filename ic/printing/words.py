@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from ic.language import ANYWHERE, BLOCKS, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
-from ic.meaning.mechanics import dh, shapes
+from ic.meaning.mechanics import dh, matter
 from ic.printing.glossary import entries, meaning
 from ic.printing.language import in_block
 from ic.printing.models import KINDS
@@ -118,7 +118,7 @@ def _of_values() -> Iterator[tuple[str, Row]]:
     for subject, words_page in PAGES.items():
         for record in words_page().records:
             yield record["name"], (record["written"], f"a value: `met doc {subject}`", record["doc"])
-    for name, shape in shapes.SHAPES.items():
+    for name, shape in matter.SHAPES.items():
         for word in (name, *(parameter.name for parameter in shape.parameters)):
             yield word, (f"shape = {name}(...)", "a link or payload", "`met doc shapes` shows it")
     for convention in dh.CONVENTIONS:

@@ -23,7 +23,7 @@ from ic.meaning.control.substitution import DEFAULTS
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.evaluate import FUNCTIONS
 from ic.meaning.expressions.quantity import ValueList
-from ic.meaning.mechanics.shapes import SHAPES
+from ic.meaning.mechanics.matter import SHAPES
 from ic.meaning.parameters.scope import Scope
 from ic.read import read
 from ic.text.complaints import Complaints

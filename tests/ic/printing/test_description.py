@@ -14,7 +14,7 @@ import ic
 from ic.language import BLOCKS
 from ic.meaning.definitions.row_tables import CSV
 from ic.meaning.expressions.evaluate import FUNCTIONS
-from ic.meaning.mechanics.shapes import SHAPES
+from ic.meaning.mechanics.matter import SHAPES
 from ic.printing.models import KINDS
 from ic.sweeps.designs import DESIGNS, DISTRIBUTIONS
 from met import cli, models, units

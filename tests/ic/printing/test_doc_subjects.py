@@ -16,7 +16,7 @@ from ic.language import BLOCKS, HEADS, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
 from ic.meaning.definitions.row_tables import CSV
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
-from ic.meaning.mechanics.shapes import SHAPES
+from ic.meaning.mechanics.matter import SHAPES
 from ic.printing import codes
 from ic.printing.glossary import entries, meaning
 from ic.printing.models import KINDS
