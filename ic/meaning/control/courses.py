@@ -23,10 +23,18 @@ from ic.meaning.definitions.csv_files import missing_column
 from ic.meaning.definitions.merge import Item, MergedBlock, open_call, refuse_block
 from ic.meaning.expressions.cycles import components
 from ic.meaning.parameters import not_sweepable
-from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
+from ic.meaning.parameters.models import (
+    TIME,
+    check_keys,
+    find_model,
+    keep_column,
+    named_file,
+    refuse_values,
+    use_model,
+    word_of,
+)
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
-from ic.meaning.parameters.tables import TIME, keep_column, named_file
 from met import models
 from met.commands.profile import COLUMN, FILE, Profile
 from met.diagnostic import Label, Place, Problem, error

@@ -10,11 +10,19 @@ from ic.meaning.checks.idle import remark_idle, remark_kinds
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters.models import check_keys, find_model, refuse_statements, refuse_values, use_model, word_of
+from ic.meaning.parameters.models import (
+    check_keys,
+    find_model,
+    refuse_statements,
+    refuse_values,
+    report_named_lists,
+    use_model,
+    use_table,
+    word_of,
+)
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
-from ic.meaning.parameters.tables import report_named_lists, use_table
 from ic.meaning.runs.base import fixed_to, remark_ground
 from ic.text.complaints import known_words
 from met import models
