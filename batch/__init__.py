@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from batch.campaigns.drive import Progress
     from batch.campaigns.executor import Executor
-    from batch.campaigns.verification.when import Verify
+    from batch.campaigns.verification.verifying import Verify
     from batch.differences.result import Diff
     from batch.linearized import LinearAnswer
     from batch.queries.summary import Summary

@@ -22,8 +22,8 @@ from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.output import check_output, check_room, default_output
 from batch.campaigns.searching import check_first_generation
 from batch.campaigns.tasks import CampaignSection
-from batch.campaigns.verification.when import WORDS as VERIFY_WORDS
-from batch.campaigns.verification.when import Verify
+from batch.campaigns.verification.verifying import WORDS as VERIFY_WORDS
+from batch.campaigns.verification.verifying import Verify
 from ic.printing.columns import size as size_text
 from met import run as engine
 from met.diagnostic import Problem, error
@@ -120,7 +120,7 @@ class CampaignPart:
 @frozen
 class Campaign:
     """A campaign that is ready to run and fully checked. words: the choice of histories, as `prepare` takes it; verify:
-    the cases that are run with shorter steps too (batch/campaigns/verification/when.py); kept_rows: the choice of cases
+    the cases that are run with shorter steps too (batch/campaigns/verification); kept_rows: the choice of cases
     with rows in the archive."""
 
     plan: Plan

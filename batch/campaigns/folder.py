@@ -38,7 +38,7 @@ from batch.archive.sink import is_at
 from batch.campaigns import shard
 from batch.campaigns.points import NPY_HEAD_BYTES, grown_program, points_path, read_points
 from batch.campaigns.tasks import CampaignSection, Done, Task
-from batch.campaigns.verification.when import WORDS as VERIFY_WORDS
+from batch.campaigns.verification.verifying import WORDS as VERIFY_WORDS
 from met import run as engine
 from met.diagnostic import Problem, error
 from met.host.files import is_count, new_file, read_json, read_regular, whole_file

@@ -16,7 +16,7 @@ from batch.archive import layout as archive_layout
 from batch.archive.summarised import CaseSummary
 from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.tasks import CampaignSection
-from batch.campaigns.verification import choosing
+from batch.campaigns.verification import verifying
 from batch.queries.tallies import MOST_POINTS, CaseBlock, CaseTallies, PointNumbers, TooManyPoints
 from met.diagnostic import Problem, error
 from met.distinct import distinct
@@ -266,7 +266,7 @@ def summarise(
         progress(first + len(rows))
     kept_places = tallies.named()
     kept_places += outcomes.worst(wanted.metric).tolist() if wanted.worst else []
-    kept_places += choosing.chosen(experiment, outcomes).tolist() if verified else []
+    kept_places += verifying.chosen(experiment, outcomes).tolist() if verified else []
     places = distinct(np.array(kept_places or [0], np.int64))  # an archive has a case
     values = tallies.values(
         lambda place: int(experiment.cases.table[section.rows[place]]),

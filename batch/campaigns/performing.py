@@ -28,7 +28,7 @@ from batch.campaigns.searching import CampaignSearch, run_search
 from batch.campaigns.status import Reporter, died_lines
 from batch.campaigns.tasks import CampaignSection
 from batch.campaigns.until_shown import StoppingPoints, run_until_shown, without_dropped
-from batch.campaigns.verification import when
+from batch.campaigns.verification import verifying
 from met.analysis.linear import metrics as linear_metrics
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
@@ -294,7 +294,7 @@ class _CampaignWork:
                 section,
                 merge.runs_in_blocks(self.folder, section, self._threads),
                 self.campaign.kept_rows,
-                verified=when.resolve(self.campaign.verify, section.prepared, len(section.rows)) == "some",
+                verified=verifying.resolve(self.campaign.verify, section.prepared, len(section.rows)) == "some",
                 progress=lambda cases: self.reporter.advance(cases, 0),
             )
             self.reporter.end()
@@ -407,11 +407,10 @@ class _CampaignWork:
     def _verify(self, writer: ArchiveWriter, number: int, section: CampaignSection, outcomes: CaseOutcomes) -> None:
         """Run some of an experiment's cases, which are all in the archive by now, with shorter steps, if that is
         wanted."""
-        way = when.resolve(self.campaign.verify, section.prepared, len(section.rows))
+        way = verifying.resolve(self.campaign.verify, section.prepared, len(section.rows))
         if way == "none":
             return
-        from batch.campaigns.verification.choosing import chosen
-        from batch.campaigns.verification.verifying import FACTORS, verify
+        from batch.campaigns.verification.verifying import FACTORS, chosen, verify
 
         experiment = self.whole.parts[number].experiment
         done = outcomes.done

@@ -19,7 +19,7 @@ from batch.campaigns.folder import Folder, FolderBusy, beside
 from batch.campaigns.output import sidecar_path
 from batch.campaigns.status import duration
 from batch.campaigns.tasks import CampaignSection
-from batch.campaigns.verification import when
+from batch.campaigns.verification import verifying
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, read_json
 from met.plan import file as plan_file
@@ -75,7 +75,7 @@ def settled(campaign: Campaign, values: Sequence[CampaignSection]) -> Campaign:
     if campaign.verify == "auto" or campaign.open_ended:  # the number of cases is not known yet
         return campaign
     return replace(
-        campaign, verify=when.settled(campaign.verify, ((value.prepared, len(value.rows)) for value in values))
+        campaign, verify=verifying.settled(campaign.verify, ((value.prepared, len(value.rows)) for value in values))
     )
 
 

@@ -16,7 +16,7 @@ from batch.campaigns.executor import Executor
 from batch.campaigns.performing import Performed, TooMany, perform
 from batch.campaigns.rehearsal import rehearse
 from batch.campaigns.replaying import Replay, differences, in_both, replay
-from batch.campaigns.verification.when import Verify
+from batch.campaigns.verification.verifying import Verify
 from batch.executors.choose import choose
 from batch.executors.threads import Threads
 from batch.export import Exported

@@ -2,20 +2,110 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import hashlib
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
+from typing import Any, Literal
 
 import numpy as np
 
 from batch.archive.verified import Verified
+from batch.campaigns.outcomes import CaseOutcomes
 from met import models
 from met import run as engine
 from met.analysis.refinement import refine
+from met.distinct import distinct
 from met.plan import Experiment
 from met.plan.channel import channels
 from met.plan.judged import MetricUse
 from met.program.system import FURTHEST
+from met.run import Prepared
+
+SEEDED = 2
+"""Number of cases that the seed chooses among all."""
+
+
+def chosen(experiment: Experiment, results: CaseOutcomes) -> np.ndarray:
+    """Places of the cases to verify, rising, among those that reached their end: the first, the last, the worst of each
+    metric, and `SEEDED` more by the seed of the experiment's noise. None where no case did."""
+    ends = results.ends()
+    if ends is None:
+        return np.zeros(0, np.int64)
+    places = [*ends, *results.worst_finite()]
+    for number in range(SEEDED):
+        left = results.done.set - len(set(places))
+        if left:
+            digest = hashlib.sha256(f"verified {experiment.cases.seed} {number}".encode()).digest()
+            places.append(_done_beside(results, places, int.from_bytes(digest[:8], "big") % left))
+    return distinct(np.array(places, np.int64))
+
+
+def _done_beside(results: CaseOutcomes, places: list[int], number: int) -> int:
+    """The case of this number among those that reached their end, not counting these places, all of which did."""
+    ranks = np.sort(results.done.rank(distinct(np.array(places, np.int64))))
+    for rank in ranks.tolist():
+        number += rank <= number
+    return int(results.done.select(np.array([number]))[0])
+
+
+def most(metrics: int, cases: int) -> int:
+    """The largest number of cases that `chosen` chooses from this many cases with these metrics."""
+    return min(cases, 2 + metrics + SEEDED)
+
+
+Verify = Literal["auto", "none", "some", "all"]
+
+WORDS: tuple[Verify, ...] = ("auto", "none", "some", "all")
+"""Allowed choices; `auto` is `some` where that is cheap."""
+
+SHARE = 0.03
+"""Share of the campaign's steps up to which verification is always cheap enough."""
+
+PREPARING = 250_000
+"""Number of steps of a campaign's cases, in vectors side by side, that takes as long as recording a program with cached
+machine code, whatever its size: 12 to 20 ms; measured on the shipped decks."""
+
+SHORT_OPERATIONS, SHORT_PROGRAM = 400_000_000, 15_000
+"""Largest number of operations of the steps added for a single case, about 0.3 s, and of a program's operations, whose
+machine code takes some seconds once: so almost every single case gets its errors by default."""
+
+
+def resolve(wanted: Verify, prepared: Prepared, cases: int) -> Verify:
+    """`none`, `some` or `all`: the resolved choice for this many cases of an experiment; `auto` is `some` where the
+    deck limits errors due to the step, and otherwise decided by cost."""
+    experiment = prepared.experiment
+    metrics = len(experiment.structure.metrics)
+    if not metrics or not cases:
+        return "none"
+    if wanted != "auto":
+        return wanted
+    if experiment.step_errors:
+        return "some"
+    steps = _steps(experiment)
+    if cases == 1:
+        size = _operations(prepared)
+        short = size <= SHORT_PROGRAM and size * steps * sum(FACTORS) <= SHORT_OPERATIONS
+        return "some" if short else "none"
+    added = most(metrics, cases) * sum(FACTORS) * steps + len(FACTORS) * PREPARING
+    return "some" if added <= SHARE * cases * steps else "none"
+
+
+def settled(wanted: Verify, sections: Iterable[tuple[Prepared, int]]) -> Verify:
+    """`auto` where the choice equals that of `auto` for each experiment; else the choice itself. So equal campaigns are
+    equal however the choice was written."""
+    same = all(resolve(wanted, *section) == resolve("auto", *section) for section in sections)
+    return "auto" if same else wanted
+
+
+def _steps(experiment: Experiment) -> int:
+    schedule = experiment.structure.schedule
+    return schedule.ticks // schedule.dynamics
+
+
+def _operations(prepared: Any) -> int:
+    return sum(len(section.nodes) for section in prepared.recording.sections)
+
 
 FACTORS = (2, 4)
 """Numbers of steps in place of one: a verified case takes 2 + 4 times its own steps in addition."""

@@ -15,8 +15,8 @@ import ic
 from batch.archive.read import ArchiveFile
 from batch.campaigns import tasks
 from batch.campaigns.outcomes import CaseOutcomes
-from batch.campaigns.verification import when
-from batch.campaigns.verification.choosing import chosen, most
+from batch.campaigns.verification import verifying
+from batch.campaigns.verification.verifying import chosen, most
 from batch.queries.step_errors.figures import case_error, figures
 from met import cli
 from met import run as engine
@@ -308,7 +308,7 @@ def test_the_figure_of_a_campaign_is_that_of_its_worst_case(sweep: Plan, tmp_pat
 
 def test_it_is_done_by_itself_where_it_is_cheap() -> None:
     def said(cases: int, ticks: int) -> str:
-        return when.resolve("auto", engine.prepare(plans.gains(cases, ticks=ticks)), cases)
+        return verifying.resolve("auto", engine.prepare(plans.gains(cases, ticks=ticks)), cases)
 
     assert said(10, 2000) == "none"  # 6 cases of 10 would be 36 more
     assert said(1_300, 2000) == "none"  # and two programs
@@ -316,7 +316,7 @@ def test_it_is_done_by_itself_where_it_is_cheap() -> None:
     assert said(40_000, 2000) == "some"
     assert said(1_300, 2_000_000) == "some"
     nominal = engine.prepare(plans.nominal(ticks=2000))
-    assert when.resolve("auto", nominal, 1) == "some"
-    assert when.resolve("auto", engine.prepare(plans.nominal(ticks=400_000)), 1) == "none"
-    assert when.resolve("none", nominal, 1) == "none"
-    assert when.resolve("all", engine.prepare(plans.gains(10)), 10) == "all"
+    assert verifying.resolve("auto", nominal, 1) == "some"
+    assert verifying.resolve("auto", engine.prepare(plans.nominal(ticks=400_000)), 1) == "none"
+    assert verifying.resolve("none", nominal, 1) == "none"
+    assert verifying.resolve("all", engine.prepare(plans.gains(10)), 10) == "all"
