@@ -35,7 +35,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from batch.archive import limits, searched, step_errors
+from batch.archive import limits, searched, verified
 from met.frozen import frozen
 from met.plan import Coordinate, Experiment, Plan, Recorded
 from met.plan.channel import DIMENSIONS, channels
@@ -466,7 +466,7 @@ def _step_errors(experiment: Experiment, variables: list[Variable]) -> dict[str,
     if not experiment.step_errors:
         return {}
     names = {variable.key: variable.name for variable in variables if variable.role == "metric"}
-    return {step_errors.ATTRIBUTE: step_errors.written(experiment.step_errors, names)}
+    return {verified.ATTRIBUTE: verified.written(experiment.step_errors, names)}
 
 
 def _search(experiment: Experiment, variables: list[Variable]) -> dict[str, Any]:

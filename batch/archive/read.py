@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive import plain, sound, step_errors, summarised, verified
+from batch.archive import plain, sound, summarised, verified
 from batch.archive.hdf5 import SIGNATURE, h5py
 from batch.archive.layout import SCHEMA, VERSION
 from batch.archive.rows import row_of
@@ -51,7 +51,7 @@ class ArchiveGroup:
             self.attributes: dict[str, Any] = {name: _plain(value) for name, value in node.attrs.items()}
             sound.check(self)
             self.verified = verified.read(node, self)
-            self.step_errors = tuple(step_errors.read(self))
+            self.step_errors = tuple(verified.read_limits(self))
             self.summary = summarised.read(node, self)
         self.summed: summarised.CaseSummary | None = None
         """The summary of all cases, once computed from their rows (batch/queries/streamed.py)."""

@@ -1,6 +1,6 @@
 """The group `verification` of an experiment: some cases' metrics, with the dynamics at half and a quarter of the step.
 
-    verified_case     positions of the cases in the case table, rising; a dimension
+verified_case     positions of the cases in the case table, rising; a dimension
     verified_metric   names of the metrics' variables; a dimension
     half, quarter     the metrics at half and a quarter of the step, SI; not-a-number where such a case failed
     instant           s, of a metric that is an instant seen at whole steps: a quarter of the step; 0 for others
@@ -13,6 +13,8 @@ The values at the step itself are the campaign's own. Only these numbers are sto
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,42 @@ from batch.archive.sound import MOST, are_cases
 from batch.archive.stored import StoredGroup, Unlike
 from batch.archive.tables import COUNT, NUMBER, WORDS
 from met.frozen import frozen
+from met.host.files import parse_json
+from met.plan.judged import StepErrorLimit
+
+ATTRIBUTE = "step_errors"
+
+FIELDS = {"text": str, "metric": str, "comparison": str, "limit": float, "share": bool}
+"""The fields of each requirement, with their types."""
+
+
+def written(limits: Iterable[StepErrorLimit], names: Mapping[str, str]) -> str:
+    """The value of the attribute. names: of the metrics' variables, by the metrics' own"""
+    plain = [{name: getattr(limit, name) for name in FIELDS} | {"metric": names[limit.metric]} for limit in limits]
+    return json.dumps(plain, sort_keys=True, separators=(",", ":"))
+
+
+def read_limits(group: StoredGroup) -> Iterator[StepErrorLimit]:
+    """The requirements of a group; their metrics are names of variables. Raises Unlike."""
+    text = group.attributes.get(ATTRIBUTE, "[]")
+    try:
+        plain = parse_json(text) if isinstance(text, str) else None
+    except ValueError:
+        plain = None
+    if not isinstance(plain, list):
+        raise Unlike(f"attribute `{ATTRIBUTE}` is no list of requirements")
+    metrics = {variable.name for variable in group.role("metric")}
+    for entry in plain:
+        good = isinstance(entry, dict) and all(type(entry.get(name)) is kind for name, kind in FIELDS.items())
+        if (
+            not good
+            or entry["metric"] not in metrics
+            or entry["comparison"] not in ("<", "<=")
+            or not entry["limit"] > 0
+        ):
+            raise Unlike(f"attribute `{ATTRIBUTE}` is no list of requirements")
+        yield StepErrorLimit(**{name: entry[name] for name in FIELDS})
+
 
 NAME = "verification"
 
