@@ -1,17 +1,107 @@
-"""`use <panda.ic> as panda;`: the entry by which a deck brings in the definitions of another one."""
+"""Entries at the top of a deck: `deck 2;`, `unit NAME = SIZE;`, and `use <panda.ic> as panda;`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
+from functools import cached_property
+from itertools import pairwise
+from typing import NoReturn
 
-from ic.grammar.cursor import token_in_words
-from ic.grammar.edition_entries import EditionEntries
-from ic.grammar.syntax import Broken, UseEntry, Word
+from ic.grammar.cursor import Unreadable, span, token_in_words
+from ic.grammar.declared_units import UNIT, USAGE, declarations, is_declaration, measures
+from ic.grammar.loops import Loops
+from ic.grammar.syntax import Broken, Expression, UseEntry, Word
+from ic.text.edition import EDITION_WORD, EDITIONS
 from ic.text.lexer import NAME, STRING, Token
 from ic.text.limits import Findings
+from met.diagnostic import Label, leave_out
+from met.units import ONE
+
+
+class EditionEntries(Loops):
+    """The part of the parser that knows these entries."""
+
+    @cached_property
+    def refused_units(self) -> set[str]:
+        """Files of edition 1 that declare units, which has been reported."""
+        return set()
+
+    def declare_units(self) -> None:
+        """Find the units that the deck declares anywhere, before it is parsed."""
+        self.take_misplaced_editions()
+        self.unsized.update(
+            self.tokens[position + 1].text
+            for position, token in enumerate(self.tokens)
+            if token.text == UNIT and token.source.edition == 1 and is_declaration(self.tokens, position)
+        )
+        positions = declarations(self.tokens)
+        if not positions:
+            return
+        self.declared = {**self.declared, **dict.fromkeys(positions, ONE)}
+        sizes: dict[str, tuple[Token, Expression]] = {}
+        self.units_alone = True
+        for name, position in positions.items():
+            self.position = position + 2
+            with suppress(Unreadable):
+                sizes[name] = (self.tokens[position], self.value())
+            self.operators, self.peak = 0, 0
+            self.open.clear()
+        known = measures(sizes, self.findings)
+        self.declared = {**self.declared, **known}
+        self.unsized.update(positions.keys() - known.keys())
+        self.position, self.units_alone = 0, False
+
+    def take_misplaced_editions(self) -> None:
+        """Read a file with a misplaced `deck 2;`, which is reported, in that edition: the rest may be right."""
+        for word, number in pairwise(self.tokens):
+            if word.text == EDITION_WORD and word.source.heading is None and number.text in map(str, EDITIONS):
+                word.source.edition = int(number.text)
+
+    def step_over_unit(self) -> None:
+        """Step over `unit NAME = SIZE;`, which has been read, and refuse it where it is not allowed."""
+        start, (word, name) = self.position, self.tokens[self.position : self.position + 2]
+        depth = len(self.open)
+        try:
+            if word.source.edition == 1:
+                help = self.as_edition_2(word, "a file of edition 2 declares units")
+                if word.source.name in self.refused_units:  # once for each file
+                    raise Unreadable
+                self.refused_units.add(word.source.name)
+                self.fail("D394", "edition 1 declares no units", span(word, name), help=help)
+            if self.depth or depth:
+                self.fail("D394", "a unit is declared outside of blocks and loops", span(word, name), help=USAGE)
+            first = declarations(self.tokens)[name.text]
+            if first != start + 1:
+                also = (Label(self.tokens[first].place, "the first"),)
+                self.fail("D394", f"unit `{name.text}` is declared twice", name, also=also, help="leave one out")
+            self.position += 3
+            self.units_alone = True
+            self.semicolon(self.value())
+            self.units_alone = False
+        except Unreadable:
+            self.units_alone = False
+            self.recover(start, depth)
+
+    def not_the_edition(self, word: Token) -> NoReturn:
+        """Report a `deck 2;` that does not set the edition, at its number."""
+        number = self.token
+        heading = word.source.heading
+        edition_entry = f"{word.text} {number.text};"
+        if heading is not None:
+            place = word.source.place(heading.first, heading.last - heading.first)
+            label = Label(place, "it is said here")
+            help = leave_out("leave one of the two out", word.place)
+            self.fail("D391", "a file says its edition once", span(word, number), also=(label,), help=help)
+        known = " or ".join(f"`{EDITION_WORD} {edition};`" for edition in EDITIONS)
+        if number.text not in map(str, EDITIONS) or self.following.text != ";":
+            self.fail("D391", "this is no edition", span(word, number), help=f"write {known} in the file's first line")
+        message = "a file says its edition before all else but comments"
+        self.fail("D391", message, span(word, number), help=f"make `{edition_entry}` the first line of the file")
+
 
 USE, AS = "use", "as"
-USAGE = 'write `use <panda.ic> as panda;` or `use "beside.ic" as beside;`'
+USE_USAGE = 'write `use <panda.ic> as panda;` or `use "beside.ic" as beside;`'
 
 
 class Uses(EditionEntries):
@@ -39,7 +129,7 @@ class Uses(EditionEntries):
         if self.depth or self.open:
             self.fail("D395", "a deck is used outside of blocks and loops", word, help="move this entry out")
         if self.token.kind != STRING and self.token.text != "<":
-            self.fail("D395", f"expected a file, found {token_in_words(self.token)}", self.token, help=USAGE)
+            self.fail("D395", f"expected a file, found {token_in_words(self.token)}", self.token, help=USE_USAGE)
         first = self.token
         name = first.text[1:-1]
         place = first.place
@@ -47,21 +137,21 @@ class Uses(EditionEntries):
             written = first.source.rest_of_line(first.offset)
             end = written.find(">")
             if end < 0:
-                self.fail("D395", "`use <` without its `>`", first, help=USAGE)
+                self.fail("D395", "`use <` without its `>`", first, help=USE_USAGE)
             name, place = written[1:end], first.source.place(first.offset, end + 1, first.expansions)
             while self.token.source is first.source and first.offset <= self.token.offset <= first.offset + end:
                 self.advance()
         else:
             self.advance()
         if not name.strip():
-            self.fail("D395", "`use` needs a file, and this name is empty", place, help=USAGE)
+            self.fail("D395", "`use` needs a file, and this name is empty", place, help=USE_USAGE)
         if self.token.text != AS:
-            self.fail("D395", f"expected `as`, found {token_in_words(self.token)}", self.token, help=USAGE)
+            self.fail("D395", f"expected `as`, found {token_in_words(self.token)}", self.token, help=USE_USAGE)
         self.advance()
         roof = self.token
         if roof.kind != NAME:
             words = token_in_words(roof)
-            self.fail("D395", f"expected a name for the roof, found {words}", roof, help=USAGE)
+            self.fail("D395", f"expected a name for the roof, found {words}", roof, help=USE_USAGE)
         self.advance()
         self.semicolon(Broken(roof.place))
         self.uses.append(UseEntry(name, first.text == "<", Word(roof.text, roof.place), place, first.source.name))
