@@ -20,8 +20,7 @@ from ic.meaning.mechanics.matter import SHAPES
 from ic.printing import codes
 from ic.printing.glossary import entries, meaning
 from ic.printing.models import KINDS
-from ic.printing.requests import SUBJECTS
-from ic.printing.words import print_word
+from ic.printing.requests import SUBJECTS, print_word
 from ic.sweeps.designs import DESIGNS, DISTRIBUTIONS
 from ic.text.preprocess import DIRECTIVES
 from met import cli, models, units
