@@ -307,9 +307,8 @@ def doc(words: tuple[str, ...], form: str) -> None:
     the code of a message, as in `met doc D060`; any word of a deck, such as `like`, `allow` or `kp`; and a word of the
     glossary, such as `shard`. `met doc language --format json` prints all of it for programs.
     """
-    from ic.printing.page import in_json, in_terminal, separated
+    from ic.printing.page import in_json, in_terminal, separated, terminal_width
     from ic.printing.requests import requested_pages
-    from ic.printing.wrapping import terminal_width
 
     if len(words) > 2:
         raise click.UsageError("at most a kind and a model")
@@ -417,7 +416,7 @@ def _print(lines: Iterable[str]) -> None:
 
 def _print_text(lines: Iterable[str]) -> None:
     """Print lines of text, filled to the width of a terminal."""
-    from ic.printing.wrapping import fitted, terminal_width
+    from ic.printing.page import fitted, terminal_width
 
     _print(fitted(lines, width=terminal_width()))
 

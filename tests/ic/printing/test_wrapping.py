@@ -10,8 +10,7 @@ from ic.language import BLOCKS
 from ic.printing.columns import columns
 from ic.printing.language import block_page
 from ic.printing.models import model_page, sources
-from ic.printing.page import in_terminal
-from ic.printing.wrapping import described, fitted, paragraphs
+from ic.printing.page import described, fitted, in_terminal, paragraphs
 from met import models
 
 ROWS = [
