@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 
 import ic
-from ic.formatting.formatter import formatted, prove
-from ic.formatting.layout import laid_out
+from ic.formatting.formatter import formatted, laid_out, prove
 from ic.formatting.rows import rows
 from ic.formatting.strings import making_strings
 from ic.text.files import FoundFile
