@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 import ic
+from ic.formatting.files import making_strings
 from ic.formatting.formatter import formatted, laid_out, prove
 from ic.formatting.rows import rows
-from ic.formatting.strings import making_strings
 from ic.text.files import FoundFile
 from ic.text.lexer import Text
 from ic.text.preprocess import preprocess
