@@ -11,10 +11,9 @@ from collections.abc import Collection, Sequence
 from ic.formatting.pieces import cut
 from ic.formatting.row import CODE, TAB, Row
 from ic.grammar.cursor import OPENING
-from ic.text.lexer import BAD, SPACE, Text, Token, logical_lines
+from ic.text.lexer import BAD, SPACE, Text, Token, complain_of_stray, complain_of_unseen, logical_lines
 from ic.text.limits import CONDITION_DEPTH, DEPTH, LONGEST_LINE, MOST_TOKENS, Findings
 from ic.text.preprocess import CONDITIONALS
-from ic.text.strays import complain_of_stray, complain_of_unseen
 from met.diagnostic import Diagnostic, Label, Problem, error
 
 _CLOSING = {closing: opening for opening, closing in OPENING.items()}

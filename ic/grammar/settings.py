@@ -7,10 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from ic.grammar.parse import NO_UNITS, parse, parse_expression
 from ic.grammar.syntax import Expression, Setting
 from ic.text.edition import FIRST, LATEST
-from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, SPACE, Text, Token, logical_lines
+from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, SPACE, Text, Token, complain_of_stray, logical_lines
 from ic.text.limits import Findings, GiveUp
 from ic.text.source import SourceFile
-from ic.text.strays import complain_of_stray
 from met.diagnostic import Problem, error
 from met.outputs import VARY
 from met.outputs import varies as is_varied

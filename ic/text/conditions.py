@@ -14,9 +14,8 @@ from operator import and_, eq, ge, gt, le, lt, mul, ne, or_, sub, xor
 from types import MappingProxyType
 from typing import NamedTuple, NoReturn
 
-from ic.text.lexer import BAD, CHARACTER, DECIMAL, NAME, SPACE, STRING, WHOLE, Token
+from ic.text.lexer import BAD, CHARACTER, DECIMAL, NAME, SPACE, STRING, WHOLE, Token, complain_of_stray
 from ic.text.limits import CONDITION_NESTING, LONGEST_NUMBER, MOST_TERMS, Findings
-from ic.text.strays import complain_of_stray
 from met.diagnostic import Place, write
 
 _NUMBER = re.compile(r"(?:0[xX](?P<hex>[0-9a-fA-F]+)|0(?P<octal>[0-7]*)|(?P<decimal>[1-9][0-9]*))")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
 
-from ic.text.lexer import BAD, COMMAND_LINE, NAME, NUMBERS, PASTE, SPACE, Token
+from ic.text.lexer import BAD, COMMAND_LINE, NAME, NUMBERS, PASTE, SPACE, Token, complain_of_stray
 from ic.text.limits import LONGEST_NAME, MOST_MACRO_BODY, Findings
-from ic.text.strays import complain_of_stray
 from ic.text.substitute import OPTIONAL, REST, Macro, closing
 from met import units
 from met.diagnostic import Help, Label, write

@@ -18,7 +18,21 @@ from ic.text.complaints import Complaints
 from ic.text.conditions import Refused, evaluate, well_formed, with_defined
 from ic.text.edition import EDITIONS, LATEST
 from ic.text.files import LIBRARY, Files, FoundFile, folders_by_slash
-from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, NAME, NOTHING, SPACE, STRING, Text, Token, logical_lines
+from ic.text.lexer import (
+    BAD,
+    CHARACTER,
+    COMMAND_LINE,
+    END,
+    NAME,
+    NOTHING,
+    SPACE,
+    STRING,
+    Text,
+    Token,
+    complain_of_stray,
+    complain_of_unseen,
+    logical_lines,
+)
 from ic.text.limits import (
     CONDITION_DEPTH,
     INCLUDE_DEPTH,
@@ -34,7 +48,6 @@ from ic.text.limits import (
 from ic.text.macros import Macros
 from ic.text.naming import VALUES, Named, names_in
 from ic.text.source import SourceFile
-from ic.text.strays import complain_of_stray, complain_of_unseen
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, meant, nearest, write
 from met.frozen import frozen
 
