@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from met.optimisers.descent import CONVERGED, LocalModel, SlopeDescent, updated
-from met.optimisers.quadratic import least_within
+from met.optimisers.descent import CONVERGED, LocalModel, SlopeDescent, least_within, updated
 
 Function = Callable[[np.ndarray], LocalModel]
 
