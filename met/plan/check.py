@@ -22,8 +22,7 @@ from met.plan import guides as guides
 from met.plan import relations as relations
 from met.plan import rest as rest
 from met.plan import structure as plan_structure
-from met.plan.checked_linear import check_linear
-from met.plan.checked_searches import check_search
+from met.plan.checked_answers import check_linear, check_search
 from met.plan.codec import Damaged
 from met.plan.columns import CaseValues, blocks
 from met.plan.defaults import INERTIA, declared, heads_of_models, related

@@ -20,7 +20,7 @@ from met.diagnostic import Place, Problem, did_you_mean, error, write
 from met.parameter import Parameter
 from met.plan import Joint, Structure
 from met.plan.channel import recordable
-from met.plan.checked_linear import is_way
+from met.plan.checked_answers import is_way
 from met.plan.judged import MetricUse
 from met.plan.linear_signals import InputSignal, input_signals, no_computer
 from met.plan.linear_uses import FIGURES, LinearUse

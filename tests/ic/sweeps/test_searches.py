@@ -15,7 +15,7 @@ from met.diagnostic import Problem
 from met.messages.render import render
 from met.plan import Plan
 from met.plan import file as plan_file
-from met.plan.checked_searches import check_search
+from met.plan.checked_answers import check_search
 from met.plan.codec import Damaged
 from met.plan.searches import Confirmation, Search, SearchedParameter
 from met.searches import search_method
