@@ -20,7 +20,7 @@ from met.dynamics.spatial import ZERO, Vector
 from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import Experiment, Joint
-from met.plan.loops import in_loops
+from met.plan.closing import in_loops
 from met.program.build import Builder
 from met.program.system import Actuator, System
 from met.program.values import parameters

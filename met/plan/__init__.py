@@ -52,6 +52,7 @@ from met.frozen import frozen, keyed
 from met.parameter import BASE as BASE
 from met.parameter import Parameter
 from met.plan.chains import ground, springs, straightened
+from met.plan.closing import Loop
 from met.plan.columns import CaseValues, FormulaColumn, ShiftedColumn, all_rows, listed
 from met.plan.judged import (
     MetricUse,
@@ -61,7 +62,6 @@ from met.plan.judged import (
     Tolerance,
 )
 from met.plan.linear_uses import LinearUse
-from met.plan.loops import Loop
 from met.plan.run_keys import RunKey, run_key
 from met.plan.searches import Search
 from met.trace.graph import Formulas

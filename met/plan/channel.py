@@ -53,7 +53,7 @@ from functools import lru_cache
 from met import models, units
 from met.frozen import frozen
 from met.plan import Joint, Recorded, Structure
-from met.plan.loops import in_loops
+from met.plan.closing import in_loops
 from met.plan.uses import quantities, sensor_parts, servo_parts
 from met.unit_parser import parse_unit
 

@@ -10,7 +10,7 @@ from met.diagnostic import Place, nearest
 from met.parameter import Parameter, is_present, under
 from met.plan import COMPONENTS, Course, Experiment, Joint, Origin, Quantity, Structure
 from met.plan.channel import JOINT_LIMITS, channels, joint_unit, ratio_unit, watched_unit
-from met.plan.loops import of_joints
+from met.plan.closing import of_joints
 from met.plan.uses import model_uses, quantities, sensor_parts, servo_parts
 from met.substitution import bed_scale
 

@@ -13,9 +13,9 @@ from met.parameter import WORLD
 from met.plan import BASE, COMPONENTS, ServoUse, Structure
 from met.plan import guides as guides
 from met.plan.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
+from met.plan.closing import ring
 from met.plan.codec import Damaged
 from met.plan.following import follows_itself
-from met.plan.loops import ring
 from met.plan.uses import quantities
 from met.trace.nodes import TRUTHS
 

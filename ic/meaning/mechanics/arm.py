@@ -32,7 +32,7 @@ from met.diagnostic import Label, Place, did_you_mean, leave_out, meant, write
 from met.frozen import frozen
 from met.plan import BASE, Joint, Link
 from met.plan.chains import springs
-from met.plan.loops import Loop
+from met.plan.closing import Loop
 from met.trace import Scalar, sqrt
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}

@@ -29,7 +29,7 @@ from met.diagnostic import leave_out
 from met.frozen import frozen
 from met.plan import Joint, Link, Structure
 from met.plan.chains import chains
-from met.plan.loops import Loop
+from met.plan.closing import Loop
 from met.trace import Real, minimum, sqrt
 
 GAUSS = ((1.0 - 1.0 / math.sqrt(3.0)) / 2.0, (1.0 + 1.0 / math.sqrt(3.0)) / 2.0)

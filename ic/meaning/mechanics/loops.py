@@ -20,9 +20,8 @@ from ic.text.complaints import known_words
 from met.diagnostic import Label, did_you_mean, leave_out
 from met.plan import Joint, Origin
 from met.plan.channel import joint_unit, ratio_unit
-from met.plan.closing import Corner, axis_across, close, corners_of
+from met.plan.closing import Corner, Loop, axis_across, close, corners_of, ring
 from met.plan.following import followed, follows_itself
-from met.plan.loops import Loop, ring
 from met.trace import Real, Scalar, absolute, rint
 from met.vectors import cross, dot, scale, sub
 

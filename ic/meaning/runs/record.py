@@ -14,7 +14,7 @@ from met import models
 from met.diagnostic import Help, Label, Place, did_you_mean, nearest, write
 from met.plan import Recorded, Structure
 from met.plan.channel import FAMILIES, Channel, carries, recordable
-from met.plan.loops import in_loops
+from met.plan.closing import in_loops
 
 COMPUTED = (Binary, Call, Unary, WithUnit)
 """Expressions that could be a signal."""

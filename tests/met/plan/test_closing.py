@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from met.plan import Joint
-from met.plan.closing import Led, close, corners_of
-from met.plan.loops import Loop, ways
+from met.plan.closing import Led, Loop, close, corners_of, ways
 from met.vectors import IDENTITY, ZERO, Vector, add, product, rotation_about, rotation_rpy, scale, turn_vector
 
 BARS = (("crank", "revolute", ""), ("coupler", "revolute", "crank"), ("rocker", "revolute", ""))
