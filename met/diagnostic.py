@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from met.messages.alike import did_you_mean, meant, nearest
 from met.messages.message import (
     Diagnostic,
     Expansion,
@@ -18,7 +17,10 @@ from met.messages.message import (
     Place,
     Severity,
     TextChange,
+    did_you_mean,
     leave_out,
+    meant,
+    nearest,
     write,
     write_either,
 )

@@ -10,8 +10,7 @@ import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from met.messages.alike import nearest
-from met.messages.message import write
+from met.messages.message import nearest, write
 from met.units import ALL_UNITS, UNITS, is_unit
 
 LONGEST = 16  # longest word that is looked up

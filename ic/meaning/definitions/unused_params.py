@@ -9,8 +9,7 @@ from typing import Any
 
 from ic.grammar.syntax import Entry, Let, Name, Setting
 from met.diagnostic import Diagnostic, Label, Place, write
-from met.messages.alike import meant
-from met.messages.message import shown_place
+from met.messages.message import meant, shown_place
 
 
 def misspelt_params(entries: Sequence[Entry]) -> Iterator[Diagnostic]:

@@ -28,7 +28,7 @@ from met.analysis.linear.plant import PlantModel, plants
 from met.analysis.linear.standing import moves, refusal, settled, standing, weak
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.messages.alike import nearest
+from met.messages.message import nearest
 from met.plan import Experiment, Recorded, Structure
 from met.plan.channel import recordable
 from met.plan.linear_signals import InputSignal, input_signals, no_computer
