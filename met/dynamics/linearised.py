@@ -57,7 +57,7 @@ from met.dynamics.spatial import (
 from met.dynamics.tree import Tree, each_number
 from met.frozen import frozen
 from met.trace import Mask
-from met.trace.known import KnownDerivative, Tangent
+from met.trace.derivative import KnownDerivative, Tangent
 from met.trace.nodes import Nodes
 from met.trace.primitives import divide
 from met.trace.scalar import Scalar
@@ -352,7 +352,7 @@ MOVING = ("q", "qd", "tau", "qdd", "wrenches")
 
 
 def tell(tree: Tree, arguments: Mapping[str, Any], solved: Solved) -> None:
-    """Give the graph in which `recursion.solve` was recorded the derivative of its results (`met.trace.known`).
+    """Give the graph in which `recursion.solve` was recorded the derivative of its results (`met.trace.derivative`).
 
     arguments  those of `solve`, by name, `velocity_products` with them
     """

@@ -5,15 +5,60 @@ which the condition takes there; `floor`, `rint`, tables and random numbers have
 and the like is that of their polynomials, right to some units in the last place of the function's own size.
 
 For plain functions: record them, and `Formulas.replay` the derivative over floats or arrays.
+
+A recorded computation may come with its derivative (`Nodes.known`): the tangents of its results from those of its
+arguments. A plain program is not changed by it, since nodes for derivatives are made only on request.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-from met.trace.known import KnownTangents
+from met.frozen import frozen
 from met.trace.nodes import OPERANDS, TRUTHS, ZERO, Node, Nodes
 from met.trace.scalar import Scalar
+
+Tangent = Callable[[int], int]
+"""The reference of the derivative of a reference's number."""
+
+
+@frozen
+class KnownDerivative:
+    """The derivative of a computation that is in a graph.
+
+    results   references of what it gives
+    held      references of what it takes that it has no derivative by: where one of these moves, it is not known
+    moves     makes what all directions share in a graph that has the nodes of the one it was recorded in, and gives a
+              function that makes the derivatives of the results along one direction
+    """
+
+    results: tuple[int, ...]
+    held: tuple[int, ...]
+    moves: Callable[[Nodes], Callable[[Tangent], Sequence[int]]]
+
+
+class KnownTangents:
+    """Derivatives that a section's recording has in closed form, for one direction after the other."""
+
+    def __init__(self, graph: Nodes, known: Sequence[KnownDerivative]) -> None:
+        self._graph, self._known = graph, known
+        self._moves: dict[int, Callable[[Tangent], Sequence[int]]] = {}
+        self._number_of = {ref >> 1: number for number, derivative in enumerate(known) for ref in derivative.results}
+
+    def at(self, position: int, tangent: Tangent) -> dict[int, int]:
+        """By position, the derivatives of all results of the computation that gives a node; none where they are not
+        known. tangent: of nodes before it"""
+        number = self._number_of.get(position)
+        if number is None:
+            return {}
+        derivative = self._known[number]
+        if any(tangent(ref) & -2 != ZERO for ref in derivative.held):
+            return {}
+        if number not in self._moves:
+            self._moves[number] = derivative.moves(self._graph)
+        moves = self._moves[number](tangent)
+        return {ref >> 1: move ^ (ref & 1) for ref, move in zip(derivative.results, moves, strict=True)}
+
 
 ROUNDS = 2.0**51
 """A sum with a constant of at least this size is whole, or half of it, by which functions round

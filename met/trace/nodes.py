@@ -70,7 +70,7 @@ class Nodes:
     __slots__ = ("_constants", "_literals", "_refs", "known", "nodes")
 
     def __init__(self) -> None:
-        self.known: list[Any] = []  # of `met.trace.known`
+        self.known: list[Any] = []  # of `met.trace.derivative`
         self.nodes: list[Node] = [("const", 0.0), ("const", 1.0), ("false",)]
         self._refs: dict[Node, int] = {}
         self._literals: dict[float, int] = {0.0: ZERO, 1.0: ONE}

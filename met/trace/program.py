@@ -18,8 +18,8 @@ from functools import cached_property
 from typing import Protocol
 
 from met.frozen import frozen
+from met.trace.derivative import KnownDerivative
 from met.trace.graph import Real, Truth
-from met.trace.known import KnownDerivative
 from met.trace.nodes import Node, live
 
 

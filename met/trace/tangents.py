@@ -13,8 +13,7 @@ from functools import cached_property
 from typing import Any
 
 from met.frozen import frozen
-from met.trace.derivative import STEPS, rounds, sign_of, slopes
-from met.trace.known import KnownTangents
+from met.trace.derivative import STEPS, KnownTangents, rounds, sign_of, slopes
 from met.trace.nodes import OPERANDS, TRUTHS, ZERO, Node, Nodes, live
 from met.trace.primitives import PLAIN
 from met.trace.program import CodeSection

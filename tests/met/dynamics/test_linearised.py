@@ -13,10 +13,9 @@ import pytest
 from met.dynamics.linearised import LinearisedDynamics, linearised, tell
 from met.dynamics.recursion import Solved, solve
 from met.dynamics.tree import Body, Tree
-from met.trace.derivative import slopes
+from met.trace.derivative import KnownTangents, slopes
 from met.trace.fuse import fused
 from met.trace.graph import Formulas, Graph
-from met.trace.known import KnownTangents
 from met.trace.nodes import live
 from met.trace.scalar import Scalar
 from tests.met.dynamics.passes import forest, passed

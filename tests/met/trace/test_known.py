@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from met.trace.derivative import KnownDerivative, Tangent
 from met.trace.graph import Graph
-from met.trace.known import KnownDerivative, Tangent
 from met.trace.nodes import Nodes
 from met.trace.program import CodeSection
 from met.trace.scalar import Scalar
