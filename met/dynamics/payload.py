@@ -15,9 +15,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from met.dynamics.energy import Energy
 from met.dynamics.floating import accelerated, factors
-from met.dynamics.kinematics import LinkMotion, fixed_motion
+from met.dynamics.kinematics import Energy, LinkMotion, fixed_motion
 from met.dynamics.recursion import Wrench, rate_wrench
 from met.dynamics.spatial import (
     NOTHING,

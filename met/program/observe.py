@@ -12,8 +12,7 @@ from typing import Any
 
 from met.dynamics.coupling import at_leaders
 from met.dynamics.effective_inertia import effective_inertia
-from met.dynamics.energy import Energy, energy
-from met.dynamics.kinematics import LinkMotion, jacobian
+from met.dynamics.kinematics import Energy, LinkMotion, energy, jacobian
 from met.dynamics.payload import energy_of
 from met.dynamics.recursion import Wrench, reactions
 from met.dynamics.spatial import Pose, Vector, add, choose, compose, dot, inverse, scale, sub

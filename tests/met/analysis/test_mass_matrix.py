@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from met.analysis.mass_matrix import mass_matrices
-from met.dynamics.energy import energy
+from met.dynamics.kinematics import energy
 from met.dynamics.tree import Tree
 from tests.oracles import dense
 from tests.oracles.random_tree import random_tree

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from met.dynamics.effective_inertia import effective_inertia
-from met.dynamics.energy import energy
-from met.dynamics.kinematics import link_motions
+from met.dynamics.kinematics import energy, link_motions
 from met.dynamics.recursion import reactions, solve
 from met.dynamics.spatial import constant
 from met.dynamics.tree import Body, Tree

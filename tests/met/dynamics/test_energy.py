@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from met.dynamics.energy import Energy, energy
-from met.dynamics.kinematics import link_motions
+from met.dynamics.kinematics import Energy, energy, link_motions
 from met.dynamics.recursion import solve
 from met.dynamics.tree import Tree
 from met.integrators import INTEGRATORS

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from met.dynamics.effective_inertia import effective_inertia
-from met.dynamics.energy import energy
+from met.dynamics.kinematics import energy
 from met.dynamics.recursion import Solved, reactions, solve
 from met.dynamics.spatial import Pose
 from met.dynamics.tree import Body, Tree

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from met.dynamics.energy import energy
 from met.dynamics.generalized import base_answers
+from met.dynamics.kinematics import energy
 from met.dynamics.spatial import Pose
 from tests.met.dynamics.test_free_base import fleet, vector
 from tests.oracles.pinocchio_floating import Flight, FloatingPinocchio

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from met.dynamics.effective_inertia import effective_inertia
-from met.dynamics.energy import Energy, energy
-from met.dynamics.kinematics import LinkMotion, link_motions
+from met.dynamics.kinematics import Energy, LinkMotion, energy, link_motions
 from met.dynamics.payload import (
     energy_of,
     free_acceleration,

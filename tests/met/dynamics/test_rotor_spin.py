@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from met.dynamics.effective_inertia import effective_inertia
-from met.dynamics.energy import energy
+from met.dynamics.kinematics import energy
 from met.dynamics.recursion import FreeRotor, Solved, reactions, solve
 from met.dynamics.tree import Body, Tree
 from tests.met.dynamics import passes
