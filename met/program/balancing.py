@@ -16,7 +16,7 @@ from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.program import friction
 from met.program.evaluation import Derivative, brake_levels, derivative, followers_level, law, servo_response
-from met.program.sticking import Sticking, sticking
+from met.program.friction import Sticking, sticking
 from met.program.system import Actuator, System
 from met.program.values import NamedValues, answer, returned
 from met.servos.servo import Drive, JointMotion, Seen, Setpoint

@@ -14,7 +14,7 @@ from met.analysis.linear.flow import Flow, derive
 from met.frozen import frozen
 from met.plan.channel import joint_unit
 from met.program import cells
-from met.program.sticking import Sticking
+from met.program.friction import Sticking
 
 
 @frozen

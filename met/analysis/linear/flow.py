@@ -11,7 +11,7 @@ from met.analysis.linear.period import ADDED, PeriodProgram
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.program.cells import AT_LIMIT, FRICTION_MODE, HAS_FRICTION
-from met.program.sticking import Sticking
+from met.program.friction import Sticking
 from met.program.system import Actuator
 from met.program.values import NamedValues, answer
 from met.servos.servo import JointMotion
