@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 
 from met import run as engine
-from met.analysis.linear.creeping import CreepingRate, creeping
 from met.analysis.linear.flow import Flow
 from met.analysis.linear.jacobian import PeriodMap, at_instants, failed, period_maps
 from met.analysis.linear.margins import (
@@ -25,6 +24,7 @@ from met.analysis.linear.margins import (
 )
 from met.analysis.linear.period import PeriodProgram
 from met.analysis.linear.plant import PlantModel, plants
+from met.analysis.linear.shafts import CreepingRate, creeping
 from met.analysis.linear.standing import moves, refusal, settled, standing, weak
 from met.diagnostic import Problem, error
 from met.frozen import frozen

@@ -7,7 +7,7 @@ import pytest
 import ic
 from batch.terminal.linear import as_data, linear_lines
 from met.analysis.linear.answers import LinearQuestion
-from met.analysis.linear.creeping import CreepingRate, creeping
+from met.analysis.linear.shafts import CreepingRate, creeping
 from tests.met.analysis.linear.oracles import at_instant
 
 DECK = """\
