@@ -28,8 +28,7 @@ class Wasm:
 
     def load(self, recording: Recording, *, lanes: int | None = None, inline: bool = True) -> Kernel:
         """The program, compiled, always with two lanes; running it raises RuntimeError where there is no node."""
-        from met.backends.wasm.module import compiled
-        from met.backends.wasm.node import WasmKernel
+        from met.backends.wasm.module import WasmKernel, compiled
 
         return WasmKernel(compiled(recording))
 

@@ -1,4 +1,4 @@
-// Runs a module under node for `met.backends.wasm.node`: the question comes on stdin, the answer goes to stdout.
+// Runs a module under node for `met.backends.wasm.module`: the question comes on stdin, the answer goes to stdout.
 //
 //   question  one line of JSON (description, last, first, record, cases, machine, bytes of the module, whether a state
 //             follows); the module; inputs [case][input]; the state

@@ -11,7 +11,7 @@ from benchmarks.arms import SEVEN, Arm
 
 from met import backends, models
 from met.backends.llvm import machine
-from met.backends.wasm import link, module, node
+from met.backends.wasm import link, module
 from met.trace import fma
 from met.trace.primitives import fused
 from met.trace.program import Phase, Program, Recording, RecordPhase, RunPhase, Tape
@@ -78,7 +78,7 @@ def test_a_multiply_add_is_rounded_once_for_operands_of_any_size(machine: bool |
     native = rows[:, 0, 0]
     exact = np.array([fused(*case) for case in given[::97].tolist()])
     assert same(native[::97], exact).all()
-    found = node.ask(module.compiled(one_row()), given, 0, 0, machine=machine).rows[:, 0, 0]
+    found = module.ask(module.compiled(one_row()), given, 0, 0, machine=machine).rows[:, 0, 0]
     wrong = ~same(found, native)
     assert not wrong.any(), f"{wrong.sum()} of {len(given)}, first {given[wrong.argmax()]}: {found[wrong.argmax()]!r}"
     assert (np.abs(native) < 2.0**-1022).sum() > 30_000  # so many have few bits
@@ -86,7 +86,7 @@ def test_a_multiply_add_is_rounded_once_for_operands_of_any_size(machine: bool |
 
 def counted(run: WholeRun, machine: bool | None, *, quick: bool = False) -> tuple[int, int]:
     """Numbers of a run's rows and outputs that node and the native kernel computed, and how many differ."""
-    found = node.ask(module.compiled(run.recording, quick=quick), run.inputs, 0, run.last, machine=machine)
+    found = module.ask(module.compiled(run.recording, quick=quick), run.inputs, 0, run.last, machine=machine)
     pairs = list(zip(run.native(), (found.rows, found.outputs), strict=True))
     return sum(a.size for a, _ in pairs), sum(differing(a, b) for a, b in pairs)
 
@@ -139,7 +139,7 @@ def test_joints_that_follow_others_have_the_native_bits(
 def test_a_module_that_is_sooner_made_has_the_same_bits(machine: bool | None) -> None:
     given = operands()[::31]
     usual, quick = (
-        node.ask(module.compiled(one_row(), quick=each), given, 0, 0, machine=machine) for each in (False, True)
+        module.ask(module.compiled(one_row(), quick=each), given, 0, 0, machine=machine) for each in (False, True)
     )
     assert same(usual.rows, quick.rows).all()
     for deck, run in (("two_link", "hybrid"), ("panda", "swing"), ("free_flyer", "flyer_felt")):
@@ -171,7 +171,7 @@ def test_rows_that_do_not_fit_on_the_stack_get_memory_once() -> None:
     assert "call ptr @malloc" in module.text(recording)
     given = np.linspace(-1.0, 1.0, 7)[:, None]
     rows, outputs = backends.load(recording).run(given, 3)
-    found = node.ask(made, given, 0, 3, times=3)
+    found = module.ask(made, given, 0, 3, times=3)
     assert rows is not None and rows.tobytes() == found.rows.tobytes()
     assert outputs.tobytes() == found.outputs.tobytes()
 
