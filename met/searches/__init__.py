@@ -14,8 +14,7 @@ import numpy as np
 
 from met.plan.searches import Search, TuningStart
 from met.searches.answer import designs_that_stand
-from met.searches.hardest import HardestCase
-from met.searches.robust import RobustTuning
+from met.searches.robust import HardestCase, RobustTuning
 from met.searches.slopes import SlopeSource
 
 

@@ -8,7 +8,7 @@ import pytest
 from met import optimisers
 from met.plan.searches import Search, SearchedParameter
 from met.searches import search_method
-from met.searches.hardest import HardestCase
+from met.searches.robust import HardestCase
 
 
 def search(at_most: int = 300, **ends: float) -> Search:
