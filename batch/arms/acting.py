@@ -19,10 +19,10 @@ from met.environments.environment import Environment, Jet, Loads
 from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import BASE, INSTANT, Experiment, Joint, Payload
+from met.program.cells import answer
 from met.program.courses import TIME
 from met.program.motion.base import ArmWorld, BaseMotion, environment_values, prescribed
 from met.program.system import PARAMETER, ReadCell, System
-from met.program.values import answer
 from met.trace import Formulas, Graph, Real, Scalar, both, floor, where
 from met.vectors import Vector, scale
 

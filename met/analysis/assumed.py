@@ -22,8 +22,8 @@ from met.integrators.integrator import Motion
 from met.plan import Experiment, Joint
 from met.plan.closing import in_loops
 from met.program.build import Builder
+from met.program.cells import parameters
 from met.program.system import Actuator, System
-from met.program.values import parameters
 from met.run import inputs
 
 INSTANTS = 200

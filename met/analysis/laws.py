@@ -16,10 +16,10 @@ from met.analysis.lanes import SMALL, SMALL_STATE, ZERO, LaneTape, differences, 
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.program.build import Builder
+from met.program.cells import NamedValues, answer
 from met.program.control import sensing
 from met.program.evaluation import law
 from met.program.system import Actuator, Fitted
-from met.program.values import NamedValues, answer
 from met.sensors.sensor import Reading, Sensed
 from met.servos.servo import JointMotion, Parts, Seen, Setpoint
 

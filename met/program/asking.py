@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.integrators.integrator import Integrator, Motion, Slope
-from met.program.values import Passing, answer
+from met.program.cells import Passing, answer
 from met.trace import Graph, Real, Scalar
 
 

@@ -15,10 +15,10 @@ from itertools import pairwise
 from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.program import friction
+from met.program.cells import NamedValues, answer, returned
 from met.program.evaluation import Derivative, brake_levels, derivative, followers_level, law, servo_response
 from met.program.friction import Sticking, sticking
 from met.program.system import Actuator, System
-from met.program.values import NamedValues, answer, returned
 from met.servos.servo import Drive, JointMotion, Seen, Setpoint
 from met.trace import Real, Truth, absolute, all_of, both, either, maximum, sign, where
 from met.trace.program import Tape

@@ -14,6 +14,7 @@ from met.plan import Experiment
 from met.plan.channel import Channel
 from met.plan.judged import CHANNEL_INPUT
 from met.program import balancing, cells, orientations, plausible
+from met.program.cells import NamedValues, answer, parameters, returned
 from met.program.control import guiding, link_sensors, sensing
 from met.program.control.substituted import LIMITED
 from met.program.evaluation import gravity, law
@@ -22,7 +23,6 @@ from met.program.motion import base, bodies
 from met.program.observe import derived
 from met.program.step import EVENTS, FAILURE, StepPhases
 from met.program.system import FURTHEST, PARAMETER, Actuator, System
-from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.servo import Seen, Setpoint
 from met.trace import Real, Truth, both, floor, where
 from met.trace.program import CallPhase, Control, Every, Phase, Program, RecordPhase, RunPhase, Tape, Unless0

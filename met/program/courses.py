@@ -14,7 +14,7 @@ from met import models
 from met.diagnostic import Place
 from met.dynamics.spatial import Real, Vector, add, rotation_rpy, turn_vector
 from met.plan import COMPONENTS, Course, Experiment, Formula
-from met.program.values import Read, answer, parameters
+from met.program.cells import Read, answer, parameters
 from met.trace import Formulas, Graph, Scalar
 from met.trace.derivative import derivative
 

@@ -17,11 +17,11 @@ from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
 from met.program import rotors
+from met.program.cells import NamedValues, answer, returned
 from met.program.control import guiding, link_sensors, sensing
 from met.program.motion.base import ArmWorld, BaseMotion, base_of, environment_values, free_base
 from met.program.motion.bodies import slopes, slopes_of_payloads, split_wrenches, tree_with_payloads
 from met.program.system import Actuator, ReadCell, System
-from met.program.values import NamedValues, answer, returned
 from met.servos.servo import Control, Drive, JointMotion, Seen, Setpoint
 from met.trace import Real, Truth, absolute, both, not_, sign, where
 from met.vectors import Vector

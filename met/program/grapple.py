@@ -28,12 +28,12 @@ from met.integrators.integrator import Motion
 from met.plan import BASE, INSTANT, Payload
 from met.plan.outputs import GRAPPLE_FIGURES
 from met.program import cells, rotors
+from met.program.cells import NamedValues
 from met.program.evaluation import servo_response
 from met.program.motion import bodies
 from met.program.motion.base import base_of, free_base, motions
 from met.program.motion.bodies import CARRIED, FLYING, place
 from met.program.system import Actuator, System
-from met.program.values import NamedValues
 from met.servos.servo import Drive
 from met.trace import Real, Truth, any_of, both, either, maximum, not_, sqrt, where
 from met.trace.program import CallPhase, Control, Every, Phase, RunPhase, Tape, WhileAny

@@ -10,13 +10,13 @@ from __future__ import annotations
 from met import models
 from met.plan.limits import LimitUse, extremes, limits
 from met.program import cells
+from met.program.cells import answer
 from met.program.control.guiding import course_values
 from met.program.joint_limits import excess
 from met.program.motion.base import ArmWorld, base_of, environment_values
 from met.program.motion.bodies import tree_with_payloads
 from met.program.step import StepPhases
 from met.program.system import System
-from met.program.values import answer
 from met.trace import Real, Truth, absolute, any_of, maximum, where
 from met.trace.program import CallPhase, Control, Phase, RunPhase, Tape, WhileAny
 

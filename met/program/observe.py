@@ -19,12 +19,12 @@ from met.dynamics.spatial import Pose, Vector, add, choose, compose, dot, invers
 from met.integrators.integrator import Motion
 from met.plan.chains import chains
 from met.plan.channel import XYZ, Channel
+from met.program.cells import answer, returned
 from met.program.evaluation import Derivative
 from met.program.joint_limits import excess
 from met.program.motion import bodies
 from met.program.motion.base import ArmWorld, BaseMotion, environment_values, motions
 from met.program.system import ReadCell, System
-from met.program.values import answer, returned
 from met.trace import Real, minimum, sqrt
 from met.vectors import Quaternion, quaternion
 

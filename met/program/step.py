@@ -20,6 +20,7 @@ from met.dynamics.spatial import choose
 from met.integrators.integrator import Motion, Slope
 from met.program import cells, friction
 from met.program.asking import Question, advance_with, changed_count, question_count
+from met.program.cells import NamedValues
 from met.program.control.substituted import Substituted
 from met.program.evaluation import Derivative, brake_levels, derivative, followers_level, servo_response
 from met.program.friction import sticking
@@ -27,7 +28,6 @@ from met.program.grapple import Grapple
 from met.program.motion import base, bodies
 from met.program.observe import Observed
 from met.program.system import Actuator, System
-from met.program.values import NamedValues
 from met.trace import Real, Truth, any_of, both, either, isfinite, not_, sign, where
 from met.trace.program import CallPhase, Control, Every, Phase, RunPhase, Tape, WhileAny
 

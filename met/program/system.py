@@ -40,8 +40,8 @@ from met.plan.channel import Channel, channels
 from met.plan.closing import Led, close, corners_of
 from met.plan.defaults import of_environment, timing_defaults
 from met.plan.uses import sensor_parts, servo_parts
+from met.program.cells import NamedValues, answer, parameters, returned
 from met.program.courses import recorded
-from met.program.values import NamedValues, answer, parameters, returned
 from met.sensors.sensor import Sensor
 from met.servos.servo import Drive, JointMotion, Parts, Servo
 from met.substitution import BedModel, Law

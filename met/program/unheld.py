@@ -15,9 +15,9 @@ from met.integrators.integrator import Motion
 from met.plan import Experiment, Joint, ServoUse
 from met.program.balancing import Demand, demands, holds
 from met.program.build import Builder
+from met.program.cells import parameters
 from met.program.evaluation import brake_levels
 from met.program.system import System
-from met.program.values import parameters
 from met.trace import Real
 
 HALVINGS = 20

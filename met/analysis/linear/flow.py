@@ -10,10 +10,9 @@ import numpy as np
 from met.analysis.linear.period import ADDED, PeriodProgram
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.program.cells import AT_LIMIT, FRICTION_MODE, HAS_FRICTION
+from met.program.cells import AT_LIMIT, FRICTION_MODE, HAS_FRICTION, NamedValues, answer
 from met.program.friction import Sticking
 from met.program.system import Actuator
-from met.program.values import NamedValues, answer
 from met.servos.servo import JointMotion
 from met.trace.nodes import Node, live
 from met.trace.program import Branch, Every, RecordedControl, RecordSection, Unless0

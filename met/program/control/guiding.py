@@ -29,11 +29,11 @@ from met.integrators.integrator import Motion
 from met.parameter import Parameter
 from met.plan import COMPONENTS, GuideUse
 from met.program import cells
+from met.program.cells import NamedValues, answer, parameters, returned
 from met.program.courses import rate_of_rpy, values_and_rates
 from met.program.motion import base, bodies
 from met.program.motion.base import BaseMotion
 from met.program.system import Actuator, ReadCell, System
-from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.servo import Setpoint
 from met.trace import Real, sqrt
 from met.trace.program import Tape

@@ -18,11 +18,11 @@ from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import BASE
 from met.program import cells
+from met.program.cells import answer
 from met.program.control import sensing
 from met.program.motion import bodies
 from met.program.motion.base import ArmWorld, BaseMotion, base_of, environment_values
 from met.program.system import Fitted, ReadCell, System
-from met.program.values import answer
 from met.trace import Real
 from met.trace.program import Tape
 from met.vectors import ZERO, Vector, add, cross, sub, turn_vector_back

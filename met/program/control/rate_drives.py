@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from met.frozen import frozen
 from met.program import cells
+from met.program.cells import answer
 from met.program.system import Actuator, System
-from met.program.values import answer
 from met.servos.motor import Motor, RateLoop
 from met.servos.servo import Seen
 from met.substitution import drive

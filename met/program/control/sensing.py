@@ -12,8 +12,8 @@ from met.diagnostic import Problem, error
 from met.environments.environment import Environment
 from met.frozen import frozen
 from met.plan import REPEAT, SEED, SensorUse
+from met.program.cells import NamedValues, answer, parameters, returned
 from met.program.system import Actuator, Fitted, ReadCell, System
-from met.program.values import NamedValues, answer, parameters, returned
 from met.sensors.sensor import Reading, Sensed
 from met.servos.servo import Control, Seen
 from met.trace import Real

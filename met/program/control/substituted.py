@@ -22,10 +22,10 @@ from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import REPEAT, SEED
 from met.program import cells
+from met.program.cells import NamedValues, answer, parameters, returned
 from met.program.control.rate_drives import Mounted, RateDrives
 from met.program.control.sensing import READING
 from met.program.system import Actuator, System
-from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.motor import Motor, torque
 from met.servos.servo import Seen
 from met.substitution import balance, bed_scale, drive, observer

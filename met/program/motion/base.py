@@ -19,10 +19,10 @@ from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.parameter import WORLD
 from met.plan import BASE
+from met.program.cells import NamedValues, parameters
 from met.program.courses import TIME
 from met.program.motion.bodies import FreeBody, bodies, flight, payload_motion, place
 from met.program.system import PARAMETER, ReadCell, System
-from met.program.values import NamedValues, parameters
 from met.trace import Real, Scalar
 from met.trace.program import Tape
 from met.vectors import ZERO, Matrix, Vector, quaternion_rpy
