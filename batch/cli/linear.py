@@ -65,8 +65,7 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
     from batch.campaigns.choosing import experiments_named, read_plan, select_rows
     from batch.linearized import files, locus, picture
     from batch.plotting import output as places
-    from batch.terminal.linear import as_data, linear_lines
-    from batch.terminal.linear_cases import answered, case_lines
+    from batch.terminal.linear import answered, as_data, case_lines, linear_lines
     from met.analysis.linear.answers import Linearized, question_of
     from met.outputs import path_of
 

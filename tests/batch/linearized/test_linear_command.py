@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import ic
 from batch.cli.linear import linear
 from batch.linearized import locus
-from batch.terminal.linear_cases import answered
+from batch.terminal.linear import answered
 from met.analysis.linear.answers import Linearized, LinearQuestion
 from met.diagnostic import Problem
 from tests.batch.linearized.test_linear_data import DECK

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from batch.terminal.linear import linear_lines
-from batch.terminal.linear_cases import case_lines
+from batch.terminal.linear import case_lines, linear_lines
 from met import run as engine
 from met.analysis.linear import metrics
 from met.analysis.linear.answers import of_deck
