@@ -28,12 +28,10 @@ typedef struct {
     void *environment;
 } fmi2CallbackFunctions;
 
-/* `instance` comes first, so that its address is that of the whole. start, stop: of fmi2SetupExperiment. */
+/* `instance` comes first, so that its address is that of the whole. */
 typedef struct {
     Instance instance;
     fmi2CallbackFunctions callbacks;
-    double start, stop;
-    bool has_stop;
     char name[64];
 } Whole;
 
@@ -117,23 +115,14 @@ FUNCTION(fmi2SetupExperiment)(
     fmi2Component instance, fmi2Boolean has_tolerance, double tolerance, double start, fmi2Boolean has_stop,
     double stop)
 {
-    Whole *const whole = instance;
     (void)has_tolerance, (void)tolerance; /* the steps of the run are fixed */
-    if (!whole) return fmi2Error;
-    if (whole->instance.data.mode != INSTANTIATED || !is_finite(start) || (has_stop && !(stop >= start))) {
-        return refused(instance, "the start must be a finite time, the stop not before it, and the instance new");
-    }
-    whole->start = start;
-    whole->has_stop = has_stop != 0;
-    whole->stop = stop;
-    return fmi2OK;
+    return instance ? status_of(set_up(instance, start, has_stop, stop)) : fmi2Error;
 }
 
 FUNCTION(fmi2EnterInitializationMode)(fmi2Component instance);
 FUNCTION(fmi2EnterInitializationMode)(fmi2Component instance)
 {
-    Whole *const whole = instance;
-    return whole ? status_of(initialize(&whole->instance, whole->start, whole->has_stop, whole->stop)) : fmi2Error;
+    return instance ? status_of(initialize(instance)) : fmi2Error;
 }
 
 FUNCTION(fmi2ExitInitializationMode)(fmi2Component instance);
@@ -151,11 +140,8 @@ FUNCTION(fmi2Terminate)(fmi2Component instance)
 FUNCTION(fmi2Reset)(fmi2Component instance);
 FUNCTION(fmi2Reset)(fmi2Component instance)
 {
-    Whole *const whole = instance;
-    if (!whole) return fmi2Error;
-    whole->start = whole->stop = 0.0;
-    whole->has_stop = false;
-    reset(&whole->instance);
+    if (!instance) return fmi2Error;
+    reset(instance);
     return fmi2OK;
 }
 

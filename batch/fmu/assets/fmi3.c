@@ -100,7 +100,8 @@ FUNCTION(fmi3EnterInitializationMode)(
     fmi3Instance instance, bool has_tolerance, double tolerance, double start, bool has_stop, double stop)
 {
     (void)has_tolerance, (void)tolerance; /* the steps of the run are fixed */
-    return instance ? status_of(initialize(instance, start, has_stop, stop)) : fmi3Error;
+    if (!instance || set_up(instance, start, has_stop, stop) != OK) return fmi3Error;
+    return status_of(initialize(instance));
 }
 
 FUNCTION(fmi3ExitInitializationMode)(fmi3Instance instance);

@@ -24,11 +24,11 @@
 
 #define VARIABLES (sizeof met_variables / sizeof met_variables[0])
 
-/* Times within this share of a tick of it are on it: those of a master are sums of its steps. */
-#define ON_TICK 1e-4
+/* Times within this share of a tick of it are on it: those of a master are sums of its steps, each rounded. */
+#define ON_TICK 1e-2
 
-/* Whole numbers up to here are doubles, and so are those of ticks. */
-#define MOST_TICKS 9007199254740992.0
+/* Whole numbers up to here are doubles. */
+#define MOST_WHOLE 9007199254740992.0
 
 typedef enum { INSTANTIATED, INITIALIZING, STEPPING, TERMINATED } Mode;
 
@@ -63,9 +63,15 @@ static bool is_finite(double x)
     return x - x == 0.0;
 }
 
+/* Whether a sum of times as large as this is rounded to far less than a tick. */
+static bool resolves_ticks(double time)
+{
+    return 4.0 * DBL_EPSILON * MODEL_BASE_HZ * met_abs(time) < ON_TICK;
+}
+
 static bool is_whole(double x)
 {
-    return x > -MOST_TICKS && x < MOST_TICKS && x == (double)(int64_t)x;
+    return x > -MOST_WHOLE && x < MOST_WHOLE && x == (double)(int64_t)x;
 }
 
 static Answer refuse(Instance *instance, const char *message)
@@ -94,8 +100,8 @@ static Answer finish(Instance *instance)
     }
     if (data->failed) {
         char message[160];
-        snprintf(message, sizeof message, "the case has failed by %.9g s: `met run` of its values says why",
-                 data->seen.tick / MODEL_BASE_HZ);
+        snprintf(message, sizeof message, "the case has failed by %.15g s: `met run` of its values says why",
+                 data->start + data->seen.tick / MODEL_BASE_HZ);
         return refuse(instance, message);
     }
     return OK;
@@ -117,17 +123,26 @@ static Answer look(Instance *instance)
     return finish(instance);
 }
 
-static Answer initialize(Instance *instance, double start, bool has_stop, double stop)
+/* The times of the simulation, before its initialization. */
+static Answer set_up(Instance *instance, double start, bool has_stop, double stop)
 {
     Data *const data = &instance->data;
     if (data->mode != INSTANTIATED) return refuse(instance, "only a new or reset instance can be initialized");
     if (!is_finite(start) || (has_stop && !(stop >= start))) {
         return refuse(instance, "the start must be a finite time, and the stop not before it");
     }
-    data->mode = INITIALIZING;
+    if (!resolves_ticks(start)) return refuse(instance, "the start is so large that ticks are lost in rounding");
     data->start = data->time = start;
     data->has_stop = has_stop;
     data->stop = stop;
+    return OK;
+}
+
+static Answer initialize(Instance *instance)
+{
+    Data *const data = &instance->data;
+    if (data->mode != INSTANTIATED) return refuse(instance, "only a new or reset instance can be initialized");
+    data->mode = INITIALIZING;
     data->on_tick = data->changed = 1;
     return OK;
 }
@@ -135,7 +150,8 @@ static Answer initialize(Instance *instance, double start, bool has_stop, double
 static Answer begin_stepping(Instance *instance)
 {
     if (instance->data.mode != INITIALIZING) return refuse(instance, "the instance is not being initialized");
-    if (look(instance) != OK || instance->data.failed) return ERROR;
+    if (look(instance) != OK) return ERROR;
+    if (instance->data.failed) return refuse(instance, "the case fails at the start: set other values, or reset it");
     instance->data.mode = STEPPING;
     return OK;
 }
@@ -209,6 +225,7 @@ static Answer get_values(Instance *instance, const uint32_t *variables, size_t c
 static Answer advance(Instance *instance, double time, double size)
 {
     Data *const data = &instance->data;
+    Answer answer;
     double ticks, least;
     int64_t last;
     bool on_tick;
@@ -218,8 +235,9 @@ static Answer advance(Instance *instance, double time, double size)
     if (!(time - data->time <= least && data->time - time <= least)) {
         return refuse(instance, "the step does not begin where the last one ended");
     }
+    if (!(size > 0.0) || !is_finite(size)) return refuse(instance, "a step must be a finite time above 0");
+    if (!resolves_ticks(time + size)) return refuse(instance, "the step leads to where ticks are lost in rounding");
     ticks = (time + size - data->start) * MODEL_BASE_HZ;
-    if (!(size > 0.0) || !(ticks < MOST_TICKS)) return refuse(instance, "a step must be a finite time above 0");
     if (data->has_stop && time + size > data->stop + least) return refuse(instance, "the step ends after the stop");
     last = (int64_t)(ticks + 0.5);
     on_tick = ticks - (double)last < ON_TICK && (double)last - ticks < ON_TICK;
@@ -241,8 +259,9 @@ static Answer advance(Instance *instance, double time, double size)
         data->changed = 0;
         data->on_tick = on_tick;
     }
-    data->time = time + size;
-    return finish(instance);
+    answer = finish(instance);
+    if (answer == OK) data->time = time + size;
+    return answer;
 }
 
 /* A state as bytes is the data after the name of the program, so that no other FMU takes it. */
@@ -269,7 +288,7 @@ static Data *read_state(const unsigned char *bytes, size_t size)
     data = malloc(sizeof *data);
     if (!data) return 0;
     memcpy(data, bytes + sizeof MODEL_TOKEN, sizeof *data);
-    if (data->mode >= INSTANTIATED && data->mode <= TERMINATED && data->next >= 0 && (double)data->next < MOST_TICKS) {
+    if (data->mode >= INSTANTIATED && data->mode <= TERMINATED && data->next >= 0 && (double)data->next < MOST_WHOLE) {
         return data;
     }
     free(data);

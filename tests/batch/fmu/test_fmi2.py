@@ -80,6 +80,16 @@ def test_a_state_leads_back(fmu: Fmu) -> None:
     assert new.call("fmi2FreeFMUstate", byref(state)) == OK
 
 
+def test_a_state_has_the_times_of_the_experiment(fmu: Fmu) -> None:
+    new, state = Instance2(fmu), c_void_p()
+    assert new.set_up(1.0, 1.1) == OK and new.call("fmi2GetFMUstate", byref(state)) == OK
+    assert new.call("fmi2Reset") == OK and new.call("fmi2SetFMUstate", state) == OK
+    assert new.call("fmi2EnterInitializationMode") == OK and new.call("fmi2ExitInitializationMode") == OK
+    assert new.step(0.0, 0.04) == ERROR and new.step(1.0, 0.04) == OK and new.step(1.04, 0.08) == ERROR
+    assert new.messages[-1] == "the step ends after the stop"
+    assert new.call("fmi2FreeFMUstate", byref(state)) == OK
+
+
 SANITIZED = """\
 import sys
 from pathlib import Path

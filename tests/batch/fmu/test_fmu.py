@@ -92,7 +92,24 @@ def test_steps_of_any_length_see_the_same_motion(fmu: Fmu, folder: Path) -> None
     ticks = fmu.instance()
     begin_case(ticks, deck(folder), 1)
     at_ticks = ticks.rows(np.arange(401) * 0.005)
-    assert bits(found) == bits(at_ticks[np.floor(points / 0.005 + 1e-6).astype(int)])
+    assert bits(found) == bits(at_ticks[np.floor(points / 0.005 + 1e-2).astype(int)])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", [1e10, -1e10])
+def test_a_start_far_from_0_keeps_the_ticks(fmu: Fmu, folder: Path, start: float) -> None:
+    times, rows, _ = run_rows(deck(folder), 0)
+    instance = fmu.instance()
+    assert instance.enter(start) == OK and instance.leave() == OK
+    assert bits(instance.rows(start + times)) == bits(rows)  # the times are rounded to 4e-4 ticks
+
+
+def test_times_that_do_not_resolve_ticks_are_refused(new: Instance) -> None:
+    assert new.enter(1e12) == ERROR
+    assert new.messages == ["the start is so large that ticks are lost in rounding"]
+    assert new.enter() == OK and new.leave() == OK and new.step(0.0, 1e12) == ERROR
+    assert new.messages[-1] == "the step leads to where ticks are lost in rounding"
+    assert new.step(0.0, 0.04) == OK
 
 
 DRIVEN = """\
@@ -265,11 +282,33 @@ def test_a_failed_case_says_when_and_goes_on_from_an_earlier_state(tmp_path: Pat
     assert statuses == [OK] * 6 + [ERROR] * 44  # `met run` says: t = 0.28 s
     assert new.messages[0] == "the case has failed by 0.28 s: `met run` of its values says why"
     assert new.messages[-1] == "the case has failed: reset it, or set an earlier state"
+    assert new.get("time") == [0.04 * 5 + 0.04]
     assert new.go_back(state) == OK and new.step(0.0, 0.04) == OK
     new.drop(state)
     assert new.call("fmi3Reset") == OK
     new.begin(loose__damping=1.0)
     assert [new.step(0.04 * step, 0.04) for step in range(50)] == [OK] * 50
+    assert new.call("fmi3Reset") == OK and new.set("loose.damping", 1e5) == OK
+    assert new.enter(1e3) == OK and new.leave() == OK and new.step(1e3, 2.0) == ERROR
+    assert new.messages[-1] == "the case has failed by 1002 s: `met run` of its values says why"
+
+
+LONG = """\
+#include <two_link.ic>
+run short like nominal { duration = 1 s;  remove settle; }
+sweep long of short { vary reach = [1, 2] m; }
+"""
+
+
+@pytest.mark.slow
+def test_a_case_that_fails_at_the_start_says_so_at_each_call(tmp_path: Path) -> None:
+    new = load(packed(tmp_path, "long", LONG), tmp_path).instance()
+    assert new.set("reach", 1e300) == OK and new.enter() == OK
+    assert new.ask("shoulder.q")[0] == ERROR
+    assert new.messages.pop() == "the case has failed by 0 s: `met run` of its values says why"
+    assert new.leave() == ERROR
+    assert new.messages == ["the case fails at the start: set other values, or reset it"]
+    assert new.set("reach", 2.0) == OK and new.leave() == OK and new.step(0.0, 0.04) == OK
 
 
 SANITIZED = """\
