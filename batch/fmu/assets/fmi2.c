@@ -48,7 +48,7 @@ static fmi2Status status_of(Answer answer)
 
 static fmi2Status refused(fmi2Component instance, const char *message)
 {
-    return instance ? status_of(refuse(instance, message)) : fmi2Error;
+    return status_of(refuse(instance, message));
 }
 
 EXPORTED const char *FMI2(fmi2GetTypesPlatform)(void);
@@ -171,57 +171,38 @@ FUNCTION(fmi2DoStep)(fmi2Component instance, double time, double size, fmi2Boole
 FUNCTION(fmi2GetFMUstate)(fmi2Component instance, fmi2FMUstate *state);
 FUNCTION(fmi2GetFMUstate)(fmi2Component instance, fmi2FMUstate *state)
 {
-    if (!instance || !state) return refused(instance, "there is no room for the state");
-    if (!*state) {
-        *state = copy_of(&((Instance *)instance)->data);
-        return *state ? fmi2OK : refused(instance, "there is no memory");
-    }
-    *(Data *)*state = ((Instance *)instance)->data;
-    return fmi2OK;
+    return status_of(get_state(instance, state));
 }
 
 FUNCTION(fmi2SetFMUstate)(fmi2Component instance, fmi2FMUstate state);
 FUNCTION(fmi2SetFMUstate)(fmi2Component instance, fmi2FMUstate state)
 {
-    if (!instance || !state) return refused(instance, "there is no state");
-    ((Instance *)instance)->data = *(Data *)state;
-    return fmi2OK;
+    return status_of(set_state(instance, state));
 }
 
 FUNCTION(fmi2FreeFMUstate)(fmi2Component instance, fmi2FMUstate *state);
 FUNCTION(fmi2FreeFMUstate)(fmi2Component instance, fmi2FMUstate *state)
 {
     (void)instance;
-    if (state) {
-        free(*state);
-        *state = 0;
-    }
-    return fmi2OK;
+    return status_of(free_state(state));
 }
 
 FUNCTION(fmi2SerializedFMUstateSize)(fmi2Component instance, fmi2FMUstate state, size_t *size);
 FUNCTION(fmi2SerializedFMUstateSize)(fmi2Component instance, fmi2FMUstate state, size_t *size)
 {
-    if (!state || !size) return refused(instance, "there is no state");
-    *size = STATE_BYTES;
-    return fmi2OK;
+    return status_of(measure_state(instance, state, size));
 }
 
 FUNCTION(fmi2SerializeFMUstate)(fmi2Component instance, fmi2FMUstate state, char bytes[], size_t size);
 FUNCTION(fmi2SerializeFMUstate)(fmi2Component instance, fmi2FMUstate state, char bytes[], size_t size)
 {
-    if (!state || !bytes || size < STATE_BYTES) return refused(instance, "there is no state, or no room for it");
-    write_state(state, (unsigned char *)bytes);
-    return fmi2OK;
+    return status_of(write_state(instance, state, bytes, size));
 }
 
 FUNCTION(fmi2DeSerializeFMUstate)(fmi2Component instance, const char bytes[], size_t size, fmi2FMUstate *state);
 FUNCTION(fmi2DeSerializeFMUstate)(fmi2Component instance, const char bytes[], size_t size, fmi2FMUstate *state)
 {
-    Data *const data = state ? read_state((const unsigned char *)bytes, size) : 0;
-    if (!data) return refused(instance, "these bytes are not a state of this FMU");
-    *state = data;
-    return fmi2OK;
+    return status_of(read_state(instance, bytes, size, state));
 }
 
 /* What an FMU for co-simulation without derivatives, other types and steps of its own pace answers: that only none of

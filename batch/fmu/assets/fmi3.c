@@ -40,7 +40,7 @@ static fmi3Status status_of(Answer answer)
 
 static fmi3Status refused(fmi3Instance instance, const char *message)
 {
-    return instance ? status_of(refuse(instance, message)) : fmi3Error;
+    return status_of(refuse(instance, message));
 }
 
 EXPORTED const char *FMI3(fmi3GetVersion)(void);
@@ -163,57 +163,38 @@ FUNCTION(fmi3DoStep)(
 FUNCTION(fmi3GetFMUState)(fmi3Instance instance, fmi3FMUState *state);
 FUNCTION(fmi3GetFMUState)(fmi3Instance instance, fmi3FMUState *state)
 {
-    if (!instance || !state) return refused(instance, "there is no room for the state");
-    if (!*state) {
-        *state = copy_of(&((Instance *)instance)->data);
-        return *state ? fmi3OK : refused(instance, "there is no memory");
-    }
-    *(Data *)*state = ((Instance *)instance)->data;
-    return fmi3OK;
+    return status_of(get_state(instance, state));
 }
 
 FUNCTION(fmi3SetFMUState)(fmi3Instance instance, fmi3FMUState state);
 FUNCTION(fmi3SetFMUState)(fmi3Instance instance, fmi3FMUState state)
 {
-    if (!instance || !state) return refused(instance, "there is no state");
-    ((Instance *)instance)->data = *(Data *)state;
-    return fmi3OK;
+    return status_of(set_state(instance, state));
 }
 
 FUNCTION(fmi3FreeFMUState)(fmi3Instance instance, fmi3FMUState *state);
 FUNCTION(fmi3FreeFMUState)(fmi3Instance instance, fmi3FMUState *state)
 {
     (void)instance;
-    if (state) {
-        free(*state);
-        *state = 0;
-    }
-    return fmi3OK;
+    return status_of(free_state(state));
 }
 
 FUNCTION(fmi3SerializedFMUStateSize)(fmi3Instance instance, fmi3FMUState state, size_t *size);
 FUNCTION(fmi3SerializedFMUStateSize)(fmi3Instance instance, fmi3FMUState state, size_t *size)
 {
-    if (!state || !size) return refused(instance, "there is no state");
-    *size = STATE_BYTES;
-    return fmi3OK;
+    return status_of(measure_state(instance, state, size));
 }
 
 FUNCTION(fmi3SerializeFMUState)(fmi3Instance instance, fmi3FMUState state, uint8_t bytes[], size_t size);
 FUNCTION(fmi3SerializeFMUState)(fmi3Instance instance, fmi3FMUState state, uint8_t bytes[], size_t size)
 {
-    if (!state || !bytes || size < STATE_BYTES) return refused(instance, "there is no state, or no room for it");
-    write_state(state, bytes);
-    return fmi3OK;
+    return status_of(write_state(instance, state, bytes, size));
 }
 
 FUNCTION(fmi3DeserializeFMUState)(fmi3Instance instance, const uint8_t bytes[], size_t size, fmi3FMUState *state);
 FUNCTION(fmi3DeserializeFMUState)(fmi3Instance instance, const uint8_t bytes[], size_t size, fmi3FMUState *state)
 {
-    Data *const data = state ? read_state(bytes, size) : 0;
-    if (!data) return refused(instance, "these bytes are not a state of this FMU");
-    *state = data;
-    return fmi3OK;
+    return status_of(read_state(instance, bytes, size, state));
 }
 
 /* What an FMU for co-simulation without event mode, clocks, derivatives and other types answers */

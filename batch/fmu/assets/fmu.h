@@ -34,10 +34,12 @@ typedef enum { INSTANTIATED, INITIALIZING, STEPPING, TERMINATED } Mode;
 
 /* All that lasts of an instance, so that a copy of it is a state.
 
+   token     of the FMU whose state it is
    on_tick   whether the communication point is on tick `next`
    changed   whether inputs have changed since `seen` was computed
    failed    whether the case has failed */
 typedef struct {
+    char token[sizeof MODEL_TOKEN];
     int32_t mode, on_tick, changed, failed, has_stop;
     int64_t next;
     double start, time, stop;
@@ -76,7 +78,7 @@ static bool is_whole(double x)
 
 static Answer refuse(Instance *instance, const char *message)
 {
-    if (instance->log) instance->log(instance, message);
+    if (instance && instance->log) instance->log(instance, message);
     return ERROR;
 }
 
@@ -85,6 +87,7 @@ static void reset(Instance *instance)
 {
     Data *const data = &instance->data;
     memset(data, 0, sizeof *data);
+    memcpy(data->token, MODEL_TOKEN, sizeof MODEL_TOKEN);
     for (size_t i = 1; i < VARIABLES; i++) {
         if (met_variables[i].kind != OUTPUT) *place_of(&data->now, i) = met_variables[i].start;
     }
@@ -264,33 +267,79 @@ static Answer advance(Instance *instance, double time, double size)
     return answer;
 }
 
-/* A state as bytes is the data after the name of the program, so that no other FMU takes it. */
-#define STATE_BYTES (sizeof MODEL_TOKEN + sizeof(Data))
+/* States: copies of the data. A state as bytes ends with a checksum of the others. */
+#define STATE_BYTES (sizeof(Data) + sizeof(uint64_t))
 
-static Data *copy_of(const Data *data)
+/* False also for a state of another FMU of MET. A state begins with its token. */
+static bool is_state(const void *state)
 {
-    Data *const copy = malloc(sizeof *copy);
-    if (copy) *copy = *data;
-    return copy;
+    return state && !memcmp(state, MODEL_TOKEN, sizeof MODEL_TOKEN);
 }
 
-static void write_state(const Data *data, unsigned char *bytes)
+/* FNV-1a of the data's bytes (Fowler, Noll and Vo): another number where one byte differs. */
+static uint64_t checksum_of(const unsigned char *bytes)
 {
-    memcpy(bytes, MODEL_TOKEN, sizeof MODEL_TOKEN);
-    memcpy(bytes + sizeof MODEL_TOKEN, data, sizeof *data);
+    uint64_t sum = UINT64_C(14695981039346656037);
+    for (size_t i = 0; i < sizeof(Data); i++) sum = (sum ^ bytes[i]) * UINT64_C(1099511628211);
+    return sum;
 }
 
-/* The state in these bytes; none where they are not of this program. */
-static Data *read_state(const unsigned char *bytes, size_t size)
+/* Write the state into `*state`, which is made if it is null. */
+static Answer get_state(Instance *instance, void **state)
 {
-    Data *data;
-    if (!bytes || size != STATE_BYTES || memcmp(bytes, MODEL_TOKEN, sizeof MODEL_TOKEN)) return 0;
-    data = malloc(sizeof *data);
-    if (!data) return 0;
-    memcpy(data, bytes + sizeof MODEL_TOKEN, sizeof *data);
-    if (data->mode >= INSTANTIATED && data->mode <= TERMINATED && data->next >= 0 && (double)data->next < MOST_WHOLE) {
-        return data;
+    if (!instance || !state) return refuse(instance, "there is no room for the state");
+    if (*state && !is_state(*state)) return refuse(instance, "the room is no state of this FMU");
+    if (!*state) *state = malloc(sizeof(Data));
+    if (!*state) return refuse(instance, "there is no memory");
+    *(Data *)*state = instance->data;
+    return OK;
+}
+
+static Answer set_state(Instance *instance, const void *state)
+{
+    if (!instance || !is_state(state)) return refuse(instance, "this is no state of this FMU");
+    instance->data = *(const Data *)state;
+    return OK;
+}
+
+static Answer free_state(void **state)
+{
+    if (state) {
+        free(*state);
+        *state = 0;
     }
-    free(data);
-    return 0;
+    return OK;
+}
+
+static Answer measure_state(Instance *instance, const void *state, size_t *size)
+{
+    if (!is_state(state) || !size) return refuse(instance, "this is no state of this FMU, or its size has no place");
+    *size = STATE_BYTES;
+    return OK;
+}
+
+static Answer write_state(Instance *instance, const void *state, void *bytes, size_t size)
+{
+    uint64_t sum;
+    if (!is_state(state) || !bytes || size < STATE_BYTES) {
+        return refuse(instance, "this is no state of this FMU, or there is too little room for it");
+    }
+    memcpy(bytes, state, sizeof(Data));
+    sum = checksum_of(bytes);
+    memcpy((char *)bytes + sizeof(Data), &sum, sizeof sum);
+    return OK;
+}
+
+static Answer read_state(Instance *instance, const void *bytes, size_t size, void **state)
+{
+    uint64_t sum;
+    if (!state || !bytes || size != STATE_BYTES || !is_state(bytes)) {
+        return refuse(instance, "these bytes are not a state of this FMU");
+    }
+    memcpy(&sum, (const char *)bytes + sizeof(Data), sizeof sum);
+    if (sum != checksum_of(bytes)) return refuse(instance, "the bytes of the state are damaged");
+    *state = malloc(sizeof(Data));
+    if (!*state) return refuse(instance, "there is no memory");
+    memcpy(*state, bytes, sizeof(Data));
+    return OK;
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 import subprocess
+from ctypes import byref, c_size_t, c_void_p
 from pathlib import Path
 
 import numpy as np
@@ -243,10 +244,29 @@ def test_a_state_leads_on_to_the_same_bits_also_as_bytes_in_another_instance(fmu
     assert other.get("gearbox.kp") == [0.03]
     for broken in (data[:-1], data + b"0", b"x" + data[1:], b""):
         assert other.from_bytes(broken)[0] == ERROR
+    for place in np.random.default_rng(2).integers(0, 8 * len(data), 200).tolist():
+        broken = bytearray(data)
+        broken[place // 8] ^= 1 << place % 8
+        assert other.from_bytes(bytes(broken))[0] == ERROR, place
+    assert other.messages[-1] == "the bytes of the state are damaged"
     first.drop(state)
     other.drop(read)
     first.free()
     other.free()
+
+
+@pytest.mark.slow
+def test_a_state_of_another_fmu_is_refused(fmu: Fmu, folder: Path, tmp_path: Path) -> None:
+    new, foreign = fmu.instance(), load(packed(folder, "seeded"), tmp_path).instance()
+    state, before = foreign.state(), new.get(*NAMES)
+    assert new.go_back(state) == ERROR and new.go_back(c_void_p()) == ERROR and new.get(*NAMES) == before
+    assert new.messages == ["this is no state of this FMU"] * 2
+    assert new.call("fmi3GetFMUState", byref(state)) == ERROR
+    assert new.messages[-1] == "the room is no state of this FMU"
+    assert new.call("fmi3SerializedFMUStateSize", state, byref(c_size_t())) == ERROR
+    assert new.from_bytes(foreign.as_bytes(state))[0] == ERROR
+    assert new.messages[-1] == "these bytes are not a state of this FMU"
+    foreign.drop(state)
 
 
 @pytest.mark.slow
