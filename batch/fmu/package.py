@@ -141,15 +141,18 @@ def _model(source: CSource, listed: tuple[FmuVariable, ...], base_hz: float) -> 
         place = f"row[{source_name}]" if isinstance(source_name, int) else members[source_name]
         kind = "OUTPUT" if variable.start is None else variable.kind.upper()
         numbers = ", ".join(_number(x) for x in (variable.start or 0.0, variable.low, variable.high))
-        rows.append(f"    {{offsetof(met_case, {place}), {kind}, {int(variable.whole)}, {numbers}}},\n")
+        rows.append(
+            f'    {{"{variable.name}", offsetof(met_case, {place}), {kind}, {int(variable.whole)}, {numbers}}},\n'
+        )
     return (
         f"/* The program of one run. Written by MET {VERSION}. */\n\n{source.text}\n"
         "#include <stddef.h>\n\n"
         f"#define MODEL_BASE_HZ {literal(base_hz)}\n\n"
         "/* By value reference; the first is time. */\n"
-        "typedef struct {\n    size_t place;\n    enum { PARAMETER, INPUT, OUTPUT } kind;\n    int whole;\n"
-        "    double start, min, max;\n} met_variable;\n\n"
-        f"static const met_variable met_variables[] = {{\n    {{0, OUTPUT, 0, 0.0, 0.0, 0.0}},\n{''.join(rows)}}};\n\n"
+        "typedef struct {\n    const char *name;\n    size_t place;\n    enum { PARAMETER, INPUT, OUTPUT } kind;\n"
+        "    int whole;\n    double start, min, max;\n} met_variable;\n\n"
+        'static const met_variable met_variables[] = {\n    {"time", 0, OUTPUT, 0, 0.0, 0.0, 0.0},\n'
+        f"{''.join(rows)}}};\n\n"
         "/* Outputs that are not 0 once the case has failed. */\n"
         f"static const size_t met_alarms[] = {{{', '.join(f'offsetof(met_case, {name})' for name in alarms)}}};\n"
     )

@@ -92,7 +92,9 @@ def _settable(experiment: Experiment) -> Iterator[FmuVariable]:
     declarations = {path: parameter for path, _, _, parameter in declared(experiment) if parameter is not None}
     inputs_of_fmu = changing(experiment)
     for coordinate, start in zip(cases.coordinates, starts, strict=False):
-        parameters = [declarations[path] for path in _equals(experiment, coordinate) if path in declarations]
+        paths = list(_equals(experiment, coordinate))
+        parameters = [declarations[path] for path in paths if path in declarations]
+        least = [0.0 for path in paths if path.startswith(("links.", "payloads.")) and path.endswith(".mass")]
         yield FmuVariable(
             coordinate.path,
             "input" if coordinate.path in inputs_of_fmu else "parameter",
@@ -100,7 +102,7 @@ def _settable(experiment: Experiment) -> Iterator[FmuVariable]:
             coordinate_unit(experiment, coordinate),
             parameters[0].doc if parameters else "",
             start,
-            max(map(_low, parameters), default=-math.inf),
+            max([*map(_low, parameters), *least], default=-math.inf),
             min(map(_high, parameters), default=math.inf),
             any(parameter.whole for parameter in parameters),
             coordinate.unit,

@@ -166,33 +166,36 @@ static Answer terminate(Instance *instance)
     return OK;
 }
 
+static Answer refuse_reference(Instance *instance, uint32_t reference)
+{
+    char message[80];
+    snprintf(message, sizeof message, "value reference %u: there is no such variable", (unsigned)reference);
+    return refuse(instance, message);
+}
+
 static Answer set_values(Instance *instance, const uint32_t *variables, size_t count, const double *values)
 {
     Data *const data = &instance->data;
-    char message[160];
+    char message[400];
     if (count && (!variables || !values)) return refuse(instance, "no variables or values are given");
     if (data->mode == TERMINATED) return refuse(instance, "the simulation is terminated");
     for (size_t i = 0; i < count; i++) { /* all are checked before the first is set */
+        const met_variable *variable;
         const char *why = 0;
-        if (variables[i] >= VARIABLES) {
-            why = "there is no such variable";
-        } else {
-            const met_variable *const variable = &met_variables[variables[i]];
-            if (variables[i] == 0 || variable->kind == OUTPUT) {
-                why = "it is computed and cannot be set";
-            } else if (variable->kind == PARAMETER && data->mode == STEPPING) {
-                why = "a parameter is fixed once the simulation runs";
-            } else if (!is_finite(values[i]) || values[i] < variable->min || values[i] > variable->max ||
-                       (variable->whole && !is_whole(values[i]))) {
-                snprintf(message, sizeof message, "value reference %u: it cannot be %.17g", (unsigned)variables[i],
-                         values[i]);
-                refuse(instance, message);
-                return DISCARD;
-            }
-        }
+        if (variables[i] >= VARIABLES) return refuse_reference(instance, variables[i]);
+        variable = &met_variables[variables[i]];
+        if (variable->kind == OUTPUT) why = "is computed and cannot be set";
+        if (variable->kind == PARAMETER && data->mode == STEPPING) why = "is fixed once the simulation runs";
         if (why) {
-            snprintf(message, sizeof message, "value reference %u: %s", (unsigned)variables[i], why);
+            snprintf(message, sizeof message, "%.300s %s", variable->name, why);
             return refuse(instance, message);
+        }
+        if (!is_finite(values[i]) || values[i] < variable->min || values[i] > variable->max ||
+            (variable->whole && !is_whole(values[i]))) {
+            snprintf(message, sizeof message, "%.300s cannot be %.15g, only %s from %.15g to %.15g", variable->name,
+                     values[i], variable->whole ? "a whole number" : "a number", variable->min, variable->max);
+            refuse(instance, message);
+            return DISCARD;
         }
     }
     for (size_t i = 0; i < count; i++) *place_of(&data->now, variables[i]) = values[i];
@@ -203,13 +206,9 @@ static Answer set_values(Instance *instance, const uint32_t *variables, size_t c
 static Answer get_values(Instance *instance, const uint32_t *variables, size_t count, double *values)
 {
     Data *const data = &instance->data;
-    char message[120];
     if (count && (!variables || !values)) return refuse(instance, "no variables or values are given");
     for (size_t i = 0; i < count; i++) {
-        if (variables[i] >= VARIABLES) {
-            snprintf(message, sizeof message, "value reference %u: there is no such variable", (unsigned)variables[i]);
-            return refuse(instance, message);
-        }
+        if (variables[i] >= VARIABLES) return refuse_reference(instance, variables[i]);
         if (variables[i] == 0) {
             values[i] = data->time;
         } else if (met_variables[variables[i]].kind == OUTPUT) {
