@@ -45,11 +45,12 @@ MACHINES = {"x86_64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
 
 CMAKE = """\
 cmake_minimum_required(VERSION 3.16)
-project({identifier} C)
-add_library({identifier} SHARED fmi{version}.c)
-set_target_properties({identifier} PROPERTIES PREFIX "" C_STANDARD 11 C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden)
+project(fmu C)
+add_library(fmu SHARED fmi{version}.c)
+set_target_properties(fmu PROPERTIES OUTPUT_NAME {identifier} PREFIX "" C_STANDARD 11 C_EXTENSIONS OFF
+  C_VISIBILITY_PRESET hidden)
 if(NOT MSVC)
-  target_compile_options({identifier} PRIVATE -ffp-contract=off)
+  target_compile_options(fmu PRIVATE -ffp-contract=off)
 endif()
 """
 

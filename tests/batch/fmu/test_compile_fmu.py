@@ -68,7 +68,7 @@ def test_fmi_2_is_chosen_for_an_fmu_alone(folder: Path, capsys: pytest.CaptureFi
     with zipfile.ZipFile("held.fmu") as archive:
         assert '<fmiModelDescription fmiVersion="2.0" ' in archive.read("modelDescription.xml").decode()
         assert [name for name in archive.namelist() if name.startswith("sources/fmi")] == ["sources/fmi2.c"]
-        assert "SHARED fmi2.c)" in archive.read("sources/CMakeLists.txt").decode()
+        assert "add_library(fmu SHARED fmi2.c)" in archive.read("sources/CMakeLists.txt").decode()
     capsys.readouterr()
     for words in ([], ["-o", "held.wasm"]):
         assert cli.main(["compile", "deck.ic", "held", "--fmi", "2", *words]) == 2
