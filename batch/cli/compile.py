@@ -54,7 +54,7 @@ def compile(
         raise click.UsageError("--fmi is for FMUs: `-o FILE.fmu` writes one")
     if output is not None:
         files.check(path_of(output))
-    experiment = files.experiment_of(source, names, **options, quiet=quiet or form == "json")
+    experiment = files.experiment_of(source, names, output, **options, quiet=quiet or form == "json")
     target = Path(f"{experiment.name}{files.ENDING}" if output is None else output)
     if output is None:
         files.check(target)

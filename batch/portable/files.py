@@ -33,19 +33,21 @@ class ModuleFiles:
     described: dict[str, Any]
 
 
-def experiment_of(source: str, names: tuple[str, ...], *, quiet: bool, **options: Any) -> Experiment:
-    """The experiment of a deck, a plan file or an archive. options: how a deck is read, as for
-    `batch.campaigns.choosing.read_plan`. Raises Problem."""
+def experiment_of(
+    source: str, names: tuple[str, ...], output: str | None, *, quiet: bool, **options: Any
+) -> Experiment:
+    """The experiment of a deck, a plan file or an archive. output: where it is to be compiled to, for messages.
+    options: how a deck is read, as for `batch.campaigns.choosing.read_plan`. Raises Problem."""
     if names_archive(source):
         with ArchiveFile(source) as file:
             plan = file.plan()
     else:
         plan = read_plan(source, names, **options, quiet=quiet)
-    return _the_one(experiments_named(plan, names or None), source)
+    return _the_one(experiments_named(plan, names or None), source, output)
 
 
-def _the_one(experiments: tuple[Experiment, ...], source: str) -> Experiment:
-    """The experiment of a module. Raises Problem E472 where there are several."""
+def _the_one(experiments: tuple[Experiment, ...], source: str, output: str | None) -> Experiment:
+    """The experiment of a module or an FMU. Raises Problem E472 where there are several."""
     if len(experiments) == 1:
         return experiments[0]
     names = list(dict.fromkeys(experiment.name_in_deck for experiment in experiments))
@@ -56,13 +58,14 @@ def _the_one(experiments: tuple[Experiment, ...], source: str) -> Experiment:
         helps = [f"name a group: {groups}"]
         if not names_archive(source) and not names_plan(source):
             plan = f"`met plan {quoted(source)} {quoted(names[0])} -o plan.json`"
-            helps = [f"{plan}, then `met compile plan.json GROUP`: {groups}"]
+            place = "" if output is None else f" -o {quoted(output)}"
+            helps = [f"{plan}, then `met compile plan.json GROUP{place}`: {groups}"]
     what = (
         f"{source} has {len(names)} runs and sweeps"
         if len(names) > 1
         else f"`{names[0]}` has {len(experiments)} structures"
     )
-    raise Problem(error("E472", f"{what}, and a module is of one", help=helps))
+    raise Problem(error("E472", f"{what}, and a module or an FMU is of one", help=helps))
 
 
 def check(output: Path) -> None:
@@ -71,10 +74,12 @@ def check(output: Path) -> None:
     if output.suffix not in (ENDING, FMU_ENDING) and not output.is_dir():
         helps = [f"`-o {quoted(output.with_suffix(ending))}`" for ending in (ENDING, FMU_ENDING) if output.name]
         raise Problem(error("E471", f"cannot write {output}: modules are .wasm files, and FMUs .fmu files", help=helps))
-    module = ((output, _is_module), (output.with_suffix(".json"), _is_description))
+    beside = output.parent / f"{output.stem}.json"
+    module = ((output, _is_module), (beside, _is_description))
+    inside = output / ("arm.fmu" if output.suffix == FMU_ENDING else "module.wasm")
     for path, own in ((output, is_fmu),) if output.suffix == FMU_ENDING else module:
         with writing(path, code="E470", help=ELSEWHERE):
-            check_place(path, code="E470", inside=output / "module.wasm")
+            check_place(path, code="E470", inside=inside)
             check_overwrite(path, own, code="E470", because=" and was not written by `met compile`")
 
 

@@ -137,14 +137,29 @@ def test_what_met_did_not_write_is_not_written_over(folder: Path, capsys: pytest
     assert not (folder / "tuned.wasm").exists()
 
 
+@pytest.mark.parametrize(
+    ("place", "file"), [(".", "module.wasm"), ("/", "/module.wasm"), ("new.fmu", "new.fmu/arm.fmu")]
+)
+def test_a_folder_is_no_place_for_a_module(
+    folder: Path, capsys: pytest.CaptureFixture[str], place: str, file: str
+) -> None:
+    (folder / "new.fmu").mkdir()
+    assert met("compile", "deck.ic", "tuned", "-o", place) == 2
+    assert capsys.readouterr().err == (
+        f"error[E470]: cannot write {place}: it is a folder\n = help: name a file in it: `-o {file}`\n\n1 error\n"
+    )
+
+
 @pytest.mark.slow
 def test_a_sweep_of_several_structures_has_no_one_module(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert met("compile", "deck.ic", "ways") == 2
     assert (
-        "error[E472]: `ways` has 2 structures, and a module is of one\n"
+        "error[E472]: `ways` has 2 structures, and a module or an FMU is of one\n"
         " = help: `met plan deck.ic ways -o plan.json`, then `met compile plan.json GROUP`: "
         "ways.modified_euler, ways.rk4\n"
     ) in capsys.readouterr().err
+    assert met("compile", "deck.ic", "ways", "-o", "arm.fmu") == 2
+    assert "`met compile plan.json GROUP -o arm.fmu`: ways.mod" in capsys.readouterr().err
     assert met("plan", "deck.ic", "ways", "-q", "-o", "plan.json") == 0
     assert met("compile", "plan.json") == 2
     assert " = help: name a group: ways.modified_euler, ways.rk4\n" in capsys.readouterr().err
