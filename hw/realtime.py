@@ -4,16 +4,13 @@ collection. It is not hard real time: lateness is counted."""
 from __future__ import annotations
 
 import contextlib
-import ctypes
+import errno
 import gc
-import os
-import signal
+
+from met.host import system
 
 PRIORITY = 50
-"""Priority of the process under SCHED_FIFO: above the threaded interrupts of most kernels."""
-
-_MCL_CURRENT, _MCL_FUTURE = 1, 2
-_PR_SET_PDEATHSIG = 1
+"""Priority of the process in real-time scheduling: above the threaded interrupts of most kernels."""
 
 
 def take_precedence() -> list[str]:
@@ -24,44 +21,25 @@ def take_precedence() -> list[str]:
     gc.disable()
     refused = []
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(PRIORITY))
-    except (AttributeError, OSError) as reason:
-        refused.append(
-            f"no precedence over other processes ({_why(reason)}): exchanges may be late; "
-            f"`{_allow('rtprio', PRIORITY)}` allows it"
-        )
-    if _locked() != 0:
-        refused.append(
-            f"memory may be swapped out ({os.strerror(ctypes.get_errno()).lower()}): exchanges may be late; "
-            f"`{_allow('memlock', 'unlimited')}` allows it"
-        )
+        system.put_first(0, PRIORITY, children=False)
+    except OSError as reason:
+        refused.append(_refusal("no precedence over other processes", reason, f"rtprio {PRIORITY}"))
+    try:
+        system.keep_in_memory()
+    except OSError as reason:
+        refused.append(_refusal("memory may be swapped out", reason, "memlock unlimited"))
     return refused
 
 
 def put_first(process: int) -> None:
     """Let another process, and threads that it will start, run before this one, where that is allowed. It is for a
     bed's firmware that runs here: on a busy machine its deadman would act."""
-    with contextlib.suppress(AttributeError, OSError):
-        os.sched_setscheduler(process, os.SCHED_FIFO, os.sched_param(PRIORITY + 1))
+    with contextlib.suppress(OSError):
+        system.put_first(process, PRIORITY + 1)
 
 
-def end_with_parent(number: signal.Signals) -> None:
-    """Let the system send this process a signal when its parent ends, where it can."""
-    with contextlib.suppress(AttributeError, OSError):
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
-
-
-def _locked() -> int:
-    try:
-        library = ctypes.CDLL(None, use_errno=True)
-        return int(library.mlockall(_MCL_CURRENT | _MCL_FUTURE))
-    except (AttributeError, OSError):
-        return -1
-
-
-def _allow(what: str, how: object) -> str:
-    return f"@GROUP - {what} {how}"
-
-
-def _why(reason: Exception) -> str:
-    return (getattr(reason, "strerror", None) or "not on this system").lower()
+def _refusal(lacking: str, reason: OSError, limit: str) -> str:
+    """What the host does without, in words, with the line of limits.conf that allows it, or the system that has it."""
+    if reason.errno == errno.ENOSYS:
+        return f"{lacking} (this system has no such call): exchanges may be late; drive motors from Linux"
+    return f"{lacking} ({str(reason.strerror).lower()}): exchanges may be late; `@GROUP - {limit}` allows it"

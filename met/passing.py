@@ -6,7 +6,6 @@ nothing and costs a copy of the state at each instant.
 
 from __future__ import annotations
 
-import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -16,6 +15,7 @@ import numpy as np
 
 from met.backends.backend import Kernel
 from met.frozen import frozen
+from met.host import system
 from met.plan import Schedule
 
 LONGEST = 1 << 16
@@ -87,7 +87,7 @@ def run_past(
         outputs[lanes] = block.outputs[: outputs.shape[1], :width].T
         return width
 
-    with ThreadPoolExecutor(max(1, min(threads or len(os.sched_getaffinity(0)), len(starts)))) as pool:
+    with ThreadPoolExecutor(max(1, min(threads or system.cores(), len(starts)))) as pool:
         try:
             for width in pool.map(work, starts):
                 done += width

@@ -19,11 +19,11 @@ from batch.archive import layout as archive_layout
 from batch.archive import summarised, verified
 from batch.archive.hdf5 import LIBVER, h5py, put_attributes
 from batch.archive.layout import Layout, Variable
-from batch.archive.provenance import Revision, version
 from batch.archive.sink import Sink
 from batch.archive.values import KINDS, times_of, values_of_cases, values_of_dimensions
 from met import backends
 from met.frozen import frozen
+from met.host.provenance import Revision, version
 from met.plan import Experiment, Plan, recipes
 from met.plan import file as plan_file
 from met.plan.columns import LISTED_ROWS, CaseValues, blocks

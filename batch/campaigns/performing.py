@@ -329,8 +329,8 @@ class _CampaignWork:
 
     def _merge(self, histories: Mapping[int, CampaignSection]) -> None:
         """Write the archive from all shards, under a temporary name that becomes its own when it is whole."""
-        from batch.archive.provenance import machine
         from batch.archive.write import ArchivePart, ArchiveWriter
+        from met.host.provenance import machine
 
         parts = []
         for part, values in zip(self.whole.parts, self.final_sections, strict=True):

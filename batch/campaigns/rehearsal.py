@@ -129,11 +129,11 @@ def main(lines: Sequence[str]) -> None:
     """Record all models of the question, and report progress."""
     from batch.archive.read import ArchiveFile
     from batch.campaigns.choosing import read_plan
-    from hw import realtime
+    from met.host import system
     from met.host.sources import names_archive
     from met.run import prepare
 
-    realtime.end_with_parent(signal.SIGKILL)
+    system.end_with_parent(signal.SIGKILL)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     faulthandler.enable()
     ends = os._exit

@@ -13,6 +13,7 @@ from batch.archive.read import ArchiveFile
 from batch.campaigns.drive import Progress
 from batch.campaigns.folder import ENDING, Folder, beside, uncovered, write_json
 from batch.campaigns.output import sidecar_path
+from met.host import system
 from met.host.files import is_count, read_json
 
 WRITE_SECONDS = 1.0
@@ -247,7 +248,7 @@ def alive(record: dict[str, Any], now: float) -> bool:
     if record["state"] not in AT_WORK:
         return False
     if record["host"] == socket.gethostname():
-        return Path(f"/proc/{record['pid']}").exists()
+        return system.is_running(record["pid"])
     return bool(now - record["updated"] < STALE_SECONDS)
 
 

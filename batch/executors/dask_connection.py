@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from met.diagnostic import Problem, error
+from met.host import system
 from met.host.files import read_json
 
 CONNECT_SECONDS = 5.0
@@ -129,7 +130,7 @@ def _started(threads: int) -> Iterator[Any]:
     clients' code. Its tasks are in children of the worker all the same."""
     from distributed import Client, LocalCluster
 
-    at_once = max(1, len(os.sched_getaffinity(0)) // threads)
+    at_once = max(1, system.cores() // threads)
     nowhere = "127.0.0.1:0"
     with (
         tempfile.TemporaryDirectory(prefix="met-dask-", ignore_cleanup_errors=True) as scratch,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 
@@ -10,6 +9,7 @@ from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.tasks import CampaignSection, Task
 from batch.executors.child import COMMAND, Crew
+from met.host import system
 
 TELL_SECONDS = 0.1
 
@@ -25,7 +25,7 @@ class Processes:
         timeout: float | None = None,
         command: Sequence[str] = COMMAND,
     ) -> None:
-        cores = len(os.sched_getaffinity(0))
+        cores = system.cores()
         self.workers = processes or cores
         self.about = f"{self.workers} process{'es' if self.workers > 1 else ''}"
         self._threads = threads or max(1, cores // self.workers)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -12,6 +11,7 @@ from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.shard import cannot_keep
 from batch.campaigns.tasks import CampaignSection, Done, Task
+from met.host import system
 
 
 class Threads:
@@ -20,7 +20,7 @@ class Threads:
     workers = 1
 
     def __init__(self, threads: int | None = None) -> None:
-        self.threads = threads or len(os.sched_getaffinity(0))
+        self.threads = threads or system.cores()
         self.about = f"{self.threads} thread{'s' if self.threads > 1 else ''}"
         self._computed = 0
         self._waiting: deque[Task] = deque()

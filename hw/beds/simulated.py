@@ -25,6 +25,7 @@ from hw.lines.transcript import TranscribedLine, TranscriptWriter
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
 from met.diagnostic import Problem, error
+from met.host import system
 from met.plant import plant_c
 from met.substitution.bed import SIMULATION_PARAMETERS
 
@@ -87,7 +88,7 @@ class SimulatedBed(WireBed):
                 stdin=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 start_new_session=True,
-                preexec_fn=partial(realtime.end_with_parent, signal.SIGKILL),
+                preexec_fn=partial(system.end_with_parent, signal.SIGKILL),
             )
             if not self._lock_step:
                 realtime.put_first(self._process.pid)

@@ -25,7 +25,7 @@ from hw.bed import Capability, Limits, Scales
 from hw.boards.interlock import Interlock, interlock_c
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.host import cache
+from met.host import cache, system
 
 Kind = Literal["host", "library", "arm", "pico"]
 
@@ -506,11 +506,7 @@ def _compile(
 def _fused() -> tuple[str, ...]:
     """The flag by which a plant uses this processor's fused multiply-add. Without it one in software gives the same
     bits."""
-    with contextlib.suppress(OSError):
-        flags = re.search(r"^flags\s*:(.*)$", Path("/proc/cpuinfo").read_text(encoding="utf-8"), re.MULTILINE)
-        if flags is not None and "fma" in flags[1].split():
-            return ("-mfma",)
-    return ()
+    return ("-mfma",) if "fma" in system.cpu_flags() else ()
 
 
 # What was built before.

@@ -42,15 +42,13 @@ Question = TypeVar("Question")
 
 def listening() -> Callable[[], bool]:
     """Hear signals from here on, but those that `nohup` or a shell had ignored. Returns a function that is True once
-    one has asked to stop."""
+    one has asked to stop, or the process that started this one has ended."""
     heard: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         if number == signal.SIGTERM or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, lambda which, _: heard.append(which))
-    realtime.end_with_parent(signal.SIGTERM)
-    if os.environ.get(_STARTED_BY, str(os.getppid())) != str(os.getppid()):  # its parent was gone before
-        os.kill(os.getpid(), signal.SIGTERM)
-    return lambda: bool(heard)
+    parent = int(os.environ.get(_STARTED_BY) or os.getppid())
+    return lambda: bool(heard) or os.getppid() != parent
 
 
 def say(**data: Any) -> None:

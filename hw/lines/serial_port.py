@@ -31,6 +31,9 @@ _NETWORK = ("socket", "rfc2217")
 _SLICE = 0.001
 """s between two looks at a line that the system cannot wait for."""
 
+_MOST_FILES = 4096
+"""Number of open files among which a line that is open already is looked for."""
+
 ADAPTERS = Path("/sys/bus/usb-serial/devices")
 _SLOW_ADAPTER = 2
 """Longest time in ms for which a USB adapter may keep bytes back without a warning."""
@@ -204,9 +207,9 @@ def _is_ours(path: str) -> bool:
     """True where this process has the same device open, other than as its terminal."""
     with contextlib.suppress(OSError):
         wanted = os.stat(path).st_rdev
-        for name in os.listdir("/proc/self/fd"):
+        for number in range(3, _MOST_FILES):
             with contextlib.suppress(OSError):
-                if int(name) > 2 and wanted and os.fstat(int(name)).st_rdev == wanted:
+                if wanted and os.fstat(number).st_rdev == wanted:
                     return True
     return False
 

@@ -13,6 +13,7 @@ import zlib
 from collections.abc import Iterator
 
 from hw.recording.records import SIZE
+from met.host import system
 
 _COUNT = struct.Struct("<Q")
 _HEAD = 64
@@ -62,6 +63,6 @@ class Ring:
 
 def make(room: int) -> Ring:
     """A ring for `room` records, in memory without a name: it is gone with the last process that has it open."""
-    file = os.memfd_create("met-bed-records")
+    file = system.nameless_file()
     os.ftruncate(file, 2 * _HEAD + room * SIZE)
     return Ring(file, room)

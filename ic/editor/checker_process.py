@@ -10,7 +10,7 @@ import subprocess
 from collections.abc import AsyncIterator
 
 from ic.editor.checking import LENGTH, CheckRequest
-from met.host import interpreter
+from met.host import interpreter, system
 
 LARGEST = 1 << 30  # bytes of one answer
 
@@ -44,7 +44,7 @@ class CheckerProcess:
         self.start()
         assert self._socket is not None
         answers, out = os.pipe()
-        with os.fdopen(os.memfd_create("request"), "w+b") as request_file, os.fdopen(out, "wb"):
+        with os.fdopen(system.nameless_file(), "w+b") as request_file, os.fdopen(out, "wb"):
             pickle.dump(request, request_file, pickle.HIGHEST_PROTOCOL)
             request_file.seek(0)
             try:

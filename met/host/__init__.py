@@ -1,1 +1,1 @@
-"""The computer that MET runs on: files, the cache of compiled objects, other Pythons, installed packages."""
+"""The computer that MET runs on: system, files, the cache of compiled objects, other Pythons, installed packages."""

@@ -23,7 +23,7 @@ from met.backends.llvm.emit import emit, numbered
 from met.backends.llvm.pieces import cut, operations
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.host import cache
+from met.host import cache, system
 from met.trace.program import Program, Recording
 from met.trace.recorder import record
 
@@ -177,7 +177,7 @@ class LlvmKernel:
         cases = len(inputs)
         rows = np.empty((cases, self.rows(0, ticks), program.columns)) if record else None
         outputs = np.empty((cases, len(program.outputs)))
-        threads = _threads(threads)
+        threads = system.cores() if threads is None else max(1, threads)
         blocks = -(-cases // self.lanes)
         chunk = self.lanes * max(1, min(_CHUNK, _CALL // (ticks + 1), -(-blocks // (8 * threads))))
         starts = range(0, cases, chunk)
@@ -313,15 +313,6 @@ class LlvmBlock:
     def cells(self) -> Mapping[str, np.ndarray]:
         """The state by name, [lane] each: views, to be read or changed. Cells that nothing reads are not kept."""
         return {name: self.state[slot] for slot, name in enumerate(self.kernel.recording.cells)}
-
-
-def _threads(wanted: int | None) -> int:
-    """The number of threads to use: as many as asked for, else as many as this process may run on."""
-    if wanted is not None:
-        return max(1, wanted)
-    if hasattr(os, "sched_getaffinity"):
-        return max(1, len(os.sched_getaffinity(0)))
-    return os.cpu_count() or 1
 
 
 def _aligned(shape: tuple[int, ...]) -> np.ndarray:

@@ -16,9 +16,9 @@ import pytest
 import batch
 from batch.archive import limits
 from batch.archive.hdf5 import put_attributes
-from batch.archive.provenance import UNKNOWN, Revision
 from batch.archive.read import ArchiveFile, _plain
 from batch.campaigns import tasks
+from met.host.provenance import UNKNOWN, Revision
 from met.plan import file as plan_file
 from met.plan import keys
 from tests.batch import plans

@@ -14,6 +14,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from met.host import system
+
 UNKNOWN = "unknown"
 
 
@@ -78,19 +80,8 @@ def machine() -> dict[str, Any]:
     return {
         "host": platform.node(),
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
-        "cpu": _cpu(),
+        "cpu": system.cpu() or UNKNOWN,
         "cores": os.cpu_count(),
         "python": platform.python_version(),
         "h5py": getattr(sys.modules.get("h5py"), "__version__", UNKNOWN),
     }
-
-
-def _cpu() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
-            for line in file:
-                if line.startswith(("model name", "Model")):
-                    return line.partition(":")[2].strip()
-    except OSError:
-        pass
-    return platform.processor() or UNKNOWN
