@@ -110,12 +110,41 @@ class CommandTable(click.Group):
         return f"; did you mean `met {close}`?" if close is not None else ""
 
 
+_LONG = "met.long"  # key under which the context keeps the value of --long
+
+
+def _keep_long(context: click.Context, _: click.Parameter, value: bool) -> None:
+    context.meta[_LONG] = value
+
+
+def _show_version(context: click.Context, _: click.Parameter, value: bool) -> None:
+    """Show the version, in one line or with --long in several, and exit."""
+    if value and context.meta[_LONG]:
+        from met.about import about
+
+        say(about())
+        context.exit()
+    if value:
+        say(f"met {VERSION}")
+        context.exit()
+    if context.meta[_LONG]:
+        raise click.UsageError("--long is for --version: `met --version --long`", context)
+
+
 @click.command(
     cls=CommandTable,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
     epilog="Start with `met run two_link.ic`. `met COMMAND --help` says more.",
 )
-@click.version_option(VERSION, "--version", prog_name="met", message="%(prog)s %(version)s")
+@click.option("--version", is_flag=True, expose_value=False, callback=_show_version, help="Show the version and exit.")
+@click.option(
+    "--long",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,  # before --version, which reads it
+    callback=_keep_long,
+    help="With --version: also what a report of a defect needs.",
+)
 def met() -> None:
     """MET takes a robot arm from a text deck to an answer: what it does under its servos, in one case or a million.
 
@@ -366,10 +395,11 @@ def complain(
 def confess(defect: Exception, arguments: Sequence[str], *, verbose: bool) -> str:
     """Report a defect of MET, in a paragraph, which is returned; the traceback goes into a file, or with -v to the
     terminal. To be called while the exception is handled."""
-    import platform
     import shlex
     import tempfile
     import traceback
+
+    from met.about import about
 
     command = shlex.join(["met", *arguments])
     if verbose:
@@ -379,7 +409,7 @@ def confess(defect: Exception, arguments: Sequence[str], *, verbose: bool) -> st
         try:
             handle, path = tempfile.mkstemp(prefix="met-defect-", suffix=".txt")
             with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
-                file.write(f"{command}\nmet {VERSION}, Python {platform.python_version()}, {platform.platform()}\n\n")
+                file.write(f"{command}\n{about()}\n\n")
                 traceback.print_exception(defect, file=file)
             where = f"The traceback is in {path}."
         except OSError as reason:

@@ -189,7 +189,7 @@ def test_a_defect_is_owned_in_one_paragraph_with_the_traceback_in_a_file(
         f"The traceback is in {report}. "
         "Please report it together with the deck and the command, `met divide`.\n"
     )
-    assert f"met {VERSION}, Python" in report.read_text()
+    assert report.read_text().startswith(f"met divide\nmet        {VERSION}, commit ")
     assert "return 1 / 0" in report.read_text()
 
 
