@@ -13,11 +13,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from met.plan.loops import of_joints
-
 from met.dynamics.spatial import IDENTITY, ZERO, Pose, Real, Vector, compose, constant, rotation_rpy, scale, sub
 from met.frozen import frozen
 from met.plan import BASE, Experiment, Joint, Link, Payload
+from met.plan.closing import of_joints
 
 SIZES = {
     "rod": ("length",),
