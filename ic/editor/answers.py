@@ -14,7 +14,6 @@ from ic.editor.hover import about, markdown
 from ic.editor.index import DeckIndex
 from ic.editor.names import NameInText, NamesInTexts
 from ic.editor.positions import Texts, lines_of, uri_of
-from ic.editor.used import uses_in
 from ic.text.files import LIBRARY, Files, FoundFile, file_at
 from ic.text.lexer import NAME, Token
 
@@ -111,9 +110,11 @@ class AskedPosition:
         if token is None or token.text not in self.names.by_name:
             return []
         meant = self.names.meant_in(self.text, token)
-        defined = {id(definition.token) for definition in self.names.by_name[token.text]}
+        defined = {(definition.file, definition.token.offset) for definition in self.names.by_name[token.text]}
         return [
-            self.location(use) for use in self._uses(token.text, meant) if also_definitions or id(use) not in defined
+            self.location(use)
+            for use in self._uses(token.text, meant)
+            if also_definitions or (use.source.name, use.offset) not in defined
         ]
 
     def _uses(self, name: str, meant: list[NameInText]) -> Iterator[Token]:
@@ -125,14 +126,12 @@ class AskedPosition:
 
     def _included(self) -> str | None:
         """The address of the file that the include or the use at the position names."""
-        for use in uses_in(self.text):
+        for use in self.text.uses:
             if use.first.offset <= self.offset < use.last.end:
                 return self._address(use.file, use.angled)
         for line in self.text.directives:
-            if line.name != "include" or not line.tokens[0].offset <= self.offset <= line.tokens[-1].end:
-                continue
-            written = self.text.source.text[line.tokens[1].end : line.tokens[-1].end].strip()
-            return self._address(written[1:-1], written[:1] == "<")
+            if line.name == "include" and line.tokens[0].offset <= self.offset <= line.tokens[-1].end:
+                return self._address(line.file[1:-1], line.file[:1] == "<")
         return None
 
     def _address(self, file: str, angled: bool) -> str | None:

@@ -20,8 +20,7 @@ from ic.editor.checker_process import CheckerProcess
 from ic.editor.checking import CheckReply, CheckRequest, Crash, FoundAnswers
 from ic.editor.index import DeckIndex
 from ic.editor.positions import file_named, path_of
-from ic.editor.structure import KnownStructures
-from ic.editor.used import used_files
+from ic.editor.structure import KnownStructures, used_files
 from met.frozen import frozen
 from met.host.files import real_path
 

@@ -10,8 +10,7 @@ from lsprotocol import types
 from ic.editor.calls import WATCHES, ends_a_model, open_call
 from ic.editor.index import DeckIndex
 from ic.editor.names import REMOVED, NamesInTexts
-from ic.editor.structure import NAMING, UNIT, DeckText, TextEntry, indices_around, through_loops
-from ic.editor.used import DEFINED
+from ic.editor.structure import DEFINED, NAMING, UNIT, DeckText, TextEntry, indices_around, through_loops
 from ic.find import library_files
 from ic.language import BLOCKS, DEFINITIONS, EXPERIMENTS, OF_A_RUN, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS

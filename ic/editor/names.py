@@ -4,15 +4,29 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from copy import copy
 from types import MappingProxyType
 
-from ic.editor.expansions import MacrosInTexts
-from ic.editor.structure import LETS, UNIT, DeckText, TextEntry, flattened, innermost_around
-from ic.editor.used import DEFINED, DecksUsed, uses_in
+from ic.editor.structure import (
+    DEFINED,
+    LETS,
+    UNIT,
+    DecksUsed,
+    DeckText,
+    TextEntry,
+    TextMacro,
+    entries_of,
+    flattened,
+    innermost_around,
+    with_whole_names,
+)
 from ic.grammar.uses import USE
 from ic.language import OF_A_RUN
 from ic.text.lexer import NAME, NUMBERS, Token
+from ic.text.limits import Findings, GiveUp
+from ic.text.macros import Macros
+from ic.text.substitute import Argument, Macro
 from met.frozen import frozen
 
 BASE_WORDS = {"like": None, "of": "run"}
@@ -44,6 +58,9 @@ REMOVED = ("metric", "require", "guide", "sensor", "payload", "signal", "linear"
 OUTERMOST = (*DEFINED, "roof", "run", "sweep", "search", "tune", "macro", UNIT)
 """The kinds of names that belong to a deck itself, not to an arm or a run."""
 
+MOST_TOKENS = 20_000
+"""Number of tokens that uses of macros make in a text after which no further use is read."""
+
 NO_NAMES: Mapping[tuple[str, str], Sequence[str]] = MappingProxyType({})
 
 
@@ -68,6 +85,91 @@ class NameInText:
         """The arm or run of the name; "" for a deck's own name."""
         around = self.entry.within if self.entry is not None else None
         return around.named.text if around is not None and around.named is not None else ""
+
+
+class TolerantMacros(Macros):
+    """Macros whose uses may have too few arguments, or too many."""
+
+    def _wrong_number(
+        self, token: Token, macro: Macro, arguments: list[Argument], close: Token
+    ) -> list[Argument] | None:
+        parameters = macro.parameters or ()
+        return [*arguments, *(Argument() for _ in parameters)][: len(parameters)]
+
+
+class MacrosInTexts:
+    """The macros of some texts, the blocks in which their bodies stand, and the entries that their uses make.
+
+    Conditions are ignored, and a use that has no end is closed: for an editor, a missing name is better than no answer.
+    """
+
+    def __init__(self, texts: Sequence[DeckText]) -> None:
+        self._texts = texts
+        self.by_name: dict[str, list[TextMacro]] = {}
+        self._defined: dict[str, Macro] = {}
+        for text in texts:
+            self._defined |= text.defined
+            for macro in text.macros:
+                self.by_name.setdefault(macro.name.text, []).append(macro)
+        self._uses = dict(self._first_uses()) if self.by_name else {}
+        self._bodies: dict[int, list[TextEntry]] = {}
+
+    def meant(self, use: Token) -> TextMacro | None:
+        """The macro that a token uses: the last that its text defines before it, or else any."""
+        macros = self.by_name.get(use.text, ())
+        before = [macro for macro in macros if macro.name.source is use.source and macro.name.offset <= use.offset]
+        return before[-1] if before else macros[-1] if macros else None
+
+    @staticmethod
+    def at(text: DeckText, offset: int) -> TextMacro | None:
+        """The macro in whose body, or on whose line after it, an offset of a text is."""
+        for macro in text.macros:
+            begin = macro.body[0].offset if macro.body else macro.end + 1
+            behind = text.source.text[macro.end : offset]
+            if begin <= offset and (offset <= macro.end or not behind.strip(" \t")):
+                return macro
+        return None
+
+    def body(self, macro: TextMacro) -> list[TextEntry]:
+        """The entries of a macro's body, inside of what stands around its first use."""
+        key = id(macro)
+        if key not in self._bodies:
+            self._bodies[key] = []  # for a macro that uses itself
+            self._bodies[key] = entries_of(macro.body, macro.end, self._around_use(macro))
+        return self._bodies[key]
+
+    def _around_use(self, macro: TextMacro) -> TextEntry | None:
+        text, use = self._uses.get(macro.name.text, (None, None))
+        if text is None or use is None:
+            return None
+        inside = self.at(text, use.offset)
+        if inside is None:
+            return text.around(use.offset)
+        body = self.body(inside)
+        return innermost_around(body, use.offset) or (body[0].within if body else self._around_use(inside))
+
+    def _first_uses(self) -> Iterator[tuple[str, tuple[DeckText, Token]]]:
+        """The first use of each macro; one in a body only where there is no other."""
+        for in_bodies in (True, False):
+            for text in reversed(self._texts):
+                lines = (token for macro in text.macros for token in macro.body)
+                for token in reversed(list(lines) if in_bodies else text.tokens):
+                    if token.text in self.by_name:
+                        yield token.text, (text, token)
+
+    def entries_in(self, text: DeckText) -> Iterator[TextEntry]:
+        """The entries that uses of macros make in a text, where the use is an entry, or begins one; each token stands
+        where it was written, in a body or in an argument."""
+        macros = {**self._defined, **text.defined}
+        count = 0
+        for entry in text.all_entries() if macros else ():
+            if count < MOST_TOKENS and entry.words and entry.words[0].text in macros:
+                reader, closing = TolerantMacros(Findings()), Token("CPP_RPAREN", ")", text.source, entry.closed, 0)
+                reader.macros = macros
+                with suppress(GiveUp):
+                    tokens = reader.expand_macros([*map(copy, entry.words), closing])
+                    count += len(tokens)
+                    yield from flattened(entries_of(with_whole_names(tokens), entry.closed, entry.within))
 
 
 class NamesInTexts:
@@ -256,8 +358,7 @@ class NamesInTexts:
     def uses(self, name: str) -> Iterator[Token]:
         """All tokens of a name in the texts, including its definitions."""
         for text in self.texts:
-            lines = (token for line in text.directives if line.name != "include" for token in line.tokens[2:])
-            for token in (*text.tokens, *lines):
+            for token in (*text.tokens, *(token for line in text.directives for token in line.words)):
                 if token.kind == NAME and token.text == name:
                     yield token
 
@@ -283,7 +384,7 @@ class NamesInTexts:
 
     def _defined(self, text: DeckText) -> Iterator[NameInText]:
         yield from _named(text.all_entries(), by_macro=False)
-        yield from (NameInText("roof", use.roof, None) for use in uses_in(text))
+        yield from (NameInText("roof", use.roof, None) for use in text.uses)
         parameters = {parameter.text for macro in text.macros for parameter in macro.parameters or ()}
         for macro in text.macros:
             yield NameInText("macro", macro.name, None)

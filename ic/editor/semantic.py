@@ -15,7 +15,6 @@ from lsprotocol import types
 from ic.editor.completion import parameters_of
 from ic.editor.names import NamesInTexts
 from ic.editor.structure import LOOP, DeckText, TextEntry, flattened
-from ic.editor.used import uses_in
 from ic.language import BLOCKS, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
 from ic.meaning.expressions.evaluate import FUNCTIONS
@@ -68,8 +67,8 @@ def meanings(text: DeckText, names: NamesInTexts) -> Iterator[tuple[Token, str, 
     entries.sort(key=lambda entry: entry.words[0].offset)
     begins = [entry.words[0].offset for entry in entries]
     loops = [entry for entry in entries if entry.kind == LOOP and entry.opened is not None and len(entry.words) > 1]
-    in_lines = (token for line in text.directives if line.name != "include" for token in line.tokens[2:])
-    files = [(use.first.offset, use.last.offset) for use in uses_in(text)]
+    in_lines = (token for line in text.directives for token in line.words)
+    files = [(use.first.offset, use.last.offset) for use in text.uses]
     deck = (token for token in text.tokens if not any(first < token.offset < last for first, last in files))
     every = sorted((*deck, *in_lines), key=lambda token: token.offset)
     before: Token | None = None

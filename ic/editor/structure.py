@@ -1,4 +1,4 @@
-"""The blocks and names of a deck's text as it stands, whole or not: for outlines, completion and the search for names.
+"""The blocks and names of a deck's text as it stands, whole or not, and the texts that it includes and uses.
 
 The parser's tree is that of a deck with its includes and macros, and does not exist for a broken text. This one is that
 of a single text, complete or not.
@@ -6,14 +6,21 @@ of a single text, complete or not.
 
 from __future__ import annotations
 
+import os
+import re
 from bisect import bisect_right
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from ic.grammar.braced_names import name_length
+from ic.grammar.uses import AS, USE
 from ic.language import BLOCKS, DEFINITIONS
-from ic.text.lexer import NAME, SPACE, Text, Token, logical_lines
+from ic.text.lexer import NAME, SPACE, STRING, Text, Token, logical_lines
+from ic.text.limits import Findings, GiveUp
+from ic.text.macros import Macros
+from ic.text.substitute import Macro
 from met.frozen import frozen
 
 LETS = ("let", "param")
@@ -31,6 +38,11 @@ NAMING = frozenset({
     *DEFINITIONS, *LETS, UNIT, "require", *(word for block in BLOCKS.values() for word in block.named),
 }) - {"substitute", "with"}  # fmt: skip
 """Words that are followed by a new name."""
+
+DEFINED = ("let", "servo", "arm")
+"""The kinds of names that stand under a roof."""
+
+_USE = re.compile(rf'\b{USE}\s*(?:"([^"\n]*)"|<([^>\n]*)>)\s*{AS}\b')
 
 
 @dataclass
@@ -52,19 +64,23 @@ class TextEntry:
     entries: list[TextEntry] = field(default_factory=list)
 
     @property
-    def texts(self) -> list[str]:
+    def own_words(self) -> list[Token]:
         """Its words, without a `default` before them."""
-        texts = [token.text for token in self.words]
-        return texts[1:] if texts[:1] == ["default"] and len(texts) > 1 else texts
+        return self.words[len(self.words) > 1 and self.words[0].text == "default" :]
+
+    @property
+    def texts(self) -> list[str]:
+        """The texts of its words, without a `default` before them."""
+        return [token.text for token in self.own_words]
 
     @property
     def kind(self) -> str:
-        return self.texts[0] if self.texts else ""
+        return next(iter(self.texts), "")
 
     @property
     def head(self) -> Token | None:
         """The first of its words, or the one behind `default`."""
-        return self.words[len(self.words) - len(self.texts)] if self.words else None
+        return next(iter(self.own_words), None)
 
     @property
     def block(self) -> str:
@@ -82,7 +98,7 @@ class TextEntry:
     @property
     def named(self) -> Token | None:
         """The token of the name that it defines: `reach` in `let reach = 2 m;`, `motor` in `servo motor { ... }`."""
-        words = self.words[len(self.words) - len(self.texts) :]
+        words = self.own_words
         if len(words) < 2 or words[0].text not in NAMING or words[1].kind != NAME:
             return None
         if words[0].text == INSIDE_SERVO and self.within is not None and self.within.block == "servo":
@@ -98,7 +114,7 @@ class TextEntry:
 
     def name_behind(self, word: str) -> Token | None:
         """The token of the name after a word, `drive` in `like panda.drive`; None where there is none."""
-        words = self.words[len(self.words) - len(self.texts) :]
+        words = self.own_words
         index = self.texts.index(word) + 1 if word in self.texts[:-1] else len(words)
         while index + 2 < len(words) and words[index + 1].text == "." and words[index + 2].kind == NAME:
             index += 2
@@ -107,13 +123,54 @@ class TextEntry:
 
 @dataclass
 class TextDirective:
-    """A line of the preprocessor: its tokens without white space, `#` first."""
+    """A line of the preprocessor: its tokens without white space, `#` first, and all of them."""
 
     tokens: list[Token]
+    line: list[Token]
 
     @property
     def name(self) -> str:
         return self.tokens[1].text if len(self.tokens) > 1 else ""
+
+    @property
+    def file(self) -> str:
+        """The file of an `#include` as it is written, with its quotes or angles; "" of another line."""
+        first, last = self.tokens[0], self.tokens[-1]
+        return first.source.text[self.tokens[1].end : last.end].strip() if self.name == "include" else ""
+
+    @property
+    def words(self) -> list[Token]:
+        """The tokens that may be words of the deck: what follows the name of a directive that includes no file."""
+        return self.tokens[2:] if self.name != "include" else []
+
+
+@frozen
+class UseInText:
+    """`use <panda.ic> as panda;` in a text: the file as it is asked for, the tokens around its name, and the roof's."""
+
+    file: str
+    angled: bool
+    first: Token
+    last: Token
+    roof: Token
+
+
+def _use(entry: TextEntry) -> UseInText | None:
+    """The use of a deck that an entry is; None where it is something else, or incomplete."""
+    words = entry.words
+    end = next((n for n, word in enumerate(words) if word.text == AS), 0)
+    if end < 2 or words[0].text != USE or len(words) <= end + 1 or words[end + 1].kind != NAME:
+        return None
+    first, last = words[1], words[end - 1]
+    if first.kind != STRING and (first.text, last.text) != ("<", ">"):
+        return None
+    file = first.source.text[first.offset + 1 : last.end - 1]
+    return UseInText(file, first.text == "<", first, last, words[end + 1])
+
+
+def used_files(text: str) -> set[str]:
+    """The names, without folders, of the files that a text uses, whose runs do not belong to the deck."""
+    return {os.path.basename(quoted or angled) for quoted, angled in _USE.findall(text)}
 
 
 def _no_loop(entry: TextEntry | None) -> TextEntry | None:
@@ -274,12 +331,13 @@ class DeckText:
                 token for token in line if token.kind == SPACE and text[token.offset : token.offset + 1] == "/"
             )
             if seen and seen[0].text == "#":
-                self.directives.append(TextDirective(seen))
+                self.directives.append(TextDirective(seen, line))
             else:
                 self.tokens += (token for token in seen if token.text.strip())
         self.tokens = list(with_whole_names(self.tokens))
         self.entries = entries_of(self.tokens, len(text))
         self.macros = [macro for macro in map(_macro, self.directives) if macro is not None]
+        self.uses = [use for use in map(_use, self.entries) if use is not None]
 
     def all_entries(self) -> Iterator[TextEntry]:
         """All entries, outer ones first."""
@@ -301,6 +359,16 @@ class DeckText:
         return token if token.offset <= offset <= token.end else None
 
     @cached_property
+    def defined(self) -> dict[str, Macro]:
+        """Its macros as the preprocessor takes them, by name, the last of each name; none that it refuses."""
+        reader = Macros(Findings())
+        with suppress(GiveUp):
+            for line in self.directives:
+                if line.name == "define" and len(line.tokens) > 2:
+                    reader.define(line.line[line.line.index(line.tokens[2]) :])
+        return reader.macros
+
+    @cached_property
     def _all_tokens(self) -> list[Token]:
         tokens = self.tokens + [token for line in self.directives for token in line.tokens if token.text.strip()]
         return sorted(tokens, key=lambda token: token.offset)
@@ -310,6 +378,65 @@ class DeckText:
         lines = self.source.text.split("\n")
         line = min(line, len(lines) - 1)
         return sum(len(text_line) + 1 for text_line in lines[:line]) + min(column, len(lines[line]))
+
+
+class DecksUsed:
+    """Which texts a name may be of: those that includes connect, and behind roofs those that these stand for.
+
+    A text that no other one is seen to include or use, for a macro names its file, counts as a part of the first.
+    """
+
+    def __init__(self, texts: Sequence[DeckText]) -> None:
+        self._uses = {text.source.name: text.uses for text in texts}
+        self._beside: dict[str, set[str]] = {name: set() for name in self._uses}  # includes, or is included by
+        reached: set[str] = set()
+        for text in texts if any(self._uses.values()) else ():
+            including = text.source.name
+            for line in text.directives:
+                for other in self._called(line.file[1:-1]) - {including}:
+                    self._beside[including].add(other)
+                    self._beside[other].add(including)
+                    reached.add(other)
+            reached.update(*(self._called(use.file) for use in self._uses[including]))
+        for name in list(self._uses)[1:]:
+            if name not in reached:
+                self._beside[name].add(texts[0].source.name)
+                self._beside[texts[0].source.name].add(name)
+
+    def __bool__(self) -> bool:
+        """True where a text uses a deck."""
+        return any(self._uses.values())
+
+    def _called(self, file: str) -> set[str]:
+        """The texts that a file's name may mean."""
+        pattern = re.compile(rf"<?(?:.*/)?{re.escape(file.removeprefix('./'))}>?")
+        return {name for name in self._uses if pattern.fullmatch(name)}
+
+    def seen_from(self, name: str) -> set[str]:
+        """The texts whose definitions a text sees without a roof, including itself."""
+        return self._connected({name}) if self else set(self._uses)
+
+    def _connected(self, names: Iterable[str]) -> set[str]:
+        connected: set[str] = set()
+        waiting = set(names)
+        while waiting:
+            name = waiting.pop()
+            connected.add(name)
+            waiting |= self._beside.get(name, set()) - connected
+        return connected
+
+    def roofs(self, names: Iterable[str]) -> dict[str, UseInText]:
+        """The roofs that some texts have."""
+        return {use.roof.text: use for name in names for use in self._uses.get(name, ())}
+
+    def under(self, name: str, words: Sequence[str]) -> set[str]:
+        """The texts for which roofs in a text stand, `cell`, `panda` in `cell.panda.d1`; none where one is not a
+        roof."""
+        seen = self.seen_from(name)
+        for word in words:
+            use = self.roofs(seen).get(word)
+            seen = self._connected(self._called(use.file)) if use is not None else set()
+        return seen
 
 
 class KnownStructures:

@@ -296,11 +296,13 @@ class Macros(Pcpp):
         if not names and arguments == [[]]:
             arguments = []
         if len(arguments) != len(names):
-            self._wrong_number(token, macro, arguments, piece)
-            return None
+            return self._wrong_number(token, macro, arguments, piece)
         return arguments
 
-    def _wrong_number(self, token: Token, macro: Macro, arguments: list[Argument], close: Token) -> None:
+    def _wrong_number(
+        self, token: Token, macro: Macro, arguments: list[Argument], close: Token
+    ) -> list[Argument] | None:
+        """Report a call with a wrong number of arguments. Returns those that count in their place, None for no call."""
         wanted, got = len(macro.parameters or ()) - macro.variadic, len(arguments) if arguments != [[]] else 0
         least = "at least " if macro.variadic else ""
         count = f"{least}{wanted} argument{'s' * (wanted != 1)}, but {got} {'is' if got == 1 else 'are'} given"
@@ -312,6 +314,7 @@ class Macros(Pcpp):
             also=(self._defined_at(macro),),
             help="a comma inside [ ] or { } parts arguments too; only ( ) keeps them together" if split else (),
         )
+        return None
 
     def _stretch(self, first: Token, last: Token) -> Place:
         """The place from one token to another where both stand on one line, else the first's."""
