@@ -10,14 +10,21 @@ from pygls.workspace import PositionCodec
 
 from ic.editor import completion
 from ic.editor.checks import CheckedDeck, DeckChecks
-from ic.editor.hover import about, markdown
-from ic.editor.index import DeckIndex
+from ic.editor.index import DeckIndex, ValueInDeck
 from ic.editor.names import NameInText, NamesInTexts
 from ic.editor.positions import Texts, lines_of, uri_of
+from ic.editor.structure import UNIT, DeckText, TextEntry
+from ic.printing.models import summary
 from ic.text.files import LIBRARY, Files, FoundFile, file_at
 from ic.text.lexer import NAME, Token
+from met import models
+from met.diagnostic import Place
+from met.messages.message import shown_place
+from met.units import UNITS
 
 NO_INDEX = DeckIndex((), ())
+
+MOST_VALUES = 4  # values that are shown of one place; if there are more, their number
 
 
 class AskedPosition:
@@ -87,10 +94,10 @@ class AskedPosition:
         token = self.token
         if token is None:
             return None
-        paragraphs = about(self.text, token, self.names, self.index, self.file)
+        paragraphs = _about(self.text, token, self.names, self.index, self.file)
         if not paragraphs:
             return None
-        contents = types.MarkupContent(types.MarkupKind.Markdown, markdown(paragraphs))
+        contents = types.MarkupContent(types.MarkupKind.Markdown, "\n\n---\n\n".join(paragraphs))
         return types.Hover(contents, self.location(token).range)
 
     def definitions(self) -> list[types.Location]:
@@ -169,3 +176,87 @@ def characters(codec: PositionCodec, line: str, units: int) -> int:
             return n
         taken += codec.client_num_units(character)
     return len(line)
+
+
+def _about(text: DeckText, token: Token, names: NamesInTexts, index: DeckIndex, file: str) -> list[str]:
+    """Paragraphs, in Markdown, about a word of a text; none where nothing is known of it.
+
+    file  the name that places of the deck give the text's file
+    """
+    entry = names.entry_at(text, token)
+    paragraphs = [*_of_key(token, entry, names), *_of_model(token), *_of_unit(text, token)]
+    return [*paragraphs, *_of_name(text, token, names, index), *_of_values(index, token, entry, file)]
+
+
+def _of_key(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Iterator[str]:
+    """The paragraph about a word that begins an entry: its declaration in the block, or in the model."""
+    if entry is None or entry.head is None or token.offset != entry.head.offset:
+        return
+    declared = names.declared_in(entry.within).get(token.text)
+    if declared is not None and entry.within is None:
+        yield f"`{declared.written}`\n\n{declared.doc}"
+    elif declared is not None and declared.written == declared.name:
+        unit = f" in {declared.unit}" if declared.unit not in ("", "1") else ""
+        yield f"`{declared.name}`{unit}: {declared.doc}; {declared.default_in_words}"
+    elif declared is not None:
+        unit = f"unit: {declared.unit}; " if declared.unit not in ("", "1") else ""
+        yield f"`{declared.written}`\n\n{declared.doc}\n\n{unit}{declared.default_in_words}"
+
+
+def _of_model(token: Token) -> Iterator[str]:
+    for kind in models.GROUPS:
+        model = models.available(kind).get(token.text)
+        if model is not None:
+            yield f"{kind} model `{token.text}`: {summary(model)}"
+
+
+def _of_unit(text: DeckText, token: Token) -> Iterator[str]:
+    unit = UNITS.get(token.text)
+    if unit is not None and text.may_be_unit(token):
+        yield f"unit `{token.text}`: {unit.word}, {unit.measure.scale:g} in SI"
+
+
+def _of_name(text: DeckText, token: Token, names: NamesInTexts, index: DeckIndex) -> Iterator[str]:
+    for definition in names.meant_in(text, token)[:2] if token.kind == NAME else ():
+        source = definition.token.source
+        line = source.text.split("\n")[source.line(definition.token.offset) - 1].strip()
+        size = index.units.get(token.text) if definition.kind == UNIT else None
+        size_words = f": {size} in SI" if size is not None else ""
+        yield f"{definition.kind} `{definition.token.text}`{size_words}\n\n```met\n{line}\n```"
+
+
+def _of_values(index: DeckIndex, token: Token, entry: TextEntry | None, file: str) -> Iterator[str]:
+    """The values that are written in the entry of a word, or at it."""
+    lines = _lines(token, entry)
+    values = [
+        candidate
+        for candidate in index.values
+        if candidate.place is not None and _is_at(candidate.place, file, lines, token)
+    ]
+    for value in values[:MOST_VALUES]:
+        yield _words(value)
+    if len(values) > MOST_VALUES:
+        yield f"and {len(values) - MOST_VALUES} more values are written here"
+
+
+def _lines(token: Token, entry: TextEntry | None) -> tuple[tuple[int, int], tuple[int, int]]:
+    """The begin and end of an entry, up to its block: lines and columns from 1."""
+    words = entry.words if entry is not None and entry.words else [token]
+    first, last = words[0].place, words[-1].place
+    return (first.line, first.column), (last.line, last.column + last.length)
+
+
+def _is_at(place: Place, file: str, lines: tuple[tuple[int, int], tuple[int, int]], token: Token) -> bool:
+    return any(
+        seen_place.file == file and lines[0] <= (seen_place.line, seen_place.column) < lines[1]
+        for seen_place in {place, shown_place(place)}
+    )
+
+
+def _words(value: ValueInDeck) -> str:
+    notes = "; ".join(value.origins)
+    return (
+        f"`{value.path}` = {value.value}"
+        + (f"  \n{notes}" if notes else "")
+        + (f"  \n{value.doc}" if value.doc else "")
+    )

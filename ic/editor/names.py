@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
@@ -22,12 +23,15 @@ from ic.editor.structure import (
     with_whole_names,
 )
 from ic.grammar.uses import USE
-from ic.language import OF_A_RUN
+from ic.language import BLOCKS, DEFINITIONS, OF_A_RUN, TOP_LEVEL, Entry
+from ic.printing.models import default
 from ic.text.lexer import NAME, NUMBERS, Token
 from ic.text.limits import Findings, GiveUp
 from ic.text.macros import Macros
 from ic.text.substitute import Argument, Macro
+from met import models
 from met.frozen import frozen
+from met.parameter import Parameter
 
 BASE_WORDS = {"like": None, "of": "run"}
 """Words before the name of a definition: of the same kind where the value is None."""
@@ -60,6 +64,10 @@ OUTERMOST = (*DEFINED, "roof", "run", "sweep", "search", "tune", "macro", UNIT)
 
 MOST_TOKENS = 20_000
 """Number of tokens that uses of macros make in a text after which no further use is read."""
+
+_DEFINITIONS: Mapping[str, Entry] = MappingProxyType({
+    name: Entry(name=name, written=BLOCKS[name].written, doc=BLOCKS[name].doc, default="") for name in DEFINITIONS
+})  # fmt: skip
 
 NO_NAMES: Mapping[tuple[str, str], Sequence[str]] = MappingProxyType({})
 
@@ -186,6 +194,7 @@ class NamesInTexts:
         self.texts = tuple(texts)
         self.used = DecksUsed(self.texts)
         self.macros = MacrosInTexts(self.texts)
+        self._entries: dict[DeckText, list[TextEntry]] = {}
         self.by_name: dict[str, list[NameInText]] = {}
         for text in self.texts:
             for definition in self._defined(text):
@@ -218,11 +227,16 @@ class NamesInTexts:
 
     def entry_at(self, text: DeckText, token: Token) -> TextEntry | None:
         """The entry of a word of a text, before its block; also one in a macro's body."""
-        macro = self.macros.at(text, token.offset)
-        for entry in text.all_entries() if macro is None else flattened(self.macros.body(macro)):
-            if entry.words and entry.words[0].offset <= token.offset <= entry.words[-1].offset:
-                return entry
-        return None
+        entries = self.entries(text)
+        n = bisect_right(entries, token.offset, key=lambda entry: entry.words[0].offset) - 1
+        return entries[n] if n >= 0 and token.offset <= entries[n].words[-1].offset else None
+
+    def entries(self, text: DeckText) -> list[TextEntry]:
+        """All entries of a text that have words, those in macros' bodies too, in the order of their first words."""
+        if text not in self._entries:
+            entries = [*text.all_entries(), *(e for macro in text.macros for e in flattened(self.macros.body(macro)))]
+            self._entries[text] = sorted((e for e in entries if e.words), key=lambda e: e.words[0].offset)
+        return self._entries[text]
 
     def around(self, text: DeckText, offset: int) -> tuple[TextEntry | None, list[TextEntry]]:
         """The innermost entry in whose block an offset is, also in a macro's body, and the entries beside it."""
@@ -252,7 +266,7 @@ class NamesInTexts:
         under = self._under_roof(token, entry)
         if under is not None:
             return under
-        definitions = self._seen(definitions, token)
+        definitions = self._seen(definitions, token.source.name)
         for kind in _wanted(token, entry):
             of_kind = [definition for definition in definitions if definition.kind == kind]
             if of_kind:
@@ -262,24 +276,16 @@ class NamesInTexts:
                 ] or (self._of_owner(of_kind, entry))
         return definitions if entry is None else []
 
-    def _seen(self, definitions: list[NameInText], token: Token) -> list[NameInText]:
-        """The definitions among these that a word's text sees without a roof."""
-        if not self.used or not definitions:
-            return definitions
-        seen = self.used.seen_from(token.source.name)
+    def _seen(self, definitions: list[NameInText], file: str) -> list[NameInText]:
+        """The definitions among these that a file's text sees without a roof."""
+        seen = self.used.seen_from(file)
         return [definition for definition in definitions if definition.file in seen or definition.kind not in OUTERMOST]
 
     def seen_from(self, text: DeckText) -> NamesInTexts:
         """The names that a text sees without a roof, and those of arms and runs."""
-        if not self.used:
-            return self
-        names, seen = copy(self), self.used.seen_from(text.source.name)
-        names.by_name = {}
-        for name, definitions in self.by_name.items():
-            visible = [
-                definition for definition in definitions if definition.file in seen or definition.kind not in OUTERMOST
-            ]
-            names.by_name |= {name: visible} if visible else {}
+        names = copy(self)
+        seen = {name: self._seen(definitions, text.source.name) for name, definitions in self.by_name.items()}
+        names.by_name = {name: definitions for name, definitions in seen.items() if definitions}
         return names
 
     def _under_roof(self, token: Token, entry: TextEntry | None) -> list[NameInText] | None:
@@ -340,7 +346,7 @@ class NamesInTexts:
         if token is None:
             return []
         under = self._under_roof(token, entry)
-        definitions = under if under is not None else self._seen(self._all.get(token.text, []), token)
+        definitions = under if under is not None else self._seen(self._all.get(token.text, []), token.source.name)
         return [definition for definition in definitions if definition.kind == kind]
 
     def _made_by_loops(self, name: str) -> list[NameInText]:
@@ -382,6 +388,27 @@ class NamesInTexts:
             entry = definitions[0].entry
         return ""
 
+    def parameters_of(self, entry: TextEntry) -> tuple[Parameter, ...]:
+        """The parameters of an entry's model."""
+        name, entry_kind = self.model_of(entry), entry.block or entry.kind
+        for kind in models.GROUPS:
+            model = models.available(kind).get(name)
+            wanted = kind == entry_kind or (entry_kind not in models.GROUPS and kind not in ("servo", "metric"))
+            if model is not None and wanted:
+                return models.written(model)
+        return ()
+
+    def declared_in(self, around: TextEntry | None) -> dict[str, Entry]:
+        """The entries that may stand in the block of an entry, or in a deck itself, by their first words: those of the
+        language, then the parameters of the block's model, which are written as their names alone."""
+        if around is None:
+            return {**_DEFINITIONS, **{entry.name: entry for entry in TOP_LEVEL.entries}}
+        block = BLOCKS.get(around.block, TOP_LEVEL)
+        declared = {entry.name.split()[0]: entry for entry in block.entries if block is not TOP_LEVEL}
+        for parameter in self.parameters_of(around):
+            declared.setdefault(parameter.name, entry_of(parameter))
+        return declared
+
     def _defined(self, text: DeckText) -> Iterator[NameInText]:
         yield from _named(text.all_entries(), by_macro=False)
         yield from (NameInText("roof", use.roof, None) for use in text.uses)
@@ -398,6 +425,12 @@ class NamesInTexts:
                 yield definition
 
 
+def entry_of(parameter: Parameter) -> Entry:
+    """The declaration of a model's parameter as an entry of a block, written as its name alone."""
+    name, written = parameter.name, default(parameter)
+    return Entry(name=name, written=name, doc=parameter.doc, default=written, parameter=parameter)
+
+
 def _named(entries: Iterable[TextEntry], by_macro: bool) -> Iterator[NameInText]:
     for entry in entries:
         name = entry.named
@@ -407,9 +440,7 @@ def _named(entries: Iterable[TextEntry], by_macro: bool) -> Iterator[NameInText]
 
 def _same(token: Token, other: Token) -> bool:
     """True for the same token, and for one that stands for the same text."""
-    return token is other or (
-        token.source is other.source and token.offset == other.offset and token.text == other.text
-    )
+    return token.source is other.source and token.offset == other.offset and token.text == other.text
 
 
 def _wanted(token: Token, entry: TextEntry | None) -> Sequence[str]:

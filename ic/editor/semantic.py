@@ -6,16 +6,14 @@ of the deck.
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 
 from lsprotocol import types
 
-from ic.editor.completion import parameters_of
 from ic.editor.names import NamesInTexts
-from ic.editor.structure import LOOP, DeckText, TextEntry, flattened
-from ic.language import BLOCKS, TOP_LEVEL
+from ic.editor.structure import LOOP, DeckText, TextEntry
+from ic.language import BLOCKS
 from ic.language.bodies import JOINT_KINDS
 from ic.meaning.expressions.evaluate import FUNCTIONS
 from ic.text.lexer import NAME, Token
@@ -30,7 +28,6 @@ MODIFIERS = ("definition", "defaultLibrary")
 LEGEND = types.SemanticTokensLegend(token_types=list(TYPES), token_modifiers=list(MODIFIERS))
 DEFINES, OF_LIBRARY = 1, 2
 
-_OF_DECK = tuple(entry.name for entry in TOP_LEVEL.entries)
 _OF_NAME: Mapping[str, str] = MappingProxyType({
     "macro": "macro", "parameter": "parameter", "unit": "type", "link": "struct", "joint": "struct", "arm": "struct",
     "payload": "struct", "servo": "class", "run": "method", "sweep": "method", "search": "method", "tune": "method",
@@ -61,11 +58,7 @@ def semantic_tokens(
 def meanings(text: DeckText, names: NamesInTexts) -> Iterator[tuple[Token, str, int]]:
     """The words of a text in order, each with its kind of `TYPES` and bits of `MODIFIERS`; words without a meaning are
     left out."""
-    entries = [entry for entry in text.all_entries() if entry.words]
-    for macro in text.macros:
-        entries += [entry for entry in flattened(names.macros.body(macro)) if entry.words]
-    entries.sort(key=lambda entry: entry.words[0].offset)
-    begins = [entry.words[0].offset for entry in entries]
+    entries = names.entries(text)
     loops = [entry for entry in entries if entry.kind == LOOP and entry.opened is not None and len(entry.words) > 1]
     in_lines = (token for line in text.directives for token in line.words)
     files = [(use.first.offset, use.last.offset) for use in text.uses]
@@ -75,21 +68,14 @@ def meanings(text: DeckText, names: NamesInTexts) -> Iterator[tuple[Token, str, 
     for n, token in enumerate(every):
         if token.kind == NAME:
             behind = every[n + 1].text if n + 1 < len(every) else ""
-            index = bisect_right(begins, token.offset) - 1
-            entry = entries[index] if index >= 0 and token.offset <= entries[index].words[-1].offset else None
-            meaning = _parameter_or_index(text, token, loops) or _meaning(text, token, entry, names, before, behind)
+            meaning = _index(token, loops) or _meaning(text, token, names, before, behind)
             if meaning is not None:
                 yield token, *meaning
         before = token
 
 
-def _parameter_or_index(text: DeckText, token: Token, loops: list[TextEntry]) -> tuple[str, int] | None:
-    """True where a word is the parameter of a macro, or the index of a loop around it."""
-    for macro in text.macros:
-        if macro.name.offset < token.offset <= macro.end:
-            for parameter in macro.parameters or ():
-                if parameter.text == token.text:
-                    return "parameter", DEFINES if parameter.offset == token.offset else 0
+def _index(token: Token, loops: list[TextEntry]) -> tuple[str, int] | None:
+    """The kind of a word that is the index of a loop around it; None where it is none."""
     for loop in loops:
         index = loop.words[1]
         if index.text == token.text and index.offset <= token.offset < loop.closed:
@@ -98,15 +84,16 @@ def _parameter_or_index(text: DeckText, token: Token, loops: list[TextEntry]) ->
 
 
 def _meaning(
-    text: DeckText, token: Token, entry: TextEntry | None, names: NamesInTexts, before: Token | None, behind: str
+    text: DeckText, token: Token, names: NamesInTexts, before: Token | None, behind: str
 ) -> tuple[str, int] | None:
-    """The kind and the modifiers of a name at its place in an entry; None where it means nothing."""
-    for definition in names.meant(token, entry)[:1]:
+    """The kind and the modifiers of a name of a text; None where it means nothing."""
+    for definition in names.meant_in(text, token)[:1]:
         defines = definition.token.offset == token.offset and definition.file == text.source.name
         library = OF_LIBRARY if definition.file.startswith("<") else 0
         return _OF_NAME.get(definition.kind, "variable"), (DEFINES if defines else 0) | library
-    if token.text in UNITS and before is not None and _may_precede_unit(text, token):
+    if token.text in UNITS and before is not None and text.may_be_unit(token):
         return "type", 0
+    entry = names.entry_at(text, token)
     if entry is None or entry.head is None:
         return None
     if token.text == "default" and token is entry.words[0] and token is not entry.head:
@@ -128,34 +115,16 @@ def _meaning(
     return ("enumMember", 0) if token.text in _words_of(entry, names) else None
 
 
-def _may_precede_unit(text: DeckText, token: Token) -> bool:
-    last = text.source.text[: token.offset].rstrip()[-1:]
-    return last.isdigit() or last in "*/.])^"
-
-
 def _key(token: Token, entry: TextEntry, names: NamesInTexts) -> tuple[str, int] | None:
-    around = entry.within
-    if around is None:
-        return ("keyword", 0) if token.text in (*BLOCKS, *_OF_DECK, LOOP) else None
-    block = BLOCKS.get(around.block)
-    declared = {declaration.name.split()[0]: declaration for declaration in block.entries} if block is not None else {}
-    if token.text in declared:
-        return ("property" if declared[token.text].form == "key" and entry.opened is None else "keyword"), 0
-    if token.text in ("remove", LOOP):
-        return "keyword", 0
-    return ("property", 0) if any(parameter.name == token.text for parameter in parameters_of(around, names)) else None
+    """The kind of the word that begins an entry: a property where it is a key without a block."""
+    declared = names.declared_in(entry.within).get(token.text)
+    if declared is None or entry.within is None:
+        others = (LOOP, *BLOCKS) if entry.within is None else (LOOP, "remove")
+        return ("keyword", 0) if declared is not None or token.text in others else None
+    return ("property" if declared.form == "key" and entry.opened is None else "keyword"), 0
 
 
 def _words_of(entry: TextEntry, names: NamesInTexts) -> tuple[str, ...]:
     """The words that are allowed as the value of an entry."""
-    around = entry.within
-    if around is None:
-        return ()
-    declared = [parameter for parameter in parameters_of(around, names) if parameter.name == entry.kind]
-    block = BLOCKS.get(around.block)
-    declared += [
-        declaration.parameter
-        for declaration in (block.entries if block is not None else ())
-        if declaration.name == entry.kind and declaration.parameter is not None
-    ]
-    return tuple(word for parameter in declared for word in parameter.words)
+    declared = names.declared_in(entry.within).get(entry.kind)
+    return declared.parameter.words if declared is not None and declared.parameter is not None else ()

@@ -373,6 +373,11 @@ class DeckText:
         tokens = self.tokens + [token for line in self.directives for token in line.tokens if token.text.strip()]
         return sorted(tokens, key=lambda token: token.offset)
 
+    def may_be_unit(self, token: Token) -> bool:
+        """True for a word after a number, a bracket, or a sign of a product of units."""
+        before = self.source.text[: token.offset].rstrip()[-1:]
+        return before.isdigit() or before in "*/.])^"
+
     def offset(self, line: int, column: int) -> int:
         """The offset of a column of a line, both counted from 0."""
         lines = self.source.text.split("\n")

@@ -51,6 +51,11 @@ class Entry:
         )  # fmt: skip
 
     @property
+    def default_in_words(self) -> str:
+        """`needed`, or what holds where it is left out, behind `default: `; "" where nothing is known of a default."""
+        return self.default if self.default.startswith("needed") or not self.default else f"default: {self.default}"
+
+    @property
     def unit(self) -> str:
         """The unit of its number; "" where it has none."""
         if self.parameter is None or self.parameter.shape in ("word", "words"):
