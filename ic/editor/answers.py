@@ -1,30 +1,49 @@
-"""Answers to an editor's questions about a position: completion, hover, definition, references."""
+"""Answers to an editor's questions about a position: completion, hover, definition, references, renaming."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from itertools import islice
 
 from lsprotocol import types
+from pygls.exceptions import JsonRpcException
 from pygls.workspace import PositionCodec
 
 from ic.editor import completion
+from ic.editor.checker_process import CheckerProcess
+from ic.editor.checking import CheckRequest, Crash
 from ic.editor.checks import CheckedDeck, DeckChecks
 from ic.editor.index import DeckIndex, ValueInDeck
-from ic.editor.names import NameInText, NamesInTexts
-from ic.editor.positions import Texts, lines_of, uri_of
+from ic.editor.names import NamesInTexts
+from ic.editor.positions import Texts, lines_of, normal, uri_of
+from ic.editor.renaming import Renamed, RenameRequest, refusal_of_name, refusal_of_word
 from ic.editor.structure import UNIT, DeckText, TextEntry
 from ic.printing.models import summary
 from ic.text.files import LIBRARY, Files, FoundFile, file_at
-from ic.text.lexer import NAME, Token
+from ic.text.lexer import NAME, Text, Token
 from met import models
 from met.diagnostic import Place
+from met.host.files import read_regular
 from met.messages.message import shown_place
 from met.units import UNITS
 
 NO_INDEX = DeckIndex((), ())
 
 MOST_VALUES = 4  # values that are shown of one place; if there are more, their number
+
+
+MOST_FILES = 5_000  # of the folders that are open, that are looked into
+MOST_DECKS = 100  # that have the name and are no part of the deck that is open
+MOST_BYTES = 1 << 20  # of a deck that is looked into
+
+
+class CannotRename(JsonRpcException):
+    """The answer that a name cannot be changed, with the reason."""
+
+    CODE = types.LSPErrorCodes.RequestFailed.value
 
 
 class AskedPosition:
@@ -43,25 +62,27 @@ class AskedPosition:
         position: types.Position,
     ) -> None:
         self._checks, self._codec = checks, codec
-        deck = checks.deck_of(uri)
+        self._deck = deck = checks.deck_of(uri)
         opened = checks.texts.get(uri)
         self._path = opened.path if opened is not None else None
         current = normal(opened.text if opened is not None else "")
         texts: dict[str, str] = {}
         self._addresses: dict[str, str] = {}
-        for name, source in deck.reply.sources.items() if deck is not None else ():
-            where = address(deck, name) if deck is not None else None
-            if where is None or (not name.rstrip(">").endswith(".ic") and where not in checks.texts):
-                continue
-            now = checks.texts.get(where)
-            texts[name] = source if now is None else normal(now.text)
-            self._addresses[name] = where
+        if deck is not None:
+            for name, source in deck.reply.sources.items():
+                where = address(deck, name)
+                if where is None or (not name.rstrip(">").endswith(".ic") and where not in checks.texts):
+                    continue
+                now = checks.texts.get(where)
+                texts[name] = source if now is None else normal(now.text)
+                self._addresses[name] = where
         self.file = next((name for name, where in self._addresses.items() if where == uri), uri)
         self._addresses[self.file] = uri
         texts.setdefault(self.file, current)
-        structures = checks.structures.of(deck.deck.uri if deck is not None else uri, texts)
+        deck_uri = deck.deck.uri if deck is not None else uri
+        structures = checks.structures.of(deck_uri, texts)
         self.text = structures[self.file]
-        self.index = checks.indexes.get(deck.deck.uri, NO_INDEX) if deck is not None else NO_INDEX
+        self.index = checks.indexes.get(deck_uri, NO_INDEX)
         self.names = NamesInTexts(structures.values(), self.index.names_by_owner)
         lines = lines_of(current)
         line = lines[position.line] if position.line < len(lines) else ""
@@ -120,16 +141,52 @@ class AskedPosition:
         defined = {(definition.file, definition.token.offset) for definition in self.names.by_name[token.text]}
         return [
             self.location(use)
-            for use in self._uses(token.text, meant)
+            for use, definitions in self.names.uses(token.text)
+            if any(definition in meant for definition in definitions)
             if also_definitions or (use.source.name, use.offset) not in defined
         ]
 
-    def _uses(self, name: str, meant: list[NameInText]) -> Iterator[Token]:
-        texts = {text.source.name: text for text in self.names.texts}
-        for use in self.names.uses(name):
-            definitions = self.names.meant_in(texts[use.source.name], use)
-            if any(definition in meant for definition in definitions):
-                yield use
+    def nameable(self) -> types.PrepareRenamePlaceholder | None:
+        """The stretch of the name here, if the texts allow a renaming. Raises CannotRename."""
+        token = self.name_here
+        if token is None:
+            return None
+        if reason := refusal_of_name(token, self.names.meant_in(self.text, token)):
+            raise CannotRename(reason)
+        return types.PrepareRenamePlaceholder(range=self.location(token).range, placeholder=token.text)
+
+    async def rename(self, new: str, folders: Iterable[str], process: CheckerProcess) -> types.WorkspaceEdit:
+        """The edits that give the name here another one, in all files. Raises CannotRename.
+
+        folders  that the editor has open, their paths;  process: which proves the edits, and checks nothing meanwhile
+        """
+        token, deck = self.name_here, self._deck
+        if token is None or deck is None:
+            raise CannotRename("there is no name here")
+        if reason := refusal_of_word(new) or refusal_of_name(token, self.names.meant_in(self.text, token)):
+            raise CannotRename(reason)
+        first = self._checks.request(deck.deck)
+        roots = tuple(os.path.realpath(root) for root in (*folders, first.folder))
+        others = tuple(_others(self._checks, deck, token.text, roots))
+        if len(others) > MOST_DECKS:
+            raise CannotRename(f"more than {MOST_DECKS} decks have the word `{token.text}`")
+        request = RenameRequest((first, *others), self.file, token.offset, new, roots)
+        async for done in process.ask(request):
+            if isinstance(done, Crash):
+                raise RuntimeError(done.traceback)
+            assert isinstance(done, Renamed)
+            if done.refused:
+                raise CannotRename(done.refused)
+            return types.WorkspaceEdit(changes=dict(self._changes(done, new, deck.deck.uri)))
+        raise CannotRename("a deck was changed or saved before the new name was proved: rename again")
+
+    def _changes(self, done: Renamed, new: str, own: str) -> Iterator[tuple[str, list[types.TextEdit]]]:
+        """The edits of each file by its address. own: the address of the deck where it is in no file"""
+        open_at = {text.identity: text.uri for text in self._checks.texts.values() if text.path is not None}
+        for path, edits in done.edits.items():
+            texts, source = Texts(done.texts, self._codec), Text(path, done.texts[path])
+            text_edits = [types.TextEdit(texts.range(source.place(*edit)), new) for edit in edits]
+            yield own if not path else open_at.get(path, uri_of(path)), text_edits
 
     def _included(self) -> str | None:
         """The address of the file that the include or the use at the position names."""
@@ -161,11 +218,6 @@ class AskedPosition:
         own = os.path.basename(self._path or "")
         folders = files.where(self._found_file(), False)[:-1]
         yield from (name for name in files.listed(folders) if name != own)
-
-
-def normal(text: str) -> str:
-    """A text with its lines ended by newlines alone."""
-    return "\n".join(lines_of(text))
 
 
 def characters(codec: PositionCodec, line: str, units: int) -> int:
@@ -260,3 +312,33 @@ def _words(value: ValueInDeck) -> str:
         + (f"  \n{notes}" if notes else "")
         + (f"  \n{value.doc}" if value.doc else "")
     )
+
+
+def _others(checks: DeckChecks, deck: CheckedDeck, word: str, roots: Iterable[str]) -> Iterator[CheckRequest]:
+    """The other decks with a word, open ones and those in the open folders; at most one more than the limit."""
+    has_word = re.compile(rf"\b{re.escape(word)}\b")
+    known = {deck.deck.identity}
+    for other in checks.decks():
+        if other.deck.identity not in known:
+            known.add(other.deck.identity)
+            yield checks.request(other.deck)
+    unsaved = checks.unsaved()
+    count = 0
+    for path in islice(_files_in(roots), MOST_FILES):
+        real = os.path.realpath(path)
+        if not path.endswith(".ic") or real in known or count > MOST_DECKS:
+            continue
+        known.add(real)
+        with suppress(OSError):
+            if has_word.search(unsaved.get(real) or read_regular(real, MOST_BYTES).decode(errors="replace")):
+                count += 1
+                folder, name = os.path.split(path)
+                yield CheckRequest(folder, name, None, checks.include_dirs, checks.defines, unsaved)
+
+
+def _files_in(roots: Iterable[str]) -> Iterator[str]:
+    """The paths of all files in some folders and in their folders, but for hidden folders."""
+    for root in roots:
+        for folder, folders, files in os.walk(root):
+            folders[:] = sorted(entry for entry in folders if not entry.startswith("."))
+            yield from (os.path.join(folder, name) for name in sorted(files))

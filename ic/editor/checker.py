@@ -1,4 +1,4 @@
-"""The process that checks decks for an editor: warmed up once, it forks a child for each check.
+"""The process that checks decks for an editor, and proves renamings: warmed up once, it forks a child for each.
 
     python -m ic.editor.checker FD        started by `CheckerProcess`; FD is one end of a socket pair
 
@@ -6,9 +6,9 @@ Each check begins from the same state, so its result is that of a fresh start, a
 the last check is part of the request. An outdated check is killed. A crash affects only its own check.
 
 On the socket, from the server, a byte each: `b"c"`, with two file descriptors, of a memory file that holds a pickled
-`CheckRequest` and of the pipe for the answers; or `b"s"`, which stops the check that runs, as the next one does too.
-The answers are pickled, each behind its length: `CheckReply`s, the last one with the audit, then a `DeckIndex` where
-the deck could be compiled; or a `Crash`.
+`CheckRequest`, or a `RenameRequest`, and of the pipe for the answers; or `b"s"`, which stops the check that runs, as
+the next one does too. The answers are pickled, each behind its length: `CheckReply`s, the last one with the audit, then
+a `DeckIndex` where the deck could be compiled; the `Renamed` of a renaming; or a `Crash`.
 """
 
 from __future__ import annotations

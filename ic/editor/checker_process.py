@@ -10,6 +10,7 @@ import subprocess
 from collections.abc import AsyncIterator
 
 from ic.editor.checking import LENGTH, CheckRequest
+from ic.editor.renaming import RenameRequest
 from met.host import interpreter, system
 
 LARGEST = 1 << 30  # bytes of one answer
@@ -39,7 +40,7 @@ class CheckerProcess:
             )
         self._socket = ours
 
-    async def ask(self, request: CheckRequest) -> AsyncIterator[object]:
+    async def ask(self, request: CheckRequest | RenameRequest) -> AsyncIterator[object]:
         """The answers to a request as they come; none, or not all, where the check was stopped or has died."""
         self.start()
         assert self._socket is not None

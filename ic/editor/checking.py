@@ -1,4 +1,4 @@
-"""One check of a deck for an editor: its request and its answers, exchanged between two processes.
+"""One check of a deck for an editor, or one proof of a renaming: its request and its answers, between two processes.
 
 First the definitions are checked, without the audit, which builds programs. Their findings are reported, in parts where
 it takes long. The audit, `met check` itself, comes after a pause, so that a typing user never waits for it.
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ic.driver.by_definition import Known
     from ic.driver.compile import Compiled
     from ic.editor.index import DeckIndex
+    from ic.editor.renaming import RenameRequest
 
 LENGTH = struct.Struct("!Q")
 """The length of a pickled answer, which precedes it."""
@@ -95,10 +96,15 @@ class Crash:
     traceback: str
 
 
-def answer(request: CheckRequest, out: int) -> None:
-    """Run the check, and write its answers into the file descriptor."""
-    os.chdir(request.folder)
+def answer(request: CheckRequest | RenameRequest, out: int) -> None:
+    """Run a check, or prove a renaming, and write the answers into the file descriptor."""
+    if isinstance(request, CheckRequest):
+        os.chdir(request.folder)
     try:
+        if not isinstance(request, CheckRequest):
+            from ic.editor.renaming import renamed
+
+            return _send(out, renamed(request))
         for reply in answers(request, pause=AUDIT_PAUSE, keep=partial(_send, out)):
             _send(out, reply)
     except Exception:

@@ -361,12 +361,12 @@ class NamesInTexts:
             for definition in definitions
         ]
 
-    def uses(self, name: str) -> Iterator[Token]:
-        """All tokens of a name in the texts, including its definitions."""
+    def uses(self, name: str) -> Iterator[tuple[Token, list[NameInText]]]:
+        """All tokens of a name in the texts, including its definitions, each with the definitions that it means."""
         for text in self.texts:
             for token in (*text.tokens, *(token for line in text.directives for token in line.words)):
                 if token.kind == NAME and token.text == name:
-                    yield token
+                    yield token, self.meant_in(text, token)
 
     def model_of(self, entry: TextEntry) -> str:
         """The model of a servo or a metric, through those that it is `like`; "" where it is not written."""

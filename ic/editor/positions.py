@@ -40,9 +40,14 @@ def file_named(name: str, folder: str) -> str | None:
     return None if name == DECK_IN_MEMORY else os.path.normpath(os.path.join(folder, name))
 
 
+def normal(text: str) -> str:
+    """A text with its lines ended by newlines alone."""
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
 def lines_of(text: str) -> list[str]:
     """The lines of a text as editors count them."""
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return normal(text).split("\n")
 
 
 class Texts:

@@ -111,10 +111,6 @@ class _Deck:
             return ""
         return os.path.realpath(os.path.join(self.request.folder, name))
 
-    @property
-    def codes(self) -> list[str]:
-        return [diagnostic.code for diagnostic in self.compiled.diagnostics if diagnostic.severity == "error"]
-
 
 def _is_deck(name: str) -> bool:
     return not name.endswith((".csv", ".urdf", ".xacro")) and name != "<command line>"
@@ -181,9 +177,7 @@ def _refuse_outside(use: Token, path: str, roots: Iterable[str]) -> None:
 
 def _uses(deck: _Deck, name: str, places: set[tuple[str, int]]) -> Iterator[Token]:
     """The tokens of a deck's texts that mean one of the definitions."""
-    texts = {text.source.name: text for text in deck.names.texts}
-    for use in deck.names.uses(name):
-        meant = deck.names.meant_in(texts[use.source.name], use)
+    for use, meant in deck.names.uses(name):
         if any((deck.path(definition.file), definition.token.offset) in places for definition in meant):
             yield use
 
@@ -198,7 +192,7 @@ def edited(text: str, edits: Iterable[tuple[int, int]], new: str) -> str:
 def _is_proved(deck: _Deck, edits: Mapping[str, tuple[tuple[int, int], ...]], old: str, new: str) -> bool:
     """True where a deck's plan is the same except for the name; False where it has none, since it has no runs. Raises
     NotRenamed."""
-    codes = deck.codes
+    codes = [diagnostic.code for diagnostic in deck.compiled.diagnostics if diagnostic.severity == "error"]
     if codes and codes != [NO_RUN]:
         label = deck.compiled.diagnostics[0].at
         raise NotRenamed(f"{label.place if label is not None else deck.request.name}: mend {codes[0]} first")

@@ -13,17 +13,15 @@ from typing import Any
 from lsprotocol import types
 from pygls.lsp.server import LanguageServer
 
-from ic.editor.answers import AskedPosition
+from ic.editor.answers import AskedPosition, CannotRename
 from ic.editor.checker_process import CheckerProcess
 from ic.editor.checks import CheckedDeck, DeckChecks, OpenText
-from ic.editor.fixes import QuickFix, actions, quick_fixes
+from ic.editor.diagnostics import QuickFix, actions, in_editor, quick_fixes
 from ic.editor.lenses import FindLastRuns, lenses
 from ic.editor.outline import folds, symbols
-from ic.editor.positions import Texts, file_named, lines_of, path_of, uri_of
-from ic.editor.rename_process import CannotRename, nameable, rename
+from ic.editor.positions import Texts, file_named, normal, path_of, uri_of
 from ic.editor.semantic import LEGEND, semantic_tokens
 from ic.editor.structure import DeckText
-from ic.editor.told import in_editor
 from ic.text.files import DECK_IN_MEMORY
 from met.diagnostic import Problem
 from met.host.files import real_path
@@ -144,7 +142,7 @@ class DeckServer(LanguageServer):
         opened = self.checks.texts.get(uri)
         if opened is None:
             return []
-        before = "\n".join(lines_of(opened.text))
+        before = normal(opened.text)
         try:
             after = lay_out_text(opened.path or DECK_IN_MEMORY, before)
         except Problem as problem:
@@ -159,7 +157,7 @@ class DeckServer(LanguageServer):
     def text(self, uri: str) -> DeckText:
         """A text that is open, with its structure; that of the last one is kept, since editors ask several things."""
         opened = self.checks.texts.get(uri)
-        text = "\n".join(lines_of(opened.text if opened is not None else ""))
+        text = normal(opened.text if opened is not None else "")
         if self._last_text is None or (self._last_text.source.name, self._last_text.source.text) != (uri, text):
             self._last_text = DeckText(uri, text)
         return self._last_text
@@ -316,15 +314,13 @@ def make(
 
     @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
     def prepare_rename(parameters: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:
-        return nameable(server.asked_position(parameters))
+        return server.asked_position(parameters).nameable()
 
     @server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))
     async def renamed(parameters: types.RenameParams) -> types.WorkspaceEdit:
         await server.checks.rest()
-        deck, codec = server.checks.deck_of(parameters.text_document.uri), server.workspace.position_codec
-        return await rename(
-            server.asked_position(parameters), parameters.new_name, server.checks, deck, server.folders(), codec
-        )
+        asked_position = server.asked_position(parameters)
+        return await asked_position.rename(parameters.new_name, server.folders(), server.process)
 
     @server.feature(types.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL, LEGEND)
     def words(parameters: types.SemanticTokensParams) -> types.SemanticTokens:

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from ic.formatting.begins import goes_on, stands_below
 from ic.formatting.pieces import blanks_between
 from ic.formatting.row import BLANK, CODE, REMARK, Row, RowPiece
 
@@ -226,7 +225,7 @@ def _paragraphs(all_rows: Sequence[Row], separators: Mapping[int, int]) -> Itera
 
 def _alike(row: Row, other: Row, first: int, second: int) -> bool:
     alike = row.parent == other.parent and first == second
-    alike = alike and goes_on(row) == goes_on(other) and stands_below(row) == stands_below(other)
+    alike = alike and row.goes_on == other.goes_on and row.stands_below == other.stands_below
     return alike and (first == 1 or row.pieces[0].text == other.pieces[0].text)
 
 
@@ -238,7 +237,7 @@ def neighbours(all_rows: Sequence[Row]) -> Iterator[tuple[int, int]]:
         if row.kind == BLANK:
             last.pop(bracket, None)
         elif row.kind == CODE and not row.exact and row.closes is None:
-            block, how = last.setdefault(bracket, {}), (goes_on(row), stands_below(row))
+            block, how = last.setdefault(bracket, {}), (row.goes_on, row.stands_below)
             yield from ((other, index) for other in block.get(how, ()))
             block[how] = [*block.get(how, ())[1 - REACH :], index]
 

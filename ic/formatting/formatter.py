@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from ic.formatting.align import ANCHORS, Groups, Node, aligned, lines_of, meeting, neighbours, offset
-from ic.formatting.begins import goes_on, stands_below
 from ic.formatting.pieces import blanks_between
 from ic.formatting.row import BLANK, BLANKS, CODE, REMARK, TAB, Row, written
 from ic.formatting.rows import rows
@@ -44,7 +43,7 @@ def _met(all_rows: Sequence[Row]) -> int:
         for anchor in ANCHORS
         for first, second in meeting(lines[above], lines[other], anchor)
     }
-    return len(met) + sum(stands_below(row) for row in all_rows if row.tabbed) + _comments_met(all_rows)
+    return len(met) + sum(row.stands_below for row in all_rows if row.tabbed) + _comments_met(all_rows)
 
 
 def _comments_met(all_rows: Sequence[Row]) -> int:
@@ -136,7 +135,7 @@ def _settled(rows: Sequence[Row], groups: Groups) -> list[list[int]] | None:
     reached: dict[Node, int] = {}  # by group: the column of its anchors
     positions = {id(row): index for index, row in enumerate(rows)}
     free = [
-        (index, row, stands_below(row), TAB * goes_on(row))
+        (index, row, row.stands_below, TAB * row.goes_on)
         for index, row in enumerate(rows)
         if row.kind in (CODE, REMARK) and not row.exact
     ]

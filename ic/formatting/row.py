@@ -6,12 +6,14 @@ import re
 from collections.abc import Sequence
 from typing import Literal
 
-from ic.text.lexer import SPACE, Text, Token
+from ic.text.lexer import NUMBERS, SPACE, STRING, Text, Token
 from met.frozen import frozen
 
 TAB = 4
 BLANKS = " \t\f\v"
 _SPLICE = re.compile(r"\\[ \t\f\v]*(?:\n|\Z)")
+_JOINING = frozenset(("+", "-", "*", "/", "^", "=", "+=", "<", "<=", ">", ">=", "==", "!=", "..", "and", "or", "by"))
+_LEFT_OPEN = _JOINING | {"not", "when", "like", "of"}
 BLANK, DIRECTIVE, REMARK, CODE = "blank", "directive", "remark", "code"
 
 Kind = Literal[
@@ -113,6 +115,40 @@ class Row:
         inside = offset - self.start
         before = self.raw.rfind("\n", 0, inside) + 1 if self._lines else 0
         return inside - before if self._tabs is None else self._tabs[inside]
+
+    @property
+    def stands_below(self) -> bool:
+        """Return True if the row was written below the text after its bracket."""
+        if self.parent is None or self.closes is not None:
+            return False
+        outer, opener = self.parent
+        following = outer.pieces[opener + 1 : opener + 2]
+        if outer.exact or not following or outer.pieces[opener].text == "{" or following[0].kind == "comment":
+            return False
+        return self.column(self.whole[0].offset) == following[0].column
+
+    @property
+    def _sets_others(self) -> bool:
+        """Return True for `* = spindle;`."""
+        return [piece.text for piece in self.pieces[:2]] == ["*", "="]
+
+    @property
+    def goes_on(self) -> bool:
+        """Return True if the row continues the one before without a bracket that says so."""
+        behind = self.behind
+        if self.closes is not None or self.stands_below:
+            return False
+        if behind is None or behind.text in (";", ",", "}"):
+            joining = bool(self.pieces) and self.pieces[0].text in _JOINING and not self._sets_others
+            return behind is not None and behind.text == "}" and joining
+        if behind.text in _LEFT_OPEN:
+            return True
+        if not self.pieces:
+            return False
+        first = self.pieces[0]
+        if self._sets_others:
+            return False
+        return first.text in _JOINING or first.text in ("(", "[") or first.tokens[0].kind in (STRING, *NUMBERS)
 
     def _expanded(self) -> list[int] | None:
         """By character, its distance in the row; None where no tab makes this differ from its position."""

@@ -7,6 +7,7 @@ opens; else it stays as it is, since text that is left out may be anything.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
 
 from ic.formatting.pieces import cut
 from ic.formatting.row import CODE, TAB, Row
@@ -55,28 +56,24 @@ def rows(source: Text, making_strings: Collection[str] = (), tab: int = TAB) -> 
     return all_rows
 
 
+@dataclass(slots=True)
 class _OpenBracket:
     """A bracket that is open: its token, its row, and which of the row's pieces it is."""
 
-    __slots__ = ("piece", "row", "token")
-
-    def __init__(self, token: Token, row: Row, piece: int = 0) -> None:
-        self.token = token
-        self.row = row
-        self.piece = piece
+    token: Token
+    row: Row
+    piece: int = 0
 
 
+@dataclass(slots=True)
 class _OpenConditional:
     """A conditional that is open: where it begins, the brackets open before it and behind each of its parts."""
 
-    __slots__ = ("broken", "ends", "index", "otherwise", "start")
-
-    def __init__(self, index: int, start: list[_OpenBracket]) -> None:
-        self.index = index
-        self.start = start
-        self.ends: list[list[_OpenBracket]] = []
-        self.otherwise = False
-        self.broken = False
+    index: int
+    start: list[_OpenBracket]
+    ends: list[list[_OpenBracket]] = field(default_factory=list)
+    otherwise: bool = False
+    broken: bool = False
 
 
 def _match_all(all_rows: list[Row], findings: Findings) -> None:

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from ic.editor import checking
-from ic.editor.carried import LastAudit, carried_over
 from ic.editor.checker_process import CheckerProcess
 from ic.editor.checking import (
     EARLY,
@@ -23,7 +22,7 @@ from ic.editor.checking import (
     compiled_with_reply,
     first_replies,
 )
-from ic.editor.checks import DeckChecks, OpenText
+from ic.editor.checks import DeckChecks, LastAudit, OpenText, carried_over
 from ic.text.files import LIBRARY
 from tests.ic.editor.client import Editor, uri
 
