@@ -9,7 +9,7 @@ from contextlib import suppress
 from lsprotocol.types import CompletionItemKind as ItemKind
 
 from ic.editor.index import DeckIndex
-from ic.editor.names import REMOVED, NamesInTexts, entry_of
+from ic.editor.names import KINDS_OF_KEYS, REMOVED, NamesInTexts, entry_of
 from ic.editor.structure import DEFINED, NAMING, UNIT, DeckText, TextEntry, indices_around, through_loops
 from ic.find import library_files
 from ic.language import BLOCKS, DEFINITIONS, EXPERIMENTS, OF_A_RUN, Entry
@@ -56,9 +56,6 @@ _OPEN, _CLOSED = ("(", "[", "{"), (")", "]", "}")
 
 WATCHES = Parameter(name="of", doc="what the metric watches: a channel, such as `JOINT.q`")
 """The argument of a metric that its model does not declare."""
-
-_NAMES_OF_KEYS = {"parent": "link", "child": "link", "arm": "arm", "leader": "joint", "link": "link", "to": "link"}
-"""The kinds of names that are the values of these keys of a joint, a loop or a run."""
 
 _MODELS_OF_KEYS: Mapping[str, models.Kind] = {
     "model": "servo", "command": "command", "integrator": "integrator", "metric": "metric", "bed": "bed", "law": "law",
@@ -313,8 +310,8 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
         return _alike(WORD, [ALL_ROWS], "requires that every row is used")
     if where == "servos":
         return _named(names, "servo", "roof")
-    if key in _NAMES_OF_KEYS and where in ("joint", "loop", "run"):
-        return _bodies(_NAMES_OF_KEYS[key], around, names)
+    if key in KINDS_OF_KEYS and where in ("joint", "loop", "run"):
+        return _bodies(KINDS_OF_KEYS[key][0], around, names)
     if texts[-2:] == ["shape", "="] and where == "link":
         return _alike(CLASS, SHAPES)
     offers = _words_of_value(texts, where)

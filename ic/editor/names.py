@@ -45,8 +45,8 @@ _OF_RUNS: Mapping[str, str] = MappingProxyType({
 UNDER: Mapping[str, str] = MappingProxyType({"links": "link", "initial": "joint", **_OF_RUNS})
 """The kinds of names after these first words of paths."""
 
-_OF_KEY: Mapping[str, tuple[str, ...]] = MappingProxyType({
-    "arm": ("arm",), "parent": ("link",), "child": ("link",), "link": ("link",), "leader": ("joint",),
+KINDS_OF_KEYS: Mapping[str, tuple[str, ...]] = MappingProxyType({
+    "arm": ("arm",), "parent": ("link",), "child": ("link",), "link": ("link",), "to": ("link",), "leader": ("joint",),
     "of": ("joint", "linear"),
 })  # fmt: skip
 """The kinds of names in the values of these keys."""
@@ -470,7 +470,7 @@ def _wanted(token: Token, entry: TextEntry | None) -> Sequence[str]:
         return ("servo", "macro")
     if before == "=" and index >= 2:
         key = words[index - 2].text
-        return (*_OF_KEY[key], "let", "macro", "metric", "signal") if key in _OF_KEY else _VALUES
+        return (*KINDS_OF_KEYS[key], "let", "macro", "metric", "signal") if key in KINDS_OF_KEYS else _VALUES
     if entry.kind in ("require", "exclude", "maximise", "minimise"):
         return ("metric", *_VALUES)
     return (

@@ -29,9 +29,6 @@ WORDS = ("for", "in", "let", "param", "like", "of", "from", "and", "or", "not", 
 NO_RUN = "D161"
 """The error of a text that is a part of decks and not a deck."""
 
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_WORDS = re.compile(r"\w+|\W+")
-
 
 @frozen
 class RenameRequest:
@@ -68,7 +65,7 @@ class NotRenamed(Exception):
 
 def refusal_of_word(new: str) -> str:
     """The reason why a word cannot be a name; "" where it can."""
-    if _NAME.fullmatch(new) is None:
+    if not (new.isascii() and new.isidentifier()):
         return f"`{new}` is no name: letters, digits and `_`, not a digit first"
     if is_unit(new):
         return f"`{new}` is a unit"
@@ -150,7 +147,8 @@ def _renamed(rename_request: RenameRequest) -> Renamed:
     texts: dict[str, str] = {}
     places = {(first.path(definition.file), definition.token.offset) for definition in meant}
     for deck in decks:
-        _refuse_taken(deck, rename_request.new)
+        for taken in deck.names.by_name.get(rename_request.new, ()):
+            raise NotRenamed(f"`{rename_request.new}` exists: {taken.kind} at {taken.token.place}")
         for use in _uses(deck, token.text, places):
             path = deck.path(use.source.name)
             _refuse_outside(use, path, rename_request.roots)
@@ -161,11 +159,6 @@ def _renamed(rename_request: RenameRequest) -> Renamed:
     if not any(proved):
         raise NotRenamed("no deck has a run by which the change could be proved: open one that includes this text")
     return Renamed(edits, texts)
-
-
-def _refuse_taken(deck: _Deck, new: str) -> None:
-    for definition in deck.names.by_name.get(new, ()):
-        raise NotRenamed(f"`{new}` exists: {definition.kind} at {definition.token.place}")
 
 
 def _refuse_outside(use: Token, path: str, roots: Iterable[str]) -> None:
@@ -206,50 +199,34 @@ def _is_proved(deck: _Deck, edits: Mapping[str, tuple[tuple[int, int], ...]], ol
         request = replace(request, text=changed.pop(""))
     after = _compiled(replace(request, unsaved={**request.unsaved, **changed}))
     before = deck.compiled
+    same_codes = [message.code for message in before.diagnostics] == [message.code for message in after.diagnostics]
     if before.plan is None or after.plan is None:
-        if [diagnostic.code for diagnostic in after.diagnostics] != [
-            diagnostic.code for diagnostic in before.diagnostics
-        ]:
+        if not same_codes:
             raise NotRenamed(f"`{old}` would not be found everywhere: {after.diagnostics[0].message}")
         return False
     old_plan, new_plan = (encode(type(plan), plan) for plan in (before.plan, after.plan))
-    if not same_but_for(old, new, old_plan, new_plan) or [d.code for d in before.diagnostics] != [
-        d.code for d in after.diagnostics
-    ]:
+    if not same_codes or not same_but_for(old, new, old_plan, new_plan):
         raise NotRenamed(f"{deck.request.name or 'the deck'} would mean something else: `{old}` has other uses")
     return True
 
 
-_COLUMNS = ("column", "length")
-
-
 def same_but_for(old: str, new: str, before: Any, after: Any) -> bool:
     """True for two values of plans that are equal with one word in place of another, and columns of places aside."""
-    if isinstance(before, str) and isinstance(after, str):
-        return before == after or _renamed_words(old, new, before, after)
-    if isinstance(before, dict) and isinstance(after, dict):
-        if "sources" in before and "experiments" in before:
-            before, after = ({k: v for k, v in value.items() if k != "sources"} for value in (before, after))
-        if "file" in before and "line" in before:
-            before, after = ({k: v for k, v in value.items() if k not in _COLUMNS} for value in (before, after))
-        keys = [(key, key if key in after else _in_words(old, new, key)) for key in before]
-        return len(before) == len(after) and all(
-            other in after and same_but_for(old, new, before[key], after[other]) for key, other in keys
-        )
-    if isinstance(before, list | tuple) and isinstance(after, list | tuple):
-        return len(before) == len(after) and all(
-            same_but_for(old, new, old_value, new_value) for old_value, new_value in zip(before, after, strict=True)
-        )
-    return type(before) is type(after) and bool(before == after)
+    word = re.compile(rf"\b{old}\b")
+    return bool(_with_word(word, new, before) == _with_word(word, new, after))
 
 
-def _renamed_words(old: str, new: str, before: str, after: str) -> bool:
-    ones, others = _WORDS.findall(before), _WORDS.findall(after)
-    return len(ones) == len(others) and all(
-        old_word == new_word or (old_word == old and new_word == new)
-        for old_word, new_word in zip(ones, others, strict=True)
-    )
-
-
-def _in_words(old: str, new: str, text: str) -> str:
-    return "".join(new if word == old else word for word in _WORDS.findall(text))
+def _with_word(old: re.Pattern[str], new: str, value: Any) -> Any:
+    """A value of a plan with a word in place of another, without the columns of places and the plan's sources."""
+    match value:
+        case str():
+            return old.sub(new, value)
+        case list() | tuple():
+            return [_with_word(old, new, inner) for inner in value]
+        case dict():
+            place, plan = {"file", "line"} <= value.keys(), {"sources", "experiments"} <= value.keys()
+            left_out = ("column", "length") if place else ("sources",) if plan else ()
+            return {
+                old.sub(new, key): _with_word(old, new, inner) for key, inner in value.items() if key not in left_out
+            }
+    return value
