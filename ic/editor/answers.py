@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from functools import cached_property
 from itertools import islice
 
 from lsprotocol import types
@@ -49,8 +50,7 @@ class CannotRename(JsonRpcException):
 class AskedPosition:
     """A position in an open text, with the deck that the text is part of, if it is known.
 
-    text   the text as it is now;  file: its name in the deck's places
-    names  those of all texts of the deck, open ones as they are now
+    text  the text as it is now;  file: its name in the deck's places
     """
 
     def __init__(
@@ -80,13 +80,22 @@ class AskedPosition:
         self._addresses[self.file] = uri
         texts.setdefault(self.file, current)
         deck_uri = deck.deck.uri if deck is not None else uri
-        structures = checks.structures.of(deck_uri, texts)
-        self.text = structures[self.file]
+        self._structures = checks.structures.of(deck_uri, texts)
+        self.text = self._structures[self.file]
         self.index = checks.indexes.get(deck_uri, NO_INDEX)
-        self.names = NamesInTexts(structures.values(), self.index.names_by_owner)
         lines = lines_of(current)
         line = lines[position.line] if position.line < len(lines) else ""
         self.offset = self.text.offset(position.line, characters(codec, line, position.character))
+
+    @cached_property
+    def names(self) -> NamesInTexts:
+        """The names of all texts of the deck, open ones as they are now."""
+        return NamesInTexts(self._structures.values(), self.index.names_by_owner)
+
+    def position(self, offset: int) -> types.Position:
+        """The editor's position of an offset of the text."""
+        texts, place = Texts({self.file: self.text.source.text}, self._codec), self.text.source.place(offset, 1)
+        return texts.position(self.file, place.line, place.column)
 
     @property
     def token(self) -> Token | None:

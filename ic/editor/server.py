@@ -6,7 +6,7 @@ import asyncio
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
@@ -21,7 +21,6 @@ from ic.editor.lenses import FindLastRuns, lenses
 from ic.editor.outline import folds, symbols
 from ic.editor.positions import Texts, file_named, normal, path_of, uri_of
 from ic.editor.semantic import LEGEND, semantic_tokens
-from ic.editor.structure import DeckText
 from ic.text.files import DECK_IN_MEMORY
 from met.diagnostic import Problem
 from met.host.files import real_path
@@ -32,6 +31,9 @@ PYGLS_LOG = "pygls.protocol.json_rpc"
 
 OPTIONS = ("includeDirs", "defines", "helpInMessage")
 """The keys that an editor may give in its `initializationOptions`."""
+
+
+BEGINNING = types.Position(0, 0)
 
 
 def _is_no_refusal(record: logging.LogRecord) -> bool:
@@ -59,7 +61,6 @@ class DeckServer(LanguageServer):
         self.fixes: dict[str, list[QuickFix]] = {}
         self._published: dict[str, types.PublishDiagnosticsParams] = {}
         self._worker: asyncio.Task[None] | None = None
-        self._last_text: DeckText | None = None
 
     def begin(self, parameters: types.InitializeParams) -> None:
         """Take the editor's options, and start to check."""
@@ -154,29 +155,6 @@ class DeckServer(LanguageServer):
         end = types.Position(len(lines) - 1, self.workspace.position_codec.client_num_units(lines[-1]))
         return [types.TextEdit(types.Range(types.Position(0, 0), end), after)]
 
-    def text(self, uri: str) -> DeckText:
-        """A text that is open, with its structure; that of the last one is kept, since editors ask several things."""
-        opened = self.checks.texts.get(uri)
-        text = normal(opened.text if opened is not None else "")
-        if self._last_text is None or (self._last_text.source.name, self._last_text.source.text) != (uri, text):
-            self._last_text = DeckText(uri, text)
-        return self._last_text
-
-    def forget_text(self, uri: str) -> None:
-        """Release the structure of a text that an editor has closed."""
-        if self._last_text is not None and self._last_text.source.name == uri:
-            self._last_text = None
-
-    def position_in(self, text: DeckText) -> Callable[[int], types.Position]:
-        """A function from offsets of a text to the editor's positions."""
-        texts = Texts({text.source.name: text.source.text}, self.workspace.position_codec)
-
-        def position(offset: int) -> types.Position:
-            place = text.source.place(offset, 1)
-            return texts.position(place.file, place.line, place.column)
-
-        return position
-
     def folders(self) -> list[str]:
         """The paths of the folders that the editor has open."""
         addresses = list(self.workspace.folders) or [self.workspace.root_uri or ""]
@@ -184,24 +162,19 @@ class DeckServer(LanguageServer):
 
     def lenses(self, uri: str) -> list[types.CodeLens]:
         """The lines above the runs of a text, with data from archives beside its file."""
-        asked_position, path = self.position_in_text(uri, types.Position(0, 0)), path_of(uri)
+        asked, path = self.in_text(uri), path_of(uri)
         known = self._last_runs(path) if self._last_runs is not None and path is not None else {}
-        position = self.position_in(asked_position.text)
         return list(
             lenses(
-                asked_position.text,
-                asked_position.index,
-                path,
-                known,
-                lambda *ends: types.Range(position(ends[0]), position(ends[1])),
+                asked.text, asked.index, path, known, lambda *ends: types.Range(*(asked.position(end) for end in ends))
             )
         )
 
     def asked_position(self, parameters: types.TextDocumentPositionParams | Any) -> AskedPosition:
         """The position that a request is about."""
-        return self.position_in_text(parameters.text_document.uri, parameters.position)
+        return self.in_text(parameters.text_document.uri, parameters.position)
 
-    def position_in_text(self, uri: str, position: types.Position) -> AskedPosition:
+    def in_text(self, uri: str, position: types.Position = BEGINNING) -> AskedPosition:
         """A position of a text."""
         return AskedPosition(self.checks, self.workspace.position_codec, self.address, uri, position)
 
@@ -265,7 +238,6 @@ def make(
     @server.feature(types.TEXT_DOCUMENT_DID_CLOSE)
     def did_close(parameters: types.DidCloseTextDocumentParams) -> None:
         server.checks.shut(parameters.text_document.uri)
-        server.forget_text(parameters.text_document.uri)
 
     @server.feature(
         types.TEXT_DOCUMENT_CODE_ACTION, types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix])
@@ -283,12 +255,12 @@ def make(
 
     @server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
     def document_symbol(parameters: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
-        text = server.text(parameters.text_document.uri)
-        return symbols(text, server.position_in(text))
+        asked = server.in_text(parameters.text_document.uri)
+        return symbols(asked.text, asked.position)
 
     @server.feature(types.TEXT_DOCUMENT_FOLDING_RANGE)
     def folding_range(parameters: types.FoldingRangeParams) -> list[types.FoldingRange]:
-        return folds(server.text(parameters.text_document.uri))
+        return folds(server.in_text(parameters.text_document.uri).text)
 
     @server.feature(
         types.TEXT_DOCUMENT_COMPLETION, types.CompletionOptions(trigger_characters=[".", "<", '"', "#", "="])
@@ -319,16 +291,13 @@ def make(
     @server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))
     async def renamed(parameters: types.RenameParams) -> types.WorkspaceEdit:
         await server.checks.rest()
-        asked_position = server.asked_position(parameters)
-        return await asked_position.rename(parameters.new_name, server.folders(), server.process)
+        return await server.asked_position(parameters).rename(parameters.new_name, server.folders(), server.process)
 
     @server.feature(types.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL, LEGEND)
     def words(parameters: types.SemanticTokensParams) -> types.SemanticTokens:
-        asked_position = server.position_in_text(parameters.text_document.uri, types.Position(0, 0))
+        asked = server.in_text(parameters.text_document.uri)
         units = server.workspace.position_codec.client_num_units
-        return semantic_tokens(
-            asked_position.text, asked_position.names, server.position_in(asked_position.text), units
-        )
+        return semantic_tokens(asked.text, asked.names, asked.position, units)
 
     @server.feature("met/settled")
     async def settled(parameters: None) -> bool:

@@ -393,20 +393,22 @@ class DecksUsed:
 
     def __init__(self, texts: Sequence[DeckText]) -> None:
         self._uses = {text.source.name: text.uses for text in texts}
-        self._beside: dict[str, set[str]] = {name: set() for name in self._uses}  # includes, or is included by
+        self._seen = {name: {name} for name in self._uses}
         reached: set[str] = set()
-        for text in texts if any(self._uses.values()) else ():
-            including = text.source.name
+        for text in texts if self else ():
             for line in text.directives:
-                for other in self._called(line.file[1:-1]) - {including}:
-                    self._beside[including].add(other)
-                    self._beside[other].add(including)
-                    reached.add(other)
-            reached.update(*(self._called(use.file) for use in self._uses[including]))
-        for name in list(self._uses)[1:]:
-            if name not in reached:
-                self._beside[name].add(texts[0].source.name)
-                self._beside[texts[0].source.name].add(name)
+                for other in self._called(line.file[1:-1]):
+                    self._connect(text.source.name, other)
+                    reached |= {other} - {text.source.name}
+            reached.update(*(self._called(use.file) for use in text.uses))
+        for text in texts[1:] if self else ():
+            if text.source.name not in reached:
+                self._connect(text.source.name, texts[0].source.name)
+
+    def _connect(self, name: str, other: str) -> None:
+        """Let two texts, and those that are connected with them, see each other."""
+        connected = self._seen[name] | self._seen[other]
+        self._seen.update(dict.fromkeys(connected, connected))
 
     def __bool__(self) -> bool:
         """True where a text uses a deck."""
@@ -419,16 +421,7 @@ class DecksUsed:
 
     def seen_from(self, name: str) -> set[str]:
         """The texts whose definitions a text sees without a roof, including itself."""
-        return self._connected({name}) if self else set(self._uses)
-
-    def _connected(self, names: Iterable[str]) -> set[str]:
-        connected: set[str] = set()
-        waiting = set(names)
-        while waiting:
-            name = waiting.pop()
-            connected.add(name)
-            waiting |= self._beside.get(name, set()) - connected
-        return connected
+        return self._seen[name] if self else set(self._uses)
 
     def roofs(self, names: Iterable[str]) -> dict[str, UseInText]:
         """The roofs that some texts have."""
@@ -440,7 +433,7 @@ class DecksUsed:
         seen = self.seen_from(name)
         for word in words:
             use = self.roofs(seen).get(word)
-            seen = self._connected(self._called(use.file)) if use is not None else set()
+            seen = {name for file in self._called(use.file) for name in self._seen[file]} if use is not None else set()
         return seen
 
 

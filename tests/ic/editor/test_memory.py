@@ -70,7 +70,7 @@ async def edit(server: DeckServer, uri: str, edits: range) -> tuple[Counter[str]
         server.checks.change(OpenText(uri, f"{DECK}let spare_{n} = {n} kg;\n", n))
         while server.checks.checked[uri].deck.version != n:
             await asyncio.sleep(0.001)
-        assert "gearbox" in server.position_in_text(uri, types.Position(0, 0)).names.by_name
+        assert "gearbox" in server.in_text(uri).names.by_name
     await server.checks.rest()
     gc.collect()
     classes = [type(each) for each in gc.get_objects()]
