@@ -50,7 +50,8 @@ class Row:
     opaque   whether even its brackets do not count
     tail     the comment at the end of code, or of a directive
     pieces   of code: what stands apart on it, in order, without the tail
-    parent   the row and the piece of it that opened the bracket in which this row begins; None at the top level
+    outer    the bracket in which this row begins, and the row that opens it; None at the top level
+    parent   this row and the piece of it that is the bracket
     closes   the row that opened the last of the brackets that close at its beginning
     behind   the last token before it in the same bracket
     tab      how far apart its tab stops are
@@ -65,6 +66,7 @@ class Row:
         "exact",
         "kind",
         "opaque",
+        "outer",
         "parent",
         "pieces",
         "raw",
@@ -85,6 +87,7 @@ class Row:
         self.opaque = False
         self.pieces: list[RowPiece] = []
         self.tail: RowPiece | None = None
+        self.outer: tuple[Token, Row] | None = None
         self.parent: tuple[Row, int] | None = None
         self.closes: Row | None = None
         self.behind: Token | None = None

@@ -18,6 +18,9 @@ from ic.text.preprocess import CONDITIONALS
 from met.diagnostic import Diagnostic, Label, Problem, error
 
 _CLOSING = {closing: opening for opening, closing in OPENING.items()}
+OpenBracket = tuple[Token, Row]
+"""A bracket that is open, and its row."""
+
 _BY_ITSELF = "a file is laid out by itself: a bracket of a macro's body or of another file is not seen"
 
 
@@ -52,17 +55,11 @@ def rows(source: Text, making_strings: Collection[str] = (), tab: int = TAB) -> 
     if making_strings:
         _keep_uses(all_rows, making_strings)
     cut(row for row in all_rows if row.kind == CODE and not row.opaque)
-    _nest(all_rows)
+    for row in all_rows:
+        if row.outer is not None:
+            bracket, opened = row.outer
+            row.parent = opened, next(i for i, piece in enumerate(opened.pieces) if bracket in piece.tokens[:1])
     return all_rows
-
-
-@dataclass(slots=True)
-class _OpenBracket:
-    """A bracket that is open: its token, its row, and which of the row's pieces it is."""
-
-    token: Token
-    row: Row
-    piece: int = 0
 
 
 @dataclass(slots=True)
@@ -70,19 +67,22 @@ class _OpenConditional:
     """A conditional that is open: where it begins, the brackets open before it and behind each of its parts."""
 
     index: int
-    start: list[_OpenBracket]
-    ends: list[list[_OpenBracket]] = field(default_factory=list)
+    start: list[OpenBracket]
+    ends: list[list[OpenBracket]] = field(default_factory=list)
     otherwise: bool = False
     broken: bool = False
 
 
 def _match_all(all_rows: list[Row], findings: Findings) -> None:
-    """Match the brackets; text surrounded by `#if` is made opaque where they do not match, elsewhere that is
-    reported."""
-    stack: list[_OpenBracket] = []
+    """Match the brackets, and tell every row the one that it begins in; text surrounded by `#if` is made opaque where
+    they do not match, elsewhere that is reported."""
+    stack: list[OpenBracket] = []
     ifs: list[_OpenConditional] = []
+    behind: Token | None = None
     for index, row in enumerate(all_rows):
         word = row.directive
+        behind = None if word in CONDITIONALS else behind
+        row.outer, row.behind = _innermost(stack), behind
         if word in ("if", "ifdef", "ifndef"):
             if len(ifs) >= CONDITION_DEPTH:
                 findings.error("D018", f"`#if` goes deeper than {CONDITION_DEPTH}", row.tokens[1].place)
@@ -90,6 +90,8 @@ def _match_all(all_rows: list[Row], findings: Findings) -> None:
             ifs.append(_OpenConditional(index, list(stack)))
         elif word not in CONDITIONALS:
             complaint = _match(row, stack) if row.kind == CODE and not (ifs and ifs[-1].broken) else None
+            if row.kind == CODE:
+                behind = row.tokens[-1] if row.tokens[-1].text not in OPENING else None
             if complaint is None:
                 continue
             if not ifs:
@@ -103,29 +105,37 @@ def _match_all(all_rows: list[Row], findings: Findings) -> None:
         elif word == "endif":
             closed = ifs.pop()
             ends = [*closed.ends, stack, *([] if closed.otherwise else [closed.start])]
-            if closed.broken or len({"".join(bracket.token.text for bracket in end) for end in ends}) > 1:
+            if closed.broken or len({"".join(token.text for token, _ in end) for end in ends}) > 1:
+                stack = closed.start
                 for inside in all_rows[closed.index : index + 1]:
                     inside.opaque = inside.exact = True
-                stack = closed.start
+                    inside.outer, inside.closes, inside.behind = _innermost(stack), None, None
             else:
                 stack = ends[0]
         else:
             ifs[-1].ends.append(stack)
             ifs[-1].otherwise = ifs[-1].otherwise or word == "else"
             stack = list(ifs[-1].start)
+        row.outer = _innermost(stack)
     for left in ifs[-1:]:
         token = all_rows[left.index].tokens[1]
         help = f"`{token.source.name}` ends without its `#endif`"
         findings.error("D008", f"`#{token.text}` is not closed", token.place, help=help)
         return
-    for opened in stack[-1:]:
-        text, helps = opened.token.text, (f"write the `{OPENING[opened.token.text]}` where it ends", _BY_ITSELF)
-        findings.error("D022", f"this `{text}` is not closed", opened.token.place, help=helps)
+    for token, _ in stack[-1:]:
+        helps = (f"write the `{OPENING[token.text]}` where it ends", _BY_ITSELF)
+        findings.error("D022", f"this `{token.text}` is not closed", token.place, help=helps)
 
 
-def _match(row: Row, stack: list[_OpenBracket]) -> Diagnostic | None:
+def _innermost(stack: Sequence[OpenBracket]) -> OpenBracket | None:
+    return stack[-1] if stack else None
+
+
+def _match(row: Row, stack: list[OpenBracket]) -> Diagnostic | None:
     """Open and close the row's brackets. Returns the finding about the row, if any."""
+    leading = True
     for token in row.tokens:
+        leading = leading and token.text in _CLOSING
         if token.kind == BAD:
             findings = Findings()
             complain_of_stray(token, findings)
@@ -135,12 +145,13 @@ def _match(row: Row, stack: list[_OpenBracket]) -> Diagnostic | None:
         if token.text in OPENING:
             if len(stack) >= DEPTH:
                 return error("D029", f"braces, brackets and parentheses go deeper than {DEPTH}", token.place)
-            stack.append(_OpenBracket(token, row))
+            stack.append((token, row))
         elif token.text in _CLOSING:
             if not stack:
                 helps = ("leave it out, or open it where it begins", _BY_ITSELF)
                 return error("D022", f"this `{token.text}` closes nothing", token.place, help=helps)
-            opening = stack.pop().token
+            opening, opened = stack.pop()
+            row.closes = opened if leading else row.closes
             if opening.text != _CLOSING[token.text]:
                 label = Label(opening.place, f"to close this `{opening.text}`")
                 message = f"expected `{OPENING[opening.text]}`, found `{token.text}`"
@@ -160,33 +171,3 @@ def _keep_uses(all_rows: Sequence[Row], names: Collection[str]) -> None:
                 row.exact = True
                 depth += {"(": 1, ")": -1}.get(token.text, 0)
             named = not depth and token.text in names
-
-
-def _nest(all_rows: list[Row]) -> None:
-    """Tell every row the bracket that it begins in. All brackets that count are known to match."""
-    stack: list[_OpenBracket] = []
-    ifs: list[tuple[list[_OpenBracket], list[list[_OpenBracket]]]] = []
-    behind: Token | None = None
-    for row in all_rows:
-        word = "" if row.opaque else row.directive
-        if word in ("if", "ifdef", "ifndef"):
-            ifs.append((list(stack), []))
-        elif word == "endif":
-            stack = [*ifs.pop()[1], stack][0]
-        elif word in CONDITIONALS:
-            ifs[-1][1].append(stack)
-            stack = list(ifs[-1][0])
-        if word in CONDITIONALS or row.opaque:
-            behind = None
-        row.parent = (stack[-1].row, stack[-1].piece) if stack else None
-        row.behind = behind
-        leading = True
-        for position, piece in enumerate(row.pieces):
-            leading = leading and piece.kind == "close"
-            if piece.kind == "open":
-                stack.append(_OpenBracket(piece.tokens[0], row, position))
-            elif piece.kind == "close":
-                opened = stack.pop().row
-                row.closes = opened if leading else row.closes
-            if piece.kind != "comment":
-                behind = None if piece.kind == "open" else piece.tokens[-1]
