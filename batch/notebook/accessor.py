@@ -125,7 +125,7 @@ class Accessor(Generic[Data]):
     def parameters(self, case: Any = None) -> Any:
         """All parameters of a case as a pandas.DataFrame by path: value (SI), unit, whether it varies, who wrote it
         and where. case: as `sel` takes it; None where there is only one."""
-        from batch.notebook.parameters import table
+        from batch.notebook.answers import parameter_table
 
         path = file_of(self._data)
         parts = self._parts() if case is None else selection.selected(self._parts(), {CASE: case})
@@ -133,15 +133,15 @@ class Accessor(Generic[Data]):
         if len(cases) != 1:
             helps = 'name one: `data.met.parameters("#0")`; of several runs, `data.met.sel(run=NAME)` before'
             raise Problem(error("E388", f"parameters are those of one case, and here are {len(cases):,}", help=helps))
-        return table(path, *cases[0])
+        return parameter_table(path, *cases[0])
 
     @without_internals
     def evidence(self) -> Any:
         """The evidence of the cases for each requirement at each design point, as a pandas.DataFrame with a row each:
         the table of `met show --evidence`, numbers in SI. It is about all cases, so ask before selecting any."""
-        from batch.notebook.evidence import table
+        from batch.notebook.answers import evidence_table
 
-        return table(file_of(self._data), self._parts())
+        return evidence_table(file_of(self._data), self._parts())
 
     @property
     @without_internals
@@ -158,7 +158,7 @@ class Accessor(Generic[Data]):
             return file.sources()
 
     def __repr__(self) -> str:
-        from batch.notebook.summary import summary
+        from batch.notebook.answers import summary
 
         return "\n".join(summary(data) for data in self._parts().values())
 

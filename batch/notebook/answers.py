@@ -1,17 +1,71 @@
-"""A summary of an archive's Dataset in a few lines."""
+"""Answers about an archive's cases in a notebook: evidence for requirements, parameters, and a summary."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
 import xarray
 
 from batch.notebook.quantities import in_deck_unit
-from batch.notebook.table import CASE, RECORDED, experiment, file_of, name_of, varied
+from batch.notebook.table import CASE, RECORDED, archive, cases_of, experiment, file_of, name_of, places, varied
+from batch.queries import cases
 from batch.queries.answer_outcome import answer_outcome
+from batch.queries.evidence_table import FIELDS, as_data, requirement_evidence
 from batch.queries.failures import STATUS
+from batch.queries.pool import by_run
 from batch.queries.search_answers import SearchAnswer
-from met.diagnostic import Problem
+from met.diagnostic import Problem, error
 from met.distinct import distinct
 from met.run import DONE
+
+
+def evidence_table(path: Path, parts: Mapping[str, xarray.Dataset]) -> Any:
+    """A pandas.DataFrame with the fields of `RequirementEvidence`, a row for each. Raises Problem E388 where cases are
+    missing, E389 where the archive is another one."""
+    with archive(path, parts) as file:
+        names = {name_of(data): len(cases_of(data)) for data in parts.values()}
+        groups = [group for group in file.groups if group.name in names]
+        for group in groups:
+            if names[group.name] != group.count:
+                message = f"evidence is of all cases, and here are {names[group.name]:,} of {group.count:,}"
+                raise Problem(error("E388", message, help="ask the data as they were opened: `batch.open(FILE).met`"))
+        evidence = requirement_evidence(groups, path.name, several=len(by_run(file.groups)) > 1)
+        rows = [as_data(row) for row in evidence]
+    held = {name: ("row", _column([row[name] for row in rows])) for name in FIELDS}
+    return xarray.Dataset(held, coords={"row": range(len(rows))}).to_dataframe()
+
+
+def _column(values: list[Any]) -> np.ndarray:
+    """Words unchanged; numbers as floats, with not-a-number where there is none."""
+    if any(isinstance(value, str) for value in values):
+        return np.array(values, object)
+    return np.array([np.nan if value is None else value for value in values])
+
+
+def parameter_table(path: Path, data: xarray.Dataset, case: int) -> Any:
+    """A pandas.DataFrame by path: value (SI), unit, varies, origin (deck, default, case, derived), place. Raises
+    Problem E389."""
+    with experiment(path, data) as (file, group):
+        [position] = places(group, path, data, np.array([case]))
+        rows = cases.parameters(file, group, int(position))
+        own = next(planned for planned in file.plan().experiments if planned.name == group.name)
+    origins = {name: quantity.origin for name, quantity in own.parameters.items()}
+    columns: dict[str, list[Any]] = {key: [row[key] for row in rows.values()] for key in ("value", "unit", "varies")}
+    columns["origin"] = [origins[name].kind for name in rows]
+    columns["place"] = [str(origins[name].place or "") for name in rows]
+    held = {name: ("path", _parameter_column(values)) for name, values in columns.items()}
+    return xarray.Dataset(held, coords={"path": list(rows)}).to_dataframe()
+
+
+def _parameter_column(values: list[Any]) -> np.ndarray:
+    """The values as an array of one dimension, even if they are lists."""
+    out = np.empty(len(values), object)
+    out[:] = values
+    return out
+
 
 FEW = 5
 """Largest number of distinct values that are listed."""
