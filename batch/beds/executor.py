@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from batch.beds.case_result import CampaignRecords, CaseResult, case_result
-from batch.campaigns import shard, tasks
+from batch.campaigns import tasks
 from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.resuming import changed_since
@@ -127,7 +127,7 @@ class OnBeds:
         if history is not None and section.single:
             history = history.astype(np.float32)
         fates = {place: (FAILED, why) for place, (_, why) in enumerate(endings) if why}
-        computed = shard.Shard(
+        computed = tasks.Shard(
             section.key(task.first, task.last),
             engine.with_linear(section.prepared, np.stack([result.outputs for result in results])),
             history,
@@ -137,7 +137,7 @@ class OnBeds:
         try:
             tasks.keep(self._folder.shards, task, computed)
         except OSError as reason:
-            return [Outcome(task, "broken", why=shard.cannot_keep(self._folder.path, reason))]
+            return [Outcome(task, "broken", why=tasks.cannot_keep(self._folder.path, reason))]
         return [Outcome(task, "done", Done(computed.seconds, computed.failed))]
 
     def close(self) -> None:

@@ -35,9 +35,8 @@ from typing import Any
 import numpy as np
 
 from batch.archive.sink import is_at
-from batch.campaigns import shard
 from batch.campaigns.points import NPY_HEAD_BYTES, grown_program, points_path, read_points
-from batch.campaigns.tasks import CampaignSection, Done, Task
+from batch.campaigns.tasks import CampaignSection, Done, Shard, Task, UnsoundShard, shard_of_file
 from batch.campaigns.verification.verifying import WORDS as VERIFY_WORDS
 from met import run as engine
 from met.diagnostic import Problem, error
@@ -316,15 +315,15 @@ class Folder:
         beside = self.shards / task.name
         return beside if path != beside and beside.exists() else path
 
-    def read(self, section: CampaignSection, task: Task) -> shard.Shard:
+    def read(self, section: CampaignSection, task: Task) -> Shard:
         """A task's shard. Raises shard.UnsoundShard where it is not one of this section's, OSError."""
-        read_shard = shard.read(self._path(task), task.cases * _bytes_of_case(section))
+        read_shard = shard_of_file(self._path(task), task.cases * _bytes_of_case(section))
         if not 0 <= task.first < task.last <= len(section.rows) or len(read_shard.outputs) != task.cases:
-            raise shard.UnsoundShard("holds other cases than its name says")
+            raise UnsoundShard("holds other cases than its name says")
         if read_shard.key != section.key(task.first, task.last):
-            raise shard.UnsoundShard("is of another plan, or of another version of MET's code")
+            raise UnsoundShard("is of another plan, or of another version of MET's code")
         if not _fits(section, read_shard):
-            raise shard.UnsoundShard("holds other outputs than the program has")
+            raise UnsoundShard("holds other outputs than the program has")
         return read_shard
 
     def sound_tasks(self, section: CampaignSection) -> tuple[dict[Task, Done], list[str]]:
@@ -336,8 +335,8 @@ class Folder:
         for task in self.named_tasks(section.number):
             try:
                 read_shard = self.read(section, task)
-            except (shard.UnsoundShard, OSError) as reason:
-                why = str(reason) if isinstance(reason, shard.UnsoundShard) else f"cannot be read: {reason.strerror}"
+            except (UnsoundShard, OSError) as reason:
+                why = str(reason) if isinstance(reason, UnsoundShard) else f"cannot be read: {reason.strerror}"
                 messages.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
                 _remove(self._path(task))
             else:
@@ -363,8 +362,8 @@ class Folder:
         """Computing time of the existing shards, s; once it is `enough`, no more are read."""
         total = 0.0
         for path in self._shard_files():
-            with contextlib.suppress(shard.UnsoundShard, OSError):
-                total += shard.read(path).seconds
+            with contextlib.suppress(UnsoundShard, OSError):
+                total += shard_of_file(path).seconds
             if total >= enough:
                 break
         return total
@@ -452,7 +451,7 @@ def _bytes_of_case(section: CampaignSection) -> int:
     return np.dtype(float).itemsize * (len(section.prepared.outputs) + rows * section.prepared.program.columns)
 
 
-def _fits(section: CampaignSection, read_shard: shard.Shard) -> bool:
+def _fits(section: CampaignSection, read_shard: Shard) -> bool:
     """True if the arrays of a shard have the program's sizes, and its failures are possible."""
     program, structure = section.prepared.program, section.prepared.experiment.structure
     if read_shard.outputs.shape[1] != len(section.prepared.outputs):

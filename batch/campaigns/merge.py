@@ -18,10 +18,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from batch.campaigns import shard
 from batch.campaigns.folder import Folder
 from batch.campaigns.outcomes import CaseOutcomes
-from batch.campaigns.tasks import CampaignSection, Task
+from batch.campaigns.tasks import CampaignSection, Shard, Task, UnsoundShard, write_shard
 from met import run as engine
 from met.diagnostic import Problem, error
 from met.plan.columns import places_among
@@ -72,7 +71,7 @@ def merge(
         run = _results(values, first, outputs, None, fates)
         return first, run, writer.case_values(number, run)
 
-    def shards(pool: ThreadPoolExecutor) -> Iterator[tuple[int, shard.Shard]]:
+    def shards(pool: ThreadPoolExecutor) -> Iterator[tuple[int, Shard]]:
         for start, read_shard in shards_in_order(folder, values, pool):
             if read_shard.history is not None:
                 run = _results(values, start, read_shard.outputs.copy(), read_shard.history, dict(read_shard.fates))
@@ -123,7 +122,7 @@ def _alone(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, str]
     end = 0
     for task in folder.named_tasks(section.number):
         if task.cases == 1 and task.first >= end:
-            with contextlib.suppress(shard.UnsoundShard, OSError):  # `pieces` meets it, too
+            with contextlib.suppress(UnsoundShard, OSError):  # `pieces` meets it, too
                 for _, why in folder.read(section, task).fates.values():
                     yield int(section.rows[task.first]), why
         end = max(end, task.last)
@@ -139,14 +138,14 @@ def results(folder: Folder, section: CampaignSection, most: Mapping[str, int] | 
 
 def shards_in_order(
     folder: Folder, section: CampaignSection, pool: ThreadPoolExecutor | None = None
-) -> Iterator[tuple[int, shard.Shard]]:
+) -> Iterator[tuple[int, Shard]]:
     """The shards of a section in order, without cases of earlier ones, each with the place of its first case. pool:
     reads some in advance, unless they have histories, which would take much memory. Raises Missing."""
 
-    def read(task: Task, end: int) -> tuple[int, shard.Shard]:
+    def read(task: Task, end: int) -> tuple[int, Shard]:
         try:
             return end, _without(folder.read(section, task), end - task.first)
-        except (shard.UnsoundShard, OSError) as reason:
+        except (UnsoundShard, OSError) as reason:
             raise Missing(f"shard {task.name} {reason}") from reason
 
     tasks, end = [], 0
@@ -160,7 +159,7 @@ def shards_in_order(
 
 
 def in_blocks(
-    shards: Iterable[tuple[int, shard.Shard]],
+    shards: Iterable[tuple[int, Shard]],
 ) -> Iterator[tuple[int, np.ndarray, dict[int, tuple[int, str]]]]:
     """Outputs and fates of cases in blocks of `BLOCK`, whatever the shards, each with the place of its first case."""
     waiting: list[np.ndarray] = []
@@ -226,32 +225,32 @@ def with_rows(folder: Folder, section: CampaignSection, places: np.ndarray, numb
             continue
         try:
             read_shard = folder.read(section, task)
-        except (shard.UnsoundShard, OSError) as reason:
+        except (UnsoundShard, OSError) as reason:
             raise Missing(f"shard {task.name} {reason}") from reason
         own = Task(number, first, last)
         part = _part(read_shard, places[first:last] - task.first, new_section.key(first, last))
-        shard.write(folder.shards / own.name, part)
+        write_shard(folder.shards / own.name, part)
         done += last - first
     if done < len(places):
         raise Missing(f"{len(places) - done:,} cases of {section.name} have no shard any more")
     return new_section
 
 
-def _part(original: shard.Shard, cases: np.ndarray, key: str) -> shard.Shard:
+def _part(original: Shard, cases: np.ndarray, key: str) -> Shard:
     """Some cases of a shard as a new shard, without computing time, which stays with the original."""
     history = None if original.history is None else original.history[cases]
     to = {case: place for place, case in enumerate(cases.tolist())}
     fates = {to[case]: fate for case, fate in original.fates.items() if case in to}
-    return shard.Shard(key, original.outputs[cases], history, 0.0, fates)
+    return Shard(key, original.outputs[cases], history, 0.0, fates)
 
 
-def _without(original: shard.Shard, first: int) -> shard.Shard:
+def _without(original: Shard, first: int) -> Shard:
     """A shard without its first cases."""
     if not first:
         return original
     history = None if original.history is None else original.history[first:]
     fates = {case - first: fate for case, fate in original.fates.items() if case >= first}
-    return shard.Shard(original.key, original.outputs[first:], history, original.seconds, fates)
+    return Shard(original.key, original.outputs[first:], history, original.seconds, fates)
 
 
 def _results(

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from batch.campaigns import shard
+from batch.campaigns import tasks
 from batch.campaigns.drive import Count, Driver, Stopped
 from batch.campaigns.folder import uncovered
 from batch.campaigns.judging import judged_designs
@@ -244,7 +244,7 @@ def run_search(driver: Driver, search: CampaignSearch, sections: dict[int, Campa
     sections[number] = search.section
 
 
-Held = list[tuple[Task, shard.Shard]]
+Held = list[tuple[Task, tasks.Shard]]
 """Shards with their tasks."""
 
 
@@ -255,15 +255,15 @@ def _held(
 
     tell  whether what is found counts as done before, and what is no shard is told of
     """
-    count, shards = driver.counts[section.number], list[tuple[Task, shard.Shard]]()
+    count, shards = driver.counts[section.number], list[tuple[Task, tasks.Shard]]()
     for task in driver.folder.named_tasks(section.number, (first, last)):
         try:
             shards.append((task, driver.folder.read(section, task)))
-        except (shard.UnsoundShard, OSError) as reason:
-            why = str(reason) if isinstance(reason, shard.UnsoundShard) else f"cannot be read: {reason.strerror}"
+        except (tasks.UnsoundShard, OSError) as reason:
+            why = str(reason) if isinstance(reason, tasks.UnsoundShard) else f"cannot be read: {reason.strerror}"
             driver.messages.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
             driver.folder.remove_shard(task)
-    end, new_shards = first, list[tuple[Task, shard.Shard]]()
+    end, new_shards = first, list[tuple[Task, tasks.Shard]]()
     for task, held_shard in shards:
         if task.last > end:
             new_shards.append((task, held_shard))

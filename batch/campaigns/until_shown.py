@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from batch.campaigns import shard
+from batch.campaigns import tasks
 from batch.campaigns.drive import Driver, Stopped
 from batch.campaigns.folder import Folder
 from batch.campaigns.merge import with_rows
@@ -75,7 +75,7 @@ class StoppingPoints:
             if task not in self._read:
                 try:
                     self._read[task] = self._outcomes(task, folder.read(self._section, task))
-                except (shard.UnsoundShard, OSError):
+                except (tasks.UnsoundShard, OSError):
                     continue
             new = ~self._known[task.first : task.last]
             self._missed[task.first : task.last][new] = self._read[task][new, :-1]
@@ -109,7 +109,7 @@ class StoppingPoints:
         batch = max(busy, min(self._needed(places, known), max(FIRST_CASES, known // GROWTH)))
         return -(-batch // GRANULE) * GRANULE
 
-    def _outcomes(self, task: Task, task_shard: shard.Shard) -> np.ndarray:
+    def _outcomes(self, task: Task, task_shard: tasks.Shard) -> np.ndarray:
         """For each case of a shard, whether it misses each of the requirements, by the archive's rule, and whether it
         failed: [case, requirement], the last for failed."""
         rows = self._section.rows[task.first : task.last]

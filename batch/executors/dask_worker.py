@@ -20,7 +20,7 @@ from distributed import Reschedule, Worker, WorkerPlugin, get_worker
 from distributed.utils import sync
 from distributed.worker import WORKER_ANY_RUNNING
 
-from batch.campaigns import shard
+from batch.campaigns import tasks
 from batch.campaigns.executor import Outcome
 from batch.campaigns.tasks import Task
 from batch.executors.child import Crew
@@ -61,7 +61,7 @@ def carry_out(order: Mapping[str, Any]) -> dict[str, Any]:
     answer = {"kind": "done", "done": [outcome.done.seconds, outcome.done.failed], "host": host}
     if not children.proved:
         children.proved = True
-        answer["proof"] = shard.read(folder / "shards" / task.path).key
+        answer["proof"] = tasks.shard_of_file(folder / "shards" / task.path).key
     return answer
 
 

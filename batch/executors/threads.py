@@ -9,8 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from batch.campaigns import tasks
 from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
-from batch.campaigns.shard import cannot_keep
-from batch.campaigns.tasks import CampaignSection, Done, Task
+from batch.campaigns.tasks import CampaignSection, Done, Task, cannot_keep
 from met.host import system
 
 

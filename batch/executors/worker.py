@@ -17,8 +17,7 @@ from typing import Any
 
 from batch.campaigns import tasks
 from batch.campaigns.folder import Folder
-from batch.campaigns.shard import cannot_keep
-from batch.campaigns.tasks import CampaignSection, Task
+from batch.campaigns.tasks import CampaignSection, Task, cannot_keep
 from batch.executors.child import NO_MEMORY
 from met.diagnostic import Problem
 

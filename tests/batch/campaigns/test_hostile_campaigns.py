@@ -19,7 +19,7 @@ import pytest
 import batch
 import ic
 from batch.archive.read import ArchiveFile
-from batch.campaigns import merge, resuming, shard, status, tasks
+from batch.campaigns import merge, resuming, status, tasks
 from batch.campaigns.campaign import prepare
 from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
@@ -341,15 +341,15 @@ def test_a_share_counts_its_own_cases(submitted: Path, monkeypatch: pytest.Monke
 
 
 def test_a_case_that_failed_may_be_run_again_on_another_machine(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write = shard.write
+    write = tasks.write_shard
 
-    def elsewhere(path: Path, made: shard.Shard) -> None:
+    def elsewhere(path: Path, made: tasks.Shard) -> None:
         if made.history is not None:
             assert np.isnan(made.outputs).any()
             made.outputs[np.isnan(made.outputs)] = -made.outputs[np.isnan(made.outputs)]  # the other sign
         write(path, made)
 
-    monkeypatch.setattr(shard, "write", elsewhere)
+    monkeypatch.setattr(tasks, "write", elsewhere)
     batch.run(deck(here, DOOR), output="a.h5", histories="failed")
 
 

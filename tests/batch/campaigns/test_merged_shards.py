@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from batch.campaigns import merge, shard
+from batch.campaigns import merge, tasks
 from batch.campaigns.folder import Folder
 from batch.campaigns.tasks import CampaignSection, Task, keep, not_run
 from met import run as engine
@@ -83,13 +83,13 @@ def section_of(rows: Iterable[int], *, recorded: bool = False, number: int = 0) 
     return CampaignSection(number, 0, Numbering(40), np.array([*rows]), recorded)  # type: ignore[arg-type]
 
 
-def a_shard(section: CampaignSection, first: int, last: int) -> shard.Shard:
+def a_shard(section: CampaignSection, first: int, last: int) -> tasks.Shard:
     """The results of some cases of a section: the row is the output, and its negative fills the history."""
     rows = np.asarray(section.rows[first:last], float)
     steps = section.prepared.experiment.structure.schedule.rows
     history = np.repeat(-rows, steps).reshape(len(rows), steps, 1) if section.recorded else None
     outputs = np.outer(rows, [0.0, 0.0, 0.0, 1.0])
-    return shard.Shard(section.key(first, last), outputs, history, 1.0)
+    return tasks.Shard(section.key(first, last), outputs, history, 1.0)
 
 
 def put(folder: Folder, section: CampaignSection, *stretches: tuple[int, int], lost: Iterable[int] = ()) -> None:
@@ -156,7 +156,7 @@ def test_a_shard_loses_its_first_cases_with_their_fates_and_histories() -> None:
 def test_blocks_have_65536_cases(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of an archive with more cases, the bytes depend on it."""
     monkeypatch.undo()
-    shards = [(at, shard.Shard("", np.zeros((count, 1)), None, 0.0)) for at, count in ((0, 65_535), (65_535, 2))]
+    shards = [(at, tasks.Shard("", np.zeros((count, 1)), None, 0.0)) for at, count in ((0, 65_535), (65_535, 2))]
     assert [(first, len(outputs)) for first, outputs, _ in merge.in_blocks(shards)] == [(0, 65_536), (65_536, 1)]
 
 
@@ -225,7 +225,7 @@ def test_another_number_of_a_case_run_again_is_an_error(folder: Folder, case: in
     place = [0, 10, 24].index(case)
     other = a_shard(histories, 0, 3)
     other.outputs[place, -1] = np.nextafter(case, np.inf)
-    shard.write(folder.shards / Task(1, 0, 3).name, other)
+    tasks.write_shard(folder.shards / Task(1, 0, 3).name, other)
     with pytest.raises(Problem) as caught:
         merged(folder, values, histories)
     [diagnostic] = caught.value.diagnostics

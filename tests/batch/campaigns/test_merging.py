@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import batch
-from batch.campaigns import shard
+from batch.campaigns import tasks
 from met import run as engine
 from met.diagnostic import Problem
 from tests.batch import plans
@@ -17,14 +17,14 @@ from tests.batch import plans
 def test_a_case_that_gives_other_numbers_when_it_is_run_again_stops_the_merge(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write = shard.write
+    write = tasks.write_shard
 
-    def wrong(path: Path, made: shard.Shard) -> None:
+    def wrong(path: Path, made: tasks.Shard) -> None:
         if made.history is not None:
             made.outputs[1, -1] += 1e-12
         write(path, made)
 
-    monkeypatch.setattr(shard, "write", wrong)
+    monkeypatch.setattr(tasks, "write", wrong)
     with pytest.raises(Problem) as caught:
         batch.run(plans.plan(plans.gains(9)), output="a.h5", histories=["every:4"])
     [told] = caught.value.diagnostics

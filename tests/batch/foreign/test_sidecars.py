@@ -17,7 +17,7 @@ import pytest
 import batch
 from batch.beds.case_result import check_head
 from batch.beds.executor import OnBeds, Ports
-from batch.campaigns import shard
+from batch.campaigns import tasks
 from batch.campaigns.folder import Folder
 from batch.terminal import job
 from hw.beds.replay import ReplayBed
@@ -175,13 +175,13 @@ def test_a_sidecar_of_any_kind_is_read_or_left(text: str, here: Path, engine: No
 
 def resummed(path: Path, change: Callable[[dict[str, Any]], object], tail: bytes = b"") -> None:
     """Another head, whose checksum is right."""
-    data = path.read_bytes()[: -shard.SUM_BYTES]
-    at = len(shard.MAGIC) + 8
-    end = at + int.from_bytes(data[len(shard.MAGIC) : at], "little")
+    data = path.read_bytes()[: -tasks.SUM_BYTES]
+    at = len(tasks.MAGIC) + 8
+    end = at + int.from_bytes(data[len(tasks.MAGIC) : at], "little")
     head = json.loads(data[at:end])
     found = change(head)
     text = (found if isinstance(found, str) else json.dumps(head)).encode()
-    made = shard.MAGIC + len(text).to_bytes(8, "little") + text + data[end:] + tail
+    made = tasks.MAGIC + len(text).to_bytes(8, "little") + text + data[end:] + tail
     path.write_bytes(made + hashlib.sha256(made).digest())
 
 
@@ -220,9 +220,9 @@ def test_a_shard_with_a_right_checksum_and_a_wrong_head_counts_as_none(name: str
 
 def test_a_shard_of_other_outputs_than_the_programs_counts_as_none(campaign: Path) -> None:
     first = sorted((campaign / "shards").iterdir())[0]
-    found = shard.read(first)
+    found = tasks.shard_of_file(first)
     wide = np.zeros((len(found.outputs), found.outputs.shape[1] + 1))
-    shard.write(first, shard.Shard(found.key, wide, found.history, found.seconds, found.fates))
+    tasks.write_shard(first, tasks.Shard(found.key, wide, found.history, found.seconds, found.fates))
     _, notes = go_on(Path("a.h5"))
     assert f"shard {first.name} holds other outputs than the program has; its 8 cases are run again" in notes
 

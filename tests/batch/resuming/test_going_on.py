@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import batch
-from batch.campaigns import shard, tasks
 from batch.campaigns import status as status_files
+from batch.campaigns import tasks
 from batch.campaigns.folder import Folder
 from tests.batch import plans, whole
 from tests.batch.begun import CASES, OF_TASK, begin, flip, go_on, plan, refused
@@ -104,9 +104,9 @@ def of_other_cases(path: Path) -> None:
 
 def fewer_cases(path: Path) -> None:
     """A sound shard with fewer cases than its name says."""
-    found = shard.read(path)
+    found = tasks.shard_of_file(path)
     assert found.history is not None
-    shard.write(path, shard.Shard(found.key, found.outputs[:-1], found.history[:-1], found.seconds))
+    tasks.write_shard(path, tasks.Shard(found.key, found.outputs[:-1], found.history[:-1], found.seconds))
 
 
 CHECKSUM = "is not what was written: its checksum differs"
@@ -142,17 +142,19 @@ def test_a_shard_that_does_not_count(
 def test_no_byte_of_a_shard_may_change_and_none_may_lack(tmp_path: Path) -> None:
     path = tmp_path / "0-000000000-000000003"
     numbers = np.arange(12.0)
-    shard.write(path, shard.Shard("5a" * 32, numbers.reshape(3, 4), numbers.reshape(3, 2, 2), 0.25, {1: (3, "gone")}))
+    tasks.write_shard(
+        path, tasks.Shard("5a" * 32, numbers.reshape(3, 4), numbers.reshape(3, 2, 2), 0.25, {1: (3, "gone")})
+    )
     sound = path.read_bytes()
     for position in range(len(sound)):
         flip(path, position, position % 8)
-        with pytest.raises(shard.UnsoundShard):
-            shard.read(path)
+        with pytest.raises(tasks.UnsoundShard):
+            tasks.shard_of_file(path)
         path.write_bytes(sound[:position])
-        with pytest.raises(shard.UnsoundShard):
-            shard.read(path)
+        with pytest.raises(tasks.UnsoundShard):
+            tasks.shard_of_file(path)
         path.write_bytes(sound)
-    found = shard.read(path)
+    found = tasks.shard_of_file(path)
     assert (found.key, found.seconds, found.fates) == ("5a" * 32, 0.25, {1: (3, "gone")})
 
 
