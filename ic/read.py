@@ -13,8 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from ic.grammar.parse import Parsed, parse_on
-from ic.grammar.roofs import under_roof, with_full_names
 from ic.grammar.syntax import NO_ROOFS, Deck, Entry, Group, Let, Roof, Roofs, UseEntry, Word
+from ic.grammar.uses import under_roof, with_full_names
 from ic.language import EXPERIMENTS, HEADS
 from ic.text.files import DECK_IN_MEMORY, LIBRARY, NOTHING_UNSAVED, Files, FoundFile, Unsaved
 from ic.text.lexer import COMMAND_LINE

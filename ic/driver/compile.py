@@ -9,9 +9,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal
 
-from ic.grammar.roofs import with_full_names
 from ic.grammar.settings import command_line, read_settings
 from ic.grammar.syntax import Deck, Setting
+from ic.grammar.uses import with_full_names
 from ic.language import EXPERIMENTS
 from ic.meaning.checks.degrees import remark_degrees
 from ic.meaning.checks.lists import skipped_elements

@@ -17,8 +17,8 @@ import numpy as np
 from ic.driver.compile import Compiled, compile_deck
 from ic.driver.explain import explanations_of
 from ic.grammar.parse import parse
-from ic.grammar.roofs import with_full_names
 from ic.grammar.syntax import Deck, Entry, Name, Number, WithUnit, children
+from ic.grammar.uses import with_full_names
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import Checks
 from ic.meaning.expressions.quantity import measure_of

@@ -78,7 +78,7 @@ class String:
 class Name:
     """A reference: `slow`, `gearbox.kp`, `shoulder.servo.voltage`, `on`; `*.servo.voltage`, of every joint.
 
-    roof  of a name that a used deck writes, the roof under which its own names are (`ic.grammar.roofs`)
+    roof  of a name that a used deck writes, the roof under which its own names are (`ic.grammar.uses`)
     """
 
     path: tuple[Word, ...]

@@ -10,8 +10,8 @@ from copy import copy
 from dataclasses import replace
 from typing import Any
 
-from ic.grammar.roofs import split_path
 from ic.grammar.syntax import Binary, Call, Deck, Entry, Expression, Group, Let, Name, Setting, Word
+from ic.grammar.uses import split_path
 from ic.language import DEFINITIONS, EXPERIMENTS, HEADS, OF_A_RUN
 from ic.meaning.definitions.csv_files import csv_files
 from ic.meaning.definitions.merge import Item, MergedBlock, defined_twice, merge
