@@ -12,7 +12,7 @@ from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPAR
 from batch.differences.result import Diff, EndingDiff, ExperimentDiff, RankedCase, RequirementDiff, SignalDiff
 from batch.differences.samples import LEVEL, MetricSamples
 from batch.queries.evidence_table import texts_of
-from batch.queries.failures import STATUS, ranges
+from batch.queries.pool import STATUS, ranges
 from batch.queries.signals import number_text
 from met.frozen import frozen
 from met.messages.visible import visible

@@ -12,7 +12,7 @@ from batch.archive.read import ArchiveGroup
 from batch.archive.stored import Stored
 from batch.export.picking import ExportedCase
 from batch.export.wire import MessageField
-from batch.queries.failures import STATUS
+from batch.queries.pool import STATUS
 from batch.queries.signals import case_text, value_text
 from met.frozen import frozen
 from met.run import DONE, FAILED

@@ -11,8 +11,7 @@ from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.archive.stored import Stored
 from batch.export.picking import rank
 from batch.queries import requirements
-from batch.queries.failures import STATUS
-from batch.queries.pool import by_run, cases_named, groups_named
+from batch.queries.pool import STATUS, by_run, cases_named, groups_named
 from met.frozen import frozen
 from met.unit_parser import decimals
 

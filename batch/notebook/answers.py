@@ -14,8 +14,7 @@ from batch.notebook.table import CASE, RECORDED, archive, cases_of, experiment, 
 from batch.queries import cases
 from batch.queries.answer_outcome import answer_outcome
 from batch.queries.evidence_table import FIELDS, as_data, requirement_evidence
-from batch.queries.failures import STATUS
-from batch.queries.pool import by_run
+from batch.queries.pool import STATUS, by_run
 from batch.queries.search_answers import SearchAnswer
 from met.diagnostic import Problem, error
 from met.distinct import distinct

@@ -12,8 +12,7 @@ import numpy as np
 from batch.archive.read import ArchiveFile
 from batch.archive.stored import Stored
 from batch.queries.best import ENDS, Designs, Goal, Stretch
-from batch.queries.failures import failure_lines
-from batch.queries.pool import CaseColumn, Pool
+from batch.queries.pool import CaseColumn, Pool, failure_lines
 from batch.queries.signals import number_text, number_texts, pretty_unit
 from batch.queries.stability_words import KEPT, margin_words, stability_data, stability_texts, wrapped
 from batch.queries.summary import finite

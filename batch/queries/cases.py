@@ -10,9 +10,8 @@ import numpy as np
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.archive.stored import Stored
 from batch.queries import ordering, requirements
-from batch.queries.failures import STATUS
 from batch.queries.ordering import CaseOrder
-from batch.queries.pool import ENDED, Pool
+from batch.queries.pool import ENDED, STATUS, Pool
 from batch.queries.signals import deck_unit, number_text, number_texts, value_text
 from batch.queries.streamed import is_streamed, summed_up
 from batch.queries.summary import finite

@@ -14,7 +14,7 @@ from batch.archive.summarised import DOUBTFUL, CaseSummary
 from batch.queries.answer_outcome import AnswerOutcome, answer_outcome
 from batch.queries.at_limits import LimitSummary, limit_summaries
 from batch.queries.evidence import EvidenceRow, evidence
-from batch.queries.failures import STATUS, FailureGroup, failures
+from batch.queries.pool import STATUS, FailureGroup, failures
 from batch.queries.requirements import requirement_texts
 from batch.queries.search_answers import SearchAnswer
 from batch.queries.signals import number_text

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from batch.archive.summarised import DOUBTFUL, VARIABLES, WORDS
-from batch.queries.failures import NUMBER
+from batch.queries.pool import NUMBER
 from batch.queries.requirements import beyond
 from met.frozen import frozen
 from met.run import DONE

@@ -15,10 +15,9 @@ from batch.queries import cases, ordering
 from batch.queries.at_limits import reached_texts
 from batch.queries.evidence_table import RequirementEvidence, requirement_evidence
 from batch.queries.evidence_table import as_data as evidence_data
-from batch.queries.failures import failure_lines
 from batch.queries.given import settings_lines
 from batch.queries.ordering import CaseOrder, structures
-from batch.queries.pool import Pool, by_run, cases_named, groups_named, pools
+from batch.queries.pool import Pool, by_run, cases_named, failure_lines, groups_named, pools
 from batch.queries.search_answers import SearchAnswer
 from batch.queries.search_result import search_result
 from batch.queries.selection import CaseSelection

@@ -12,7 +12,7 @@ from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, CampaignPart
 from batch.campaigns.performing import Performed
 from batch.campaigns.status import duration
-from batch.queries.failures import failure_lines
+from batch.queries.pool import failure_lines
 from batch.queries.search_result import SearchResult
 from batch.queries.step_errors.figures import HINT
 from batch.queries.summary import Summary, as_json, finite

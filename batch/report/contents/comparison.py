@@ -9,8 +9,7 @@ import numpy as np
 from batch.differences import words
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, VERDICTS
 from batch.differences.result import Diff, ExperimentDiff
-from batch.queries.failures import ranges
-from batch.queries.pool import ENDED, Pool
+from batch.queries.pool import ENDED, Pool, ranges
 from batch.report.contents.against import GOOD, ComparedArchive, EarlierCases
 from batch.report.contents.changes import PARAMETERS, ArchiveChanges, DeckTextChange, OtherOrigin, RunChanges
 from batch.report.contents.moves import metric_moves

@@ -10,8 +10,7 @@ import numpy as np
 from batch.queries.answer_outcome import answer_outcome
 from batch.queries.at_limits import limit_summaries, reached_texts
 from batch.queries.evidence import EvidenceRow, evidence, percent_below
-from batch.queries.failures import failures, ranges
-from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
+from batch.queries.pool import ENDED, CaseColumn, Pool, failures, page_number, ranges
 from batch.queries.search_answers import SearchAnswer
 from batch.queries.signals import deck_unit
 from batch.queries.step_errors.figures import NONE, StepErrorVerdict, Verification, error_text, figures, verdicts

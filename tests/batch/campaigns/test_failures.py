@@ -19,7 +19,7 @@ import ic
 from batch.archive.read import ArchiveFile
 from batch.campaigns import performing, tasks
 from batch.executors.processes import Processes
-from batch.queries.failures import failures
+from batch.queries.pool import failures
 from batch.terminal import running
 from met import cli
 from met.diagnostic import Problem
