@@ -18,8 +18,8 @@ from met.frozen import frozen
 from met.judging import judge
 from met.passing import Memories, run_past
 from met.plan import REPEAT, Cases, Experiment, keys
+from met.plan.judged import ANSWERED, NOT_ASKED, WHY_ANSWER, WHY_NONE
 from met.plan.limits import LimitUse, extremes, limits
-from met.plan.linear_uses import ANSWERED, NOT_ASKED, WHY_ANSWER, WHY_NONE
 from met.plan.outputs import GRAPPLE_FIGURES, grappled_payloads
 from met.program import cells, plausible
 from met.program.build import COORDINATE, METRIC, build

@@ -15,9 +15,8 @@ from met.diagnostic import Place
 from met.frozen import frozen
 from met.plan import BASE, Base, Cases, Command, Course, Experiment, Formula, Plan, Quantity, Schedule, Structure
 from met.plan.columns import CaseValues, blocks, different
-from met.plan.judged import Requirement
+from met.plan.judged import LinearUse, Requirement
 from met.plan.keys import in_key, inputs, structure_key
-from met.plan.linear_uses import LinearUse
 from met.plan.searches import Search
 from met.trace import Formulas
 from met.unit_parser import decimals

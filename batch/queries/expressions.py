@@ -22,7 +22,7 @@ from ic.text.complaints import known_words
 from ic.text.lexer import COMMAND_LINE
 from met import models
 from met.diagnostic import Problem, did_you_mean, error
-from met.plan.linear_uses import FIGURES
+from met.plan.judged import FIGURES
 from met.trace import Formulas, Graph
 from met.unit_parser import parse_unit
 from met.units import Dimension

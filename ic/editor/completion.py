@@ -30,7 +30,7 @@ from met import models
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan.channel import COMMAND_UNIT, MOTION, OF_JOINT
-from met.plan.linear_uses import FIGURES
+from met.plan.judged import FIGURES
 from met.unit_parser import parse_unit
 from met.units import ALL_UNITS
 

@@ -26,7 +26,7 @@ from ic.printing.models import (
 from ic.printing.page import Page, Table
 from met import models, units
 from met.plan import channel
-from met.plan.linear_uses import FIGURES
+from met.plan.judged import FIGURES
 from met.units import ONE
 
 OF_ANY = (

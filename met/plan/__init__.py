@@ -55,13 +55,13 @@ from met.plan.chains import ground, springs, straightened
 from met.plan.closing import Loop
 from met.plan.columns import CaseValues, FormulaColumn, ShiftedColumn, all_rows, listed
 from met.plan.judged import (
+    LinearUse,
     MetricUse,
     Requirement,
     SignalExpression,
     StepErrorLimit,
     Tolerance,
 )
-from met.plan.linear_uses import LinearUse
 from met.plan.run_keys import RunKey, run_key
 from met.plan.searches import Search
 from met.trace.graph import Formulas

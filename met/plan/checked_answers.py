@@ -7,8 +7,8 @@ import math
 from met.plan import Experiment, Structure
 from met.plan.channel import recordable
 from met.plan.codec import Damaged
+from met.plan.judged import FIGURES, LinearUse
 from met.plan.linear_signals import input_signals
-from met.plan.linear_uses import FIGURES, LinearUse
 from met.plan.searches import MOST_PLANTS, MOST_SEARCHED, SHORTEST, Search, are_starts
 from met.plan.structure import check_name, check_whole
 from met.unit_parser import parse_unit

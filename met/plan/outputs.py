@@ -7,8 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from met import models
 from met.plan import Recorded, Structure
 from met.plan.channel import channel_paths, channels_beside, watched_unit
-from met.plan.judged import MetricUse
-from met.plan.linear_uses import FIGURES
+from met.plan.judged import FIGURES, MetricUse
 
 OF_ALL = {"rel": "1", "time": "s"}
 """Tolerances that apply to everything, with units: a share of the value; how much earlier or later."""

@@ -13,8 +13,7 @@ from met.diagnostic import Label, Place, leave_out
 from met.frozen import frozen
 from met.metrics.metric import ROUNDING, Metric
 from met.plan import ServoUse, Structure
-from met.plan.judged import CHANNEL_INPUT, MetricUse, Requirement
-from met.plan.linear_uses import FIGURES
+from met.plan.judged import CHANNEL_INPUT, FIGURES, MetricUse, Requirement
 from met.trace.graph import Formulas
 from met.trace.nodes import OPERANDS
 

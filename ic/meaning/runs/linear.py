@@ -21,9 +21,8 @@ from met.parameter import Parameter
 from met.plan import Joint, Structure
 from met.plan.channel import recordable
 from met.plan.checked_answers import is_way
-from met.plan.judged import MetricUse
+from met.plan.judged import FIGURES, LinearUse, MetricUse
 from met.plan.linear_signals import InputSignal, input_signals, no_computer
-from met.plan.linear_uses import FIGURES, LinearUse
 from met.trace import Scalar
 
 ONE_INSTANT = NotSweepable("is one for the whole sweep", "write a `linear` block for each instant")

@@ -17,8 +17,7 @@ from met import models
 from met.diagnostic import did_you_mean
 from met.metrics.metric import Metric
 from met.plan.channel import Channel
-from met.plan.judged import MetricUse, SignalExpression
-from met.plan.linear_uses import FIGURES
+from met.plan.judged import FIGURES, MetricUse, SignalExpression
 
 
 def resolve_metrics(

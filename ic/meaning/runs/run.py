@@ -42,8 +42,7 @@ from met.diagnostic import Place, did_you_mean, write
 from met.frozen import frozen
 from met.integrators import DEFAULT_INTEGRATOR
 from met.plan import Allowance, Cases, Experiment, Schedule, ServoUse, Structure
-from met.plan.judged import MetricUse, Requirement, StepErrorLimit, Tolerance
-from met.plan.linear_uses import LinearUse
+from met.plan.judged import LinearUse, MetricUse, Requirement, StepErrorLimit, Tolerance
 from met.trace import Formulas
 
 BLOCKS = ("servos", *(block.name for block in (INITIAL, ENVIRONMENT, RATES, TOLERANCES)))

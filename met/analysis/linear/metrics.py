@@ -20,8 +20,7 @@ from met.analysis.linear.plant import plants
 from met.analysis.linear.standing import settled
 from met.diagnostic import Problem
 from met.passing import Memories
-from met.plan.judged import MetricUse
-from met.plan.linear_uses import (
+from met.plan.judged import (
     ANSWERED,
     AT_LIMIT,
     EVENT,
@@ -34,6 +33,7 @@ from met.plan.linear_uses import (
     WHY_ANSWER,
     LinearFigure,
     LinearUse,
+    MetricUse,
 )
 from met.program.build import METRIC
 

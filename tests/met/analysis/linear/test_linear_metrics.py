@@ -14,7 +14,7 @@ from met import run as engine
 from met.analysis.linear import metrics
 from met.analysis.linear.answers import of_deck
 from met.plan import keys
-from met.plan.linear_uses import FIGURES
+from met.plan.judged import FIGURES
 from tests.ic.small_decks import ARM, RUN, SERVO, experiment
 
 KP = (0.1, 0.2, 0.8, 3.2)
