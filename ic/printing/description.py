@@ -14,9 +14,9 @@ from ic.language.runs import BASE_KINDS
 from ic.meaning.expressions.evaluate import COMPARISONS, CONSTANTS, RESERVED, USAGE
 from ic.printing import codes, subjects, sweeps
 from ic.printing.columns import count
-from ic.printing.language import block_page
 from ic.printing.models import KINDS, UNIT_WORDS, model_record, parameter_record, where_written
 from ic.printing.page import Page, Table
+from ic.printing.subjects import block_page
 from ic.text.edition import EDITIONS, FIRST
 from ic.text.preprocess import DIRECTIVES
 from met import models, units

@@ -15,10 +15,9 @@ from ic.meaning.mechanics import dh, matter
 from ic.printing.codes import is_code, print_code
 from ic.printing.description import language_page
 from ic.printing.glossary import entries, meaning
-from ic.printing.language import in_block
 from ic.printing.models import KINDS, WHERE_WRITTEN, model_page, model_record, summary
 from ic.printing.page import Page, Table, described, terminal_width
-from ic.printing.subjects import BLOCK_PAGES, OTHER_PAGES, channels, in_si, unit_table
+from ic.printing.subjects import BLOCK_PAGES, OTHER_PAGES, channels, in_block, in_si, unit_table
 from ic.printing.sweeps import PAGES
 from met import models
 from met.diagnostic import Problem, did_you_mean, error

@@ -8,9 +8,9 @@ import pytest
 
 from ic.language import BLOCKS
 from ic.printing.columns import columns
-from ic.printing.language import block_page
 from ic.printing.models import model_page, sources
 from ic.printing.page import described, fitted, in_terminal, paragraphs
+from ic.printing.subjects import block_page
 from met import models
 
 ROWS = [
