@@ -5,7 +5,7 @@ verified_case     positions of the cases in the case table, rising; a dimension
     half, quarter     the metrics at half and a quarter of the step, SI; not-a-number where such a case failed
     instant           s, of a metric that is an instant seen at whole steps: a quarter of the step; 0 for others
     missed            how far the metric at a quarter of the step may be off by what lies between samples, SI, as
-                      met/metrics/furthest.py has it; 0 for what samples do not miss
+                      met/metrics/metric.py has it; 0 for what samples do not miss
     attributes        `order` of the integrator; `step_s`, the campaign's own step
 
 The values at the step itself are the campaign's own. Only these numbers are stored; errors are computed from them.

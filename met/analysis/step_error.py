@@ -48,7 +48,7 @@ def step_error(first: float, second: float, scale: float, expected: int, missed:
     second    |x(h/2) - x(h/4)|
     scale     size of the number, |x|
     expected  order of the integrator
-    missed    how far x(h/4) may be off by what lies between samples (met/metrics/furthest.py). Where an extreme is the
+    missed    how far x(h/4) may be off by what lies between samples (met/metrics/metric.py). Where an extreme is the
               same sample with all three steps, their differences show nothing of it
     """
     if not (math.isfinite(first) and math.isfinite(second)):

@@ -21,8 +21,7 @@ from met.dynamics.tree import Body, Tree
 from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Integrator, Motion
-from met.metrics.furthest import furthest
-from met.metrics.metric import Metric
+from met.metrics.metric import Metric, furthest
 from met.parameter import Memory, Parameter, State
 from met.plan import (
     BASE,

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from met.metrics import METRICS
-from met.metrics.furthest import furthest
-from met.metrics.metric import Metric
+from met.metrics.metric import Metric, furthest
 from tests.met.test_metrics import worth
 
 BY_NAME = {metric.name: metric for metric in METRICS}
