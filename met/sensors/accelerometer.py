@@ -22,8 +22,24 @@ from typing import Any
 
 from met.parameter import ZEROS, Parameter
 from met.sensors import butterworth
-from met.sensors.on_link import ALONG, BIAS, LINK, SCALE, at_rest, component, reading
-from met.sensors.sensor import DELAY, NOISE, PAST, RESOLUTION, Felt, Reading, Sensed, Sensor, filled
+from met.sensors.sensor import (
+    ALONG,
+    BIAS,
+    DELAY,
+    LINK,
+    NOISE,
+    PAST,
+    RESOLUTION,
+    SCALE,
+    Felt,
+    Reading,
+    Sensed,
+    Sensor,
+    at_rest,
+    component,
+    filled,
+    reading,
+)
 from met.trace import Real
 
 

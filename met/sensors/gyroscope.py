@@ -15,9 +15,32 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from met.sensors.on_link import ALONG, BIAS, LINK, SCALE, at_rest, component, reading
-from met.sensors.optional_filter import CUTOFF, FILTER, STATES, behind, fastest, follow, settled, swing
-from met.sensors.sensor import DELAY, NOISE, PAST, RESOLUTION, Felt, Reading, Sensed, Sensor, filled
+from met.sensors.sensor import (
+    ALONG,
+    BIAS,
+    CUTOFF,
+    DELAY,
+    FILTER,
+    LINK,
+    NOISE,
+    PAST,
+    RESOLUTION,
+    SCALE,
+    STATES,
+    Felt,
+    Reading,
+    Sensed,
+    Sensor,
+    at_rest,
+    behind,
+    component,
+    fastest,
+    filled,
+    follow,
+    reading,
+    settled,
+    swing,
+)
 from met.trace import Real
 
 

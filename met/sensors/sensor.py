@@ -16,9 +16,10 @@ from typing import Any, Protocol
 
 from met.environments.environment import World
 from met.frozen import frozen
-from met.parameter import Declaration, Memory, Parameter, State
-from met.trace import Real, rint, where
-from met.vectors import ZERO, Vector
+from met.parameter import BASE, Declaration, Memory, Parameter, State
+from met.sensors import butterworth
+from met.trace import Real, rint, sqrt, where
+from met.vectors import ZERO, Vector, dot, scale
 
 
 class Felt(World, Protocol):
@@ -144,3 +145,69 @@ def delayed(p: Any, held: Any, value: Real) -> Reading:
 def filled(value: Real) -> Mapping[str, Real]:
     """The queue at the start of a run."""
     return {memory.name: value for memory in PAST}
+
+
+LINK = Parameter(name="link", shape="word", names="link", words=(BASE,), doc="link that the sensor is fixed to")
+ALONG = Parameter(
+    name="along",
+    shape="vector",
+    direction=True,
+    doc="measured direction, in the link's frame; the length of the vector does not matter",
+)
+SCALE = Parameter(
+    name="scale",
+    default=1.0,
+    doc="reading per unit of the measured quantity: with 1.01 the sensor reads one per cent more",
+)
+BIAS = Parameter(name="bias", unit="of", default=0.0, doc="reading at zero of the measured quantity")
+
+
+def component(along: Vector, vector: Vector) -> Real:
+    """The component of a vector along a direction of any length."""
+    return dot(scale(1.0 / sqrt(dot(along, along)), along), vector)
+
+
+def reading(p: Any, held: Any, value: Real, sensed: Sensed) -> Reading:
+    """A value with scale, bias and the tick's noise, to the nearest step of the converter, `delay` ticks late."""
+    return delayed(p, held, converted(noisy(p, p.scale * value + p.bias, sensed), p.resolution))
+
+
+def at_rest(p: Any, value: Real) -> Real:
+    """The reading at the start of a run, without noise."""
+    return converted(p.scale * value + p.bias, p.resolution)
+
+
+_THERE = ("filter", ("butterworth",))
+
+FILTER = Parameter(
+    name="filter",
+    shape="word",
+    words=("none", "butterworth"),
+    default="none",
+    doc="analog filter between the quantity and the reading",
+)
+CUTOFF = butterworth.cutoff(_THERE)
+STATES = butterworth.states(_THERE)
+
+
+def follow(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
+    return {} if p.filter == "none" else butterworth.slopes(p, states, value)
+
+
+def fastest(p: Any) -> Real | None:
+    return None if p.filter == "none" else butterworth.fastest(p)
+
+
+def swing(p: Any) -> tuple[Real, Real] | None:
+    return None if p.filter == "none" else butterworth.swing(p)
+
+
+def settled(p: Any, value: Real) -> Mapping[str, Real]:
+    """The filter's states after a long constant input."""
+    return {} if p.filter == "none" else butterworth.settled(value)
+
+
+def behind(p: Any, states: Any, sensed: Sensed) -> Real:
+    """The filter's output at a tick; without a filter, its input."""
+    output: Real = sensed.value if p.filter == "none" else states.filtered
+    return output

@@ -14,19 +14,26 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from met.sensors.optional_filter import CUTOFF, FILTER, STATES, behind, fastest, follow, settled, swing
 from met.sensors.sensor import (
+    CUTOFF,
     DELAY,
+    FILTER,
     NOISE,
     PAST,
     RESOLUTION,
+    STATES,
     Reading,
     Sensed,
     Sensor,
+    behind,
     converted,
     delayed,
+    fastest,
     filled,
+    follow,
     noisy,
+    settled,
+    swing,
 )
 from met.trace import Real
 

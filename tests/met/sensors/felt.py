@@ -16,8 +16,7 @@ import met.sensors
 from met import run as engine
 from met.parameter import ZEROS, Parameter, State
 from met.run import Run
-from met.sensors.on_link import ALONG, LINK, component
-from met.sensors.sensor import Reading, Sensor
+from met.sensors.sensor import ALONG, LINK, Reading, Sensor, component
 from tests.ic.small_decks import experiment
 
 INTEGRAL = Sensor(
