@@ -15,7 +15,7 @@ import numpy as np
 from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.tasks import GRANULE, CampaignSection
 from batch.queries.signals import number_text
-from ic.meaning.checks.beds import bed_warning
+from ic.meaning.checks.programs import bed_warning
 from ic.meaning.checks.step_words import fault_warning, from_instants, loop_warning
 from met import models
 from met import run as engine
