@@ -9,7 +9,7 @@ from os import PathLike
 from ic.driver.compile import Compiled, Select, check
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Expression, Name, children, place_of
-from ic.meaning.expressions.command_line import written_origin
+from ic.meaning.expressions.names import written_origin
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.owner import Settled
 from ic.meaning.parameters.scope import Scope

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ic.language import HEADS
-from ic.meaning.expressions.command_line import ON_COMMAND_LINE
+from ic.meaning.expressions.names import ON_COMMAND_LINE
 from ic.printing.codes import is_code
 from ic.printing.columns import columns, number, quantity, vector
 from ic.printing.settings import settings

@@ -16,16 +16,16 @@ from typing import Any
 from ic.grammar.syntax import Call, Expression, Name, Setting, String, place_of
 from ic.meaning.definitions.merge import Item, no_block, refuse_block
 from ic.meaning.definitions.resolve import Definitions
-from ic.meaning.expressions.command_line import (
+from ic.meaning.expressions.conditions import Checks, VariedPath
+from ic.meaning.expressions.cycles import components
+from ic.meaning.expressions.names import (
     ON_COMMAND_LINE,
     CommandLineValue,
+    Names,
     evaluate_setting,
     is_on_command_line,
     written_origin,
 )
-from ic.meaning.expressions.conditions import Checks, VariedPath
-from ic.meaning.expressions.cycles import components
-from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, ValueList, no_single_number
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.not_sweepable import NotSweepable
