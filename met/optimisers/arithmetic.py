@@ -1,4 +1,4 @@
-"""Sums, products and roots whose bits are the same on every machine.
+"""Sums, products, roots and random numbers whose bits are the same on every machine.
 
 Additions, multiplications, divisions and square roots are rounded alike everywhere; libraries add in an order that
 depends on the processor, and their logarithms, exponentials and eigenvalues differ in the last places. A search that
@@ -8,6 +8,7 @@ branches on such a place would run other cases.
 from __future__ import annotations
 
 import math
+import zlib
 
 import numpy as np
 
@@ -65,3 +66,35 @@ def power(base: float, exponent: int) -> float:
 def logarithm(x: float) -> float:
     """The natural logarithm, rounded to 30 binary places."""
     return round(math.log(x) * KEPT) / KEPT
+
+
+SUMMED = 12
+"""Number of uniform numbers in a nearly normal one: the variance of their sum is 1."""
+
+
+class Draws:
+    """A stream of random numbers that follows from a seed and a name, by Philox, a counter-based generator."""
+
+    def __init__(self, seed: int, name: str) -> None:
+        self._generator = np.random.Generator(np.random.Philox(key=[seed, zlib.crc32(name.encode())]))
+
+    def even(self, *shape: int) -> np.ndarray:
+        """Numbers that are uniform in [0, 1)."""
+        return self._generator.random(shape)
+
+    def nearly_normal(self, *shape: int) -> np.ndarray:
+        """Numbers of mean 0 and variance 1: sums of twelve uniform ones less 6, so that no logarithm is needed; all lie
+        between -6 and 6."""
+        return added(self.even(SUMMED, *shape)) - SUMMED / 2
+
+    def whole(self, below: int, *shape: int) -> np.ndarray:
+        """Whole numbers in [0, below)."""
+        return (self.even(*shape) * below).astype(np.int64)
+
+    def spread(self, count: int, dimension: int) -> np.ndarray:
+        """Points of the unit cube, [count, dimension], as a Latin hypercube: each coordinate has one in each of `count`
+        equal intervals."""
+        out = np.empty((count, dimension))
+        for column in range(dimension):
+            out[:, column] = (np.argsort(self.even(count), kind="stable") + self.even(count)) / max(count, 1)
+        return out

@@ -12,8 +12,7 @@ import math
 
 import numpy as np
 
-from met.optimisers.arithmetic import added, growth, logarithm, lower_factor, power, total, transformed
-from met.optimisers.draws import Draws
+from met.optimisers.arithmetic import Draws, added, growth, logarithm, lower_factor, power, total, transformed
 
 WIDEST = 1.0
 """The largest step, in edges of the cube: with it, points are practically uniform in the cube."""

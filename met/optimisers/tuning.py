@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from met.optimisers.arithmetic import Draws
 from met.optimisers.covariance import CovarianceAdaptation
-from met.optimisers.draws import Draws
 
 STEP = 0.2
 """The first standard deviation, in edges of the cube. With 0.3 and 3,200 candidates, results in 16 dimensions were

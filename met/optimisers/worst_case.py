@@ -19,8 +19,8 @@ import math
 
 import numpy as np
 
+from met.optimisers.arithmetic import Draws
 from met.optimisers.covariance import CovarianceAdaptation
-from met.optimisers.draws import Draws
 
 LEADING = 0.15
 """Share of the population whose members, the best, are the targets of trials."""
