@@ -6,8 +6,8 @@ points and the values so far, to the bit, on every machine: so an interrupted ca
 
 from __future__ import annotations
 
+from met.optimisers.covariance import RestartedAdaptation
 from met.optimisers.optimiser import Optimiser
-from met.optimisers.tuning import RestartedAdaptation
 from met.optimisers.worst_case import WorstCaseSearch
 
 
