@@ -4,13 +4,21 @@ Richardson's extrapolation: where x(h) = x + c h^p, the differences d1 = x(h) - 
 log2(d1/d2) and the error c h^p = d1 2^p/(2^p - 1). Where the observed p is not that of the integrator, nor that of a
 number sampled once a step (1), the estimate is not valid; then three times the larger difference is a cautious bound,
 as the grid convergence index has it for two grids (P. J. Roache, Journal of Fluids Engineering 116, 1994, 405-413).
+
+Only the dynamics are refined. Servos, guides, sensors, beds, recorded rows and noise keep their instants in time, so
+that an experiment and its refinement differ only in the error of integration, and in how often quantities that are
+observed at each step are sampled.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from math import gcd
 
+from met import models
 from met.frozen import frozen
+from met.plan import Experiment, GuideUse, ServoUse, Structure
 
 NEAR = 0.3
 """Largest difference of an observed order from the expected one."""
@@ -78,3 +86,42 @@ def instant_error(first: float, second: float, both: float, instant: float) -> S
     if not all(map(math.isfinite, (first, second, both))):
         return StepError(math.inf, math.nan, False)
     return StepError(both + second + instant, math.nan, second <= first + 2.0 * instant * (1.0 + ROUNDING))
+
+
+def refine(experiment: Experiment, factor: int) -> Experiment:
+    """The same experiment with `factor` steps of the dynamics in the place of each one.
+
+    Where a step has too few base ticks to be parted, the base rate becomes a multiple of it. Raises ValueError where
+    factor is below 1.
+    """
+    if factor < 1:
+        raise ValueError(f"a step cannot be parted in {factor}")
+    return replace(experiment, structure=_refine(experiment.structure, factor))
+
+
+def _refine(structure: Structure, factor: int) -> Structure:
+    schedule = structure.schedule
+    faster = factor // gcd(schedule.dynamics, factor)  # new base ticks in an old one
+    step = schedule.dynamics * faster // factor
+
+    def servo(use: ServoUse) -> ServoUse:
+        ticks = not use.continuous and models.find("servo", use.model).control is not None
+        return replace(use, divisor=use.divisor * faster if ticks else step)
+
+    def guide(use: GuideUse) -> GuideUse:
+        ticks = models.find("guide", use.model).steer is not None
+        return replace(use, divisor=use.divisor * faster if ticks else step)
+
+    return replace(
+        structure,
+        schedule=replace(
+            schedule,
+            base_hz=schedule.base_hz * faster,
+            dynamics=step,
+            record=schedule.record * faster,
+            ticks=schedule.ticks * faster,
+        ),
+        servos=tuple(map(servo, structure.servos)),
+        guides=tuple(map(guide, structure.guides)),
+        sensors=tuple(replace(use, divisor=use.divisor * faster) for use in structure.sensors),
+    )

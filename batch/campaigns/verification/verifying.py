@@ -14,7 +14,7 @@ from batch.archive.verified import Verified
 from batch.campaigns.outcomes import CaseOutcomes
 from met import models
 from met import run as engine
-from met.analysis.refinement import refine
+from met.analysis.step_error import refine
 from met.distinct import distinct
 from met.plan import Experiment
 from met.plan.channel import channels

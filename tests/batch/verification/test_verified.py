@@ -20,7 +20,7 @@ from batch.campaigns.verification.verifying import chosen, most
 from batch.queries.step_errors.figures import case_error, figures
 from met import cli
 from met import run as engine
-from met.analysis.refinement import refine
+from met.analysis.step_error import refine
 from met.diagnostic import Problem
 from met.plan import Plan
 from tests.batch import begun, plans

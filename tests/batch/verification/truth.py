@@ -21,7 +21,7 @@ import ic
 from batch.campaigns.verification.verifying import verify
 from batch.queries.step_errors.figures import case_error
 from met import run as engine
-from met.analysis.refinement import refine
+from met.analysis.step_error import refine
 from met.plan import Experiment
 from tests.batch.verification import stops
 from tests.oracles.random_deck import random_deck

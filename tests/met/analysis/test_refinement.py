@@ -7,7 +7,7 @@ import pytest
 
 import ic
 from met import run as engine
-from met.analysis.refinement import refine
+from met.analysis.step_error import refine
 from met.plan import Experiment
 from tests.oracles.random_deck import random_deck
 
