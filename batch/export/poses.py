@@ -146,7 +146,7 @@ def pose_variables(pose: Pose, rows: int | tuple[int, ...], time: int | None = 0
 
 def without_sign_jumps(q: np.ndarray, axis: int) -> np.ndarray:
     """Unit quaternions (..., 4), each with the sign by which it is nearer the one before it along an axis, as in
-    records (`met.program.orientations`); rows of not-a-number are passed over."""
+    records (`met.program.observe`); rows of not-a-number are passed over."""
     rows = np.moveaxis(q, axis, 0)
     number = np.arange(len(rows)).reshape(-1, *(1,) * (rows.ndim - 2))
     known = np.maximum.accumulate(np.where(np.isfinite(rows).all(axis=-1), number, 0), axis=0)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from met.plan import Experiment
 from met.plan.channel import Channel
 from met.plan.judged import CHANNEL_INPUT
-from met.program import balancing, cells, orientations, plausible
+from met.program import balancing, cells, observe, plausible
 from met.program.cells import NamedValues, answer, parameters, returned
 from met.program.control import guiding, link_sensors, sensing
 from met.program.control.substituted import LIMITED
@@ -385,7 +385,7 @@ class Builder:
 
     def _observe(self, held: list[Channel]) -> Body:
         def body(tape: Tape) -> None:
-            by_path = orientations.values(tape, self.step.observed(tape), held, orientations.INSTANT)
+            by_path = observe.values(tape, self.step.observed(tape), held, observe.INSTANT)
             for path, value in by_path.items():
                 tape.write(path, value)
 
@@ -397,9 +397,9 @@ class Builder:
         seen = [channel for channel in held if channel.path in columns]
 
         def body(tape: Tape) -> None:
-            fresh = orientations.held(tape, seen)
+            fresh = observe.held(tape, seen)
             if at_rows:
-                fresh |= orientations.values(tape, self.step.observed(tape), at_rows, orientations.ROW)
+                fresh |= observe.values(tape, self.step.observed(tape), at_rows, observe.ROW)
             for column, path in enumerate(columns):
                 tape.record(column, fresh[path] if path in fresh else tape.read(path))
 

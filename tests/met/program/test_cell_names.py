@@ -13,7 +13,7 @@ from met.program import System, build, cells
 from met.program.build import METRIC
 from met.program.cells import GUIDE_FRAME, GUIDE_TIME, SHAFT_RATE, CellFamily
 from met.program.motion.bodies import bodies
-from met.program.orientations import INSTANT, ROW
+from met.program.observe import INSTANT, ROW
 from met.program.step import FROM, STAGE
 from met.program.system import PARAMETER, TREE
 from met.trace.recorder import record
