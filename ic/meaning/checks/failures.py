@@ -10,7 +10,7 @@ from collections.abc import Hashable, Iterable, Mapping
 from types import SimpleNamespace
 from typing import Any
 
-from ic.meaning.checks.constants import constant_value
+from ic.meaning.checks.idle import constant_value
 from ic.meaning.control.schedule import Ticks
 from ic.meaning.control.servos import Use
 from ic.meaning.parameters.scope import Scope

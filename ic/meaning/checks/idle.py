@@ -9,20 +9,43 @@ from typing import Any
 
 import numpy as np
 
-from ic.meaning.checks.constants import constant_value, constant_values
 from ic.meaning.control.servos import Use, differ_beyond_rounding, unit_written
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters.models import value_place
-from ic.meaning.parameters.owner import Settled
+from ic.meaning.parameters.owner import XYZ, Settled
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.analysis.probe import accelerates
 from met.diagnostic import Label, Place, leave_out
 from met.environments.environment import Environment
-from met.parameter import WORLD
+from met.parameter import WORLD, Parameter
 from met.plan import EnvironmentUse, Joint, Structure
 from met.trace import Real, Scalar
+
+
+def constant_value(scope: Scope, path: str) -> Any:
+    """A parameter's value: a number or a word; None where it varies, or is unknown."""
+    settled = scope.settled(path)
+    return None if settled is None or isinstance(settled.value, Scalar) else settled.value
+
+
+def constant_values(scope: Scope, head: str, declared: Iterable[Parameter]) -> SimpleNamespace | None:
+    """The values of a model's parameters, as attributes of their names; None where one varies, or is unknown.
+    Those that are there only under some words are left out.
+
+    head  path of the model's use, such as `environment.stop`
+    """
+    values: dict[str, Any] = {}
+    for parameter in (parameter for parameter in declared if parameter.only is None):
+        path = f"{head}.{parameter.name}"
+        if parameter.shape == "vector":
+            parts = tuple(constant_value(scope, f"{path}.{axis}") for axis in XYZ)
+            values[parameter.name] = None if None in parts else parts
+        else:
+            values[parameter.name] = constant_value(scope, path)
+    return None if None in values.values() else SimpleNamespace(**values)
+
 
 ENDS = ("q_min", "q_max")
 """The ends of a joint's range, which an arm gives it."""

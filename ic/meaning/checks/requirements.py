@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from itertools import product
 
-from ic.meaning.checks.constants import constant_values
+from ic.meaning.checks.idle import constant_values
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.diagnostic import Label, Place, leave_out
