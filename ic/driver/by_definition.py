@@ -17,7 +17,7 @@ from functools import partial
 
 from ic.grammar.syntax import Deck, Entry, Group
 from ic.language import EXPERIMENTS
-from ic.meaning.checks.degrees import remark_degrees
+from ic.meaning.checks.slips import remark_degrees
 from ic.meaning.control.servos import check_servo_definition
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.mechanics.arm import bring_arm, check_arm, packed_arm, resolve_arm

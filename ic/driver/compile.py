@@ -13,9 +13,7 @@ from ic.grammar.settings import command_line, read_settings
 from ic.grammar.syntax import Deck, Setting
 from ic.grammar.uses import with_full_names
 from ic.language import EXPERIMENTS
-from ic.meaning.checks.degrees import remark_degrees
-from ic.meaning.checks.lists import skipped_elements
-from ic.meaning.checks.macros import macros_taken_apart
+from ic.meaning.checks.slips import macros_taken_apart, remark_degrees, skipped_elements
 from ic.meaning.control.servos import check_servo_definition
 from ic.meaning.control.unused_servos import check_on_a_joint, servos_in_use
 from ic.meaning.definitions.resolve import Definition, Definitions
