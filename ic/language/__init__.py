@@ -6,7 +6,6 @@ sweeps are made of these declarations. A new key needs an `Entry`, and the code 
 
 from __future__ import annotations
 
-from ic.language.anywhere import ANYWHERE
 from ic.language.bodies import ARM, BOOM, JOINT, LINK, LOOP, PAYLOAD
 from ic.language.declaration import BlockDeclaration, Entry
 from ic.language.runs import (
@@ -23,8 +22,7 @@ from ic.language.runs import (
     TOLERANCES,
     TUNE,
 )
-from ic.language.servos import SERVO
-from ic.language.top_level import TOP_LEVEL
+from ic.language.top_level import ANYWHERE, SERVO, TOP_LEVEL
 
 BLOCKS = {
     block.name: block
