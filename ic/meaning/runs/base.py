@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from ic.grammar.syntax import Call, Expression, place_of
+from ic.language import BLOCKS
 from ic.language.runs import BASE_KINDS
 from ic.meaning.control.courses import course_named, use_course
 from ic.meaning.definitions.merge import Item, MergedBlock
@@ -16,15 +17,44 @@ from ic.meaning.mechanics.bodies import carried_loads
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, refuse_values, word_of
 from ic.meaning.parameters.not_sweepable import NotSweepable
-from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.owner import Owner, Settled
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import Help, Label, Place, did_you_mean, leave_out
 from met.parameter import WORLD, Parameter
-from met.plan import BASE, COMPONENTS, Base, Course, Link, Payload, Structure
+from met.plan import BASE, COMPONENTS, Base, Course, Link, Origin, Payload, Structure
 from met.plan.chains import ground
 from met.plan.defaults import INERTIA, OF_FREE_BASE, component
+from met.plan.run_keys import RunKey, run_keys
+
+
+def resolve_run_keys(scope: Scope, run: Owner, block: MergedBlock, cls: type) -> dict[str, Any]:
+    """The fields of a plan's dataclass that keep keys of this run, by name; the default where one has a mistake, which
+    is reported. Each key is settled in the scope, so that it can be explained."""
+    return {field: key.in_plan(_read(scope, run, block, key)) for field, key in run_keys(cls)}
+
+
+def _read(scope: Scope, run: Owner, block: MergedBlock, key: RunKey) -> Any:
+    """The value of one key of a run, in SI; its default where the run does not write it."""
+    wanted = key.parameter
+    head, _, name = key.path.rpartition(".")
+    holder = block.get(head) if head else None
+    body = block if not head else (holder.body if holder is not None else None) or MergedBlock()
+    item = body.get(name)
+    owner = Owner(BLOCKS[head].called, item.place if item is not None else run.place, head) if head else run
+    if wanted.shape == "word":
+        value: Any = scope.word(owner, wanted, item)
+    elif item is not None:
+        value = scope.constant(owner, wanted, item)
+    else:
+        value = wanted.default
+        scope.auxiliary[key.path] = Settled(value, wanted.unit, Origin("default"), wanted.doc)
+    entry = BLOCKS[head or "run"][name]
+    if entry.varies == "never":
+        scope.not_sweepable[key.path] = NotSweepable("is one for the whole sweep", not_sweepable.A_RUN_FOR_EACH)
+    return wanted.default if value is None else value
+
 
 USAGE = "write `base = fixed;`, `base = free;` or `base = prescribed { x = sine(amplitude = 1 cm, frequency = 2 Hz); }`"
 INITIAL_OF_BASE = tuple(f"{BASE}.{name}" for name, _ in OF_FREE_BASE)

@@ -25,10 +25,9 @@ from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import ALLOW
-from ic.meaning.runs.base import initial_base, resolve_base
+from ic.meaning.runs.base import initial_base, resolve_base, resolve_run_keys
 from ic.meaning.runs.expressions import resolve_signals
 from ic.meaning.runs.initial import resolve_environment, resolve_initial
-from ic.meaning.runs.keys import resolve_run_keys
 from ic.meaning.runs.linear import resolve_linear, resolve_linear_metrics
 from ic.meaning.runs.metrics import resolve_metrics
 from ic.meaning.runs.rates import resolve_rates, resolve_schedule

@@ -10,7 +10,7 @@ from ic.find import find
 from ic.language.declaration import Entry
 from ic.meaning.definitions.merge import MergedBlock
 from ic.meaning.parameters.owner import Owner
-from ic.meaning.runs.keys import resolve_run_keys
+from ic.meaning.runs.base import resolve_run_keys
 from met.diagnostic import Place
 from met.frozen import frozen
 from met.parameter import Parameter
