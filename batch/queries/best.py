@@ -22,8 +22,7 @@ from met.diagnostic import Problem, did_you_mean, error
 from met.distinct import distinct
 from met.frozen import frozen
 from met.run import DONE
-from met.statistics.design_points import design_points
-from met.statistics.in_step import in_step
+from met.statistics.design_points import design_points, in_step
 from met.units import Dimension
 
 MOST_CELLS = 1 << 26

@@ -13,7 +13,7 @@ from batch.archive.stored import Stored
 from batch.queries.signals import deck_unit
 from met.diagnostic import Problem, did_you_mean, error
 from met.frozen import frozen
-from met.statistics.in_step import in_step
+from met.statistics.design_points import in_step
 from met.statistics.saltelli import FEWEST_PAIRS, is_saltelli, saltelli_shares
 from met.statistics.sensitivity import FEWEST, InputShare, dependent, shares
 
