@@ -1,6 +1,6 @@
 """The group `verification` of an experiment: some cases' metrics, with the dynamics at half and a quarter of the step.
 
-verified_case     positions of the cases in the case table, rising; a dimension
+    verified_case     positions of the cases in the case table, rising; a dimension
     verified_metric   names of the metrics' variables; a dimension
     half, quarter     the metrics at half and a quarter of the step, SI; not-a-number where such a case failed
     instant           s, of a metric that is an instant seen at whole steps: a quarter of the step; 0 for others

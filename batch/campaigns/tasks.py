@@ -3,13 +3,15 @@
 A section is cases of one experiment that are run alike, with their histories or without; a task is a stretch of them.
 The results do not depend on how cases are cut into tasks, or on who runs them.
 
-line       MET shard 1
+A shard is a file with its own checksum:
+
+    line       MET shard 1
     8 bytes    length of the head, little-endian
     head       JSON: key, seconds, fates, arrays with their types and shapes
     arrays     outputs [case, output], history [case, row, column]; little-endian, one after the other
     32 bytes   SHA-256 of all before
 
-It gets its name only when it is whole and on the disk. Still, `read` checks the sum, and its caller compares the key,
+It gets its name only when it is whole and on the disk. Still, `shard_of_file` checks the sum, and its caller compares the key,
 which covers everything that decided the numbers. A shard from another plan, cut short, or with a bit turned over, does
 not count.
 """

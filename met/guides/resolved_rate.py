@@ -1,7 +1,7 @@
 """Resolved rate: the joint rates that move a point of a link, and the attitude of the link, along a path in the world.
 
-v      = path's rate + gain * (path - where it is) - what it does with these joints at rest
-    qd     = J' (J J' + lambda^2 I)^-1 v                           (Whitney 1969; damped, met/guides/damped.py)
+    v      = path's rate + gain * (path - where it is) - what it does with these joints at rest
+    qd     = J' (J J' + lambda^2 I)^-1 v                           (Whitney 1969; damped, Nakamura 1986)
     lambda^2 = max_damping^2 (1 - (sigma/threshold)^2)  where sigma < threshold, else 0
     qd     is made smaller as a whole, if a joint would move faster than its `max_rate`
 
@@ -22,12 +22,6 @@ that is lost: a path that begins there in that direction does not begin; without
 
 It is not a planner: it knows neither joint stops nor collisions, and of the motions of a redundant arm it takes the
 smallest.
-
-u = J' (J J' + lambda^2 I)^-1 v       makes |J u - v|^2 + lambda^2 |u|^2 least
-
-(Nakamura and Hanafusa, Inverse kinematic solutions with singularity robustness, J. Dyn. Sys. Meas. Control 108, 1986.)
-J J' is symmetric and not negative, so it is taken apart without pivoting, L diag(d) L'. Without damping u is the
-pseudo-inverse's, the smallest of all that carry the task out.
 """
 
 from __future__ import annotations
@@ -59,7 +53,14 @@ def gram(rows: Sequence[Sequence[Real]]) -> Rows:
 
 
 def damped(rows: Sequence[Sequence[Real]], square: Rows, damping: Real, task: Sequence[Real]) -> list[Real]:
-    """u for the rows of J, its J J', lambda^2 and v."""
+    """u for the rows of J, its J J', lambda^2 and v.
+
+        u = J' (J J' + lambda^2 I)^-1 v       makes |J u - v|^2 + lambda^2 |u|^2 least
+
+    (Nakamura and Hanafusa, Inverse kinematic solutions with singularity robustness, J. Dyn. Sys. Meas. Control 108,
+    1986.) J J' is symmetric and not negative, so it is taken apart without pivoting, L diag(d) L'. Without damping u is
+    the pseudo-inverse's, the smallest of all that carry the task out.
+    """
     y = _solved(_factors(square, damping), task)
     return [dot([row[k] for row in rows], y) for k in range(len(rows[0]))]
 

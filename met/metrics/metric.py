@@ -59,7 +59,7 @@ class Metric(Declaration):
     between  the same metric told between samples, which moves as its channel does and is within a sample of this one;
              for one that moves in steps of a sample, whose gradient is that one's. None: this one moves by itself
     furthest  the same metric with what it may be off by between samples added; None: it is not off, or says an extreme,
-              of which met/metrics/furthest.py finds it
+              of which `furthest` finds it
     update  (p, held, x, t, dt) -> new memory: x the channel at time t (s), dt s since the sample before (0 at first)
     result  (p, held, t) -> the metric, at the run's last sample, time t
     """

@@ -1,9 +1,11 @@
 """Numbers that a plan computes from channels, the conditions that judge its cases, and figures of linear answers.
 
-linear hand_loop { at = 2 s; open = pan.servo.voltage; }
+A run asks for linear answers by name:
+
+    linear hand_loop { at = 2 s; open = pan.servo.voltage; }
     require phase_margin(hand_loop) > 30 deg;
 
-They are computed for each case after it has run (`met.analysis.linear.metrics`). They are part of no program, so they
+Their figures are computed for each case after it has run (`met.analysis.linear.metrics`). They are part of no program, so they
 change no bit of a run and no structure key.
 """
 

@@ -1,12 +1,14 @@
 """The observer: a steady-state Kalman filter that estimates shaft rate, the filter's two states and the torque missing
 in the data sheet from the filtered rate alone.
 
-x = (w, y, z, d):  J w' = -damp w + d + u,  y' = z,  z' = wc^2 (w - y) - sqrt(2) wc z,  d' = 0
+    x = (w, y, z, d):  J w' = -damp w + d + u,  y' = z,  z' = wc^2 (w - y) - sqrt(2) wc z,  d' = 0
 
 u is held over a tick, so the prediction is exact. The noises of a tick are a torque held over it, a step of d, and an
 error of the reading.
 
-y' = z,   z' = wc^2 (u - y) - sqrt(2) wc z,   wc = 2 pi f_cut
+The tachometer's filter is a Butterworth low-pass of order 2:
+
+    y' = z,   z' = wc^2 (u - y) - sqrt(2) wc z,   wc = 2 pi f_cut
 
 Decay and frequency of its free motion are both sigma = wc/sqrt(2). Its response to a straight line or an exponential is
 that motion about the course that follows the input: no step size is involved.
