@@ -11,9 +11,9 @@ A shard is a file with its own checksum:
     arrays     outputs [case, output], history [case, row, column]; little-endian, one after the other
     32 bytes   SHA-256 of all before
 
-It gets its name only when it is whole and on the disk. Still, `shard_of_file` checks the sum, and its caller compares the key,
-which covers everything that decided the numbers. A shard from another plan, cut short, or with a bit turned over, does
-not count.
+It gets its name only when it is whole and on the disk. Still, `shard_of_file` checks the sum, and its caller compares
+the key, which covers everything that decided the numbers. A shard from another plan, cut short, or with a bit turned
+over, does not count.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ goes is where the deck would say it:
     run      what decides the structure of a run: upon every run that is asked for, where it has what the path names
     number   any other number: in place of what the run settles (`expressions.command_line`), as a sweep's coordinate is
 
-An entry of a run that is further out, and a general one of which other parameters take their value (`q = 0 rad;` and
-`with initial.hinge.q = 1 rad;`), may stand.
+Entries of a run that a setting leaves without effect are warned of. An entry that is further out, and a general one of
+which other parameters take their value (`q = 0 rad;` and `with initial.hinge.q = 1 rad;`), may stand.
 """
 
 from __future__ import annotations

@@ -3,8 +3,9 @@
 Evaluated at every stage of every step (`docs/physics.md`, "Rates"), as ordinary functions over numbers that may be
 traced.
 
-A load that jumped within a step would cost an integrator its order. Multiplied by the share, the load has the right
-impulse, and a window that begins and ends with steps is met exactly.
+A step of the dynamics sees a window in time as the share of the step that lies in it. A load that jumped within a step
+would cost an integrator its order. Multiplied by the share, the load has the right impulse, and a window that begins
+and ends with steps is met exactly.
 """
 
 from __future__ import annotations

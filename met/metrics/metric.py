@@ -3,13 +3,14 @@
 It sees its channel at every tick of the channel's owner (the dynamics' for motion and torque, the servo's for its
 computer's memory), whatever is recorded, so its value does not depend on the record.
 
-Both ends belong to it. They are decimals, and so is the time of a sample: four units in the last place are allowed for
-the rounding of the three.
+Both ends of a window belong to it. They are decimals, and so is the time of a sample: four units in the last place are
+allowed for the rounding of the three.
 
-Of an extreme: about each sample that is larger than both of its neighbours, the signal is taken to rise on the straight
-line through the two samples before, and to fall on that through the two behind, and may reach where these meet. This
-holds for a signal with a kink there, such as a rate at a stop, and is at least twice what a parabola has beyond its
-samples. A metric that is not an extreme says itself how far it may be off (`Metric.furthest`).
+`furthest` takes an extreme as far from its samples as the signal may have been between them. About each sample that is
+larger than both of its neighbours, the signal is taken to rise on the straight line through the two samples before, and
+to fall on that through the two behind, and may reach where these meet. This holds for a signal with a kink there, such
+as a rate at a stop, and is at least twice what a parabola has beyond its samples. A metric that is not an extreme says
+itself how far it may be off (`Metric.furthest`).
 """
 
 from __future__ import annotations

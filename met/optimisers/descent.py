@@ -6,9 +6,9 @@ functions linearised, and one curvature for all, that of the Lagrangian by Powel
 *Numerical Optimization*, 2006, procedures 18.2 and 18.5). At a corner where as many pieces and hinges meet as there are
 dimensions it needs no curvature, and in a smooth valley few pieces.
 
-Mehrotra's predictor and corrector (SIAM J. Optimization 2 (1992) 575) on the reduced equations, for tens of unknowns.
-Library solvers add in an order that depends on the processor, and a search that branches on their results would run
-other cases.
+A step is found by Mehrotra's predictor and corrector (SIAM J. Optimization 2 (1992) 575) on the reduced equations, for
+tens of unknowns. Library solvers add in an order that depends on the processor, and a search that branches on their
+results would run other cases.
 """
 
 from __future__ import annotations

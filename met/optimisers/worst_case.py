@@ -4,13 +4,15 @@ Differential evolution follows several basins and reaches corners; division into
 dimensions mislead the others; CMA-ES polishes the best places that are apart from each other. The finds of the other
 two enter the population of differential evolution, and polishing starts from it.
 
-The mutation is current-to-pbest of Zhang and Sanderson, *JADE* (IEEE Trans. Evol. Comput. 13(5), 2009), with constants
-drawn for each trial: a search has too few generations to learn them. Values are compared and never calculated with.
+The mutation of differential evolution is current-to-pbest of Zhang and Sanderson, *JADE* (IEEE Trans. Evol. Comput.
+13(5), 2009), with constants drawn for each trial: a search has too few generations to learn them. Values are compared
+and never calculated with.
 
-After Jones, Perttunen and Stuckman, *Lipschitzian Optimization Without the Lipschitz Constant* (JOTA 79(1), 1993), with
-two changes. Boxes of every size are cut, the best of each (Baker et al., *Aggressive DIRECT*, HPC 2000), rather than
-those on a convex hull of values: so values are only compared, and a batch can have any size. And a box is cut along one
-of its longest edges, the one that was cut least often (Jones, *DIRECT*, Encyclopedia of Optimization, 2001).
+Division is after Jones, Perttunen and Stuckman, *Lipschitzian Optimization Without the Lipschitz Constant* (JOTA 79(1),
+1993), with two changes. Boxes of every size are cut, the best of each (Baker et al., *Aggressive DIRECT*, HPC 2000),
+rather than those on a convex hull of values: so values are only compared, and a batch can have any size. And a box is
+cut along one of its longest edges, the one that was cut least often (Jones, *DIRECT*, Encyclopedia of Optimization,
+2001).
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ A run asks for linear answers by name:
     linear hand_loop { at = 2 s; open = pan.servo.voltage; }
     require phase_margin(hand_loop) > 30 deg;
 
-Their figures are computed for each case after it has run (`met.analysis.linear.metrics`). They are part of no program, so they
-change no bit of a run and no structure key.
+Their figures are computed for each case after it has run (`met.analysis.linear.metrics`). They are part of no program,
+so they change no bit of a run and no structure key.
 """
 
 from __future__ import annotations

@@ -3,9 +3,10 @@
 They follow from the state at the instant, in the modes in which its derivative was taken. They are separate pieces of
 the program, which compute the derivative anew: so no bit of another channel depends on them.
 
-The first that is asked for has w >= 0; each one after it has the sign by which it lies nearer the one before. A record
-compares a row with the row before it, a metric an instant with the instant before it, each in cells of its own, so that
-a metric changes no row. The signs depend on the case alone, not on cases beside it.
+Of the two unit quaternions of a rotation, the first that is asked for has w >= 0; each one after it has the sign by
+which it lies nearer the one before. A record compares a row with the row before it, a metric an instant with the
+instant before it, each in cells of its own, so that a metric changes no row. The signs depend on the case alone, not on
+cases beside it.
 """
 
 from __future__ import annotations

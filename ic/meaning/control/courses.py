@@ -1,8 +1,8 @@
 """Values and courses in time, where a deck allows either; commands whose course is a column of a CSV file.
 
-A command follows its rows as they are, so it asks a joint to turn back by almost a turn in one row. A wrap is told from
-a real motion by what surrounds it: with a turn added the rows go on as fast as they went before, and without it the
-row is far faster than all others.
+Angles that a log has wrapped, 3.1 rad and then -3.1 rad, are warned of. A command follows its rows as they are, so it
+asks a joint to turn back by almost a turn in one row. A wrap is told from a real motion by what surrounds it: with a
+turn added the rows go on as fast as they went before, and without it the row is far faster than all others.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 A number may be a recorded scalar, where a sweep varies what it depends on; then what comes of it is recorded too.
 
-Each number of the result is that of the same arithmetic on single numbers, so it has the same bits, and is recorded
-where it depends on a varied value.
+Each number that arithmetic of lists gives is that of the same arithmetic on single numbers, so it has the same bits,
+and is recorded where it depends on a varied value.
 """
 
 from __future__ import annotations

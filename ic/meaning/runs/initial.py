@@ -1,7 +1,7 @@
 """The environment of a run, its models and their parameters; and its initial state.
 
-The position is the value of the joint's position command at t = 0. The rate is the slope of that there, or the value
-of its rate command. Both are recorded where a sweep varies the course.
+Where a command gives it, the position is the value of the joint's position command at t = 0. The rate is the slope of
+that there, or the value of its rate command. Both are recorded where a sweep varies the course.
 """
 
 from __future__ import annotations
