@@ -5,7 +5,7 @@ releases follow it. Joints that are told their acceleration do not jump, nor do 
 friction holds no joint against a blow; states of servos stay what they are, but for the rate of a rotor behind an
 elastic gear on a free base: the rotor goes on turning as it did, and the link that its rate counts from jumps.
 
-The figures are outside of the state: no bit of a run depends on them. The figures are computed just before and after the
+The figures are outside of the state: no bit of a run depends on them. They are computed just before and after the
 impact, so a run has a cost only at the instants of its grapples. With I_p the payload's spatial inertia, dV its
 velocity against the link where it is caught (`met.dynamics.payload`), and dV_L what the impact adds to that of the link
 
