@@ -348,8 +348,8 @@ class Definitions:
         if (
             len(words) > 2
             and words[1].text in DEFINITIONS
-            and meant(words[0].text, ("default",)) is not None
             and words[0].text != "default"
+            and meant(words[0].text, ("default",)) is not None
         ):
             self._complaints.error(
                 "D045",
