@@ -8,6 +8,7 @@ name that no one else's has, and MET is beside it. As a program, it runs a modul
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from importlib import import_module
@@ -69,6 +70,7 @@ def main() -> int:
         print(f"error[E339]: {words}\n = help: {REMEDY}\n\n1 error", file=sys.stderr)
         return 2
     status: int = command()
+    gc.freeze()  # else Python looks for garbage among all that is left before it ends: 20 ms of `met check`
     return status
 
 
