@@ -61,6 +61,10 @@ REMEDY = "rename that file, or take its folder off PYTHONPATH"
 
 def main() -> int:
     """The command `met`."""
+    if sys.platform == "win32":
+        helps = "on Windows, install it in a Linux of WSL 2: `wsl --install`"
+        print(f"error[E338]: MET does not run on Windows itself\n = help: {helps}\n\n1 error", file=sys.stderr)
+        return 2
     try:
         find_own_packages()
         command = import_module("met.cli").main

@@ -16,6 +16,7 @@ from types import ModuleType
 import click
 import pytest
 
+import met_arm
 from met import cli
 from met.diagnostic import Place, Problem, error
 from met.host.entry_points import EntryPoint, offered
@@ -397,6 +398,15 @@ def test_a_module_that_hides_one_that_is_needed_is_named(
     finally:
         for name in [each for each in sys.modules if each.startswith("ring9")]:
             del sys.modules[name]
+
+
+def test_windows_is_refused_with_a_way_out(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, "platform", "win32")
+    assert met_arm.main() == cli.BAD_INPUT
+    assert capsys.readouterr().err == (
+        "error[E338]: MET does not run on Windows itself\n"
+        " = help: on Windows, install it in a Linux of WSL 2: `wsl --install`\n\n1 error\n"
+    )
 
 
 def test_where_mets_name_is_another_modules_already_that_is_named(
