@@ -19,7 +19,7 @@ from met.version import VERSION  # noqa: E402  (only once the checkout is on the
 
 # In the order in which a user needs them; the headings stand in the sidebar.
 PAGES = {
-    "Begin": ["README", "tutorial"],
+    "Begin": ["README", "install", "tutorial"],
     "Decks": ["deck", "loops", "coupled", "booms", "editions", "robots", "servos", "environments", "models",
               "substitution", "reference", "diagnostics", "editors"],
     "Campaigns and results": ["cluster", "best", "search", "verification", "evidence", "sensitivity", "linear", "plots",
