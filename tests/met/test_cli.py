@@ -158,7 +158,7 @@ def test_with_format_json_a_problem_is_json_on_stdout(tmp_path: Path) -> None:
 
 def test_wrong_usage_ends_with_2_and_says_how_it_is_used(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["check"]) == 2
-    assert capsys.readouterr().err == (
+    assert capsys.readouterr().err.replace("check -h'", "check --help'") == (  # click before 8.4 names the short option
         "Usage: met check [OPTIONS] DECK...\nTry 'met check --help' for help.\n\nError: Missing argument 'DECK...'.\n"
     )
 

@@ -314,5 +314,5 @@ error[E338]: cannot write `bars.ic`: no space left on device
 def test_the_kinds_of_the_command_are_those_that_can_be_begun() -> None:
     from ic.cli_new import new
 
-    assert new.params[0].type.choices == ("deck", *MODELS)  # type: ignore[attr-defined]
+    assert tuple(new.params[0].type.choices) == ("deck", *MODELS)  # type: ignore[attr-defined]
     assert set(files.MODELS) | {"bed", "law"} == set(models.GROUPS)
