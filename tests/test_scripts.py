@@ -453,3 +453,33 @@ def test_the_page_for_contributors_says_what_the_product_may_weigh() -> None:
     [limit] = re.findall(r"^MOST = (\S+)", (ROOT / "scripts" / "weigh").read_text(), re.MULTILINE)
     page = " ".join((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split())
     assert f"at most {int(limit):,} statements" in page
+
+
+STAND_IN = """\
+#!/bin/sh
+# A Python that makes environments with itself in them, runs what it reads, and says what else it would run.
+here=$(dirname "$0")
+case "$1 $2" in
+    '-m venv') mkdir -p "$4/bin" && cp "$0" "$4/bin/python" && ln -sf /bin/true "$4/bin/met" ;;
+    '- '*) exec REAL "$@" ;;
+    *) echo "$@" >> "$here/../said"; [ "$2" != pytest ] || exit 3 ;;
+esac
+"""
+
+
+def test_versions_tests_with_the_oldest_versions_and_with_the_newest(checkout: Path, tmp_path: Path) -> None:
+    python = program(tmp_path / "python", STAND_IN.replace("REAL", sys.executable))
+    done = start(checkout, "-k", "friction", script="versions", MET_PYTHON=str(python))
+    assert done.returncode == 1, "the tests have failed"
+    for age, numpy in (("oldest", "numpy == 2.0"), ("newest", "numpy >= 2.0")):
+        folder = checkout / "build/versions" / age
+        wanted = (folder / "requirements.txt").read_text().splitlines()
+        assert numpy in wanted and "pcpp == 1.30" in wanted
+        (locked,) = re.findall(r"^pytest==\S+", (checkout / "requirements-test.lock").read_text(), re.MULTILINE)
+        assert locked in wanted, "what only the tests need is as locked"
+        assert all(re.fullmatch(r"[\w.-]+ ?(==|>=) ?[\w.]+", line) for line in wanted)
+        *_, editable, tests = (folder / "said").read_text().splitlines()
+        assert "--editable ." in editable
+        assert tests.startswith("-m pytest -n ") and tests.endswith(" -k friction")
+    done = start(checkout, "newest", script="versions", MET_PYTHON=str(python))
+    assert "newest" in done.stdout and "oldest" not in done.stdout
