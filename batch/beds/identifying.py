@@ -113,7 +113,7 @@ def identify_and_tell(
     assert which.experiment is not None
     sheet = sheet_of(which.experiment, which.joint, kt_load)
     deck = Path(output or f"{which.joint}.identified.ic")
-    records = deck.with_suffix(".records")
+    records = deck.parent / f"{deck.stem}.records"
     _check_output(deck, records)
     _check_sheet(sheet, which.joint)
     if which.simulated is None and not sheet.has_kt_load:
@@ -163,6 +163,7 @@ def _check_sheet(sheet: DataSheet, joint: str) -> None:
 def _check_output(deck: Path, records: Path) -> None:
     """Raise Problem E305 where the deck cannot be written or exists already, or where the records would replace
     something that is not a regular file."""
+    check_place(deck, code="E305", inside=deck / "identified.ic")
     wrong, helps = "", "give another name with `-o`"
     if deck.suffix != ".ic":
         wrong, helps = f"cannot write {deck}: it is to be a deck, which ends in .ic", f"`-o {deck.with_suffix('.ic')}`"
@@ -172,7 +173,6 @@ def _check_output(deck: Path, records: Path) -> None:
         wrong = f"cannot write {records}: it is not a regular file"
     if wrong:
         raise Problem(error("E305", wrong, help=helps))
-    check_place(deck, code="E305")
 
 
 def check(fit: FitResult, about: About) -> None:

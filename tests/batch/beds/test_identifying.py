@@ -75,6 +75,16 @@ def test_what_is_no_file_in_the_place_of_the_records_is_left_there(
     assert os.lstat("shoulder.identified.records").st_mode == before
 
 
+@pytest.mark.parametrize(("place", "file"), [(".", "identified.ic"), ("/", "/identified.ic")])
+def test_a_folder_is_no_place_for_the_deck(
+    identify: Callable[..., tuple[int, str, str]], place: str, file: str
+) -> None:
+    status, _, complaint = identify("--port", "emulated", "-o", place)
+    assert status == cli.BAD_INPUT and complaint == (
+        f"error[E305]: cannot write {place}: it is a folder\n = help: name a file in it: `-o {file}`\n\n1 error\n"
+    )
+
+
 @pytest.mark.release
 def test_the_deck_that_is_written_holds_the_truth_and_can_be_included(
     identify: Callable[..., tuple[int, str, str]], capsys: pytest.CaptureFixture[str], here: Path
