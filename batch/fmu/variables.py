@@ -13,7 +13,7 @@ from batch.archive.layout import coordinate_unit
 from batch.modules.description import described_columns
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import REPEAT, Coordinate, Experiment, Formula
+from met.plan import REPEAT, SEED, Coordinate, Experiment, Formula
 from met.plan.defaults import declared
 from met.plan.outputs import metric_units
 from met.program.build import METRIC
@@ -21,8 +21,11 @@ from met.run import inputs
 
 Kind = Literal["parameter", "input", "output", "local"]
 
-BELOW_SEED = 2.0**32
-"""Upper bound of repeats and seeds."""
+NOISE = {
+    REPEAT: ("number of the repeat, which has noise of its own", 2.0**32 - 1.0),
+    SEED: ("seed of the noise", 2.0**53 - 1.0),
+}
+"""Descriptions and largest values of a case's inputs for its noise, by their names."""
 
 WRENCH = ("force", "moment")
 """Parameters of the environment model `wrench` that may change during a run."""
@@ -109,8 +112,8 @@ def _settable(experiment: Experiment) -> Iterator[FmuVariable]:
             coordinate.scale,
         )
     for name, start in zip(cases.noise, starts[len(cases.coordinates) :], strict=True):
-        what = "number of the repeat, which has noise of its own" if name == REPEAT else "seed of the noise"
-        yield FmuVariable(name, "parameter", name, "1", what, start, 0.0, BELOW_SEED - 1.0, True)
+        what, most = NOISE[name]
+        yield FmuVariable(name, "parameter", name, "1", what, start, 0.0, most, True)
 
 
 def _equals(experiment: Experiment, coordinate: Coordinate) -> Iterator[str]:

@@ -113,6 +113,27 @@ def test_times_that_do_not_resolve_ticks_are_refused(new: Instance) -> None:
     assert new.step(0.0, 0.04) == OK
 
 
+SOWN = """\
+#include <two_link.ic>
+run noisy like hybrid { duration = 0.4 s;  remove settle; }
+sweep sown of noisy { vary gearbox.kp = [0.02, 0.03] V*s/rad;  repeat 2;  seeds = independent; }
+"""
+
+
+@pytest.mark.slow
+def test_noise_has_the_bits_of_its_case(tmp_path: Path) -> None:
+    found = deck(tmp_path, "sown", SOWN)
+    fmu = load(packed(tmp_path, "sown", SOWN), tmp_path)
+    for name in found.cases.noise:
+        start, most = (float(fmu.attributes[name][key]) for key in ("start", "max"))
+        assert 0.0 <= start <= most
+    times, rows, _ = run_rows(found, 1)
+    instance, other = fmu.instance(), fmu.instance()
+    begin_case(instance, found, 1)
+    begin_case(other, found, 0)
+    assert bits(instance.rows(times)) == bits(rows) != bits(other.rows(times))
+
+
 DRIVEN = """\
 #include <two_link.ic>
 servo outside { model = external;  command = torque(0 N*m); }
