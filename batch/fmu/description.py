@@ -75,6 +75,7 @@ def model_description(experiment: Experiment, variables: Sequence[FmuVariable], 
             [
                 *([element("Float64", TIME)] if version == 3 else []),
                 *(write(variable, number) for number, variable in numbered),
+                *([_scalar_time()] if version == 2 and not numbered else []),
             ],
         ),
         element("ModelStructure", {}, _structure(outputs, version)),
@@ -84,6 +85,13 @@ def model_description(experiment: Experiment, variables: Sequence[FmuVariable], 
 
 TIME = {"name": "time", "valueReference": 0, "causality": "independent", "variability": "continuous", "unit": "s"}
 """The variable that FMI 3.0 asks for besides those of the model."""
+
+
+def _scalar_time() -> str:
+    """Time as a variable of FMI 2.0, which asks for one variable at least."""
+    unit = TIME["unit"]
+    words = {name: word for name, word in TIME.items() if name != "unit"}
+    return element("ScalarVariable", words, [element("Real", {"unit": unit})])
 
 
 def _co_simulation(naming: Naming, version: int, step: float) -> str:

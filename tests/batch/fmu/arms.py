@@ -35,6 +35,7 @@ sweep tuned of brief {
         environment.push.force.y = [0, 2, -3] N;
     }
 }
+run silent like brief { record = [];  remove volts; }
 sweep seeded of nominal { vary gearbox.kp = [0.01, 0.02] V*s/rad; }
 """
 """Servos that tick between instants of the dynamics, rows further apart than both, and all kinds of variables."""

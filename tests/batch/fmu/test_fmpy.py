@@ -28,7 +28,7 @@ def file(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReques
 
 
 @pytest.mark.parametrize("version", [2, 3])
-@pytest.mark.parametrize("name", ["tuned", "seeded"])
+@pytest.mark.parametrize("name", ["tuned", "seeded", "silent"])
 def test_the_description_is_valid(tmp_path: Path, name: str, version: int) -> None:
     fmpy = pytest.importorskip("fmpy.validation")
     path = tmp_path / "arm.fmu"
