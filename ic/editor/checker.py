@@ -19,8 +19,11 @@ import pickle
 import signal
 import socket
 import sys
+import traceback
+from functools import partial
 
-from ic.editor.checking import CheckRequest, answer, answers
+from ic.editor.checking import AUDIT_PAUSE, LENGTH, CheckRequest, Crash, answers
+from ic.editor.renaming import RenameRequest, renamed
 
 
 def _warm_up() -> None:
@@ -55,6 +58,25 @@ def serve(connection: socket.socket) -> None:
                 os._exit(status)
         for descriptor in passed:
             os.close(descriptor)
+
+
+def answer(request: CheckRequest | RenameRequest, out: int) -> None:
+    """Run a check, or prove a renaming, and write the answers into the file descriptor."""
+    if isinstance(request, CheckRequest):
+        os.chdir(request.folder)
+    try:
+        if not isinstance(request, CheckRequest):
+            return _send(out, renamed(request))
+        for reply in answers(request, pause=AUDIT_PAUSE, keep=partial(_send, out)):
+            _send(out, reply)
+    except Exception:
+        _send(out, Crash(traceback.format_exc()))
+
+
+def _send(out: int, answer: object) -> None:
+    data = pickle.dumps(answer, pickle.HIGHEST_PROTOCOL)
+    with os.fdopen(os.dup(out), "wb") as stream:
+        stream.write(LENGTH.pack(len(data)) + data)
 
 
 def main() -> None:

@@ -6,14 +6,11 @@ it takes long. The audit, `met check` itself, comes after a pause, so that a typ
 
 from __future__ import annotations
 
-import os
 import pickle
 import struct
 import time
-import traceback
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +22,6 @@ if TYPE_CHECKING:
     from ic.driver.by_definition import Known
     from ic.driver.compile import Compiled
     from ic.editor.index import DeckIndex
-    from ic.editor.renaming import RenameRequest
 
 LENGTH = struct.Struct("!Q")
 """The length of a pickled answer, which precedes it."""
@@ -94,21 +90,6 @@ class Crash:
     """The traceback of a check that is a defect of MET."""
 
     traceback: str
-
-
-def answer(request: CheckRequest | RenameRequest, out: int) -> None:
-    """Run a check, or prove a renaming, and write the answers into the file descriptor."""
-    if isinstance(request, CheckRequest):
-        os.chdir(request.folder)
-    try:
-        if not isinstance(request, CheckRequest):
-            from ic.editor.renaming import renamed
-
-            return _send(out, renamed(request))
-        for reply in answers(request, pause=AUDIT_PAUSE, keep=partial(_send, out)):
-            _send(out, reply)
-    except Exception:
-        _send(out, Crash(traceback.format_exc()))
 
 
 def answers(
@@ -202,9 +183,3 @@ def _reply(
         known,
         audited,
     )
-
-
-def _send(out: int, answer: object) -> None:
-    data = pickle.dumps(answer, pickle.HIGHEST_PROTOCOL)
-    with os.fdopen(os.dup(out), "wb") as stream:
-        stream.write(LENGTH.pack(len(data)) + data)
