@@ -176,7 +176,7 @@ static Answer refuse_reference(Instance *instance, uint32_t reference)
 static Answer set_values(Instance *instance, const uint32_t *variables, size_t count, const double *values)
 {
     Data *const data = &instance->data;
-    char message[400];
+    char message[500];
     if (count && (!variables || !values)) return refuse(instance, "no variables or values are given");
     if (data->mode == TERMINATED) return refuse(instance, "the simulation is terminated");
     for (size_t i = 0; i < count; i++) { /* all are checked before the first is set */
