@@ -35,7 +35,7 @@ def import_(file: str, output: str | None, force: bool, mimic: str, quiet: bool,
 
     if force and output is None:
         raise click.UsageError("--force is for -o: nothing is written without it")
-    text, remarks = import_with_remarks(file, mimic)  # type: ignore[arg-type]  # click has seen to it
+    text, remarks = import_with_remarks(file, mimic, output)  # type: ignore[arg-type]  # click has seen to it
     if output is None:
         say(text, end="", exact=True)
         _remark(remarks, quiet)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Callable, Iterable
 from typing import Generic, TypeVar
@@ -9,8 +10,10 @@ from typing import Generic, TypeVar
 from ic.grammar.syntax import Deck, String
 from ic.text.files import LIBRARY, Files, FoundFile, folders_by_slash
 from ic.text.lexer import COMMAND_LINE
+from ic.text.limits import MOST_MESH_BYTES
 from ic.text.source import SourceFile
 from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
+from met.host.files import read_regular
 
 T = TypeVar("T")
 
@@ -44,8 +47,7 @@ class NamedFiles(Generic[T]):
 
     def get(self, named: String) -> T:
         """The content of the file of this name. Raises Problem, the same each time for a fault of the file."""
-        self.was_asked = True
-        file = self._find(named)
+        file = self.find(named)
         if file.name not in self._read:
             try:
                 text = self._files.text(file, kind=self._kind, most=self._most)
@@ -61,7 +63,9 @@ class NamedFiles(Generic[T]):
             raise content
         return content
 
-    def _find(self, named: String) -> FoundFile:
+    def find(self, named: String) -> FoundFile:
+        """The file of this name. Raises Problem where there is none."""
+        self.was_asked = True
         file = self._deck if named.place.file == COMMAND_LINE else named.place.file
         path = os.path.join(LIBRARY, file[1:-1]) if file.startswith("<") else file
         folders = self._files.where(FoundFile(path, file), False)
@@ -72,3 +76,25 @@ class NamedFiles(Generic[T]):
             looked = f"looked in {', '.join(dict.fromkeys(folder.in_words for folder in folders))}"
             raise Problem(error(self._missing, f'cannot find "{named.value}"', named.place, help=(*near, looked)))
         return found_file
+
+
+class MeshFiles(NamedFiles[str]):
+    """The files of meshes that a deck names. They are looked at alone: of each its digest is known here."""
+
+    def __init__(self, deck: Deck) -> None:
+        super().__init__(
+            deck, lambda name, text: text, kind="mesh", ending=".stl", most=MOST_MESH_BYTES, missing="D219"
+        )
+        self._digests: dict[str, str] = {}
+
+    def digest(self, named: String) -> tuple[str, str]:
+        """The name of a file, and the SHA-256 of its contents. Raises Problem D219 where it cannot be read."""
+        file = self.find(named)
+        if file.name not in self._digests:
+            try:
+                self._digests[file.name] = hashlib.sha256(read_regular(file.path, MOST_MESH_BYTES)).hexdigest()
+            except OSError as reason:
+                most = f"a mesh is a file of at most {MOST_MESH_BYTES >> 20} MB: a program for meshes reduces it"
+                message = f"cannot read `{file.name}`: {reason.strerror}"
+                raise Problem(error("D219", message, named.place, help=most)) from None
+        return file.name, self._digests[file.name]

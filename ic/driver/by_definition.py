@@ -94,7 +94,8 @@ class DefinitionChecks:
     @property
     def findings(self) -> Known:
         """The findings to keep for the next check. Empty where files are searched whose texts are in no key."""
-        if self._definitions.csv_files.was_asked or self._definitions.robot_files.was_asked:
+        files = self._definitions
+        if any(kind.was_asked for kind in (files.csv_files, files.robot_files, files.mesh_files)):
             return {}
         return {key: self._findings[n] for n, key in enumerate(self._keys) if key is not None and n in self._findings}
 

@@ -14,6 +14,7 @@ from ic.robots.deck import arm_name, print_deck, remarks
 from ic.robots.entries import ArmEntries, arm_entries
 from ic.robots.files import KIND, load
 from ic.robots.following import Treatment, without_mimics
+from ic.robots.robot import Link
 from ic.text.complaints import Complaints
 from ic.text.files import Files, FoundFile
 from ic.text.limits import MOST_URDF_BYTES
@@ -25,9 +26,10 @@ def import_robot(path: str, mimic: Treatment = "follow") -> str:
     return import_with_remarks(path, mimic)[0]
 
 
-def import_with_remarks(path: str, mimic: Treatment = "follow") -> tuple[str, list[str]]:
+def import_with_remarks(path: str, mimic: Treatment = "follow", beside: str | None = None) -> tuple[str, list[str]]:
     """The text of the deck, and lines about what is not in it or doubtful. mimic: treatment of joints that follow
-    others. Raises Problem, with the file's text."""
+    others; beside: the file that the deck will be, None where it is one in the current folder. Raises Problem, with the
+    file's text."""
     files = Files()
     try:
         file = FoundFile(path, os.path.normpath(path))
@@ -35,6 +37,7 @@ def import_with_remarks(path: str, mimic: Treatment = "follow") -> tuple[str, li
         if mimic != "follow":
             arm = arm_entries(without_mimics(arm.robot, mimic))
         arm = _checked(arm)
+        arm = _meshes_from(os.path.dirname(beside or ""), arm)
     except Problem as problem:
         sources = tuple(files.read_so_far.values())
         raise Problem(
@@ -46,6 +49,22 @@ def import_with_remarks(path: str, mimic: Treatment = "follow") -> tuple[str, li
     title = f"made by `met import {name}{option}` from a file with the SHA-256 {source.sha256[:16]}..."
     lines = print_deck(arm, title)
     return "\n".join(lines) + "\n", list(remarks(arm))
+
+
+def _meshes_from(folder: str, arm: ArmEntries) -> ArmEntries:
+    """The entries with paths of meshes from another folder than that of the robot's file."""
+    robot, home = arm.robot, os.path.dirname(arm.robot.file)
+    if os.path.abspath(folder) == os.path.abspath(home) or not any(link.visuals for link in robot.links):
+        return arm
+
+    def moved(link: Link) -> Link:
+        paths = (os.path.relpath(os.path.join(home, visual.path), folder or ".") for visual in link.visuals)
+        visuals = (replace(visual, path=path) for visual, path in zip(link.visuals, paths, strict=True))
+        return replace(link, visuals=tuple(visuals))
+
+    links = tuple(map(moved, robot.links))
+    other = arm_entries(replace(robot, links=links, root=links[robot.links.index(robot.root)]))
+    return replace(other, base=None, no_body=arm.no_body) if arm.base is None else other
 
 
 def _checked(arm: ArmEntries) -> ArmEntries:

@@ -37,6 +37,10 @@ LINK = BlockDeclaration(
               path="links.LINK.inertia", default="that of the shape; without a shape, needed",
               doc="inertia about the centre of mass, along the link's axes: `[xx, yy, zz]` or "
                   "`[xx, yy, zz, xy, xz, yz]`"),
+        Entry(name="mesh", written='mesh = "upper.stl";', default="none",
+              doc="a file with the link's surface, for pictures: no number follows from it; `placed(\"upper.stl\", "
+                  "at = [0, 0, 0.1] m, rpy = [0, 0, 90] deg, scale = [0.001, 0.001, 0.001])` puts it elsewhere, and "
+                  "several stand in a list"),
         Entry(name="lumped", written="lumped = on;", parameter=LUMPED, path="links.LINK.lumped", default="`off`",
               doc="`on`: the numbers of this link are an identified set (base parameters), not those of a body; each "
                   "run checks the mass matrix of the arm instead"),

@@ -10,13 +10,14 @@ import os
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
 from ic.grammar.spell import spell
-from ic.grammar.syntax import Setting
+from ic.grammar.syntax import Call, Expression, List, Setting, String
 from ic.robots.attributes import printable
 from ic.robots.doubts import in_other_units, incomplete
 from ic.robots.entries import LIMITS, ArmEntries, RobotEntry, spelled
 from ic.robots.following import hold_position
 from ic.robots.names import word
 from ic.robots.robot import MOVING, Inertial, Joint, Mimic
+from ic.robots.warnings import unseen_words
 from ic.text.edition import EDITION_WORD, LATEST
 
 WIDE = 100  # columns of a block on one line
@@ -47,8 +48,9 @@ def arm_name(body: ArmEntries) -> str:
 
 
 def _about(body: ArmEntries) -> Iterator[str]:
-    weight = " Its mass counts in a run with `base = free;`." if body.base is not None else ""
-    if body.base is None and body.robot.root.inertial is not None:
+    weighs = body.base is not None and body.base.weighs
+    weight = " Its mass counts in a run with `base = free;`." if weighs else ""
+    if not weighs and body.robot.root.inertial is not None:
         weight = " Its inertia is left out: no body has it."
     yield f"// `base` is the file's link `{_safe(body.robot.root.name.text)}`.{weight}"
     if body.robot.dropped:
@@ -65,6 +67,7 @@ def remarks(body: ArmEntries) -> Iterator[str]:
     attributes = {what: elements for what, elements in body.robot.dropped.items() if " of " in what}
     if attributes:
         yield f"attributes not read, and not in the deck: {_counted(attributes)}"
+    yield from (f"{unseen_words(len(elements))} {reason}" for reason, elements in body.robot.unseen.items())
     yield from (remark.text for remark in in_other_units(body.robot))
     yield from incomplete(body.robot)
     if body.no_body:
@@ -78,7 +81,7 @@ def _block(part: RobotEntry, notes: list[str]) -> Iterator[str]:
     """An entry on one line where it is short, else a line for each key; notes behind the first line, or above it."""
     words = " ".join(word.text for word in part.entry.words)
     entries = [entry for entry in part.entry.body if isinstance(entry, Setting)]
-    settings = [(entry.path[0].text, f"{spell(entry.value)};") for entry in entries]
+    settings = [(entry.path[0].text, f"{_spelled(entry.value)};") for entry in entries]
     note = f"// {'; '.join(map(_safe, notes))}" if notes else ""
     rows = _rows(settings)
     line = f"    {words} {{ {'  '.join(f'{key} = {value}' for key, value in settings)} }}"
@@ -93,6 +96,13 @@ def _block(part: RobotEntry, notes: list[str]) -> Iterator[str]:
     for (key, value), *rest in rows:
         yield "  ".join((f"        {key:{width}} = {value}", *(f"{other} = {text}" for other, text in rest)))
     yield "    }"
+
+
+def _spelled(value: Expression) -> str:
+    """The text of a value; of a list of meshes, a line for each."""
+    if isinstance(value, List) and all(isinstance(mesh, Call | String) for mesh in value.items):
+        return f"[{''.join(f'{chr(10)}            {spell(mesh)},' for mesh in value.items)}\n        ]"
+    return spell(value)
 
 
 def _rows(settings: list[tuple[str, str]]) -> list[list[tuple[str, str]]]:

@@ -12,9 +12,23 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from ic.grammar.syntax import Entry, Expression, Group, List, Name, Number, Setting, Unary, Unit, WithUnit, Word
+from ic.grammar.syntax import (
+    Call,
+    Entry,
+    Expression,
+    Group,
+    List,
+    Name,
+    Number,
+    Setting,
+    String,
+    Unary,
+    Unit,
+    WithUnit,
+    Word,
+)  # fmt: skip
 from ic.robots.names import DeckNames, deck_names
-from ic.robots.robot import MOVING, Inertial, Joint, Link, Numbers, Robot, Written
+from ic.robots.robot import MOVING, Inertial, Joint, Link, Numbers, Robot, Visual, Written
 from met.diagnostic import Place
 from met.frozen import frozen
 from met.plan import BASE
@@ -51,12 +65,17 @@ class RobotEntry:
     source: Link | Joint
     entry: Group
 
+    @property
+    def weighs(self) -> bool:
+        """Whether it is a link for which the file has inertia."""
+        return isinstance(self.source, Link) and self.source.inertial is not None
+
 
 @frozen
 class ArmEntries:
     """A robot's arm: its entries, links and then joints, in the file's order, with the names in decks.
 
-    base     the link `base`, as a base that moves has it; None where the file's root has no inertia
+    base     the link `base`, as a base that moves has it; None where the file's root has neither inertia nor meshes
     notes    on places whose text is not the number that entries have from there: how this came about
     no_body  why the root's inertia is left out, where no body has it; else empty
     """
@@ -79,7 +98,8 @@ def arm_entries(robot: Robot) -> ArmEntries:
     links = tuple(RobotEntry(link, _link(link, names.links[link.name.text])) for link in robot.carried)
     kinds = {joint.name.text: _kind(joint) for joint in robot.joints}
     joints = tuple(RobotEntry(joint, _joint(joint, names, kinds)) for joint in robot.joints)
-    base = None if robot.root.inertial is None else RobotEntry(robot.root, _link(robot.root, BASE))
+    root = robot.root
+    base = RobotEntry(root, _link(root, BASE)) if root.inertial is not None or root.visuals else None
     return ArmEntries(robot, names, base, links, joints, dict(_notes(robot)))
 
 
@@ -109,7 +129,27 @@ def _link(link: Link, name: str) -> Group:
             settings.append(_vector("com", inertial.com, "m"))
         if inertial.mass.values[0] != 0.0 or not inertial.moments.nothing:
             settings.append(_vector("inertia", moments(inertial), "kg*m^2"))
+    if link.visuals:
+        files = tuple(map(_mesh, link.visuals))
+        mesh = files[0] if len(files) == 1 else List(files, link.visuals[0].place)
+        settings.append(_setting("mesh", mesh, link.visuals[0].place))
     return _group("link", name, None, settings, link.name.place)
+
+
+def _mesh(visual: Visual) -> Expression:
+    """The file of a mesh, within a call where it is not at the link's frame."""
+    place, file = visual.place, String(visual.path, visual.place)
+    placing = (
+        ("at", visual.at, (0.0, 0.0, 0.0), "m"),
+        ("rpy", visual.rpy, (0.0, 0.0, 0.0), "rad"),
+        ("scale", visual.scale, (1.0, 1.0, 1.0), ""),
+    )
+    named: list[tuple[Word, Expression]] = []
+    for key, values, default, unit in placing:
+        if values != default:
+            numbers = List(tuple(_plain(value, place) for value in values), place)
+            named.append((Word(key, place), WithUnit(numbers, _unit(unit, place), place) if unit else numbers))
+    return Call(_name("placed", place), (file,), tuple(named), None, place) if named else file
 
 
 def moments(inertial: Inertial) -> Numbers:

@@ -59,9 +59,24 @@ class Inertial:
 
 
 @frozen
+class Visual:
+    """A mesh of a link's looks: its path from the folder of the robot's file, its frame in the link's (m, rad), and the
+    factors along its axes that make metres of its numbers."""
+
+    path: str
+    place: Place
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+@frozen
 class Link:
+    """A link; visuals: its meshes that exist, whichever reader found them."""
+
     name: Written
     inertial: Inertial | None
+    visuals: tuple[Visual, ...] = ()
 
 
 @frozen
@@ -108,6 +123,7 @@ class Robot:
 
     root     the link that no joint carries, which is the arm's base
     dropped  elements that were not read, by tag, or of which an attribute was not, by `NAME of TAG`
+    unseen   elements that name meshes which are not drawn, by reason
     """
 
     file: str
@@ -116,6 +132,7 @@ class Robot:
     joints: tuple[Joint, ...]
     root: Link
     dropped: Mapping[str, tuple[Element, ...]]
+    unseen: Mapping[str, tuple[Element, ...]] = field(default_factory=dict)
 
     @property
     def carried(self) -> tuple[Link, ...]:

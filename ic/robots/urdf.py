@@ -1,15 +1,18 @@
 """The text of a URDF file to a `Robot`.
 
-Links, joints and inertia are read; what else the file holds is counted by name, so that none of it is dropped in
-silence. Joints of kinds that MET does not have are read too: an arm made from the file may remove or change them.
+Links, joints, inertia and the files of visual meshes are read; what else the file holds is counted by name, so that
+none of it is dropped in silence. Joints of kinds that MET does not have are read too: an arm made from the file may
+remove or change them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from ic.robots.attributes import XACRO, Found, printable, read_element
 from ic.robots.robot import Inertial, Joint, Link, Mimic, Numbers, Robot
+from ic.robots.visuals import link_visuals
 from ic.robots.xml import Element, parse
 from ic.text.complaints import Complaints, known_words
 from ic.text.limits import MOST_LINKS
@@ -50,12 +53,14 @@ def read(name: str, text: str) -> Robot:
             )
     complaints = Complaints()
     dropped: dict[str, list[Element]] = {}
+    unseen: dict[str, list[Element]] = {}
     links, joints, own = [], [], None
     with complaints.gather():
         own = read_element(root, dropped)
     for element in root.all("link"):
         with complaints.gather():
-            links.append(_link(read_element(element, dropped)))
+            link = _link(read_element(element, dropped))
+            links.append(replace(link, visuals=link_visuals(element, name, dropped, unseen)))
     for element in root.all("joint"):
         with complaints.gather():
             joints.append(_joint(read_element(element, dropped)))
@@ -72,7 +77,7 @@ def read(name: str, text: str) -> Robot:
         tuple(links),
         tuple(joints),
         _root(root, links, joints),
-        {what: tuple(elements) for what, elements in dropped.items()},
+        *({what: tuple(elements) for what, elements in counted.items()} for counted in (dropped, unseen)),
     )
 
 

@@ -68,6 +68,12 @@ def _left_out(body: ArmEntries) -> Iterator[Label]:
         counts = [f"{len(elements)} `{printable(what)}`" for what, elements in kinds[:MOST_NAMED]]
         more = f" and {len(kinds) - MOST_NAMED} kinds more" if len(kinds) > MOST_NAMED else ""
         yield Label(kinds[0][1][0].place, f"not read: {', '.join(counts)}{more}")
+    for reason, elements in robot.unseen.items():
+        yield Label(elements[0].place, f"{unseen_words(len(elements))} {reason}")
+
+
+def unseen_words(count: int) -> str:
+    return f"not drawn: {count} mesh{'es' * (count != 1)}"
 
 
 def _joints(body: ArmEntries, joints: Sequence[Joint]) -> str:

@@ -16,6 +16,7 @@ from met.diagnostic import Diagnostic
 MOST_BYTES = 2 << 20  # of one file
 MOST_TOKENS = 500_000  # of all files together, white space included
 MOST_URDF_BYTES = 8 << 20  # of one URDF file
+MOST_MESH_BYTES = 64 << 20  # of one mesh
 MOST_ELEMENTS = 50_000  # of one XML file
 MOST_LINKS = 1_000  # of one robot
 XML_DEPTH = 40  # of elements within each other

@@ -109,9 +109,25 @@ class Quantity:
 
 
 @frozen
+class Mesh:
+    """A file with a link's surface: it is looked at, and never simulated.
+
+    file, sha256     its name, as the deck's files are named, and the digest of its contents; "" where there was none
+    at, rpy, scale   its frame in the link's, m and rad, and the factors along its axes, by which its numbers are metres
+    """
+
+    file: str
+    sha256: str = ""
+    at: tuple[float, ...] = (0.0, 0.0, 0.0)
+    rpy: tuple[float, ...] = (0.0, 0.0, 0.0)
+    scale: tuple[float, ...] = (1.0, 1.0, 1.0)
+
+
+@frozen
 class Link:
     """A rigid body; its numbers are parameters. `shape` is its picture, in words of `ic` (kind, numbers in SI).
 
+    meshes  what it looks like, where files say so
     lumped  whether its numbers are an identified set (base parameters), which need not be those of a body
     root    of a boom: the piece at its root. The boom itself is a frame at its tip: its numbers are those of the whole,
             and its pieces have the matter
@@ -122,6 +138,7 @@ class Link:
     shape: tuple[str, tuple[tuple[str, float], ...]] | None = keyed("never", default=None)
     lumped: bool = keyed("never", default=False)
     root: str = keyed("where set", default="")
+    meshes: tuple[Mesh, ...] = keyed("never", default=())
 
 
 @frozen
@@ -392,7 +409,10 @@ BALANCED = RunKey(
 
 @frozen
 class Structure:
-    """Everything that determines the compiled program, apart from values."""
+    """Everything that determines the compiled program, apart from values.
+
+    base_meshes  what a base looks like that is no link
+    """
 
     arm: str
     links: tuple[Link, ...]
@@ -411,6 +431,7 @@ class Structure:
     sensors: tuple[LinkSensor, ...] = keyed("where set", default=())
     expressions: tuple[SignalExpression, ...] = keyed("where set", default=())
     balanced: bool = run_key(BALANCED)
+    base_meshes: tuple[Mesh, ...] = keyed("never", default=())
 
     @property
     def free(self) -> bool:

@@ -16,6 +16,7 @@ from ic.language import DEFINITIONS, EXPERIMENTS, HEADS, OF_A_RUN
 from ic.meaning.definitions.csv_files import csv_files
 from ic.meaning.definitions.merge import Item, MergedBlock, defined_twice, merge
 from ic.meaning.definitions.row_tables import RowTable, row_table
+from ic.named_files import MeshFiles
 from ic.robots.files import RobotFiles
 from ic.text.complaints import Complaints, known_words, where_it_belongs, with_article
 from ic.text.edition import FIRST
@@ -62,6 +63,7 @@ class Definitions:
         self.lets: dict[str, Let] = {}
         self.csv_files = csv_files(deck)
         self.robot_files = RobotFiles(deck)
+        self.mesh_files = MeshFiles(deck)
         self._row_tables: dict[Place, RowTable | Problem] = {}
         self._by_kind: dict[str, dict[str, Definition]] = {kind: {} for kind in DEFINITIONS}
         self._merged: dict[tuple[str, str], MergedBlock] = {}
@@ -289,12 +291,13 @@ class Definitions:
             return merge(None, body.entries, home=definition.name, base_name=None, complaints=self._complaints)
         return None
 
-    def base_from_file(self, arm: str) -> Item | None:
-        """The link `base` of the file that an arm, or one that it is like, is made from; None where there is none."""
+    def base_from_file(self, arm: str, *, of_mass: bool = True) -> Item | None:
+        """The link `base` of the file that an arm, or one that it is like, is made from; None where there is none.
+        of_mass: whether it is none without inertia"""
         for name in reversed(self.homes(self._by_kind["arm"][arm])):
             call = self._by_kind["arm"][name].group.made_from
             base = self.robot_files.arm_entries(call).base if call is not None else None
-            if base is not None:
+            if base is not None and (base.weighs or not of_mass):
                 return merge(None, (base.entry,), home=name, base_name=None, complaints=self._complaints).get(
                     "link base"
                 )

@@ -20,6 +20,7 @@ from ic.meaning.mechanics.dh import use_dh
 from ic.meaning.mechanics.foreign import how_to_close, refuse_foreign_joint
 from ic.meaning.mechanics.loops import check_followers, close_loops, resolve_loop, use_follows
 from ic.meaning.mechanics.matter import use_matter
+from ic.meaning.mechanics.meshes import link_meshes
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.addresses import in_arm
 from ic.meaning.parameters.models import check_keys, value_place, word_of
@@ -308,7 +309,9 @@ def resolve_link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Part:
         return ()
     written = item.body.get(LUMPED.name)
     lumped = written is not None and scope.word(owner, LUMPED, written) != "off"  # None: no such word, already reported
-    link = Link(item.name, item.place, use_matter(scope, owner, "link", item.name, item.body, lumped=lumped), lumped)
+    shape = use_matter(scope, owner, "link", item.name, item.body, lumped=lumped)
+    meshes = link_meshes(scope, owner, item.body.get("mesh"))
+    link = Link(item.name, item.place, shape, lumped, meshes=meshes)
     return resolve_boom(scope, owner, item, item.body, link) if is_boom else (link,)
 
 

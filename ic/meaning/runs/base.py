@@ -14,6 +14,7 @@ from ic.meaning.control.courses import course_named, use_course
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm, resolve_link
 from ic.meaning.mechanics.bodies import carried_loads
+from ic.meaning.mechanics.meshes import link_meshes
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, refuse_values, word_of
 from ic.meaning.parameters.not_sweepable import NotSweepable
@@ -23,7 +24,7 @@ from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import Help, Label, Place, did_you_mean, leave_out
 from met.parameter import WORLD, Parameter
-from met.plan import BASE, COMPONENTS, Base, Course, Link, Origin, Payload, Structure
+from met.plan import BASE, COMPONENTS, Base, Course, Link, Mesh, Origin, Payload, Structure
 from met.plan.chains import ground
 from met.plan.defaults import INERTIA, OF_FREE_BASE, component
 from met.plan.run_keys import RunKey, run_keys
@@ -236,6 +237,17 @@ def _free(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:
         return _standing(scope, item, arm)
     parts = resolve_link(scope, written, scope.definitions.homes(scope.definitions.of_kind("arm")[arm.name]))
     return replace(arm, links=(*arm.links, *(link for link in parts if isinstance(link, Link))))
+
+
+def base_meshes(scope: Scope, arm: ResolvedArm) -> tuple[Mesh, ...]:
+    """What the base looks like where it is no link of the arm: by the file that the arm is made from."""
+    if any(link.name == BASE for link in arm.links) or BASE in arm.failed:
+        return ()
+    written = scope.definitions.base_from_file(arm.name, of_mass=False)
+    if written is None or written.body is None:
+        return ()
+    owner = Owner(f"link `{BASE}`", written.place, f"links.{BASE}")
+    return link_meshes(scope, owner, written.body.get("mesh"))
 
 
 def _standing(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:

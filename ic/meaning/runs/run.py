@@ -25,7 +25,7 @@ from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import ALLOW
-from ic.meaning.runs.base import initial_base, resolve_base, resolve_run_keys
+from ic.meaning.runs.base import base_meshes, initial_base, resolve_base, resolve_run_keys
 from ic.meaning.runs.expressions import resolve_signals
 from ic.meaning.runs.initial import resolve_environment, resolve_initial
 from ic.meaning.runs.linear import resolve_linear, resolve_linear_metrics
@@ -89,6 +89,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     if arm is None:
         return None
     scope.failed_parts = arm.failed
+    base_looks = base_meshes(scope, arm)
     base, arm = resolve_base(scope, block.get("base"), arm)
     name_guides(scope, block)
     uses, scope.failed_servos = resolve_servos(scope, body_of(scope, block.get("servos")), arm)
@@ -136,6 +137,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         payloads=payloads,
         guides=tuple(guide.use(others[guide.path]) for guide in guides),
         sensors=tuple(sensor.use(others[sensor.path]) for sensor in sensors),
+        base_meshes=base_looks,
         **keys,
     )
     signals = resolve_signals(scope, block, structure, names_in_record(block.get("record")))
