@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from batch.arms.acting import ActingOnArm, acting_json, acting_on
+from batch.arms.meshes import NO_MESHES, ArmMeshes, arm_meshes, meshes_json
 from batch.arms.scene import ArmScene, arm_scene, lacking, scene_json
 from met.frozen import frozen
 from met.messages.visible import visible
@@ -19,22 +21,26 @@ class DrawnArm:
     recorded  channels of the run, in the order of the columns of its rows
     scene     None where the run does not record the signals that it is `lacking`
     acting    None where nothing acts on the arm
+    meshes    those of its links that are drawn;  none where they are left out
     """
 
     recorded: tuple[str, ...]
     scene: ArmScene | None
     acting: ActingOnArm | None
     lacking: tuple[str, ...]
+    meshes: ArmMeshes = NO_MESHES
 
 
-def drawn_arm(experiment: Experiment, recorded: Sequence[str]) -> DrawnArm:
-    """The arm of an experiment whose rows have these channels."""
+def drawn_arm(experiment: Experiment, recorded: Sequence[str], folder: Path | None) -> DrawnArm:
+    """The arm of an experiment whose rows have these channels. folder: of its archive, where files of meshes are looked
+    for too; None to leave meshes out"""
     scene = arm_scene(experiment, recorded)
     if missing := lacking(scene, recorded):
         return DrawnArm(tuple(recorded), None, None, missing)
     acting = acting_on(experiment, scene, recorded)
+    meshes = NO_MESHES if folder is None else arm_meshes(experiment.structure, folder)
     is_shown = acting.arrows or acting.payloads or acting.not_drawn
-    return DrawnArm(tuple(recorded), scene, acting if is_shown else None, ())
+    return DrawnArm(tuple(recorded), scene, acting if is_shown else None, (), meshes)
 
 
 def drawn_json(arm: DrawnArm) -> dict[str, Any]:
@@ -61,6 +67,9 @@ def drawn_json(arm: DrawnArm) -> dict[str, Any]:
         "columns": columns(arm.scene.channels),
         "reactions": forces,
     }
+    if arm.meshes.words:
+        data["scene"]["meshes"] = meshes_json(arm.meshes, [body.name for body in arm.scene.bodies])
+        data["meshes"] = arm.meshes.words
     if arm.acting is not None:
         data["acting"] = acting_json(arm.acting) | {"columns": columns(arm.acting.channels)}
     visible_data: dict[str, Any] = visible_texts(data)

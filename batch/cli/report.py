@@ -27,6 +27,7 @@ from met.messages.visible import say
     is_flag=True,
     help="Only the contents of the archive: the page runs no case again, and draws no arm.",
 )
+@click.option("--no-meshes", is_flag=True, help="Draw links by their shapes, without the files of their meshes.")
 @loudness_options
 def report(
     archive: str,
@@ -36,6 +37,7 @@ def report(
     tolerances: tuple[str, ...],
     title: str,
     no_simulation: bool,
+    no_meshes: bool,
     quiet: bool,
     verbose: bool,
 ) -> int:
@@ -50,6 +52,7 @@ def report(
 
     if tolerances and against is None:
         raise click.UsageError("--tol is for a comparison: `--against BEFORE.h5` names the other archive")
+    notes: list[str] = []
     progress = (lambda done: click.echo(f"stability of {done} cases is known", err=True)) if verbose else None
     target = make(
         archive,
@@ -59,9 +62,13 @@ def report(
         against=against,
         tolerances=tolerances,
         simulate=not no_simulation,
+        meshes=not no_meshes,
+        tell=notes.append,
         progress=progress,
     )
     if not quiet:
+        for note in notes:
+            say(f"note: {note}", err=True)
         with kept(f"{target} is whole"):
             say(f"{target}  ({size(target.stat().st_size)})")
     return YES

@@ -32,6 +32,7 @@ from met.messages.visible import say
 @click.option(
     "--port", type=click.IntRange(1, 65535), metavar="N", help="Of a deck: the port on 127.0.0.1 [a free one]."
 )
+@click.option("--no-meshes", is_flag=True, help="Draw links by their shapes, without the files of their meshes.")
 @deck_options
 @loudness_options
 def view(
@@ -41,6 +42,7 @@ def view(
     against: str | None,
     numbers: str | None,
     port: int | None,
+    no_meshes: bool,
     defines: tuple[str, ...],
     include_dirs: tuple[str, ...],
     settings: tuple[str, ...],
@@ -64,7 +66,7 @@ def view(
     if names_archive(source):
         if port is not None:
             raise click.UsageError(f"--port is for decks: the page of the archive `{source}` is a file")
-        return _write(source, name, output, against, numbers, include_dirs, quiet)
+        return _write(source, name, output, against, numbers, include_dirs, quiet, meshes=not no_meshes)
     if output is not None:
         raise click.UsageError(
             f"-o is for archives: the page of the deck `{source}` is served; `met run` makes an archive of it"
@@ -73,6 +75,8 @@ def view(
         raise click.UsageError(f"--against is for archives: `met run {source}` makes one of the deck")
     if numbers is not None:
         raise click.UsageError(f"--numbers is for archives: `met run {source}` makes one of the deck")
+    if no_meshes:
+        raise click.UsageError("--no-meshes is for archives: the page of a deck has a switch for meshes")
     return _watch(source, name, port or 0, defines, include_dirs, settings, quiet=quiet, verbose=verbose)
 
 
@@ -84,6 +88,8 @@ def _write(
     numbers: str | None,
     include_dirs: tuple[str, ...],
     quiet: bool,
+    *,
+    meshes: bool,
 ) -> int:
     from batch.portable import files
     from batch.portable.page import view as page
@@ -93,7 +99,7 @@ def _write(
     target = Path(archive).with_suffix(".view.html") if output is None else path_of(output)
     files.check_page(target)
     notes: list[str] = []
-    text = page(archive, () if name is None else (name,), against, numbers, include_dirs, notes.append)
+    text = page(archive, () if name is None else (name,), against, numbers, include_dirs, notes.append, meshes=meshes)
     files.write_page(text, target)
     if not quiet:
         for note in notes:

@@ -62,11 +62,14 @@ def view(
     numbers: str | Path | None = None,
     include_dirs: Sequence[str | Path] = (),
     tell: Callable[[str], object] = lambda line: None,
+    *,
+    meshes: bool = True,
 ) -> str:
     """The page of the archive's only run or sweep, or of the one that is named. against: another archive, or a log of
     measured signals, that is shown beside it. numbers: the archive's deck, whose numbers can be others there, with
-    further folders of what it includes. tell: takes a line on a log of another span than the run's. Raises
-    Problem E473 where several runs are meant, and those of `batch.portable.beside` and `batch.portable.numbers`."""
+    further folders of what it includes. tell: takes lines on the meshes that are drawn, and on a log of another span
+    than the run's. meshes: whether links are drawn by their meshes. Raises Problem E473 where several runs are meant,
+    and those of `batch.portable.beside` and `batch.portable.numbers`."""
     with ArchiveFile(archive) as file:
         file.need_every_row("a page that simulates")
         groups = groups_named(file, names)
@@ -77,7 +80,9 @@ def view(
             )
         (group,) = groups
         experiment = next(experiment for experiment in file.plan().experiments if experiment.name == group.name)
-        data = data_of(experiment, file, group)
+        data = data_of(experiment, file, group, folder=file.path.parent if meshes else None)
+        if "meshes" in data["arm"]:
+            tell(data["arm"]["meshes"])
         data["report"] = visible(f"met report {quoted(Path(archive).name)}")
         answer = design_answer(file, pools(groups)[0])
         if answer is not None and answer.case in data["positions"]:
@@ -150,6 +155,7 @@ def data_of(
     source: str = "archive",
     prepared: Prepared | None = None,
     quick: bool = False,
+    folder: Path | None = None,
 ) -> dict[str, Any]:
     """Data for the script: the module, its description, and the archive's data about the first cases.
 
@@ -157,11 +163,14 @@ def data_of(
     source    what the page calls whatever its numbers are compared with
     prepared  the experiment, where it is at hand
     quick     whether a module that is sooner made and slower will do
+    folder    where files of links' meshes are looked for too; None to draw no meshes
     """
     prepared = prepared or prepare(experiment)
     making = begun(prepared.recording, quick=quick)
     arm = drawn_json(
-        drawn_arm(experiment, [described_column["channel"] for described_column in described_columns(experiment)])
+        drawn_arm(
+            experiment, [described_column["channel"] for described_column in described_columns(experiment)], folder
+        )
     )
     code_key, module = prepared.code_key, making()
     description = described(prepared, module)

@@ -24,6 +24,8 @@ def report(
     against: str | os.PathLike[str] | None = None,
     tolerances: str | Sequence[str] = (),
     simulate: bool = True,
+    meshes: bool = True,
+    tell: Callable[[str], object] = lambda line: None,
     progress: Callable[[int], None] | None = None,
 ) -> Path:
     """Write a report of an archive; its place. The same archives give the same bytes.
@@ -34,6 +36,8 @@ def report(
     against      an earlier archive: what changed is in the page too
     tolerances   how much may differ from it, as `batch.diff` has them
     simulate     whether the page can run the cases again, and draws the arm
+    meshes       whether links are drawn by their meshes, from files that are there
+    tell         called with lines on these
     progress     called with the number of cases whose stability is known, where motors are on beds
 
     Raises met.diagnostic.Problem for mistakes that a user can correct.
@@ -64,6 +68,11 @@ def report(
             texts = [tolerances] if isinstance(tolerances, str) else tolerances
             diff_ = rename_archives(diff(Path(against), archive, read(texts)), *display_names(Path(against), archive))
             other = ComparedArchive(stack.enter_context(ArchiveFile(Path(against))), diff_)
-        text = page(gather(file, experiments, title, progress, other, simulate=simulate))
+        contents = gather(file, experiments, title, progress, other, simulate=simulate, meshes=meshes)
+        text = page(contents)
     write(target, text)
+    played = [section.simulation.structures for section in contents.sections if section.simulation is not None]
+    for words in dict.fromkeys(structure.arm.meshes.words for structures in played for structure in structures):
+        if words:
+            tell(words)
     return target

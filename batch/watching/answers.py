@@ -169,7 +169,7 @@ def page(answer: DeckAnswer, prepared: Prepared) -> str:
     rows = shown_rows(experiment)
     empty = {use.name: np.full(len(rows), np.nan) for use in experiment.metrics}
     group = GroupInMemory.of_metrics(experiment, rows, np.full(len(rows), NOT_YET, np.int8), empty)
-    data = data_of(experiment, plan, group, source=kind_of(experiment), prepared=prepared, quick=True)
+    data = data_of(experiment, plan, group, source=kind_of(experiment), prepared=prepared, quick=True, folder=Path())
     by = "by the code of `met run`"
     if experiment.cases.count > len(rows):
         by += f"; of {experiment.cases.count:,} cases these are the first {len(rows):,}"

@@ -5,6 +5,7 @@
 MET.arm = (() => {
   const POSE = 12;  // numbers of a body: the rows of its rotation, its origin
   const SHAPE = 9;  // of a shape: middle, axis, size
+  const PIN = 0.55;  // of a joint's size, on a link with a mesh
   const SOLID = 16;  // of a solid: place, three axes, size
   const { joint: JOINT, cube: CUBE, rail: RAIL, foot: FOOT } = MET.look;
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -108,14 +109,23 @@ MET.arm = (() => {
       [out[to + 12], out[to + 13], out[to + 14], out[to + 15]] = [x, y, z, length];
     }
 
-    // The solids: {mesh, role, joint, at, axes (of the mesh, in the world), size}.
+    // The links' meshes, which are drawn in the place of their shapes.
+    const skins = (MET.meshes?.[scene.meshes] ?? scene.meshes ?? []).map(skin);
+    const skinned = new Set(skins.map(({ body }) => body));
+
+    // The solids: {mesh, role, joint, at, axes (of the mesh, in the world), size}; with `skin`, one of the links' meshes,
+    // unless they are to be plain.
     const own = new Float64Array(SOLID);
-    function solids(numbers) {
-      const out = scene.shapes.map(([, , role, joint], n) => {
+    function solids(numbers, plain = false) {
+      const out = plain ? [] : skins.map((worn, n) => ({ mesh: `skin ${n}`, skin: worn, role: "link", joint: -1, body: worn.body, at: up(origin(numbers, worn.body)),
+        axes: [0, 1, 2].map((which) => up(rows(numbers, worn.body).map((row) => row[which]))), size: [1, 1, 1, 0] }));
+      scene.shapes.forEach(([body, , role, joint], n) => {
+        if (!plain && skinned.has(body) && ["link", "base"].includes(role)) return;
         write(numbers, n, own, 0);
-        return { mesh: meshes[n], role, joint, body: scene.shapes[n][0], at: vector(own, 0), axes: [3, 6, 9].map((at) => vector(own, at)), size: [...vector(own, 12), own[15]] };
+        if (!plain && skinned.has(body) && role === "joint") [12, 13, 14].forEach((k) => { own[k] *= PIN; });
+        out.push({ mesh: meshes[n], role, joint, body, at: vector(own, 0), axes: [3, 6, 9].map((at) => vector(own, at)), size: [...vector(own, 12), own[15]] });
       });
-      if (!scene.moves) out.push({ mesh: "can", role: "base", joint: -1, at: [0, 0, FOOT[1] * limb / 2], axes: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], size: [FOOT[0] * limb, FOOT[0] * limb, 0.4 * limb, FOOT[1] * limb] });
+      if (!scene.moves && (plain || !skinned.has(0))) out.push({ mesh: "can", role: "base", joint: -1, at: [0, 0, FOOT[1] * limb / 2], axes: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], size: [FOOT[0] * limb, FOOT[0] * limb, 0.4 * limb, FOOT[1] * limb] });
       return out;
     }
 
@@ -141,11 +151,29 @@ MET.arm = (() => {
     const arrows = (numbers, forces, metres) => forces.flatMap(([body, ...force]) =>
       arrow(up(origin(numbers, body)), up(rows(numbers, body).map((row) => dot(row, force))), metres * size(force), "force"));
 
-    return { take, solids, arrow, arrows, up, at: (numbers, body) => up(origin(numbers, body)), write, meshes, frames, scene, limb, reach: scene.reach };
+    return { skins, take, solids, arrow, arrows, up, at: (numbers, body) => up(origin(numbers, body)), write, meshes, frames, scene, limb, reach: scene.reach };
+  }
+
+  // A link's mesh, as `batch.arms.meshes.meshes_json` has it: points, in its body's frame, and places of corners of faces.
+  function skin({ body, low, edge, points, faces }) {
+    const cells = new Uint16Array(MET.bytes(points).buffer);
+    const places = Float32Array.from(cells, (cell, n) => low[n % 3] + edge * cell);
+    const far = [0, 1, 2].map((axis) => low[axis] + edge * cells.reduce((most, cell, n) => (n % 3 === axis ? Math.max(most, cell) : most), 0));
+    return { body, points: places, faces: new Uint16Array(MET.bytes(faces).buffer), low, far };
+  }
+
+  // Ends and radius of a link's mesh as if it were a pill: along the longest side of the box round it.
+  function endsOfSkin({ low, far }, at, axes) {
+    const half = low.map((x, k) => (far[k] - x) / 2);
+    const middle = axes.reduce((p, axis, k) => plus(p, axis, low[k] + half[k]), at);
+    const longest = half.indexOf(Math.max(...half));
+    const others = half.filter((_, k) => k !== longest);
+    return { ends: [-1, 1].map((side) => plus(middle, axes[longest], side * half[longest])), radius: Math.hypot(...others) };
   }
 
   // Ends and radius of a solid as if it were a pill, by which it is fitted into a picture.
-  function ends({ mesh, at, axes, size: [x, y, z, length] }) {
+  function ends({ mesh, skin, at, axes, size: [x, y, z, length] }) {
+    if (skin) return endsOfSkin(skin, at, axes);
     const half = mesh === "block" ? z / 2 : length / 2;
     return { ends: [plus(at, axes[2], -half), plus(at, axes[2], half)], radius: mesh === "block" ? Math.hypot(x, y) / 2 : x };
   }

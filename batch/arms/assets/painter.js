@@ -73,7 +73,7 @@ MET.painter = (() => {
         return node("path", { d: d([a, [b[0] + 0.01, b[1]]], false), stroke: css(colours.shade), "stroke-linecap": "round", "stroke-width": (2 * radius * scale((a[2] + b[2]) / 2)).toFixed(1) });
       })));
     }
-    ghosts.forEach((numbers, n) => arm.solids(numbers).forEach((one) => solid(one, colours.ghost(n), Math.min(1, 1.5 * colours.ghost(n)[3]))));
+    ghosts.forEach((numbers, n) => arm.solids(numbers, true).forEach((one) => solid(one, colours.ghost(n), Math.min(1, 1.5 * colours.ghost(n)[3]))));
     picture.twin.filter(({ role }) => role !== "base").forEach((each) => solid(each, colours.twin, colours.twin[3]));
     picture.clear.forEach((each) => solid(each, colours.clear(each), colours.clear(each)[3]));
     if (trace.length > 1) path(1e9, { d: d(trace.map(seen), false), stroke: css(colours.trace), "stroke-width": 1.6 });  // under the arm

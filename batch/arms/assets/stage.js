@@ -47,6 +47,7 @@ MET.stage = (() => {
     let [chosen, others, floor, time, playing, rate, end] = [null, [], null, 0, false, 1, 0];
     let [frames, ghostly, fresh, asked, touched, moved, before] = [false, true, true, false, false, false, 0];
     let [path, still, rest, pace, coarse, inks, saidAt] = [[], true, 0, 0, 1, null, 0];
+    let meshed = arm.skins.length > 0;
     let [twin, twinned] = [null, true];  // another arm beside the chosen case: its solids at a time
     const legend = MET.acting.legend(arm, () => redraw());
     const acts = acting ? MET.acting.make(acting, arm) : null;
@@ -64,21 +65,23 @@ MET.stage = (() => {
     };
     const withFrames = toggle("frames", "Axes of the links' frames: x red, y green, z blue (f)", frames, () => (frames = !frames));
     const withOthers = toggle("", "The other cases, pale; in the colour of a warning those that fail or miss a requirement (g)", ghostly, () => (ghostly = !ghostly));
+    const withMeshes = toggle("meshes", "The links as their files have them, or as plain shapes (m)", meshed, () => (meshed = !meshed));
+    withMeshes.hidden = !meshed;
     const withTwin = toggle("", "What stands beside the run", true, () => (twinned = !twinned));
     withTwin.hidden = true;
     const whole = node("button", { type: "button", class: "chip", title: "Everything in view (0)", click: () => { home(); redraw(); } }, "fit");
     const help = toggle("?", "Keys and mouse (?)", false, () => !(keys.hidden = !keys.hidden));
-    const keys = node("dl", { class: "keys", hidden: true }, KEYS.map(([key, does]) => [node("dt", null, key), node("dd", null, does)]));
+    const keys = node("dl", { class: "keys", hidden: true }, [...KEYS, ...(meshed ? [["m", "meshes of the links"]] : [])].map(([key, does]) => [node("dt", null, key), node("dd", null, does)]));
     const triad = MET.triad.make(arm, scene.gravity);
     const view = node("div", { class: "view", tabindex: 0, role: "application", "aria-label": "The arm in 3D. Space plays, comma and full stop step, arrows turn, with shift they move, plus and minus zoom, 0 shows all." },
-      surface?.canvas, paper, told, scaled, triad.box, node("div", { class: "tools" }, withTwin, withOthers, withFrames, whole, help), keys);
+      surface?.canvas, paper, told, scaled, triad.box, node("div", { class: "tools" }, withTwin, withOthers, withMeshes, withFrames, whole, help), keys);
     const sign = node("path", { d: "M3 1.5 L14 8 L3 14.5 Z" });
     const play = node("button", { type: "button", class: "play", "aria-label": "Play", click: () => run(!playing) }, node("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, sign));
     const scrub = node("input", { type: "range", min: 0, max: 1, step: "any", "aria-label": "Time", input: () => { run(false); seek(Number(scrub.value) * end); } });
     const clock = node("output", { class: "clock" });
     const speed = node("select", { "aria-label": "Speed", change: () => { rate = Number(speed.value); } }, SPEEDS.map((each) => node("option", { value: each }, `${number(each)} ×`)));
     const film = node("div", { class: "film printed" });
-    root.append(node("div", { class: "stage" }, view, node("div", { class: "transport" }, play, scrub, clock, speed), legend.box, ...[MET.acting.note(acting)].filter(Boolean), film));
+    root.append(node("div", { class: "stage" }, view, node("div", { class: "transport" }, play, scrub, clock, speed), legend.box, ...[MET.acting.note(acting), drawn.meshes && node("p", { class: "note" }, `${drawn.meshes}.`)].filter(Boolean), film));
     const ending = new AbortController();
     if (surface?.renderer.software) view.classList.add("plain");
     surface?.canvas.addEventListener("webglcontextlost", () => {
@@ -106,10 +109,10 @@ MET.stage = (() => {
       };
     }
 
-    function picture(at, all = true, fine = still) {
+    function picture(at, all = true, fine = still, plain = !surface || !meshed) {
       const numbers = chosen.at(at);
       const around = legend.solids(at, numbers);
-      const own = arm.solids(numbers).filter(({ role }) => role !== "payload" || legend.shown("payload"))
+      const own = arm.solids(numbers, plain).filter(({ role }) => role !== "payload" || legend.shown("payload"))
         .map((each) => (each.role === "payload" && around.flying?.has(each.body) ? { ...each, role: "flying" } : each));
       const solids = [...own, ...(frames ? arm.frames(numbers) : []), ...around.solids];
       const shown = all && ghostly ? others : [];
@@ -266,6 +269,7 @@ MET.stage = (() => {
       else if (event.key === "b" && !withTwin.hidden) withTwin.click();
       else if (legend.key(event.key)) return;
       else if (event.key === "?") help.click();
+      else if (event.key === "m" && !withMeshes.hidden) withMeshes.click();
       else if (event.key === "f") withFrames.click();
       else if (event.key === "g" && !withOthers.hidden) withOthers.click();
       else return;
@@ -325,7 +329,7 @@ MET.stage = (() => {
       camera.aspect = 4 / 3;
       camera.fit(chosenPills());
       film.replaceChildren(...Array.from({ length: FILM }, (_, n) => (end * n) / (FILM - 1)).map((at) =>
-        node("figure", null, MET.painter.draw(picture(at, false), 400, 300), node("figcaption", null, `${number(at)} s`))));
+        node("figure", null, MET.painter.draw(picture(at, false, true, true), 400, 300), node("figcaption", null, `${number(at)} s`))));
       Object.assign(camera, { distance, target, aspect });
     }, { signal: ending.signal });
     const sides = new ResizeObserver(redraw);
@@ -345,7 +349,7 @@ MET.stage = (() => {
 
     // Where it is seen from and at which instant; and back there, on a page that takes another's place.
     const seenFrom = ({ azimuth, elevation, distance, target }) => ({ azimuth, elevation, distance, target });
-    const kept = () => ({ camera: seenFrom(camera), time, playing, rate, frames, ghostly, legend: legend.kept(), twinned });
+    const kept = () => ({ camera: seenFrom(camera), time, playing, rate, frames, meshed, ghostly, legend: legend.kept(), twinned });
 
     function resume(before) {
       const all = chosen ? chosenPills() : [];
@@ -354,6 +358,7 @@ MET.stage = (() => {
       Object.assign(camera, seenFrom(before.camera));
       speed.value = rate;
       if (before.frames !== frames) withFrames.click();
+      if (before.meshed === false && meshed) withMeshes.click();
       if (before.ghostly !== ghostly) withOthers.click();
       legend.resume(before.legend);
       if (before.twinned !== twinned) withTwin.click();

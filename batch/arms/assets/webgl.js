@@ -7,7 +7,7 @@
 "use strict";
 
 MET.webgl = (() => {
-  const { plus, unit, along, length, SOLID: TINT } = MET.arm;
+  const { plus, unit, along, length, dot, cross, SOLID: TINT } = MET.arm;
   const [NUMBERS, ROW] = [20, 128];  // of a solid, in five dots of a texture; solids in its row
   const [FEW, THIN] = [16, 0.4];  // ghosts; of more, limbs are thinner by this and have few faces
   const SUN = unit([-0.28, -0.18, 1]);  // where shadows come from
@@ -44,7 +44,7 @@ MET.webgl = (() => {
     out vec4 done;
     void main() {
       if (shadow.w > 0.0) { done = shade; return; }
-      vec3 n = normalize(normal), v = normalize(eye - place);
+      vec3 n = normalize(gl_FrontFacing ? normal : -normal), v = normalize(eye - place);
       float lit = 0.5 + 0.5 * dot(n, key), sky = 0.5 + 0.5 * n.z;
       vec3 c = colour.rgb * (0.42 + 0.66 * lit * lit) * mix(0.84, 1.04, sky);
       c += 0.2 * pow(max(dot(n, normalize(key + v)), 0.0), 36.0);
@@ -161,6 +161,30 @@ MET.webgl = (() => {
     return { vertices, faces };
   }
 
+  // A link's mesh, smooth where its faces meet at less than an angle; they may be wound either way.
+  const CREASE = Math.cos(0.6);
+  function smoothed({ points, faces }) {
+    const point = (n) => [points[3 * n], points[3 * n + 1], points[3 * n + 2]];
+    const normals = Array.from({ length: faces.length / 3 }, (_, n) => {
+      const [a, b, c] = [0, 1, 2].map((k) => point(faces[3 * n + k]));
+      return cross(plus(b, a, -1), plus(c, a, -1));  // as long as the face is large
+    });
+    const around = new Map();
+    faces.forEach((corner, n) => { if (!around.has(corner)) around.set(corner, []); around.get(corner).push(Math.floor(n / 3)); });
+    const [vertices, numbers] = [[], new Map()];
+    const corners = Array.from(faces, (corner, n) => {
+      const own = unit(normals[Math.floor(n / 3)]);
+      const normal = unit(around.get(corner).reduce((sum, face) => (dot(unit(normals[face]), own) > CREASE ? plus(sum, normals[face]) : sum), [0, 0, 0]));
+      const key = `${corner} ${normal.map((x) => Math.round(20 * x))}`;
+      if (!numbers.has(key)) {
+        numbers.set(key, vertices.length / 7);
+        vertices.push(...point(corner), 0, ...normal);
+      }
+      return numbers.get(key);
+    });
+    return { vertices, faces: corners };
+  }
+
   // Whether a processor draws, with whose help no picture has four samples a dot in time.
   function drawnBySoftware() {
     const gl = document.createElement("canvas").getContext("webgl2", { antialias: false });
@@ -220,6 +244,8 @@ MET.webgl = (() => {
     const quick = { pill: mesh(pill(10, 2)), can: mesh(drum(16)), block: fine.block, cone: mesh(cone(12)) };  // while a processor draws it moving
     const coarse = { pill: mesh(pill(8, 1)), can: mesh(drum(8)), block: fine.block, cone: mesh(cone(8)) };
     const [sparse, flat] = [2, 1].map((steps) => ({ ...coarse, pill: mesh(ribbon(steps)) }));
+    const skins = new WeakMap();  // the meshes of links as they are drawn
+    const meshOf = (skin) => skins.get(skin) ?? skins.set(skin, mesh(smoothed(skin))).get(skin);
     const kept = software ? { frame: gl.createFramebuffer(), dots: gl.createRenderbuffer(), of: "" } : null;
 
     // Solids as a texture has them, those of a mesh one after another.
@@ -240,7 +266,7 @@ MET.webgl = (() => {
     }
     const laid = (counts) => {
       let first = 0;
-      return counts.map(([name, count]) => ({ name, count, first: (first += count) - count }));
+      return counts.map(([name, count, skin]) => ({ name, count, skin, first: (first += count) - count }));
     };
 
     function fill(into, solids, colour) {
@@ -254,7 +280,7 @@ MET.webgl = (() => {
         into.numbers.set(each.size, at + 12);
         into.numbers.set(colour(each), at + TINT);
       });
-      into.runs = laid(Object.entries(by).map(([name, several]) => [name, several.length]));
+      into.runs = laid(Object.entries(by).map(([name, several]) => [name, several.length, several[0].skin]));
       upload(into, rows);
     }
 
@@ -277,12 +303,15 @@ MET.webgl = (() => {
 
     function put(meshes, { texture, runs }, { uniforms }) {
       gl.bindTexture(gl.TEXTURE_2D, texture);
-      runs.forEach(({ name, first, count }) => {
-        const of = meshes[name];
+      const culled = gl.isEnabled(gl.CULL_FACE);
+      runs.forEach(({ name, first, count, skin }) => {
+        const of = skin ? meshOf(skin) : meshes[name];
         copies(of, count);
+        if (culled) gl[skin ? "disable" : "enable"](gl.CULL_FACE);
         gl.uniform2i(uniforms.run, first, of.each);
         gl.drawElements(gl.TRIANGLES, count * of.faces.length, gl.UNSIGNED_INT, 0);
       });
+      if (culled) gl.enable(gl.CULL_FACE);
     }
 
     function drawFloor({ camera, floor: height, step, reach, colours }, view) {

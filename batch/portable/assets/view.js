@@ -276,6 +276,8 @@ MET.simulate = (data, back, { seen = null, surface = null } = {}) => {
 
   function leave() {
     data.stood = values;
+    const [other, { scene }] = [data.numbers?.arm, data.arm];  // its arm is this one, which has the meshes
+    if (scene?.meshes && other?.scene && JSON.stringify(other.scene.bodies) === JSON.stringify(scene.bodies)) [other.scene.meshes, other.meshes] = [scene.meshes, data.arm.meshes];
     MET.simulate(back || data.numbers, back ? null : data, close());
   }
 

@@ -50,6 +50,7 @@ def gather(
     against: ComparedArchive | None = None,
     *,
     simulate: bool = False,
+    meshes: bool = True,
 ) -> Report:
     """Gather all that a page says of an archive, or of these runs and sweeps of it. Raises Problem E325 for another
     name.
@@ -57,6 +58,7 @@ def gather(
     progress  called with the number of cases whose margin is known, where motors are on beds
     against   another archive to compare with
     simulate  whether the page is to run cases again
+    meshes    whether it draws links by their meshes
     """
     groups = groups_named(archive, names)
     pools_ = pools(groups)
@@ -80,6 +82,7 @@ def gather(
                 before,
                 archive,
                 simulate,
+                meshes,
             ),
             changes=() if against is None else comparison.run_changes(against.differences, before),
         )
@@ -128,6 +131,7 @@ def _section(
     before: EarlierCases | None,
     file: ArchiveFile,
     simulate: bool,
+    meshes: bool,
 ) -> ReportSection:
     """All that the page says of a run or sweep. only: its name in commands; values: the most numbers of histories"""
     own = {group.name: experiments[group.name] for group in pool.groups if group.name in experiments}
@@ -157,7 +161,7 @@ def _section(
             *(case for notable in (best_cases, worst_cases) if notable is not None for case in notable.cases),
         ]
         first += [] if before is None else before.most
-        played = simulation(pool, own, drawn, first, points, before)
+        played = simulation(pool, own, drawn, first, points, before, meshes=meshes)
     errors = together(map(figures, pool.groups))
     return ReportSection(
         name=pool.name,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -39,6 +40,8 @@ def simulation(
     first: Sequence[int],
     points: Overview | None,
     before: EarlierCases | None = None,
+    *,
+    meshes: bool = True,
 ) -> PageSimulation | None:
     """The modules of a pool's structures, and of as many cases as there is room for what they are run with; None where
     the plan cannot be read here.
@@ -46,6 +49,7 @@ def simulation(
     first   numbers of the cases that are wanted before others
     points  the cases that are drawn, of which the worst come next; None: all are
     before  another archive to compare with: its program of these cases is there too, where its plan can be read here
+    meshes  whether links are drawn by their meshes
     """
     groups = [group for group in pool.groups[:MOST_STRUCTURES] if group.name in experiments]
     if not groups:
@@ -61,7 +65,8 @@ def simulation(
         of_group = pool.group_of == number
         mine = numbers[np.isin(numbers, pool.cases[of_group])]
         sources = drawn.sources[number]
-        structure, left = _structure(group, experiments[group.name], mine, sources, left)
+        folder = group.path.parent if meshes else None
+        structure, left = _structure(group, experiments[group.name], mine, sources, left, folder)
         if before is not None:
             was, left = _earlier(before, earlier, number, structure, sources, left)
             structure = replace(structure, before=was)
@@ -92,7 +97,7 @@ def _earlier(
         pairs = dict(zip(mine[matched.cases.b].tolist(), theirs[matched.cases.a].tolist(), strict=True))
         both = [case for case in now.cases.tolist() if case in pairs]
         wanted = np.array([pairs[case] for case in both], np.int64)
-        structure, left = _structure(group, experiments[group.name], wanted, sources, left)
+        structure, left = _structure(group, experiments[group.name], wanted, sources, left, None)
         cases = np.array(both[: len(structure.cases)], np.int64)
         # on the arm of an earlier archive, a ghost, nothing is drawn that acts on it
         return replace(structure, cases=cases, arm=replace(structure.arm, acting=None)), left
@@ -100,10 +105,15 @@ def _earlier(
 
 
 def _structure(
-    group: ArchiveGroup, experiment: Experiment, wanted: np.ndarray, sources: Sequence[Sequence[str]], left: int
+    group: ArchiveGroup,
+    experiment: Experiment,
+    wanted: np.ndarray,
+    sources: Sequence[Sequence[str]],
+    left: int,
+    folder: Path | None,
 ) -> tuple[SimulatedStructure, int]:
     """A structure with as many of the wanted cases as fit in `left` bytes, and the remaining bytes. sources: the
-    channel of each line of each panel"""
+    channel of each line of each panel; folder: where files of meshes are looked for, None to draw none"""
     from met.backends.wasm.module import compiled
 
     prepared = prepare(experiment)
@@ -125,7 +135,7 @@ def _structure(
         metrics=tuple((name, group.at(name, positions)) for name in metrics),
         status=group.at("status", positions),
         panels=tuple(tuple(columns.get(channel, -1) for channel in panel) for panel in sources),
-        arm=drawn_arm(experiment, list(columns)),
+        arm=drawn_arm(experiment, list(columns), folder),
     )
     return structure, left - width * len(wanted)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import json
 from collections.abc import Sequence
 from typing import Any
@@ -83,7 +84,8 @@ def exact(values: np.ndarray) -> dict[str, Any]:
 
 
 def modules_script(sections: Sequence[ReportSection]) -> str:
-    """The WebAssembly modules of all sections by their digests, for the page's script, whose own digest covers them."""
+    """The WebAssembly modules and meshes of all sections by their digests, for the page's script, whose own digest
+    covers them."""
     structures = [
         structure for section in sections if section.simulation for structure in section.simulation.structures
     ]
@@ -91,7 +93,9 @@ def modules_script(sections: Sequence[ReportSection]) -> str:
     modules = {
         version.description["kernel"]["module"]: base64.b64encode(version.code).decode("ascii") for version in all_
     }
-    return f"MET.modules = {json.dumps(modules)};"
+    arms = [drawn_json(structure.arm) for structure in structures if structure.arm.meshes.links]
+    meshes = {_digest(arm["scene"]["meshes"]): arm["scene"]["meshes"] for arm in arms}
+    return f"MET.modules = {json.dumps(modules)};" + (f"\nMET.meshes = {json.dumps(meshes)};" if meshes else "")
 
 
 def _column(column: CaseColumn) -> dict[str, Any]:
@@ -248,9 +252,21 @@ def _structure(structure: SimulatedStructure) -> dict[str, Any]:
             for name, values in structure.metrics
         ],
         "panels": [list(columns) for columns in structure.panels],
-        "arm": drawn_json(structure.arm),
+        "arm": _arm(structure),
         "before": None if structure.before is None else _structure(structure.before),
     }
+
+
+def _arm(structure: SimulatedStructure) -> dict[str, Any]:
+    """The arm of a structure, with the name of its meshes in place of them."""
+    arm = drawn_json(structure.arm)
+    if meshes := arm.get("scene", {}).get("meshes"):
+        arm["scene"]["meshes"] = _digest(meshes)
+    return arm
+
+
+def _digest(meshes: list[dict[str, Any]]) -> str:
+    return hashlib.sha256(json.dumps(meshes).encode()).hexdigest()
 
 
 def _stability(bed_stability: Stability) -> dict[str, Any]:
