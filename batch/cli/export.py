@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     help="Of a table: metrics and varied values in SI units, or in those of the deck; signals are in SI units.",
 )
 @click.option("--layout", is_flag=True, help="Also write a layout for Foxglove, FILE.layout.json.")
+@click.option("--no-meshes", is_flag=True, help="Of an MCAP: draw links by their shapes, without their meshes.")
 @click.option("--force", is_flag=True, help="Overwrite an existing file, whatever it is.")
 @format_option
 @loudness_options
@@ -64,6 +65,7 @@ def export(
     evidence: bool,
     units: Literal["si", "deck"],
     layout: bool,
+    no_meshes: bool,
     force: bool,
     form: str,
     quiet: bool,
@@ -97,8 +99,11 @@ def export(
         units=units,
         layout=layout,
         force=force,
+        meshes=not no_meshes,
     )
     written = [path for path in (done.path, done.layout) if path is not None]
+    if done.note and not quiet:
+        say(f"note: {done.note}", err=True)
     with kept(f"{done.path} is whole"):
         if form == "json":
             facts = {

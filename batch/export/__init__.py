@@ -41,6 +41,7 @@ class Exported:
     layout  the layout file beside it, where one was asked for
     cases   how many cases it has, 0 of evidence, and `rows` how many rows all of them have
     table   what a row is
+    note    what is said of the meshes that were drawn; "" where there is nothing to say
     """
 
     path: Path
@@ -48,6 +49,7 @@ class Exported:
     cases: int
     rows: int
     table: Rows = "histories"
+    note: str = ""
 
 
 def export(
@@ -62,6 +64,7 @@ def export(
     units: Literal["si", "deck"] = "si",
     layout: bool = False,
     force: bool = False,
+    meshes: bool = True,
 ) -> Exported:
     """Write an archive for another tool: histories, or a table of cases with their metrics, or of requirements.
 
@@ -77,6 +80,7 @@ def export(
     units    of a table: "deck" for metrics and what is varied as the deck writes them; signals are in SI
     layout   of an MCAP: also write how Foxglove shows it, in `<output>.layout.json`
     force    write over a file that is there, whatever it is
+    meshes   of an MCAP: draw links by their meshes, from files that are there
 
     Raises met.diagnostic.Problem for mistakes that a user can correct.
     """
@@ -88,7 +92,7 @@ def export(
 
     form, target = format_and_target(archive, output, form)
     writer = find(form)
-    request = ExportRequest(table, tuple(signals), units, layout, force, named=bool(cases))
+    request = ExportRequest(table, tuple(signals), units, layout, force, bool(cases), meshes)
     writer.check_request(request, target)
     with ArchiveFile(Path(archive)) as file:
         if table != "evidence" and not cases:
@@ -106,7 +110,7 @@ def export(
             return Exported(target, written.layout, rows.count, written.rows, "metrics")
         picked = pick(file, runs, names, signals)
         written = writer.write_histories(file, picked, target, request)
-    return Exported(target, written.layout, len(picked), written.rows)
+    return Exported(target, written.layout, len(picked), written.rows, note=written.note)
 
 
 def _row(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: Sequence[str]) -> Rows:

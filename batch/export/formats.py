@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Rows = Literal["metrics", "histories", "evidence"]
 """The rows of an export: a case with its metrics, an instant of a case, or a requirement at a design point."""
 
-Option = Literal["units", "layout"]
+Option = Literal["units", "layout", "meshes"]
 """An option of `met export` that only some formats take."""
 
 
@@ -39,6 +39,7 @@ class ExportRequest:
     layout    True where a layout file was asked for
     force     True to overwrite any file that exists; None where the user has no way to say so
     named     True where cases were asked for one by one
+    meshes    True to draw links by their meshes, where the format draws any; False where they are to be left out
     """
 
     table: Rows | None = None
@@ -47,14 +48,16 @@ class ExportRequest:
     layout: bool = False
     force: bool | None = False
     named: bool = False
+    meshes: bool = True
 
 
 @frozen
 class WrittenExport:
-    """The number of rows of an export that was written, and the layout file beside it, if any."""
+    """The number of rows of an export that was written, the layout file beside it, if any, and what is said of it."""
 
     rows: int
     layout: Path | None = None
+    note: str = ""
 
 
 class ExportFormat:
@@ -95,6 +98,9 @@ class ExportFormat:
         if request.layout and "layout" not in self.options:
             helps = "`-o FILE.mcap` writes one, and its layout"
             raise Problem(error("E375", f"a layout shows an MCAP file, and {target} is none", help=helps))
+        if not request.meshes and "meshes" not in self.options:
+            helps = "leave `--no-meshes` out"
+            raise Problem(error("E375", f"an MCAP file draws the arm, and {target} is none", help=helps))
         if request.table == "metrics" and "metrics" not in self.tables:
             helps = "; ".join(filter(None, ("`-o FILE.csv` writes one", self.metrics_in)))
             message = f"{target} would hold histories: {self.title} is no table of metrics"

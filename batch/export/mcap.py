@@ -17,12 +17,14 @@ from __future__ import annotations
 import heapq
 import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from batch.archive.read import ArchiveFile
+from batch.arms.meshes import arm_meshes
 from batch.campaigns.campaign import Campaign
 from batch.export import layout, scene, topics, wire
 from batch.export.case_log import LogLine, log_lines, result, varied
@@ -296,7 +298,7 @@ class Mcap(ExportFormat):
 
     title = "an MCAP file"
     tables = ("histories",)
-    options = ("layout",)
+    options = ("layout", "meshes")
     metrics_in = "in an MCAP file they are in `/result`"
 
     def is_own(self, path: Path) -> bool:
@@ -321,14 +323,17 @@ class Mcap(ExportFormat):
     def write_histories(
         self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: ExportRequest
     ) -> WrittenExport:
-        posed_arms = arms(file, cases, named=request.named)
+        solid, *ghosts = arms(file, cases, named=request.named)
+        if request.meshes:
+            solid = replace(solid, meshes=arm_meshes(solid.experiment.structure, file.path.parent))
+        posed_arms, note = [solid, *ghosts], solid.meshes.words
         if not request.layout:
-            return WrittenExport(write(file, posed_arms, target))
+            return WrittenExport(write(file, posed_arms, target), note=note)
         text, beside = layout.text(posed_arms), layout.beside(target)
         check(beside, file.path, lambda path: path.read_text("utf-8", "replace") == text, force=request.force)
         rows = write(file, posed_arms, target)
         layout.write(beside, text)
-        return WrittenExport(rows, beside)
+        return WrittenExport(rows, beside, note)
 
 
 FORMAT = Mcap()

@@ -12,6 +12,7 @@ import numpy as np
 
 from batch.archive.read import reading
 from batch.archive.stored import Stored
+from batch.arms.meshes import NO_MESHES, ArmMeshes
 from batch.arms.placing import OF_FREE_BASE, POSITION, free_pose, parameters, prescribed_pose, world_poses
 from batch.export.picking import ExportedCase
 from met.diagnostic import Problem, error
@@ -35,6 +36,7 @@ class PosedArm:
               for a time only where their position and orientation were recorded
     place     of each link's origin from the base's at the first row, world axes, m
     travel    of each joint that slides: the stretch of q, 0 in it, that this case uses, m
+    meshes    what its links are drawn by, besides shapes
     """
 
     case: ExportedCase
@@ -46,6 +48,7 @@ class PosedArm:
     poses: Mapping[str, PoseVariables]
     place: Mapping[str, np.ndarray]
     travel: Mapping[str, tuple[float, float]]
+    meshes: ArmMeshes = NO_MESHES
 
 
 @frozen

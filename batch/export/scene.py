@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from batch.arms.meshes import LinkMesh
 from batch.arms.shapes import ArmNumbers, ArmShape, drawn, head, shape_of, shapes
 from batch.export.poses import PosedArm
 from batch.export.wire import plain
@@ -53,15 +54,22 @@ def scene(arm: PosedArm, root: str, ghost: bool, size: float) -> Any:
     payloads = [payload for payload in structure.payloads if payload.name in arm.poses]
     bodies: list[Link | Payload] = [*structure.links, *payloads]
     shapes_of = shapes(_numbers(arm, size), bodies)
+    meshes = {mesh.link: mesh for mesh in arm.meshes.links}
+    for name in meshes:
+        shapes_of[name] = [shape for shape in shapes_of[name] if shape.role in ("joint", "rail")]
     if all(link.name != BASE for link in structure.links):
-        _draw(_entity(out, root, f"{arm.prefix}{BASE}"), shapes_of[BASE], grey, grey)
+        entity = _entity(out, root, f"{arm.prefix}{BASE}")
+        _draw(entity, shapes_of[BASE], grey, grey)
+        _triangles(entity, meshes.get(BASE), grey)
     for number, link in enumerate(bodies):
         entity = _entity(out, arm.prefix + link.name, arm.prefix + link.name)
         what = "payload" if isinstance(link, Payload) else "link"
         metadata = {what: link.name, "mass": f"{arm.values.get(f'{head(link)}.mass', math.nan):g} kg"}
         if drawn(link) and link.shape is not None:
             metadata["shape"] = link.shape[0]
-        _draw(entity, shapes_of[link.name], _colour(LINKS[number % len(LINKS)], opacity), grey)
+        own = _colour(LINKS[number % len(LINKS)], opacity)
+        _draw(entity, shapes_of[link.name], own, grey)
+        _triangles(entity, meshes.get(link.name), own)
         for key, value in metadata.items():
             entity.metadata.add(key=key, value=plain(value))
     return out
@@ -123,6 +131,15 @@ def _lines(entity: Any, lines: Sequence[ArmShape], colour: Any) -> None:
             points=points,
             color=colour,
         )
+
+
+def _triangles(entity: Any, mesh: LinkMesh | None, colour: Any) -> None:
+    """The mesh of a link, in its frame."""
+    from foxglove_schemas_protobuf.Point3_pb2 import Point3
+
+    if mesh is not None:
+        points = [Point3(x=x, y=y, z=z) for x, y, z in mesh.points.tolist()]
+        entity.triangles.add(pose=_pose(ORIGIN), points=points, color=colour, indices=mesh.faces.ravel().tolist())
 
 
 def _point(numbers: Sequence[Real]) -> Vector:

@@ -50,6 +50,6 @@ def test_the_tables_begin_as_they_are_shown(folder: Path) -> None:
 
 def test_the_options_are_those_of_the_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["export", "--help"]) == cli.YES
-    told = set(re.findall(r"--[a-z]+", capsys.readouterr().out))
-    named = set(re.findall(r"^\| `(--[a-z]+)", PAGE, re.MULTILINE)) | {"--metrics"}
+    told = set(re.findall(r"--[a-z-]+", capsys.readouterr().out))
+    named = set(re.findall(r"^\| `(--[a-z-]+)", PAGE, re.MULTILINE)) | {"--metrics"}
     assert named <= told and told - named == {"--output", "--to", "--format", "--quiet", "--verbose", "--help"}

@@ -10,15 +10,31 @@ import numpy as np
 import pytest
 
 import batch
+import ic
 from batch.archive.read import ArchiveFile
 from batch.export import export
+from met import cli
 from met import run as engine
 from met.diagnostic import Problem
 from met.dynamics.kinematics import link_motions
 from met.program.system import System
 from met.vectors import quaternion
 from tests.batch import plans
+from tests.batch.arms.solids import binary_stl, box
 from tests.batch.export.decks import CHAIN, DECK, LINKS, Mcap, made, matrix, said
+
+MESHED = """\
+arm one {
+    link bar { mass = 1 kg;  shape = box(size = [1, 1, 1] m); }
+    joint hinge revolute { parent = base;  child = bar;  axis = z; }
+}
+servo held { model = ideal;  bandwidth = 20 1/s;  command = position(0 rad); }
+run hold {
+    arm = one;  servos { hinge = held; }
+    rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }
+    duration = 0.1 s;  record = [q];
+}
+"""
 
 
 @pytest.fixture(scope="module")
@@ -467,3 +483,29 @@ def _ends(cylinder: object) -> np.ndarray:
     pose = matrix(cylinder.pose.position, cylinder.pose.orientation)  # type: ignore[attr-defined]
     half = cylinder.size.z / 2.0  # type: ignore[attr-defined]
     return np.array([(pose @ [0, 0, end, 1])[:3] for end in (-half, half)])
+
+
+@pytest.mark.slow
+def test_a_link_with_a_mesh_is_triangles_in_its_frame(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("box.stl").write_bytes(binary_stl(box((1.0, 2.0, 3.0))))
+    mesh = ';  mesh = placed("box.stl", at = [1, 0, 0] m); }'
+    text = MESHED.replace("; }", mesh, 1)
+    batch.run(ic.compile(text=text), output="a.h5")
+    assert cli.main(["export", "a.h5"]) == 0
+    assert capsys.readouterr().err == "note: meshes of 1 link: 12 triangles, 0.2 kB\n"
+    drawn = Mcap(Path("a.mcap")).entities("/scene")["bar"]
+    (triangles,) = drawn.triangles
+    points = np.array([(p.x, p.y, p.z) for p in triangles.points])[list(triangles.indices)].reshape(-1, 3, 3)
+    sides = box((1.0, 2.0, 3.0)) + np.array([1.0, 0.0, 0.0])
+    np.testing.assert_allclose(np.sort(points, axis=0), np.sort(sides, axis=0), atol=1e-6)
+    assert len(drawn.cubes) == 0 and len(drawn.cylinders) == 1  # of the joint
+    assert cli.main(["export", "a.h5", "--no-meshes", "-q"]) == 0
+    plain = Mcap(Path("a.mcap")).entities("/scene")["bar"]
+    assert len(plain.triangles) == 0 and len(plain.cubes) == 1
+    assert cli.main(["export", "a.h5", "--no-meshes", "-o", "a.csv"]) == 2
+    assert capsys.readouterr().err == (
+        "error[E375]: an MCAP file draws the arm, and a.csv is none\n = help: leave `--no-meshes` out\n\n1 error\n"
+    )
