@@ -18,14 +18,13 @@ from ic.editor.checker_process import CheckerProcess
 from ic.editor.checking import CheckRequest, Crash
 from ic.editor.checks import CheckedDeck, DeckChecks
 from ic.editor.index import DeckIndex, ValueInDeck
-from ic.editor.names import NamesInTexts
+from ic.editor.names import NamesInTexts, models_called
 from ic.editor.positions import Texts, lines_of, normal, uri_of
 from ic.editor.renaming import Renamed, RenameRequest, refusal_of_name, refusal_of_word
 from ic.editor.structure import UNIT, DeckText, TextEntry
 from ic.printing.models import summary
 from ic.text.files import LIBRARY, Files, FoundFile, file_at
 from ic.text.lexer import NAME, Text, Token
-from met import models
 from met.diagnostic import Place
 from met.host.files import read_regular
 from met.messages.message import shown_place
@@ -265,10 +264,8 @@ def _of_key(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Itera
 
 
 def _of_model(token: Token) -> Iterator[str]:
-    for kind in models.GROUPS:
-        model = models.available(kind).get(token.text)
-        if model is not None:
-            yield f"{kind} model `{token.text}`: {summary(model)}"
+    for kind, model in models_called(token.text).items():
+        yield f"{kind} model `{token.text}`: {summary(model)}"
 
 
 def _of_unit(text: DeckText, token: Token) -> Iterator[str]:

@@ -327,14 +327,14 @@ class _MovedLines:
         same = next((n for n in range(most - self._first) if old[-1 - n] != new[-1 - n]), most - self._first)
         self._behind, self._further = len(old) - same, len(new) - len(old)
 
-    def line(self, line: int) -> int | None:
-        """The present number of a line, counted from 1; None where it has changed."""
-        if line <= self._first:
-            return line
-        return line + self._further if line > self._behind else None
+    def line(self, line: int) -> int:
+        """The present number of a line, counted from 1. Raises LineChanged."""
+        if self._first < line <= self._behind:
+            raise LineChanged
+        return line if line <= self._first else line + self._further
 
 
-class _Changed(Exception):
+class LineChanged(Exception):
     """Raised where a place is in a line that has changed."""
 
 
@@ -343,10 +343,7 @@ def carried_over(last: CheckReply, now: CheckReply) -> CheckReply:
     moved = {name: _MovedLines(last.sources[name], text) for name, text in now.sources.items() if name in last.sources}
 
     def line(file: str, number: int) -> int:
-        line_now = moved[file].line(number) if file in moved else number
-        if line_now is None:
-            raise _Changed
-        return line_now
+        return moved[file].line(number) if file in moved else number
 
     def place(old: Place) -> Place:
         return replace(
@@ -366,7 +363,7 @@ def carried_over(last: CheckReply, now: CheckReply) -> CheckReply:
             moved_label = label(diagnostic.at) if diagnostic.at is not None else None
             if moved_label is not None and (diagnostic.code, moved_label.place) not in reported:
                 diagnostics.append(replace(diagnostic, at=moved_label, also=tuple(map(label, diagnostic.also))))
-        except _Changed:
+        except LineChanged:
             continue
     return replace(now, diagnostics=(*now.diagnostics, *diagnostics), edits=(*now.edits, *(() for _ in diagnostics)))
 

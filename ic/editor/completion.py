@@ -9,7 +9,7 @@ from contextlib import suppress
 from lsprotocol.types import CompletionItemKind as ItemKind
 
 from ic.editor.index import DeckIndex
-from ic.editor.names import KINDS_OF_KEYS, REMOVED, NamesInTexts, entry_of
+from ic.editor.names import KINDS_OF_KEYS, REMOVED, NamesInTexts, entry_of, models_called
 from ic.editor.structure import DEFINED, NAMING, UNIT, DeckText, TextEntry, indices_around, through_loops
 from ic.find import library_files
 from ic.language import BLOCKS, DEFINITIONS, EXPERIMENTS, OF_A_RUN, Entry
@@ -222,7 +222,7 @@ def _parameter(texts: list[str], around: TextEntry | None, names: NamesInTexts) 
         return None
     call = open_call(texts)
     if call is not None:
-        return call.wanted
+        return next((parameter for parameter in call.parameters if parameter.name == call.argument), None)
     compared = [n for n, word in enumerate(texts) if word in COMPARISONS]
     if texts[0] == "require" and compared:
         return _limit(texts[compared[-1] - 1], names)
@@ -270,7 +270,8 @@ def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> 
     signals_alone = words[0].text in _SIGNALS_ALONE
     signals = index.signals
     if words[0].text in _OF_SIGNALS and not any(path.startswith(head) for path in signals):
-        signals = tuple(f"{head}{name}" for name, *_ in (*MOTION, *OF_JOINT) if _names_a_joint(head, names))
+        is_joint = head[:-1] in names.of_kind("joint")  # whose signals are known before the deck is without errors
+        signals = tuple(f"{head}{name}" for name, *_ in (*MOTION, *OF_JOINT) if is_joint)
     paths = [(value.path, f"{value.value}; {value.doc}") for value in index.values if not signals_alone]
     paths += [(path, "signal") for path in signals] + [(path, "in the table") for path in index.cells]
     begins = re.compile(re.sub(r"\\{.*?\\}", r"[^.]+", re.escape(head)))  # `bodies.{side}_arm.`, in a loop
@@ -292,11 +293,6 @@ def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> 
     return offers
 
 
-def _names_a_joint(head: str, names: NamesInTexts) -> bool:
-    """True for `JOINT.`, with a joint of the texts: its signals are known before the deck is without errors."""
-    return any(definition.kind == "joint" for definition in names.by_name.get(head[:-1], ()))
-
-
 def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, index: DeckIndex) -> list[Offer]:
     """The words with which a value may begin."""
     key = texts[0]
@@ -310,7 +306,7 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
         return _alike(WORD, [ALL_ROWS], "requires that every row is used")
     if where == "servos":
         return _named(names, "servo", "roof")
-    if key in KINDS_OF_KEYS and where in ("joint", "loop", "run"):
+    if key in KINDS_OF_KEYS and key != "of" and where in ("joint", "loop", "run"):
         return _bodies(KINDS_OF_KEYS[key][0], around, names)
     if texts[-2:] == ["shape", "="] and where == "link":
         return _alike(CLASS, SHAPES)
@@ -417,7 +413,7 @@ def _named(names: NamesInTexts, *kinds: str, around: TextEntry | None = None) ->
     offers: list[Offer] = []
     for kind in kinds:
         known = names.of_kind(kind)
-        own = [name for name in known if any(names.is_of(name, kind, owner) for owner in owners)]
+        own = [name for name in known if any(d.kind == kind and d.owner in owners for d in names.by_name[name])]
         for name in own or known:
             written = names.written_out(name, kind, owners) if "{" in name else ()
             offers += _alike(icons.get(kind, REFERENCE), (name, *written), kind)
@@ -449,11 +445,6 @@ class OpenCall:
     argument: str
     earlier: tuple[str, ...]
     parameters: tuple[Parameter, ...]
-
-    @property
-    def wanted(self) -> Parameter | None:
-        """The parameter whose value is written."""
-        return next((parameter for parameter in self.parameters if parameter.name == self.argument), None)
 
 
 def open_call(texts: Sequence[str]) -> OpenCall | None:
@@ -491,8 +482,5 @@ def _parameters(name: str, entry: str) -> tuple[Parameter, ...]:
     metric = models.available("metric").get(name)
     if metric is not None and entry == "metric":
         return (WATCHES, *models.written(metric))
-    for kind in models.GROUPS:
-        model = models.available(kind).get(name)
-        if model is not None:
-            return models.written(model)
-    return ()
+    called = [models.written(model) for model in models_called(name).values()]
+    return called[0] if called else ()

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
 from types import MappingProxyType
+from typing import Any
 
 from ic.editor.structure import (
     DEFINED,
@@ -210,10 +211,6 @@ class NamesInTexts:
             if any(definition.kind in kinds for definition in definitions)
         ]
 
-    def is_of(self, name: str, kind: str, owner: str) -> bool:
-        """True where an arm or a run of that name defines the name."""
-        return any(definition.kind == kind and definition.owner == owner for definition in self.by_name.get(name, ()))
-
     def written_out(self, name: str, kind: str, owners: Sequence[str]) -> list[str]:
         """The names that a loop makes from one with braces: those of these arms and runs, or of all where there are
         none."""
@@ -390,11 +387,9 @@ class NamesInTexts:
 
     def parameters_of(self, entry: TextEntry) -> tuple[Parameter, ...]:
         """The parameters of an entry's model."""
-        name, entry_kind = self.model_of(entry), entry.block or entry.kind
-        for kind in models.GROUPS:
-            model = models.available(kind).get(name)
-            wanted = kind == entry_kind or (entry_kind not in models.GROUPS and kind not in ("servo", "metric"))
-            if model is not None and wanted:
+        entry_kind = entry.block or entry.kind
+        for kind, model in models_called(self.model_of(entry)).items():
+            if kind == entry_kind or (entry_kind not in models.GROUPS and kind not in ("servo", "metric")):
                 return models.written(model)
         return ()
 
@@ -423,6 +418,11 @@ class NamesInTexts:
             ):
                 known.add((definition.token.text, definition.token.offset))
                 yield definition
+
+
+def models_called(name: str) -> dict[models.Kind, Any]:
+    """The models of a name, by their kinds."""
+    return {kind: models.available(kind)[name] for kind in models.GROUPS if name in models.available(kind)}
 
 
 def entry_of(parameter: Parameter) -> Entry:

@@ -11,13 +11,12 @@ from types import MappingProxyType
 
 from lsprotocol import types
 
-from ic.editor.names import NamesInTexts
+from ic.editor.names import NamesInTexts, models_called
 from ic.editor.structure import LOOP, DeckText, TextEntry
 from ic.language import BLOCKS
 from ic.language.bodies import JOINT_KINDS
 from ic.meaning.expressions.evaluate import FUNCTIONS
 from ic.text.lexer import NAME, Token
-from met import models
 from met.units import UNITS
 
 TYPES = ("keyword", "property", "class", "function", "type", "enumMember", "macro", "parameter", "variable", "struct",
@@ -110,9 +109,11 @@ def _meaning(
         return "property", 0
     if before is not None and before.text == ".":
         return "property", 0
-    if any(token.text in models.available(kind) for kind in models.GROUPS) and "=" in entry.texts:
+    if models_called(token.text) and "=" in entry.texts:
         return "class", OF_LIBRARY
-    return ("enumMember", 0) if token.text in _words_of(entry, names) else None
+    declared = names.declared_in(entry.within).get(entry.kind)
+    words = declared.parameter.words if declared is not None and declared.parameter is not None else ()
+    return ("enumMember", 0) if token.text in words else None
 
 
 def _key(token: Token, entry: TextEntry, names: NamesInTexts) -> tuple[str, int] | None:
@@ -121,10 +122,5 @@ def _key(token: Token, entry: TextEntry, names: NamesInTexts) -> tuple[str, int]
     if declared is None or entry.within is None:
         others = (LOOP, *BLOCKS) if entry.within is None else (LOOP, "remove")
         return ("keyword", 0) if declared is not None or token.text in others else None
-    return ("property" if declared.form == "key" and entry.opened is None else "keyword"), 0
-
-
-def _words_of(entry: TextEntry, names: NamesInTexts) -> tuple[str, ...]:
-    """The words that are allowed as the value of an entry."""
-    declared = names.declared_in(entry.within).get(entry.kind)
-    return declared.parameter.words if declared is not None and declared.parameter is not None else ()
+    is_key = declared.form == "key" and (entry.opened is None or declared.written == declared.name)
+    return ("property" if is_key else "keyword"), 0

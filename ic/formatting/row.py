@@ -146,11 +146,9 @@ class Row:
             return behind is not None and behind.text == "}" and joining
         if behind.text in _LEFT_OPEN:
             return True
-        if not self.pieces:
+        if not self.pieces or self._sets_others:
             return False
         first = self.pieces[0]
-        if self._sets_others:
-            return False
         return first.text in _JOINING or first.text in ("(", "[") or first.tokens[0].kind in (STRING, *NUMBERS)
 
     def _expanded(self) -> list[int] | None:
