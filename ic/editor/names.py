@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from copy import copy
 from types import MappingProxyType
 from typing import Any
@@ -97,7 +96,10 @@ class NameInText:
 
 
 class TolerantMacros(Macros):
-    """Macros whose uses may have too few arguments, or too many."""
+    """Macros whose uses may have too few arguments, or too many; what they find wrong is of no interest."""
+
+    def __init__(self) -> None:
+        super().__init__(Findings())
 
     def _wrong_number(
         self, token: Token, macro: Macro, arguments: list[Argument], close: Token
@@ -170,15 +172,18 @@ class MacrosInTexts:
         """The entries that uses of macros make in a text, where the use is an entry, or begins one; each token stands
         where it was written, in a body or in an argument."""
         macros = {**self._defined, **text.defined}
-        count = 0
+        count, reader = 0, None
         for entry in text.all_entries() if macros else ():
             if count < MOST_TOKENS and entry.words and entry.words[0].text in macros:
-                reader, closing = TolerantMacros(Findings()), Token("CPP_RPAREN", ")", text.source, entry.closed, 0)
+                reader, closing = reader or TolerantMacros(), Token("CPP_RPAREN", ")", text.source, entry.closed, 0)
                 reader.macros = macros
-                with suppress(GiveUp):
+                try:
                     tokens = reader.expand_macros([*map(copy, entry.words), closing])
-                    count += len(tokens)
-                    yield from flattened(entries_of(with_whole_names(tokens), entry.closed, entry.within))
+                except GiveUp:
+                    reader = None
+                    continue
+                count += len(tokens)
+                yield from flattened(entries_of(with_whole_names(tokens), entry.closed, entry.within))
 
 
 class NamesInTexts:
