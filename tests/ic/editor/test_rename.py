@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 from typing import Any
 
 import pytest
+from lsprotocol import types
 
 import ic
+from ic.editor.answers import CannotRename
+from ic.editor.checks import OpenText
 from ic.editor.renaming import same_but_for
+from ic.text.files import LIBRARY
 from met.plan import Plan
 from met.plan.codec import encode
 from tests.ic.editor.client import Editor, uri
 from tests.ic.editor.test_loops import CHAIN
+from tests.ic.editor.test_memory import checking
 from tests.ic.editor.test_questions import ARM, LENGTHS, at
 from tests.ic.editor.test_text import edited
 
@@ -165,6 +171,25 @@ def test_a_name_with_other_uses_in_a_table_is_refused(editor: Editor, deck: Path
     editor.change(deck, text)
     assert editor.of(deck) == []
     assert "`gearbox` would not be found everywhere" in refused(editor, deck, "gearbox like", "motor")
+
+
+@pytest.mark.slow
+def test_a_change_before_the_new_name_is_proved_ends_the_renaming(tmp_path: Path) -> None:
+    text, address = (LIBRARY / "two_link.ic").read_text(), (tmp_path / "deck.ic").as_uri()
+
+    async def ends() -> str:
+        async with checking() as server:
+            server.checks.open(OpenText(address, text, 0))
+            await server.checks.rest()
+            position = types.Position(*at(text, "reach"))
+            renaming = asyncio.create_task(server.in_text(address, position).rename("span", (), server.process))
+            await asyncio.sleep(0)
+            server.checks.change(OpenText(address, text + "\n", 1))
+            with pytest.raises(CannotRename) as reason:
+                await renaming
+            return reason.value.message
+
+    assert asyncio.run(ends()) == "a deck was changed or saved before the new name was proved: rename again"
 
 
 @pytest.mark.release
