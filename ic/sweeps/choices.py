@@ -36,7 +36,7 @@ from ic.meaning.expressions.evaluate import FUNCTIONS, evaluate
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, ValueList, measure_of
 from ic.meaning.mechanics.matter import SHAPES
-from ic.meaning.parameters.not_sweepable import A_RUN_FOR_EACH
+from ic.meaning.parameters.owner import A_RUN_FOR_EACH
 from met import models, units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen

@@ -21,7 +21,6 @@ from ic.grammar.syntax import Call, Expression, Name, String, Word, place_of
 from ic.meaning.definitions.csv_files import missing_column
 from ic.meaning.definitions.merge import Item, MergedBlock, open_call, refuse_block
 from ic.meaning.expressions.cycles import components
-from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import (
     TIME,
     check_keys,
@@ -32,7 +31,7 @@ from ic.meaning.parameters.models import (
     use_model,
     word_of,
 )
-from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.owner import OF_A_FILE, Owner
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.commands.profile import COLUMN, FILE, Profile
@@ -69,7 +68,7 @@ def use_file(
         MergedBlock({key: item for key, item in body.items.items() if key in [other.name for other in others]}),
     )
     for entry in (FILE.name, COLUMN.name, *LISTS):
-        scope.not_sweepable[owner.join(entry)] = not_sweepable.FILE
+        scope.not_sweepable[owner.join(entry)] = OF_A_FILE
     columns: dict[str, tuple[float, ...]] | None = None
     file = body.get(FILE.name)
     if file is None:

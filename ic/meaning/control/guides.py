@@ -18,9 +18,8 @@ from ic.meaning.control.servos import Use, fixed_rate
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.cycles import components
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, value_place, word_of
-from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.owner import COMPILED_ALONE, Owner, a_model
 from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
@@ -218,10 +217,10 @@ def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration
     guided = guide.components(SimpleNamespace(**values)) if values is not None and paths else ()
     courses = _courses(scope, owner, body, paths, guided if values is not None else COMPONENTS, joints)
     rate = None
-    scope.not_sweepable[owner.path] = not_sweepable.model("a guide", owner.path)
+    scope.not_sweepable[owner.path] = a_model("a guide", owner.path)
     if guide.steer is not None and body.get("rate") is not None:
         rate = fixed_rate(scope, owner, body.items["rate"], owner.label, doc="how often its law ticks")
-    scope.not_sweepable[owner.join("rate")] = not_sweepable.COMPILED_ALONE
+    scope.not_sweepable[owner.join("rate")] = COMPILED_ALONE
     fastest = None
     if guide.fastest is not None and values is not None:
         with scope.complaints.gather():
@@ -351,7 +350,7 @@ def _course(scope: Scope, owner: Owner, item: Item) -> str | None:
     model = use_course(scope, spot, inner, item, doc=f"{item.name} of the path", column=item.name, body=item.body)
     if model is not None:
         scope.keep_in_deck(f"{path}.model", model, item)
-        scope.not_sweepable[path] = not_sweepable.model("a course in time", path)
+        scope.not_sweepable[path] = a_model("a course in time", path)
     return model
 
 

@@ -10,9 +10,8 @@ from ic.meaning.control.schedule import Rate
 from ic.meaning.control.servos import fixed_rate
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of, words_chosen
-from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.owner import Owner, a_model
 from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
@@ -99,7 +98,7 @@ def _sensor(scope: Scope, item: Item, arm: ResolvedArm, payloads: tuple[Payload,
     known = {"joint": [joint.name for joint in arm.moving], "link": bodies}
     check_names(scope, owner, sensor.parameters, body, arm=arm.name, known=known, failed=arm.failed)
     values = use_model(scope, owner, sensor.parameters, body, ["rate"])
-    scope.not_sweepable[owner.path] = not_sweepable.model("a sensor", owner.path)
+    scope.not_sweepable[owner.path] = a_model("a sensor", owner.path)
     rate_item = body.get("rate")
     rate = fixed_rate(scope, owner, rate_item, owner.label, doc="how often it reads") if rate_item is not None else None
     words = [parameter for parameter in sensor.parameters if parameter.shape == "word" and not parameter.names]

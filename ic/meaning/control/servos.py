@@ -19,7 +19,6 @@ from ic.meaning.definitions.merge import Item, MergedBlock, no_block, overlay, r
 from ic.meaning.expressions.quantity import measure_of
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.mechanics.loops import leaders_in_words
-from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import (
     check_keys,
     find_bare_model,
@@ -28,7 +27,7 @@ from ic.meaning.parameters.models import (
     word_of,
     words_chosen,
 )
-from ic.meaning.parameters.owner import Owner, Settled
+from ic.meaning.parameters.owner import Owner, Settled, chosen
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from ic.text.files import add_include, library_defines
@@ -218,7 +217,7 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
             scope, replace(owner, path=f"{item.name}.servo"), block.items["rate"], f"servo `{name}`", continuous=True
         )
     scope.keep_setting(f"{item.name}.servo.model", servo.name, item=model)
-    scope.not_sweepable[f"{item.name}.servo.model"] = not_sweepable.chosen(f"{item.name}.servo", "definitions")
+    scope.not_sweepable[f"{item.name}.servo.model"] = chosen(f"{item.name}.servo", "definitions")
     words = words_chosen([parameter for parameter in servo.parameters if parameter.name in servo.deciding], block)
     bare = ServoUse(item.name, name, servo.name, command, 1, words=words)
     sensors = tuple(use for sensor_item in sensed if (use := use_sensor(scope, owner, bare, sensor_item)) is not None)

@@ -15,7 +15,7 @@ from ic.meaning.definitions.merge import Item
 from ic.meaning.definitions.resolve import Definition
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters.models import word_of
-from ic.meaning.parameters.not_sweepable import NotSweepable
+from ic.meaning.parameters.owner import NotSweepable
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.parameters.shared import SharedEntries
 from ic.text.complaints import Complaints

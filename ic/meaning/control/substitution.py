@@ -15,7 +15,6 @@ from ic.meaning.control.schedule import Ticks
 from ic.meaning.control.servos import Use, moving_kind
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import (
     body_of,
     check_keys,
@@ -25,7 +24,7 @@ from ic.meaning.parameters.models import (
     value_place,
     word_of,
 )
-from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.owner import Owner, chosen
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
@@ -228,7 +227,7 @@ def _substitution(
             joint=kind,  # type: ignore[arg-type]
             call=True,
         )
-        scope.not_sweepable[f"{owner.path}.model"] = not_sweepable.chosen(owner.path, "models")
+        scope.not_sweepable[f"{owner.path}.model"] = chosen(owner.path, "models")
         body = (part.body if part is not None else None) or MergedBlock()
         if part_kind == "bed":
             _use_bed(scope, owner, model, body, use, scale)

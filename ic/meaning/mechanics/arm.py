@@ -21,10 +21,9 @@ from ic.meaning.mechanics.foreign import how_to_close, refuse_foreign_joint
 from ic.meaning.mechanics.loops import check_followers, close_loops, resolve_loop, use_follows
 from ic.meaning.mechanics.matter import use_matter
 from ic.meaning.mechanics.meshes import link_meshes
-from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.addresses import in_arm
 from ic.meaning.parameters.models import check_keys, value_place, word_of
-from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.owner import COMPILED_ALONE, Owner
 from ic.meaning.parameters.relations import check_relations, no_direction
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.parameters.shared import SharedEntries
@@ -360,7 +359,7 @@ def _joint(
         _frame(scope, owner, kind, body)
     limits = _limits(scope, replace(owner, joint=kind), body)  # type: ignore[arg-type]  # a kind of joint by now
     for end in ("parent", "child"):
-        scope.not_sweepable[f"{item.name}.{end}"] = not_sweepable.COMPILED_ALONE
+        scope.not_sweepable[f"{item.name}.{end}"] = COMPILED_ALONE
     follows = use_follows(scope, replace(owner, joint=kind), body, block)  # type: ignore[arg-type]
     if parent is None or child is None or follows is None:
         return None

@@ -22,8 +22,7 @@ import numpy as np
 from ic.grammar.syntax import List, WithUnit
 from ic.language.bodies import BOOM, DAMPING_RATIO, EI, GJ, NODES
 from ic.meaning.definitions.merge import Item, MergedBlock
-from ic.meaning.parameters.not_sweepable import NotSweepable
-from ic.meaning.parameters.owner import XYZ, Owner
+from ic.meaning.parameters.owner import XYZ, NotSweepable, Owner
 from ic.meaning.parameters.scope import Scope
 from met.diagnostic import leave_out
 from met.frozen import frozen

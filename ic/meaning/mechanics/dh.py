@@ -17,9 +17,8 @@ from collections.abc import Callable
 
 from ic.grammar.syntax import Call, place_of
 from ic.meaning.definitions.merge import Item, MergedBlock
-from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, word_of
-from ic.meaning.parameters.owner import XYZ, Owner
+from ic.meaning.parameters.owner import XYZ, Owner, follows, several
 from ic.meaning.parameters.scope import Scope
 from met.diagnostic import Label, did_you_mean, leave_out, write
 from met.frozen import frozen
@@ -91,7 +90,7 @@ def use_dh(scope: Scope, owner: Owner, kind: str, item: Item, body: MergedBlock)
     inner = Owner(f"the dh of {owner.label}", item.place, owner.join("dh"), homes=owner.homes, call=True)
     numbers = item.body or MergedBlock()
     check_keys(scope, numbers, [wanted.name for wanted in NUMBERS], inner)
-    scope.not_sweepable[owner.join("dh")] = not_sweepable.several(_numbers(owner))
+    scope.not_sweepable[owner.join("dh")] = several(_numbers(owner))
     entered = [scope.number(inner, wanted, numbers.get(wanted.name), record=False) for wanted in NUMBERS]
     values = [value for value in entered if value is not None]
     if len(values) < len(NUMBERS):
@@ -122,7 +121,7 @@ def _refuse_others(scope: Scope, owner: Owner, item: Item, body: MergedBlock) ->
                 ),
             )
         for path in (name, *(f"{name}.{axis}" for axis in XYZ)):
-            scope.not_sweepable[owner.join(path)] = not_sweepable.follows(owner.join("dh"), _numbers(owner))
+            scope.not_sweepable[owner.join(path)] = follows(owner.join("dh"), _numbers(owner))
 
 
 def _numbers(owner: Owner) -> list[str]:

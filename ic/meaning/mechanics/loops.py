@@ -12,9 +12,8 @@ import numpy as np
 from ic.grammar.syntax import List, Name
 from ic.language.bodies import BRANCH, LEADER, LOOP, OFFSET, PIN_AT, RATIO, TO_AT
 from ic.meaning.definitions.merge import Item, MergedBlock
-from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, value_place
-from ic.meaning.parameters.owner import Owner, Settled
+from ic.meaning.parameters.owner import COMPILED_ALONE, Owner, Settled
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met.diagnostic import Label, did_you_mean, leave_out
@@ -44,7 +43,7 @@ def use_follows(scope: Scope, owner: Owner, body: MergedBlock, arm: MergedBlock)
                 helps = ["write `follows = JOINT;` too", leave_out(f"or leave `{name}` out")]
                 scope.complaints.error("D213", message, stray.place, help=helps)
         return ()
-    scope.not_sweepable[owner.join("follows")] = not_sweepable.COMPILED_ALONE
+    scope.not_sweepable[owner.join("follows")] = COMPILED_ALONE
     kinds = {
         joint.name: joint.detail[0].text
         for joint in arm.of_kind("joint")

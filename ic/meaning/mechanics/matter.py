@@ -12,9 +12,8 @@ from dataclasses import replace
 from ic.language.bodies import COM, INERTIA, MASS
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.bodies import check_body
-from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, refuse_values, value_place, word_of
-from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.owner import Owner, several
 from ic.meaning.parameters.scope import Scope
 from met.diagnostic import did_you_mean
 from met.frozen import frozen
@@ -183,7 +182,7 @@ def _com(scope: Scope, owner: Owner, kind: str, item: Item | None, solid: Solid 
     if item is not None or solid is None:
         scope.vector(owner, replace(_of_kind(COM, kind), default=(0.0, 0.0, 0.0)), item)
         return
-    scope.not_sweepable[owner.join("com")] = not_sweepable.several([owner.join(f"com.{axis}") for axis in "xyz"])
+    scope.not_sweepable[owner.join("com")] = several([owner.join(f"com.{axis}") for axis in "xyz"])
     for axis, value in zip("xyz", solid.com, strict=True):
         scope.derived(owner, f"com.{axis}", value, "m", f"middle of the {solid.kind}")
 
@@ -212,9 +211,7 @@ def _inertia(
     if mass is None:
         scope.checks.fail(owner.join("inertia"))
         return None
-    scope.not_sweepable[owner.join("inertia")] = not_sweepable.several(
-        [owner.join(f"inertia.{moment}") for moment in MOMENTS]
-    )
+    scope.not_sweepable[owner.join("inertia")] = several([owner.join(f"inertia.{moment}") for moment in MOMENTS])
     return tuple(
         scope.derived(owner, f"inertia.{name}", value, "kg*m^2", f"uniform {solid.kind} of the {kind}'s mass")
         for name, value in zip(MOMENTS, solid.inertia(mass), strict=True)

@@ -12,10 +12,8 @@ from ic.language.bodies import ATTITUDE, GRAPPLE, PAYLOAD, PAYLOAD_AT, PAYLOAD_R
 from ic.meaning.definitions.merge import Item, MergedBlock, no_block
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.mechanics.matter import use_matter
-from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, value_place
-from ic.meaning.parameters.not_sweepable import NotSweepable
-from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.owner import COMPILED_ALONE, NotSweepable, Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met.diagnostic import Label, Place, did_you_mean, leave_out
@@ -99,7 +97,7 @@ def _payload(scope: Scope, item: Item, arm: ResolvedArm, taken: Collection[str])
     if payload.flies:
         _check_solid(scope, owner, payload, item)
     scope.keep_setting(owner.join("on"), link or BASE, item=body.get("on"))
-    scope.not_sweepable[owner.join("on")] = not_sweepable.COMPILED_ALONE
+    scope.not_sweepable[owner.join("on")] = COMPILED_ALONE
     return payload
 
 

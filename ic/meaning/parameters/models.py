@@ -10,8 +10,7 @@ from typing import Any
 from ic.grammar.syntax import Call, Expression, Name, String, place_of
 from ic.meaning.definitions.csv_files import CsvColumn, CsvTable, missing_column
 from ic.meaning.definitions.merge import Item, MergedBlock, refuse_pending
-from ic.meaning.parameters import not_sweepable
-from ic.meaning.parameters.owner import Owner, Settled
+from ic.meaning.parameters.owner import OF_A_FILE, Owner, Settled
 from ic.meaning.parameters.relations import check_relations
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words, where_it_belongs, with_article
@@ -254,7 +253,7 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Merged
         MergedBlock({key: item for key, item in body.items.items() if key in own}),
     )
     for name in (FILE.name, *(parameter.name for parameter in lists)):
-        scope.not_sweepable[owner.join(name)] = not_sweepable.FILE
+        scope.not_sweepable[owner.join(name)] = OF_A_FILE
     columns: dict[str, tuple[float, ...]] | None = None
     with scope.complaints.gather():
         columns = _columns(scope, owner, lists, body.items[FILE.name])

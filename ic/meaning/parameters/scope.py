@@ -27,9 +27,7 @@ from ic.meaning.expressions.names import (
     written_origin,
 )
 from ic.meaning.expressions.quantity import Value, ValueList, no_single_number
-from ic.meaning.parameters import not_sweepable
-from ic.meaning.parameters.not_sweepable import NotSweepable
-from ic.meaning.parameters.owner import XYZ, Owner, Settled
+from ic.meaning.parameters.owner import COMPILED, COMPILED_ALONE, LIST, WORD, XYZ, NotSweepable, Owner, Settled, several
 from ic.meaning.parameters.value_checks import ValueChecks, how_to_write
 from ic.text.complaints import Complaints
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
@@ -148,7 +146,7 @@ class Scope:
         """
         heads = [owner.path] * (wanted.name == owner.short) + [owner.join(wanted.name)]
         for head in heads:
-            self.not_sweepable.setdefault(head, not_sweepable.several([f"{heads[0]}.{name}" for name in names]))
+            self.not_sweepable.setdefault(head, several([f"{heads[0]}.{name}" for name in names]))
         values: list[Value | None] = [None] * len(names)
         if item is not None and replacements is None:
             with self.complaints.gather():
@@ -176,7 +174,7 @@ class Scope:
         another than varying it itself."""
         path = owner.join(wanted.name)
         for known in owner.paths(wanted.name, item.homes):
-            self.not_sweepable[known] = not_sweepable.COMPILED
+            self.not_sweepable[known] = COMPILED
         number = None
         with self.complaints.gather():
             value = self._one_number(owner, wanted, item)
@@ -211,7 +209,7 @@ class Scope:
             self._missing(owner, wanted)
         elif self.constant(owner, wanted, item) is None:
             self.auxiliary.pop(path, None)
-        self.not_sweepable[path] = not_sweepable.COMPILED_ALONE
+        self.not_sweepable[path] = COMPILED_ALONE
         if path not in self.auxiliary:
             return None
         self.parameters[path] = self.auxiliary.pop(path)
@@ -220,7 +218,7 @@ class Scope:
     def number_list(self, owner: Owner, wanted: Parameter, item: Item | None) -> tuple[float, ...] | None:
         """A list of any length, the same in all cases."""
         path = owner.join(wanted.name)
-        self.not_sweepable[path] = not_sweepable.LIST
+        self.not_sweepable[path] = LIST
         if item is None and isinstance(wanted.default, tuple):
             self.parameters[path] = Settled(wanted.default, owner.unit(wanted)[0], Origin("default"), wanted.doc)
             return wanted.default
@@ -264,7 +262,7 @@ class Scope:
     def word(self, owner: Owner, wanted: Parameter, item: Item | None, *, record: bool = False) -> str | None:
         """A word, one of `wanted.words` where it has any."""
         path = owner.join(wanted.name)
-        self.not_sweepable[path] = not_sweepable.WORD
+        self.not_sweepable[path] = WORD
         if item is None:
             if not isinstance(wanted.default, str):
                 self._missing(owner, wanted)
@@ -300,7 +298,7 @@ class Scope:
     def keep_in_deck(self, path: str, value: str, item: Item) -> None:
         """Keep a setting that only the deck writes, neither a sweep nor `--set`."""
         self.keep_setting(path, value, item=item)
-        self.not_sweepable[path] = not_sweepable.COMPILED_ALONE
+        self.not_sweepable[path] = COMPILED_ALONE
 
     def keep_setting(
         self, path: str, value: Real | str, unit: str = "", item: Item | None = None, note: str = ""

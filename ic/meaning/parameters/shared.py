@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ic.meaning.expressions.names import FoundNames
-from ic.meaning.parameters.not_sweepable import NotSweepable
-from ic.meaning.parameters.owner import Settled
+from ic.meaning.parameters.owner import NotSweepable, Settled
 from ic.meaning.parameters.scope import Scope
 from met.frozen import frozen
 

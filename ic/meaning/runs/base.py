@@ -15,10 +15,8 @@ from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm, resolve_link
 from ic.meaning.mechanics.bodies import carried_loads
 from ic.meaning.mechanics.meshes import link_meshes
-from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, refuse_values, word_of
-from ic.meaning.parameters.not_sweepable import NotSweepable
-from ic.meaning.parameters.owner import Owner, Settled
+from ic.meaning.parameters.owner import A_RUN_FOR_EACH, DECIDES, NotSweepable, Owner, Settled, a_model
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
@@ -53,7 +51,7 @@ def _read(scope: Scope, run: Owner, block: MergedBlock, key: RunKey) -> Any:
         scope.auxiliary[key.path] = Settled(value, wanted.unit, Origin("default"), wanted.doc)
     entry = BLOCKS[head or "run"][name]
     if entry.varies == "never":
-        scope.not_sweepable[key.path] = NotSweepable("is one for the whole sweep", not_sweepable.A_RUN_FOR_EACH)
+        scope.not_sweepable[key.path] = NotSweepable("is one for the whole sweep", A_RUN_FOR_EACH)
     return wanted.default if value is None else value
 
 
@@ -75,7 +73,7 @@ NOTHING = (0.0, 0.0, 0.0)
 def resolve_base(scope: Scope, item: Item | None, arm: ResolvedArm) -> tuple[Base | None, ResolvedArm]:
     """The base, None where it is fixed or failed (already reported); and the arm, with the base as a link where it
     moves."""
-    scope.not_sweepable[BASE] = NotSweepable(not_sweepable.DECIDES, "write `vary base = [fixed, free];`")
+    scope.not_sweepable[BASE] = NotSweepable(DECIDES, "write `vary base = [fixed, free];`")
     kind = word_of(item.value) if item is not None and item.value is not None else None
     if item is None:
         scope.keep_setting(BASE, "fixed")
@@ -319,7 +317,7 @@ def _course(scope: Scope, item: Item) -> str | None:
     if model is not None:
         scope.keep_in_deck(f"{BASE}.{item.name}.model", model, item)
         path = f"{BASE}.{item.name}"
-        scope.not_sweepable[path] = not_sweepable.model("a course in time", path)
+        scope.not_sweepable[path] = a_model("a course in time", path)
         _check_jumps(scope, item, model, place_of(item.value))
     return model
 

@@ -11,8 +11,7 @@ from ic.language.runs import LINEAR, LINEAR_AT
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.quantity import Value, ValueList
 from ic.meaning.parameters.models import check_keys, refuse_values, word_of
-from ic.meaning.parameters.not_sweepable import NotSweepable
-from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.owner import NotSweepable, Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.record import nearest_channels, of_lost
 from ic.text.complaints import known_words

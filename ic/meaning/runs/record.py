@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from ic.grammar.syntax import Binary, Call, Expression, List, Name, Unary, WithUnit, place_of
 from ic.meaning.definitions.merge import Item
-from ic.meaning.parameters.not_sweepable import NotSweepable
-from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.owner import NotSweepable, Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models

@@ -21,8 +21,7 @@ from ic.meaning.mechanics.arm import ResolvedArm, resolve_arm
 from ic.meaning.mechanics.payloads import resolve_payloads
 from ic.meaning.parameters.addresses import OF_JOINT, in_run
 from ic.meaning.parameters.models import body_of, find_bare_model, overriding_place, refuse_statements, word_of
-from ic.meaning.parameters.not_sweepable import NotSweepable
-from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.owner import NotSweepable, Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import ALLOW
 from ic.meaning.runs.base import base_meshes, initial_base, resolve_base, resolve_run_keys
