@@ -63,7 +63,7 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
     import json
 
     from batch.campaigns.choosing import experiments_named, read_plan, select_rows
-    from batch.linearized import files, locus, picture
+    from batch.linearized import files, picture
     from batch.plotting import output as places
     from batch.terminal.linear import answered, as_data, case_lines, linear_lines
     from met.analysis.linear.answers import Linearized, question_of
@@ -98,7 +98,7 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
     if options["all_cases"]:
         every = answered(question)
         if drawn is not None:
-            locus.draw(question, every, drawn)
+            picture.draw_locus(question, every, drawn)
         data = [
             as_data(answer) if isinstance(answer, Linearized) else {"case": n, "why_not": answer}
             for n, answer in enumerate(every)

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 import ic
 from batch.cli.linear import linear
-from batch.linearized import locus
+from batch.linearized import picture
 from batch.terminal.linear import answered
 from met.analysis.linear.answers import Linearized, LinearQuestion
 from met.diagnostic import Problem
@@ -116,7 +116,7 @@ def test_a_picture_of_all_cases_is_a_root_locus(folder: Path) -> None:
     path = folder / swept(folder)
     question = LinearQuestion(ic.compile(path, select=["gains"]).experiments[0], 0.0, (), (), OPEN[1:])
     found = answered(question)
-    drawn = locus.figure(question, [*found[:2], "`hinge` breaks away, t = 0 s"])
+    drawn = picture.locus_figure(question, [*found[:2], "`hinge` breaks away, t = 0 s"])
     z_plane, s_plane, bar = drawn.axes
     assert "3 cases, 1 of them without an answer" in drawn.get_suptitle() and bar.get_ylabel() == "drive.kp, V*s/rad"
     shown = [line.get_xydata() for line in z_plane.get_lines() if line.get_marker() == "."]
@@ -125,7 +125,7 @@ def test_a_picture_of_all_cases_is_a_root_locus(folder: Path) -> None:
         assert at.tolist() == [[pole.z.real, pole.z.imag] for pole in case.poles]
     assert len(shown) == 2 and [line.get_marker() for line in s_plane.get_lines()].count("x") == 1
     with pytest.raises(Problem, match="E450") as refused:
-        locus.figure(question, ["`hinge` breaks away, t = 0 s"])
+        picture.locus_figure(question, ["`hinge` breaks away, t = 0 s"])
     assert refused.value.diagnostics[0].message == "there is nothing to draw: no case has an answer"
     met(folder, "linear", "deck.ic", "gains", "--all-cases", *OPEN, "--picture", "locus.svg", status=1)
     assert (folder / "locus.svg").read_text(encoding="utf-8").count("<svg") == 1
