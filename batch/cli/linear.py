@@ -63,7 +63,8 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
     import json
 
     from batch.campaigns.choosing import experiments_named, read_plan, select_rows
-    from batch.linearized import files, picture
+    from batch.linearized import picture
+    from batch.linearized.data import check, write
     from batch.plotting import output as places
     from batch.terminal.linear import answered, as_data, case_lines, linear_lines
     from met.analysis.linear.answers import Linearized, question_of
@@ -82,7 +83,7 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
     check_options(source, names, **how_read)
     output, drawn = (None if options[key] is None else path_of(options[key]) for key in ("output", "picture"))
     if output is not None:
-        files.check(output)
+        check(output)
     if drawn is not None:
         places.check(drawn)
     plan = read_plan(source, names, **how_read, quiet=form == "json")
@@ -108,7 +109,7 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
         return NO if any(loop.unstable for loop in loops) else YES
     linearized = question.of(case)
     if output is not None:
-        files.write(linearized, output)
+        write(linearized, output)
     if drawn is not None:
         picture.draw(linearized, drawn)
     lines = linear_lines(linearized, experiment.cases.count)

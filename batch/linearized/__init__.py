@@ -28,10 +28,10 @@ class LinearAnswer:
 
     def write(self, output: Path | str) -> None:
         """Writes A, B, C, D with names into a new file: .npz, .h5 or .csv. Raises Problem E305, E326."""
-        from batch.linearized import files
+        from batch.linearized import data
 
-        files.check(path_of(output))
-        files.write(self.found, Path(output))
+        data.check(path_of(output))
+        data.write(self.found, Path(output))
 
     def draw(self, output: Path | str) -> None:
         """Draws opened loops (Bode, Nichols) and steps: .png, .svg or .pdf. Raises Problem E450, E305, E326."""
