@@ -79,7 +79,7 @@ def draw(
     sheet: PictureSheet | None = None,
 ) -> Path:
     """Draw a picture of open archives, as `plot` does."""
-    from batch.plotting import histories, metrics
+    from batch.plotting import histories, requests
     from batch.plotting import output as place
 
     for open_archive in (archive, *([against] if against is not None else [])):
@@ -105,7 +105,7 @@ def draw(
         else:
             theirs = [None] * len(pool.groups) if against is None else beside(archive, pool.groups, against)
             others = {number: group for number, group in enumerate(theirs) if group is not None}
-            figure = metrics.draw(archive, pool, wanted.metrics, over, sheet, others, against)
+            figure = requests.draw(archive, pool, wanted.metrics, over, sheet, others, against)
         place.save(figure, target)
     return target
 
