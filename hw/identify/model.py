@@ -19,7 +19,7 @@ from met import backends
 from met.backends.backend import Kernel
 from met.servos.motor import damping, torque
 from met.substitution import observer, shaft
-from met.substitution.emulated_shaft import SUBSTEP
+from met.substitution.emulated import SUBSTEP
 from met.trace import cos, sin
 from met.trace.program import CallPhase, Phase, Program, Tape, Unless0
 from met.trace.recorder import record

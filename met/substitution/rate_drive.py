@@ -17,18 +17,18 @@ from typing import Any
 from met.parameter import Memory, Parameter
 from met.sensors.sensor import converted
 from met.servos.motor import RateLoop, damping, torque
-from met.substitution import emulated_shaft
+from met.substitution import emulated
 from met.substitution.bed import TORQUE, BedModel, Draw, Wire
 from met.substitution.drive import wound
 from met.trace import Real, Truth, absolute, clip
 
 
 def begin(p: Any, w: Real) -> Mapping[str, Real]:
-    return {**emulated_shaft.begin(p, w), "integral": 0.0, "motor_torque": 0.0}
+    return {**emulated.begin(p, w), "integral": 0.0, "motor_torque": 0.0}
 
 
 def advance(p: Any, held: Any, wire: Wire, time: float, draw: Draw) -> Mapping[str, Real]:
-    h = emulated_shaft.substep(time)
+    h = emulated.substep(time)
     loop = RateLoop(p.kp, p.ki, p.v_max)
     integral, tau = held.integral, held.motor_torque
 
@@ -41,7 +41,7 @@ def advance(p: Any, held: Any, wire: Wire, time: float, draw: Draw) -> Mapping[s
         return tau
 
     decay = damping(p.kt, p.resistance, p.f_v) / p.inertia
-    memory = emulated_shaft.turned(p, held, wire.current, time, draw, driving, decay)
+    memory = emulated.turned(p, held, wire.current, time, draw, driving, decay)
     return {**memory, "integral": integral, "motor_torque": tau}
 
 
@@ -60,24 +60,24 @@ BED = BedModel(
         ),
         Parameter(name="ki", unit="V/rad", at_least=0.0, of_servo="ki", doc="integral gain of the drive's rate loop"),
         Parameter(name="v_max", unit="V", above=0.0, of_servo="v_max", doc="largest voltage of the drive's amplifier"),
-        *emulated_shaft.ARMATURE,
-        emulated_shaft.TAU_MAX,
-        *emulated_shaft.SHAFT,
-        *emulated_shaft.REST,
+        *emulated.ARMATURE,
+        emulated.TAU_MAX,
+        *emulated.SHAFT,
+        *emulated.REST,
         Parameter(
             name="converter_rate", unit="rad/s", at_least=0.0, default=0.0, doc="resolution of the commanded rate"
         ),
-        emulated_shaft.CURRENT,
+        emulated.CURRENT,
     ),
     memory=(
-        *emulated_shaft.MEMORY,
+        *emulated.MEMORY,
         Memory(name="integral", unit="rad", doc="integral of the rate error in the drive's own loop"),
         TORQUE,
     ),
     begin=begin,
     advance=advance,
-    read=emulated_shaft.read,
+    read=emulated.read,
     taken=taken,
     # 16 bits over +-400 rad/s
-    presets={"none": {}, "typical": {**emulated_shaft.TYPICAL, "converter_rate": 800.0 / 65536.0}},
+    presets={"none": {}, "typical": {**emulated.TYPICAL, "converter_rate": 800.0 / 65536.0}},
 )

@@ -17,18 +17,18 @@ from typing import Any
 
 from met.parameter import Parameter
 from met.sensors.sensor import converted
-from met.substitution import emulated_shaft
+from met.substitution import emulated
 from met.substitution.bed import TORQUE, BedModel, Draw, Wire
 from met.substitution.drive import LEAST, at_least
 from met.trace import Real, Truth, absolute, clip, exp
 
 
 def begin(p: Any, w: Real) -> Mapping[str, Real]:
-    return {**emulated_shaft.begin(p, w), "motor_torque": 0.0}
+    return {**emulated.begin(p, w), "motor_torque": 0.0}
 
 
 def advance(p: Any, held: Any, wire: Wire, time: float, draw: Draw) -> Mapping[str, Real]:
-    h = emulated_shaft.substep(time)
+    h = emulated.substep(time)
     times = 2.0 * math.pi * p.bandwidth * h
     left = exp(-times)
     goal, tau = p.gain * wire.drive, held.motor_torque
@@ -39,7 +39,7 @@ def advance(p: Any, held: Any, wire: Wire, time: float, draw: Draw) -> Mapping[s
         return goal + away * ((1.0 - left) / times)  # the mean of the substep
 
     decay = at_least(p.f_v / p.inertia, LEAST / h)
-    memory = emulated_shaft.turned(p, held, wire.current, time, draw, driving, decay)
+    memory = emulated.turned(p, held, wire.current, time, draw, driving, decay)
     return {**memory, "motor_torque": tau}
 
 
@@ -54,7 +54,7 @@ BED = BedModel(
     doc=__doc__,
     drive="torque",
     parameters=(
-        emulated_shaft.TAU_MAX,
+        emulated.TAU_MAX,
         Parameter(
             name="gain", above=0.0, default=1.0, doc="torque of the drive divided by the torque that it is commanded"
         ),
@@ -65,18 +65,18 @@ BED = BedModel(
             default=math.inf,
             doc="bandwidth of the drive's current loop; inf: the torque follows at once",
         ),
-        *emulated_shaft.SHAFT,
-        *emulated_shaft.REST,
+        *emulated.SHAFT,
+        *emulated.REST,
         Parameter(
             name="converter_torque", unit="N*m", at_least=0.0, default=0.0, doc="resolution of the commanded torque"
         ),
-        emulated_shaft.CURRENT,
+        emulated.CURRENT,
     ),
-    memory=(*emulated_shaft.MEMORY, TORQUE),
+    memory=(*emulated.MEMORY, TORQUE),
     begin=begin,
     advance=advance,
-    read=emulated_shaft.read,
+    read=emulated.read,
     taken=taken,
     # 12 bits over +-0.15 N m, the torque of such a motor
-    presets={"none": {}, "typical": {**emulated_shaft.TYPICAL, "converter_torque": 0.3 / 4096.0}},
+    presets={"none": {}, "typical": {**emulated.TYPICAL, "converter_torque": 0.3 / 4096.0}},
 )
