@@ -24,11 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive import tables
+from batch.archive import stored
 from batch.archive.hdf5 import h5py
 from batch.archive.sound import MOST, are_cases
-from batch.archive.stored import StoredGroup, Unlike
-from batch.archive.tables import COUNT, NUMBER, WORDS
+from batch.archive.stored import COUNT, NUMBER, WORDS, StoredGroup, Unlike
 from met.frozen import frozen
 from met.run import LOST
 
@@ -37,7 +36,7 @@ NAME = "summary-of-cases"
 DOUBTFUL = -1
 """The status of a cause that makes finished cases doubtful."""
 
-VARIABLES: tables.Declared = {
+VARIABLES: stored.Declared = {
     "cause": (("cause",), WORDS, "why cases failed or are doubtful"),
     "cause_status": (("cause",), COUNT, "how they ended; -1: doubtful"),
     "cause_cases": (("cause",), COUNT, "cases of this cause"),
@@ -105,7 +104,7 @@ def write(parent: Any, summary: CaseSummary) -> None:
     node = parent.create_group(NAME, track_order=True)
     node.attrs["cases"], node.attrs["limited"] = summary.cases, summary.limited
     node.attrs["rows"], node.attrs["drawn"] = summary.rows, summary.drawn
-    tables.write(node, VARIABLES, summary.values)
+    stored.write(node, VARIABLES, summary.values)
 
 
 def read(node: Any, group: StoredGroup) -> CaseSummary | None:
@@ -115,7 +114,7 @@ def read(node: Any, group: StoredGroup) -> CaseSummary | None:
         return None
     if not isinstance(inside, h5py().Group):
         raise Unlike(f"`{NAME}` is no group")
-    values = tables.read(inside, VARIABLES, NAME)
+    values = stored.read(inside, VARIABLES, NAME)
     cases, limited, rows, drawn = (inside.attrs.get(name) for name in ("cases", "limited", "rows", "drawn"))
     if not isinstance(cases, np.integer) or not 0 < cases < MOST:
         raise Unlike(f"attribute `cases` of `{NAME}` is missing or of another type")

@@ -19,11 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive import tables
+from batch.archive import stored
 from batch.archive.hdf5 import h5py
 from batch.archive.sound import MOST, are_cases
-from batch.archive.stored import StoredGroup, Unlike
-from batch.archive.tables import COUNT, NUMBER, WORDS
+from batch.archive.stored import COUNT, NUMBER, WORDS, StoredGroup, Unlike
 from met.frozen import frozen
 from met.host.files import parse_json
 from met.plan.judged import StepErrorLimit
@@ -69,7 +68,7 @@ MOST_ORDER = 100
 
 DIMENSIONS = ("verified_case", "verified_metric")
 
-VARIABLES: tables.Declared = {
+VARIABLES: stored.Declared = {
     "verified_case": (("verified_case",), COUNT, "cases that were run with shorter steps, by position in the table"),
     "verified_metric": (("verified_metric",), WORDS, "their metrics"),
     "half": (DIMENSIONS, NUMBER, "metrics with the dynamics at half of the step, SI"),
@@ -115,7 +114,7 @@ def write(parent: Any, verified_metrics: Verified) -> None:
         "instant": verified_metrics.instant,
         "missed": verified_metrics.missed,
     }
-    tables.write(node, VARIABLES, values)
+    stored.write(node, VARIABLES, values)
 
 
 def read(node: Any, group: StoredGroup) -> Verified | None:
@@ -124,7 +123,7 @@ def read(node: Any, group: StoredGroup) -> Verified | None:
     if not isinstance(inside, h5py().Group):  # a metric of an older archive may have this name
         return None
     declared = {name: VARIABLES[name] for name in VARIABLES if name != "missed" or name in inside}  # later than others
-    values = tables.read(inside, declared, NAME)
+    values = stored.read(inside, declared, NAME)
     cases, metrics = values["verified_case"], tuple(map(str, values["verified_metric"].tolist()))
     if not len(cases) or not (np.diff(cases) > 0).all() or not are_cases(group, cases).all():
         raise Unlike("its verified cases are none of its cases")
