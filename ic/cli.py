@@ -124,7 +124,7 @@ def _print_verdict(checked: _Checked, verbose: bool) -> None:
 
 def _complain_together(checked_decks: Iterable[_Checked], form: str) -> None:
     """Print the messages of several files as one, for programs: those that decks share are printed once."""
-    from ic.printing.codes import titles
+    from ic.printing.looked_up import titles
 
     diagnostics: dict[object, Diagnostic] = {}
     allowed: dict[object, tuple[Diagnostic, str]] = {}

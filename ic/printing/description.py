@@ -12,7 +12,7 @@ from ic.language import ANYWHERE, BLOCKS, DEFINITIONS, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
 from ic.language.runs import BASE_KINDS
 from ic.meaning.expressions.evaluate import COMPARISONS, CONSTANTS, RESERVED, USAGE
-from ic.printing import codes, subjects, sweeps
+from ic.printing import looked_up, subjects, sweeps
 from ic.printing.columns import count
 from ic.printing.models import KINDS, UNIT_WORDS, model_record, parameter_record, where_written
 from ic.printing.page import Page, Table
@@ -82,7 +82,7 @@ def description() -> dict[str, Any]:
         "editions": [{"edition": edition, "taken_names": _taken_names(edition)} for edition in EDITIONS],
         "diagnostics": [
             {"code": code, "title": title, "may_be_allowed": code in WARNINGS}
-            for code, title in sorted(codes.titles().items())
+            for code, title in sorted(looked_up.titles().items())
         ],
         "library": library_files(),
     }

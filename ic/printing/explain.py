@@ -12,8 +12,8 @@ import numpy as np
 
 from ic.language import HEADS
 from ic.meaning.expressions.names import ON_COMMAND_LINE
-from ic.printing.codes import is_code
 from ic.printing.columns import columns, number, quantity, vector
+from ic.printing.looked_up import is_code
 from ic.printing.settings import settings
 from ic.robots.entries import NOTES
 from ic.text.complaints import known_words

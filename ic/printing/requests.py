@@ -12,9 +12,8 @@ from typing import Any
 from ic.language import ANYWHERE, BLOCKS, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
 from ic.meaning.mechanics import dh, matter
-from ic.printing.codes import is_code, print_code
 from ic.printing.description import language_page
-from ic.printing.glossary import entries, meaning
+from ic.printing.looked_up import entries, is_code, meaning, print_code
 from ic.printing.models import KINDS, WHERE_WRITTEN, model_page, model_record, summary
 from ic.printing.page import Page, Table, described, terminal_width
 from ic.printing.subjects import BLOCK_PAGES, OTHER_PAGES, channels, in_block, in_si, unit_table

@@ -17,8 +17,8 @@ from ic.language.bodies import JOINT_KINDS
 from ic.meaning.definitions.row_tables import CSV
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
 from ic.meaning.mechanics.matter import SHAPES
-from ic.printing import codes
-from ic.printing.glossary import entries, meaning
+from ic.printing import looked_up
+from ic.printing.looked_up import entries, meaning
 from ic.printing.models import KINDS
 from ic.printing.requests import SUBJECTS, print_word
 from ic.sweeps.designs import DESIGNS, DISTRIBUTIONS
@@ -130,7 +130,7 @@ error[D060]: no
 def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     path = tmp_path / "diagnostics.md"
     path.write_text(ENTRY)
-    monkeypatch.setattr(codes, "PAGE", path)
+    monkeypatch.setattr(looked_up, "PAGE", path)
     return path
 
 

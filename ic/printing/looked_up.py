@@ -1,9 +1,11 @@
-"""The entry of a message's code on the page docs/diagnostics.md, for the terminal."""
+"""Entries of pages of docs for the terminal: of a message's code, and of a word of MET's glossary."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
 
 from ic.text.codes import PAGE
 from met.diagnostic import Problem, did_you_mean, error
@@ -57,3 +59,34 @@ def in_plain_text(text: str) -> str:
         if line or lines[-1]:
             lines.append(line)
     return "\n".join(lines[1:])
+
+
+GLOSSARY = Path(__file__).parents[1] / "pages" / "glossary.md"
+
+_WORD_ROW = re.compile(r"^\| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
+
+
+@cache
+def entries() -> dict[str, tuple[str, str]]:
+    """The row of each word, (its words, their meaning), in plain text; empty where the page is not installed.
+
+    A row of several words explains each of them, and also a word in bold type within its meaning.
+    """
+    if not GLOSSARY.is_file():
+        return {}
+    rows: dict[str, tuple[str, str]] = {}
+    for row in _WORD_ROW.finditer(GLOSSARY.read_text(encoding="utf-8")):
+        words, meaning = row[1].strip(), row[2].strip()
+        if words == "word" or set(words) == {"-"}:
+            continue
+        row_of_all = (in_plain_text(words), in_plain_text(meaning))
+        for word in (*words.replace("the wire", "wire").split(", "), *re.findall(r"\*\*(.+?)\*\*", meaning)):
+            rows.setdefault(in_plain_text(word), row_of_all)
+    return rows
+
+
+def meaning(word: str) -> Iterator[str]:
+    """Return the glossary's meaning of a word, in one line; empty for an unknown word."""
+    row = entries().get(word) or entries().get(word.removesuffix("s"))
+    if row is not None:
+        yield f"{row[0]}: {row[1]}"
