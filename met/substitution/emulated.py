@@ -1,21 +1,11 @@
 """The emulated bed: two motors on a shaft, a tachometer with a filter, converters, and the faults of each.
 
-J w' = tau_m(V, w) + Kt_load i - F_v w - s F_c + unevenness,   s as friction sticks
+    J w' = tau_m(V, w) + Kt_load i - F_v w - s F_c + unevenness,   s as friction sticks
 
-The drive motor is fed by a voltage amplifier, the load motor by a current amplifier; the rest is in emulated_shaft.py.
-The faults are a ripple of the load torque (`unevenness` of it, `lobes` periods per turn), misaligned motors (`once` and
-`twice` per turn), noise of the tachometer (`tachometer`, rms, a new value at each tick), and the resolution of the
-converters (0: none).
-
-J w' = tau_m + Kt_load i - F_v w - s F_c + unevenness,   s as friction sticks
-
-The load motor stands behind a current amplifier. The tachometer's signal goes through a Butterworth filter of order 2
-and a converter. Between its substeps the bed is exact while the shaft slides on and no limit is reached; a shaft that
-turns back stops first, within a substep.
-
-Faults, in the order of the shaft's turn: the load torque is uneven (`unevenness` of it, `lobes` a turn), the motors are
-out of line (`once` and `twice` a turn), the tachometer is noisy (`tachometer`, rms, a new value each tick), converters
-have a resolution (0: none).
+The drive motor is fed by a voltage amplifier, the load motor by a current amplifier; the rest is common to all emulated
+beds. The faults are a ripple of the load torque (`unevenness` of it, `lobes` periods per turn), misaligned motors
+(`once` and `twice` per turn), noise of the tachometer (`tachometer`, rms, a new value at each tick), and the resolution
+of the converters (0: none).
 """
 
 from __future__ import annotations
@@ -51,6 +41,9 @@ def turned(
     p: Any, held: Any, current: Real, time: float, draw: Draw, driving: Callable[[Real], Real], decay: Real
 ) -> Mapping[str, Real]:
     """The memory after `time` s, by name.
+
+    Between its substeps the bed is exact while the shaft slides on and no limit is reached; a shaft that turns back
+    stops first, within a substep. The tachometer's signal goes through a Butterworth filter of order 2 and a converter.
 
     current  of the load motor, A
     driving  rate of the shaft as a substep begins, rad/s -> torque of the drive motor, N m; called once in each
