@@ -91,14 +91,14 @@ def writing(output: Path, *, code: str, help: str | Sequence[str] = ()) -> Itera
         raise Problem(error(code, f"cannot write {output}: {refusal_text(reason)}", help=help)) from reason
 
 
-def settle_named(output: Path, *, code: str) -> None:
+def settle_named(output: Path) -> None:
     """Wait until a whole file that has got its name is on the disk under it. Raises Problem where the disk has
     failed."""
     try:
         settle_folder(output.parent)
     except OSError as reason:
         message = f"{output} is whole, but its disk may lose it: {refusal_text(reason)}"
-        raise Problem(error(code, message, help="copy it to another disk")) from reason
+        raise Problem(error("E305", message, help="copy it to another disk")) from reason
 
 
 def refusal_text(reason: OSError) -> str:

@@ -7,7 +7,7 @@ nothing and costs a copy of the state at each instant.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import field
 
@@ -55,7 +55,6 @@ def run_past(
     *,
     record: bool,
     threads: int | None = None,
-    progress: Callable[[int], None] | None = None,
 ) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
     """Rows and outputs as `Kernel.run` gives them, and the memory [case, instant, cell] at these ticks, which rise.
 
@@ -67,16 +66,16 @@ def run_past(
     outputs = np.empty((cases, len(program.outputs)))
     memory = np.empty((cases, len(instants), len(kernel.recording.cells)))
     pieces: dict[int, list[np.ndarray]] = {}
-    wanted, starts, done, ended = frozenset(instants), range(0, cases, kernel.lanes), 0, threading.Event()
+    wanted, starts, ended = frozenset(instants), range(0, cases, kernel.lanes), threading.Event()
 
-    def work(start: int) -> int:
+    def work(start: int) -> None:
         block = kernel.block(inputs[start : start + kernel.lanes])
         lanes = slice(start, min(start + kernel.lanes, cases))
         width, first, instant_numbers = lanes.stop - lanes.start, 0, iter(range(len(instants)))
         rows = pieces[start] = []
         for last in ends:
             if ended.is_set():
-                return 0
+                return
             if record:
                 rows.append(block.recorded(first, last))
             else:
@@ -85,14 +84,11 @@ def run_past(
                 memory[lanes, next(instant_numbers)] = block.state[: memory.shape[2], :width].T
             first = last + 1
         outputs[lanes] = block.outputs[: outputs.shape[1], :width].T
-        return width
 
     with ThreadPoolExecutor(max(1, min(threads or system.cores(), len(starts)))) as pool:
         try:
-            for width in pool.map(work, starts):
-                done += width
-                if progress is not None:
-                    progress(done)
+            for _ in pool.map(work, starts):
+                pass
         except BaseException:
             ended.set()
             raise

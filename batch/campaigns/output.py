@@ -68,7 +68,7 @@ def publish(output: Path, temporary: Path, sidecar: dict[str, Any]) -> None:
             raise Problem(error("E305", message, help="without it the same command runs all cases again")) from reason
     finally:
         beside_temporary.unlink(missing_ok=True)
-    outputs.settle_named(output, code="E305")
+    outputs.settle_named(output)
 
 
 OF_OTHER_FILES = frozenset(

@@ -51,4 +51,4 @@ def whole(output: Path) -> Iterator[Sink]:
             raise
         finally:
             sink.close()
-        settle_named(output, code="E305")
+        settle_named(output)

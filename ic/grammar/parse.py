@@ -101,12 +101,9 @@ def parse_on(
     return Parsed(tuple(entries), tuple(parser.unreadable), sound, parser.declared, tuple(parser.uses))
 
 
-def parse_expression(
-    tokens: Sequence[Token], findings: Findings, declared: Mapping[str, Measure] = NO_UNITS
-) -> Expression | None:
+def parse_expression(tokens: Sequence[Token], findings: Findings) -> Expression | None:
     """The expression that these tokens make; None, with errors in the findings, where they do not make one."""
     parser = _Parser(tokens, findings)
-    parser.declared = declared
     with suppress(GiveUp, EndedInsideBlock, Unreadable):
         expression = parser.value()
         if parser.token.kind != END:

@@ -128,10 +128,10 @@ class _Condition:
         self.findings.error(code, message, place.place if isinstance(place, Token) else place, help=help or ())
         raise Refused
 
-    def not_understood(self, why: str, token: Token, help: str = "") -> NoReturn:
+    def not_understood(self, why: str, token: Token) -> NoReturn:
         used = next((token.text for token in self.tokens if token.text in _WORDS), "")
         words = f"the preprocessor writes `{_WORDS[used]}` for `{used}`" if used else ""
-        self.refuse(f"this condition cannot be understood: {why}", token, help or words or _USUAL)
+        self.refuse(f"this condition cannot be understood: {why}", token, words or _USUAL)
 
     def cannot_follow(self) -> NoReturn:
         token, before = self.tokens[self.position], self.tokens[self.position - 1]

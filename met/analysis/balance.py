@@ -9,6 +9,6 @@ from met.program.unheld import Unheld, unheld
 from met.run import inputs
 
 
-def unheld_at_start(experiment: Experiment, case: int = 0) -> tuple[Unheld, ...]:
-    """The joints that are to begin balanced in this case and whose servos cannot hold them, in the arm's order."""
-    return unheld(experiment, inputs(experiment, np.array([case])))[0]
+def unheld_at_start(experiment: Experiment) -> tuple[Unheld, ...]:
+    """The joints that are to begin balanced in the first case and whose servos cannot hold them, in the arm's order."""
+    return unheld(experiment, inputs(experiment, np.array([0])))[0]
