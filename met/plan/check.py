@@ -18,7 +18,6 @@ import numpy as np
 from met import units
 from met.parameter import Parameter
 from met.plan import BASE, Coordinate, Experiment, Formula, Quantity
-from met.plan import guides as guides
 from met.plan import relations as relations
 from met.plan import rest as rest
 from met.plan import structure as plan_structure
@@ -265,7 +264,7 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
             _check_table(experiment, use.head, TABLES[use.model], where)
         for name, word in _words(use) if use.kind in ("servo", "sensor") else ():
             _is_word(parameters, f"{use.head}.{name}", word, where)
-    guides.check_paths(experiment, where)
+    relations.check_paths(experiment, where)
     _check_bodies(experiment, where)
 
 

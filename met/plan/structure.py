@@ -10,8 +10,7 @@ from typing import Any
 
 from met import models
 from met.parameter import WORLD
-from met.plan import BASE, COMPONENTS, ServoUse, Structure
-from met.plan import guides as guides
+from met.plan import BASE, COMPONENTS, ServoUse, Structure, relations
 from met.plan.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.plan.closing import ring
 from met.plan.codec import Damaged
@@ -33,7 +32,7 @@ def check(structure: Structure, where: str) -> None:
     _check_payloads(structure, f"{where}.payloads")
     _check_schedule(structure, where)
     _check_uses(structure, where)
-    guides.check(structure, where)
+    relations.check(structure, where)
     _check_record(structure, f"{where}.record")
 
 
@@ -120,7 +119,7 @@ def _check_base(structure: Structure, where: str) -> None:
         raise Damaged(f"{where}.base", f"there is no link `{BASE}`, and it moves")
     if base.kind == "free" and base.courses:
         raise Damaged(f"{where}.base.courses", "a free base has none")
-    guides.check_courses(base, COMPONENTS, f"{where}.base")
+    relations.check_courses(base, COMPONENTS, f"{where}.base")
     if not structure.velocity_products and base.turns:
         raise Damaged(f"{where}.velocity_products", "a base that turns needs them")
 
