@@ -24,7 +24,7 @@ from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import allowed_warnings, silence_of_all, warn_of_unneeded
 from ic.read import in_order, read, read_again
 from ic.sweeps.effects import Effects
-from ic.sweeps.from_command_line import command_line_sweep
+from ic.sweeps.files import command_line_sweep
 from ic.sweeps.groups import DeckSource, ScopedExperiment, experiments_of
 from ic.sweeps.settings import Settings, check_params
 from ic.text.complaints import Complaints, known_words
